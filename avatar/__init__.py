@@ -1,0 +1,1 @@
+"""What stages share: body model, camera, gaussians and their binding, rasterisers, losses, metrics, artifact files."""

@@ -1,0 +1,179 @@
+"""Artifact files: the one place that knows their names, arrays and shapes.
+
+Readers return plain arrays; writers are byte-deterministic; checks raise `ArtifactError` and import nothing heavy.
+T kept frames, J = 55 joints, E expression size, N gaussians.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+
+class ArtifactError(Exception):
+    """A file is not what its port promises. The message names the file, the array and what was expected."""
+
+
+@dataclass
+class Clip:
+    """clip.json of `split`."""
+
+    fps: float | None
+    """Frames a second of the source; None for photos."""
+    timestamps_s: list[float] | None
+    """True presentation time of each kept frame; None for photos: no temporal terms then."""
+    width: int
+    height: int
+    focal_px: float | None
+    """From the file's metadata, else None."""
+    source_sha256: str
+    source_name: str = ""
+    plate: bool = False
+    """Whether `frames/plate.png`-like empty scene came with the photos (written as `plate.png` beside `frames`)."""
+    notes: list[str] = field(default_factory=list)
+
+    def write(self, path: Path) -> None:
+        path.write_text(json.dumps(asdict(self), indent=1, sort_keys=True) + "\n")
+
+    @classmethod
+    def read(cls, path: Path) -> Clip:
+        return cls(**json.loads(Path(path).read_text()))
+
+
+def frame_paths(frames: Path) -> list[Path]:
+    """(T,) sorted `%06d.png` or `%06d.exr` files of a folder."""
+    return sorted(p for p in Path(frames).iterdir() if p.suffix in (".png", ".exr") and p.stem.isdigit())
+
+
+def read_frame(path: Path) -> np.ndarray:
+    """(H, W, 3) uint8 RGB."""
+    import cv2
+
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if image is None:
+        raise ArtifactError(f"{path}: cannot be read as an image")
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+
+def write_frame(path: Path, rgb: np.ndarray) -> None:
+    """rgb: (H, W, 3) uint8."""
+    import cv2
+
+    if not cv2.imwrite(str(path), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)):
+        raise OSError(f"{path}: cannot be written")
+
+
+def read_alpha(path: Path) -> np.ndarray:
+    """(H, W) float32 in 0..1 from a one-channel half EXR."""
+    import OpenEXR
+
+    with OpenEXR.File(str(path)) as f:
+        return np.ascontiguousarray(next(iter(f.channels().values())).pixels, dtype=np.float32)
+
+
+def write_alpha(path: Path, alpha: np.ndarray) -> None:
+    """alpha: (H, W) in 0..1; written as one half channel `A`, ZIP."""
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, {"A": alpha.astype(np.float16)}) as f:
+        f.write(str(path))
+
+
+def write_arrays(path: Path, **arrays: np.ndarray) -> None:
+    """Compressed npz, no pickle, byte-deterministic."""
+    with open(path, "wb") as f:
+        np.savez_compressed(f, **arrays)
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """All arrays of an npz; objects are refused."""
+    try:
+        with np.load(path, allow_pickle=False) as z:
+            return {k: z[k] for k in z.files}
+    except (OSError, ValueError, KeyError) as e:
+        raise ArtifactError(f"{path}: not a readable npz ({e})") from e
+
+
+def check_arrays(path: Path, shapes: dict[str, tuple]) -> dict[str, np.ndarray]:
+    """Reads an npz and asserts names and shapes.
+
+    shapes: name -> tuple of int or letter; a letter stands for one length, the same wherever it appears in the file.
+    """
+    arrays = read_arrays(path)
+    sizes: dict[str, int] = {}
+    for name, shape in shapes.items():
+        if name not in arrays:
+            raise ArtifactError(f"{path}: array {name} is missing (has {', '.join(sorted(arrays))})")
+        got = arrays[name].shape
+        want = tuple(sizes.setdefault(s, got[i] if i < len(got) else -1) if isinstance(s, str) else s
+                     for i, s in enumerate(shape))
+        if got != want:
+            raise ArtifactError(f"{path}: array {name} has shape {got}, expected {want}")
+    return arrays
+
+
+KEYPOINT_SHAPES = {"xy": ("T", 133, 2), "score": ("T", 133), "world": ("T", 133, 3), "detector": ()}
+FILLED_SHAPES = KEYPOINT_SHAPES | {"missing": ("T", 2), "filled": ("T", 133), "sigma": ("T", 133)}
+FACE_SHAPES = {"valid": ("T",), "expression": ("T", "E"), "jaw": ("T", 3), "shape": ("S",), "landmarks": ("T", "L", 3)}
+BODY_SHAPES = {
+    "betas": ("B",), "expression": ("T", "E"), "global_orient": ("T", 3), "body_pose": ("T", 63),
+    "left_hand_pose": ("T", 45), "right_hand_pose": ("T", 45), "jaw_pose": ("T", 3), "leye_pose": ("T", 3),
+    "reye_pose": ("T", 3), "transl": ("T", 3), "joint_offset": (55, 3), "joints": ("T", 55, 3), "focal": (2,),
+    "center": (2,), "sigma_joints": ("T", 55), "model": (),
+}
+AVATAR_SHAPES = {"face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": ("N", 3), "rgb": ("N", 3), "opacity": ("N",)}
+
+
+def check_keypoints(path: Path) -> None:
+    arrays = check_arrays(path, KEYPOINT_SHAPES)
+    score = arrays["score"]
+    if not (np.isfinite(score).all() and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
+        raise ArtifactError(f"{path}: score must lie in 0..1")
+
+
+def check_filled_keypoints(path: Path) -> None:
+    check_arrays(path, FILLED_SHAPES)
+
+
+def check_face(path: Path) -> None:
+    check_arrays(path, FACE_SHAPES)
+
+
+def check_body(path: Path) -> None:
+    arrays = check_arrays(path, BODY_SHAPES)
+    for name, a in arrays.items():
+        if a.dtype.kind == "f" and not np.isfinite(a).all():
+            raise ArtifactError(f"{path}: array {name} is not finite")
+
+
+def check_avatar(path: Path) -> None:
+    arrays = check_arrays(path, AVATAR_SHAPES)
+    for name in AVATAR_SHAPES:
+        if not np.isfinite(arrays[name]).all():
+            raise ArtifactError(f"{path}: array {name} is not finite")
+
+
+def check_json(path: Path) -> None:
+    try:
+        json.loads(Path(path).read_text())
+    except (OSError, ValueError) as e:
+        raise ArtifactError(f"{path}: not readable JSON ({e})") from e
+
+
+def check_image_folder(path: Path) -> None:
+    if not Path(path).is_dir() or not frame_paths(path):
+        raise ArtifactError(f"{path}: expected a folder of %06d.png or %06d.exr images")
+
+
+def check_file(path: Path) -> None:
+    if not Path(path).is_file() or Path(path).stat().st_size == 0:
+        raise ArtifactError(f"{path}: expected a file with content")
+
+
+def check_folder(path: Path) -> None:
+    if not Path(path).is_dir() or not any(Path(path).iterdir()):
+        raise ArtifactError(f"{path}: expected a folder with content")

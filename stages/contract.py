@@ -1,0 +1,84 @@
+"""What a stage declares and what it is handed.
+
+A stage folder holds `__init__.py` with one `STAGE = Stage(...)` (light: no heavy import) and `stage.py` with one
+`run(job: Job) -> dict`. The engine reads `STAGE`, builds the key, and calls `run` with read-only inputs and a private
+output folder. A stage never imports another stage, the engine or the cache.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Output:
+    """One declared output: a file or folder of the stage's output folder."""
+
+    path: str
+    """Relative path, e.g. `keypoints.npz` or `frames`."""
+    check: Callable[[Path], None]
+    """Raises `avatar.artifacts.ArtifactError` when the file or folder is not what the port promises (name, shape, dtype, count)."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The declaration of one step; `dvc.yaml` says the same and a test holds the two together."""
+
+    name: str
+    inputs: tuple[str, ...]
+    """Ports it reads, `<stage>/<output path>`; the source clip is the port `clip`."""
+    outputs: tuple[Output, ...]
+    config: type
+    """Frozen-by-convention dataclass; its fields are the parameters `<stage>.<field>`, its defaults are params.yaml's."""
+    packages: tuple[str, ...] = ()
+    """Distributions whose version is part of the key."""
+    models: Callable[[Any], tuple[str, ...]] = lambda config: ()
+    """Names of the model files that this configuration needs (see `avatar.models`); their digests are part of the key."""
+    uses_device: bool = False
+    """Whether the device class (cpu, cuda) is part of the key."""
+    code: tuple[str, ...] = ()
+    """Extra first-party modules in the code closure that static imports do not show."""
+
+
+@dataclass
+class Job:
+    """What `run` is handed."""
+
+    inputs: dict[str, Path]
+    """Port -> read-only file or folder."""
+    out: Path
+    """Private, empty, writable folder; everything the stage declares is written here."""
+    config: Any
+    """Instance of the stage's config dataclass."""
+    models: dict[str, Path] = field(default_factory=dict)
+    """Model name -> file."""
+    device: str = "cpu"
+    progress: Callable[[int, int, str], None] = lambda done, total, what: None
+    """Called as work goes on: done, total, unit (`frames`, `steps`)."""
+    warn: Callable[[str], None] = lambda message: None
+    """A sentence for the user that names the frame, file or parameter; kept in the action record and the report."""
+
+
+class StageError(Exception):
+    """A stage cannot give a right result. The message names what, where and what to do (exit code 1)."""
+
+
+class BadInput(StageError):
+    """The user's file or parameter is at fault (exit code 2)."""
+
+
+def make_config(stage: Stage, values: dict[str, Any]) -> Any:
+    """Config instance from parameter values; unknown names and wrong types raise `BadInput` that names them."""
+    known = {f.name: f for f in dataclasses.fields(stage.config)}
+    for name in values:
+        if name not in known:
+            raise BadInput(f"unknown parameter {stage.name}.{name}; known: {', '.join(sorted(known)) or 'none'}")
+    config = stage.config(**values)
+    check = getattr(config, "check", None)
+    if check is not None:
+        check()
+    return config
