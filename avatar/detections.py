@@ -1,0 +1,72 @@
+"""Boxes and points out of single-shot detector outputs: anchors, decoding, weighted non-maximum suppression."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsac.avatar.tflite import sigmoid
+
+
+@dataclass(frozen=True)
+class Detections:
+    """n finds, best first, in the units of the region they were made in (0..1) until mapped."""
+
+    box: np.ndarray
+    """(n, 4) x0 y0 x1 y1."""
+    points: np.ndarray
+    """(n, k, 2)."""
+    score: np.ndarray
+    """(n,) in 0..1."""
+
+    def __len__(self) -> int:
+        return len(self.score)
+
+
+def anchor_centers(size: int, strides: tuple[int, ...]) -> np.ndarray:
+    """(n, 2) in 0..1: the grid of each stride, two anchors a cell and layer, equal strides side by side in one grid."""
+    centers = []
+    for stride in dict.fromkeys(strides):
+        cells = -(-size // stride)
+        grid = (np.stack(np.meshgrid(np.arange(cells), np.arange(cells)), axis=-1).reshape(-1, 2) + 0.5) / cells
+        centers.append(np.repeat(grid, 2 * strides.count(stride), axis=0))
+    return np.concatenate(centers)
+
+
+def decode(raw: np.ndarray, logits: np.ndarray, centers: np.ndarray, size: int, threshold: float) -> Detections:
+    """raw: (n, 4 + 2 k) box centre, box size and points in input pixels about the anchor; logits: (n, 1).
+
+    Returns those of score >= threshold, best first, not yet suppressed.
+    """
+    score = sigmoid(logits[:, 0])
+    order = np.argsort(-score, kind="stable")
+    keep = order[score[order] >= threshold]
+    values = raw[keep].reshape(len(keep), -1, 2) / size
+    middle, extent, points = values[:, 0] + centers[keep], values[:, 1], values[:, 2:] + centers[keep][:, None]
+    return Detections(np.hstack([middle - extent / 2, middle + extent / 2]), points, score[keep])
+
+
+def iou(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a: (..., 4), b: (..., 4) boxes. Returns intersection over union; 0 for empty boxes."""
+    low, high = np.maximum(a[..., :2], b[..., :2]), np.minimum(a[..., 2:], b[..., 2:])
+    inter = np.prod(np.clip(high - low, 0, None), axis=-1)
+    area = np.prod(a[..., 2:] - a[..., :2], axis=-1) + np.prod(b[..., 2:] - b[..., :2], axis=-1) - inter
+    return np.where(area > 0, inter / np.where(area > 0, area, 1), 0.0)
+
+
+def suppress(found: Detections, overlap: float = 0.3) -> Detections:
+    """Blends each best find with all that overlap it by more than `overlap` IoU, weighted by score (BlazeFace)."""
+    box, points, score = [], [], []
+    rest = np.arange(len(found))
+    while len(rest):
+        similar = iou(found.box[rest], found.box[rest[0]]) > overlap
+        similar[0] = True
+        group = rest[similar]
+        weight = found.score[group] / found.score[group].sum()
+        box.append(weight @ found.box[group])
+        points.append(np.tensordot(weight, found.points[group], axes=1))
+        score.append(found.score[rest[0]])
+        rest = rest[~similar]
+    return Detections(np.reshape(box, (-1, 4)), np.reshape(points, (len(score), *found.points.shape[1:])),
+                      np.array(score))
