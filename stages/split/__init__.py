@@ -1,0 +1,21 @@
+"""split: a clip becomes frames with true timestamps.
+
+takes  clip: a video file, or a folder of photos (optional plate.jpg or plate.png: the empty scene)
+gives  frames/%06d.png (8-bit RGB; frames/plate.png for a plate), clip.json (artifacts.Clip)
+
+The picture is turned as its rotation tag says, HDR is tone-mapped to SDR BT.709, transparency is composited over black,
+pixels are made square, and the aspect is never changed. The same input gives the same bytes.
+"""
+
+from gsac.avatar.artifacts import check_image_folder
+from gsac.stages.contract import Output, Stage
+from gsac.stages.split.check import check_clip
+from gsac.stages.split.config import SplitConfig
+
+STAGE = Stage(
+    name="split",
+    inputs=("clip",),
+    outputs=(Output("frames", check_image_folder), Output("clip.json", check_clip)),
+    config=SplitConfig,
+    packages=("av", "imageio-ffmpeg", "numpy", "opencv-contrib-python-headless", "pillow"),
+)

@@ -1,0 +1,109 @@
+"""What a video file holds, without decoding more than its first picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from gsac.stages.contract import BadInput
+
+HLG, PQ, BT2020_PRIMARIES, BT2020_MATRIX, UNSPECIFIED = 18, 16, 9, 9, 2
+"""Code points of ITU-T H.273."""
+
+
+@dataclass
+class Video:
+    stream: int
+    """Index of the video stream in the file."""
+    ticks: np.ndarray
+    """(N,) int64 presentation times, rising, in time_base; empty where the container does not say."""
+    time_base: Fraction
+    declared_frames: int
+    """Frames the header promises; 0 where it does not say."""
+    width: int
+    height: int
+    """Displayed size: turned by the rotation tag, pixels square."""
+    transfer: int
+    primaries: int
+    matrix: int
+    has_alpha: bool
+    decoder: str | None
+    """The ffmpeg decoder to ask for, where its first choice would lose something."""
+    rate: float | None
+    """Frames a second that the header claims."""
+    tags: dict[str, str]
+    """Metadata of container and stream; keys in lower case."""
+
+
+def probe(path: Path) -> Video:
+    """Raises BadInput for a file without a decodable picture."""
+    try:
+        with av.open(str(path), metadata_errors="ignore") as container:
+            return _probe(container, path)
+    except (av.FFmpegError, OSError) as e:
+        raise BadInput(f"{path.name}: not a video that ffmpeg can read ({_reason(e)}). If it plays elsewhere, "
+                       "convert it to MP4 (H.264) and try again.") from e
+
+
+def _probe(container: av.container.InputContainer, path: Path) -> Video:
+    streams = [s for s in container.streams.video if not s.disposition & av.stream.Disposition.attached_pic]
+    if not streams:
+        raise BadInput(f"{path.name}: holds no video stream; expected a video of one person or a folder of photos.")
+    stream = max(streams, key=lambda s: (s.width or 0) * (s.height or 0))
+    picture = _first_picture(container, stream, path)
+    ticks = _packet_times(path, stream.index)
+
+    width, height = picture.width, picture.height
+    aspect = stream.sample_aspect_ratio or Fraction(1)
+    if aspect > 1:
+        width = round(width * aspect)
+    elif aspect > 0:
+        height = round(height / aspect)
+    if abs(picture.rotation) % 180 == 90:
+        width, height = height, width
+
+    codec = stream.codec_context.name
+    tags = {key.lower(): value for key, value in (dict(container.metadata) | dict(stream.metadata)).items()}
+    hidden_alpha = codec in ("vp8", "vp9") and tags.get("alpha_mode") == "1"
+    rate = stream.average_rate or stream.guessed_rate
+    return Video(
+        stream=stream.index, ticks=ticks, time_base=stream.time_base, declared_frames=stream.frames,
+        width=width, height=height, transfer=int(picture.color_trc), primaries=int(picture.color_primaries),
+        matrix=int(picture.colorspace), has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
+        decoder={"vp8": "libvpx", "vp9": "libvpx-vp9"}[codec] if hidden_alpha else None,
+        rate=float(rate) if rate else None, tags=tags)
+
+
+def _first_picture(container, stream, path: Path) -> av.VideoFrame:
+    error = "no packet of it decodes"
+    for packet in container.demux(stream):
+        try:
+            for picture in packet.decode():
+                return picture
+        except av.FFmpegError as e:
+            error = _reason(e)
+    raise BadInput(f"{path.name}: no frame can be decoded ({error}). The file is empty or damaged; "
+                   "copy it from the phone again.")
+
+
+def _packet_times(path: Path, index: int) -> np.ndarray:
+    """(N,) rising ticks of the whole packets of one stream; empty if any lacks its time."""
+    ticks = []
+    with av.open(str(path), metadata_errors="ignore") as container:
+        try:
+            for packet in container.demux(container.streams[index]):
+                if packet.size == 0 or packet.is_discard or packet.is_corrupt:
+                    continue
+                if packet.pts is None:
+                    return np.zeros(0, np.int64)
+                ticks.append(packet.pts)
+        except av.FFmpegError:
+            pass  # a truncated file: what was read so far is what there is
+    return np.unique(np.array(ticks, np.int64))
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)

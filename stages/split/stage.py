@@ -1,0 +1,48 @@
+"""Entry of split: a video file or a folder of photos, then one check that frames and clip.json agree."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.stages.contract import BadInput, Job, StageError
+from gsac.stages.split.photos import SUFFIXES, list_photos, split_photos
+from gsac.stages.split.video import split_video
+
+
+def run(job: Job) -> None:
+    source = job.inputs["clip"]
+    frames = job.out / "frames"
+    frames.mkdir()
+    if source.is_dir():
+        photos, plate = list_photos(source)
+    elif not source.is_file():
+        raise BadInput(f"{source}: no such file or folder")
+    elif source.stat().st_size == 0:
+        raise BadInput(f"{source.name}: the file is empty; expected a video or a folder of photos.")
+    else:
+        photos, plate = ([source], None) if source.suffix.lower() in SUFFIXES else ([], None)
+    if photos:
+        fields = {"fps": None, "timestamps_s": None}
+        fields |= split_photos(photos, plate, frames, job.config, job.warn, job.progress)
+    else:
+        fields = split_video(source, frames, job.config, job.warn, job.progress)
+
+    # The file's name is left out: equal content must give equal bytes.
+    clip = Clip(source_sha256=_digest(photos + [plate] * (plate is not None) if photos else [source]), **fields)
+    kept = len(frame_paths(frames))
+    if clip.timestamps_s is not None and len(clip.timestamps_s) != kept:
+        raise StageError(f"{source.name}: {kept} frames and {len(clip.timestamps_s)} timestamps")
+    if kept == 1:
+        job.warn(f"{source.name} gives one frame: the avatar will be right from one side only. Record a full turn.")
+    clip.write(job.out / "clip.json")
+
+
+def _digest(files: list[Path]) -> str:
+    """sha256 of a file; of several, the sha256 of their sha256s in order."""
+    digests = []
+    for path in files:
+        with open(path, "rb") as f:
+            digests.append(hashlib.file_digest(f, "sha256").hexdigest())
+    return digests[0] if len(digests) == 1 else hashlib.sha256("\n".join(digests).encode()).hexdigest()

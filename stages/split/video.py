@@ -1,0 +1,135 @@
+"""A video file becomes PNG frames: imageio-ffmpeg's program decodes, turns, tone-maps and scales."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+from gsac.stages.contract import BadInput, StageError
+from gsac.stages.split import focal
+from gsac.stages.split.pick import fitted_size, pick_by_time
+from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, PQ, UNSPECIFIED, Video, probe
+
+TRANSFER_NAMES = {HLG: "arib-std-b67", PQ: "smpte2084"}
+SHOWN = re.compile(r"\bn:\s*\d+ pts:\s*(-?\d+)")
+TIME_BASE = re.compile(r"config in time_base: (\d+)/(\d+)")
+SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
+
+
+def split_video(path: Path, frames: Path, config, warn: Callable[[str], None],
+                progress: Callable[[int, int, str], None]) -> dict:
+    """Writes frames/%06d.png. Returns the Clip fields fps, timestamps_s, width, height, focal_px, notes."""
+    video = probe(path)
+    base = video.time_base
+    if not len(video.ticks):
+        shown, base, _ = _run(path, video, ["-vf", "showinfo=checksum=0", "-f", "null", "-"], None, None)
+        video.ticks = np.unique(np.array(shown, np.int64))
+    if not len(video.ticks):
+        raise BadInput(f"{path.name}: holds no frame; record the clip again.")
+    if video.declared_frames > len(video.ticks):
+        warn(f"{path.name} is truncated: its header promises {video.declared_frames} frames and {len(video.ticks)} are "
+             "there. Those are used.")
+
+    width, height = fitted_size(video.width, video.height, config.max_height)
+    times = (video.ticks - video.ticks[0]) * float(base)
+    picks = pick_by_time(times, config.fps, config.count)
+    graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, width, height))
+    output = ["-vf", graph, "-pix_fmt", "rgb24", "-compression_level", "4", "-pred", "up", "-flags", "+bitexact",
+              "-start_number", "0", "-f", "image2", "%06d.png"]
+    shown, base, errors = _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"))
+
+    written = len(list(frames.glob("*.png")))
+    if written == 0:
+        raise BadInput(f"{path.name}: none of its frames decodes ({errors[0] if errors else 'no reason given'}). "
+                       "Copy the file from the phone again.")
+    if written != len(shown):
+        raise StageError(f"{path.name}: ffmpeg decoded {len(shown)} frames and wrote {written}; is the disk full?")
+    if written < len(picks):
+        warn(f"{path.name} is damaged: {len(picks) - written} of the {len(picks)} frames to keep do not decode "
+             "and are left out.")
+    elif errors:
+        warn(f"{path.name}: ffmpeg met errors while decoding, so some frames may look broken: {errors[0]}")
+
+    notes = []
+    if video.transfer in TRANSFER_NAMES:
+        notes.append(f"tone-mapped from {TRANSFER_NAMES[video.transfer]} to SDR BT.709")
+    if video.has_alpha:
+        notes.append("transparency composited over black")
+    span = float(times[-1])
+    return {
+        "fps": (len(times) - 1) / span if span > 0 else video.rate,
+        "timestamps_s": [float((tick - int(video.ticks[0])) * base) for tick in shown],
+        "width": width, "height": height, "focal_px": focal.from_video_tags(video.tags, width, height),
+        "notes": notes,
+    }
+
+
+def _select(ticks: np.ndarray, picks: np.ndarray) -> list[str]:
+    """Filter that keeps the picked presentation times; nothing where all are kept."""
+    if len(picks) == len(ticks):
+        return []
+
+    def any_of(values: list[int]) -> str:  # a balanced tree: the evaluator recurses
+        if len(values) == 1:
+            return f"eq(pts,{values[0]})"
+        half = len(values) // 2
+        return f"({any_of(values[:half])}+{any_of(values[half:])})"
+
+    return [f"select='{any_of([int(t) for t in ticks[picks]])}'"]
+
+
+def _picture_filters(video: Video, width: int, height: int) -> list[str]:
+    scale = f"scale={width}:{height}:flags={SCALING}"
+    if video.transfer in TRANSFER_NAMES:
+        source = f"tin={TRANSFER_NAMES[video.transfer]}"
+        if video.primaries == UNSPECIFIED:
+            source += f":pin={BT2020_PRIMARIES}"
+        if video.matrix == UNSPECIFIED:
+            source += f":min={BT2020_MATRIX}"
+        # 203 nits is BT.2408's diffuse white: it lands near the top of SDR and only highlights above it are bent.
+        return [scale, f"zscale=t=linear:npl=203:{source}", "format=gbrpf32le", "zscale=p=bt709",
+                "tonemap=mobius:param=0.7:desat=0", "zscale=t=bt709:d=none", "format=gbrp"]
+    if video.has_alpha:
+        return ["format=gbrap", "premultiply=inplace=1", f"scale={width}:{height}:flags={SCALING}", "format=gbrp"]
+    return [scale]
+
+
+def _run(path: Path, video: Video, output: list[str], folder: Path | None,
+         on_frame: Callable[[int], None] | None) -> tuple[list[int], Fraction, list[str]]:
+    """Runs ffmpeg. Returns the ticks of the frames that passed `showinfo`, their time base, and its error lines."""
+    decoder = ["-c:v", video.decoder] if video.decoder else []
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
+               "-fflags", "+discardcorrupt", *decoder, "-i", f"file:{path.absolute()}", "-map", f"0:{video.stream}",
+               "-fps_mode", "passthrough", *output]
+    ticks: list[int] = []
+    base, errors = video.time_base, []
+    # The output pattern is relative to `folder`: a % in the folder's own name is no pattern.
+    with subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                          stderr=subprocess.PIPE, text=True, errors="replace") as process:
+        try:
+            for line in process.stderr:
+                if found := SHOWN.search(line):
+                    ticks.append(int(found[1]))
+                    if on_frame:
+                        on_frame(len(ticks))
+                elif found := TIME_BASE.search(line):
+                    base = Fraction(int(found[1]), int(found[2]))
+                elif "[error]" in line or "[fatal]" in line:
+                    errors.append(line.strip())
+        except BaseException:
+            process.kill()
+            raise
+    why = errors[-1] if errors else f"exit code {process.returncode}"
+    if process.returncode != 0 and not ticks:
+        raise BadInput(f"{path.name}: ffmpeg cannot decode it ({why}).")
+    if process.returncode != 0:
+        raise StageError(f"{path.name}: ffmpeg stopped after {len(ticks)} frames ({why}).")
+    return ticks, base, errors
+
+
+
