@@ -1,0 +1,149 @@
+"""split on folders of photos."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import Clip, frame_paths, read_frame
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.split.config import SplitConfig
+from gsac.stages.split.stage import run
+from PIL import Image, ImageCms
+
+ORIENTATION, FOCAL_35MM, EXIF_IFD = 0x0112, 0xA405, 0x8769
+
+
+def photo(path, colour=(200, 60, 30), size=(60, 80), **save):
+    """Left half in the colour, right half black."""
+    pixels = np.zeros((size[1], size[0], 3), np.uint8)
+    pixels[:, : size[0] // 2] = colour
+    Image.fromarray(pixels).save(path, **save)
+
+
+def split(source, out, **config):
+    warnings = []
+    out.mkdir()
+    run(Job({"clip": source}, out, SplitConfig(**config), warn=warnings.append))
+    return Clip.read(out / "clip.json"), [read_frame(p) for p in frame_paths(out / "frames")], warnings
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "photos").mkdir()
+    return tmp_path / "photos"
+
+
+def test_photos_come_in_natural_order_without_timestamps(folder, tmp_path):
+    for i in (10, 9, 100):
+        photo(folder / f"img{i}.png", (i, i, i))
+    (folder / "notes.txt").write_text("x")
+    (folder / "._img9.png").write_bytes(b"resource fork")
+    clip, frames, _ = split(folder, tmp_path / "out")
+    assert [int(f[0, 0, 0]) for f in frames] == [9, 10, 100]
+    assert clip.timestamps_s is None and clip.fps is None and not clip.plate and clip.focal_px is None
+
+
+def test_the_plate_is_no_frame(folder, tmp_path):
+    photo(folder / "0.png")
+    photo(folder / "1.png")
+    photo(folder / "Plate.PNG", (1, 2, 3))
+    clip, frames, _ = split(folder, tmp_path / "out")
+    assert clip.plate and len(frames) == 2
+    assert tuple(read_frame(tmp_path / "out/frames/plate.png")[0, 0]) == (1, 2, 3)
+
+
+def test_exif_turns_the_photo_and_gives_the_focal_length(folder, tmp_path):
+    exif = Image.Exif()
+    exif[ORIENTATION] = 6
+    exif.get_ifd(EXIF_IFD)[FOCAL_35MM] = 28
+    photo(folder / "0.jpg", exif=exif)
+    photo(folder / "1.jpg", exif=exif)
+    clip, frames, _ = split(folder, tmp_path / "out")
+    assert (clip.width, clip.height) == (80, 60)
+    assert frames[0][5, 40, 0] > 150 and frames[0][55, 40, 0] < 50
+    assert clip.focal_px == pytest.approx(28 / np.hypot(36, 24) * 100)
+
+
+def test_the_focal_length_follows_the_scale(folder, tmp_path):
+    exif = Image.Exif()
+    exif.get_ifd(EXIF_IFD)[FOCAL_35MM] = 28
+    photo(folder / "0.jpg", exif=exif)
+    clip, _, warnings = split(folder, tmp_path / "out", max_height=40)
+    assert (clip.width, clip.height) == (30, 40)
+    assert clip.focal_px == pytest.approx(28 / np.hypot(36, 24) * 50)
+    assert "one frame" in warnings[-1]
+
+
+def test_transparency_sixteen_bits_and_palettes_become_eight_bit_rgb(folder, tmp_path):
+    Image.fromarray(np.full((80, 60, 4), (200, 100, 50, 128), np.uint8)).save(folder / "0.png")
+    Image.fromarray(np.full((80, 60), 32896, np.uint16)).save(folder / "1.png")
+    Image.fromarray(np.full((80, 60, 3), (10, 20, 30), np.uint8)).quantize(4).save(folder / "2.png")
+    clip, frames, _ = split(folder, tmp_path / "out")
+    assert frames[0][0, 0] == pytest.approx([100, 50, 25], abs=1)
+    assert frames[1][0, 0] == pytest.approx([128, 128, 128], abs=1)
+    assert frames[2][0, 0] == pytest.approx([10, 20, 30], abs=2)
+    assert clip.notes == ["transparency composited over black"]
+
+
+def test_a_colour_profile_is_turned_into_srgb(folder, tmp_path):
+    srgb = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
+    swapped = bytearray(srgb)  # the same profile with the primaries of red and blue exchanged
+    red, blue = swapped.find(b"rXYZ"), swapped.find(b"bXYZ")
+    swapped[red : red + 4], swapped[blue : blue + 4] = b"bXYZ", b"rXYZ"
+    photo(folder / "0.png", icc_profile=bytes(srgb))
+    photo(folder / "1.png", icc_profile=bytes(swapped))
+    photo(folder / "2.png", icc_profile=b"broken")
+    _, frames, _ = split(folder, tmp_path / "out")
+    assert frames[0][0, 0] == pytest.approx([200, 60, 30], abs=1)
+    assert frames[1][0, 0] == pytest.approx([30, 60, 200], abs=4)
+    assert frames[2][0, 0] == pytest.approx([200, 60, 30], abs=1)
+
+
+def test_count_keeps_first_and_last(folder, tmp_path):
+    for i in range(9):
+        photo(folder / f"{i}.png", (i, 0, 0))
+    _, frames, warnings = split(folder, tmp_path / "out", count=3)
+    assert [int(f[0, 0, 0]) for f in frames] == [0, 4, 8] and "3 kept" in warnings[0]
+
+
+def test_photos_of_different_sizes_are_bad_input(folder, tmp_path):
+    photo(folder / "0.png")
+    photo(folder / "1.png", size=(60, 81))
+    with pytest.raises(BadInput, match=r"1\.png is 60x81 and 0\.png is 60x80"):
+        split(folder, tmp_path / "out")
+
+
+@pytest.mark.parametrize(("name", "content", "message"), [
+    ("notes.txt", b"x", "holds no photos"),
+    ("a.HEIC", b"x", "a.HEIC.*Export them as JPEG"),
+    ("a.jpg", b"not a jpeg", "a.jpg.*cannot be read"),
+])
+def test_a_folder_that_gives_no_photo_is_bad_input(folder, tmp_path, name, content, message):
+    (folder / name).write_bytes(content)
+    with pytest.raises(BadInput, match=message):
+        split(folder, tmp_path / "out")
+
+
+def test_a_cut_photo_is_bad_input(folder, tmp_path):
+    buffer = io.BytesIO()
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (80, 60, 3), np.uint8)).save(buffer, "JPEG")
+    (folder / "0.jpg").write_bytes(buffer.getvalue()[:900])
+    with pytest.raises(BadInput, match="0.jpg"):
+        split(folder, tmp_path / "out")
+
+
+def test_a_single_photo_works_with_a_warning(tmp_path):
+    photo(tmp_path / "me.jpg")
+    clip, frames, warnings = split(tmp_path / "me.jpg", tmp_path / "out")
+    assert len(frames) == 1 and clip.timestamps_s is None and "one frame" in warnings[0]
+
+
+@pytest.mark.footage
+def test_the_turn_photos_and_their_plate_keep_their_aspect(tmp_path):
+    source = Path(__file__).parents[4] / "shared/footage/turn-photos"
+    if not source.exists():
+        pytest.skip("footage turn-photos is not here")
+    clip, frames, _ = split(source, tmp_path / "out")
+    assert (clip.width, clip.height, len(frames), clip.plate) == (1707, 1280, 7, True)
+    assert read_frame(tmp_path / "out/frames/plate.png").shape == frames[0].shape

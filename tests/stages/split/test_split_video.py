@@ -1,0 +1,214 @@
+"""split on videos: made here with the ffmpeg program, and the odd ones of the footage."""
+
+import filecmp
+import subprocess
+from pathlib import Path
+
+import av
+import cv2
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import Clip, frame_paths, read_frame
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.split.config import SplitConfig
+from gsac.stages.split.stage import run
+
+FOOTAGE = Path(__file__).parents[4] / "shared" / "footage"
+
+
+def ffmpeg(*arguments):
+    subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", *map(str, arguments)], check=True)
+
+
+def make_clip(path, *encode, size="160x120", rate=30, seconds=1.0, filters=None):
+    more = ["-vf", filters] if filters else []
+    ffmpeg("-f", "lavfi", "-i", f"testsrc=size={size}:rate={rate}:duration={seconds}", *more, *encode, path)
+    return path
+
+
+def split(source, out, **config):
+    warnings = []
+    out.mkdir()
+    run(Job({"clip": source}, out, SplitConfig(**config), warn=warnings.append))
+    clip = Clip.read(out / "clip.json")
+    frames = frame_paths(out / "frames")
+    assert [p.stem for p in frames] == [f"{i:06d}" for i in range(len(frames))]
+    assert {read_frame(p).shape for p in frames} == {(clip.height, clip.width, 3)}
+    assert clip.timestamps_s is None or len(clip.timestamps_s) == len(frames)
+    return clip, [read_frame(p) for p in frames], warnings
+
+
+def footage(name):
+    path = FOOTAGE / name
+    if not path.exists():
+        pytest.skip(f"footage {name} is not here")
+    return path
+
+
+@pytest.mark.footage
+def test_a_rotation_tag_turns_the_picture(tmp_path):
+    source = footage("odd-video/rot90.mp4")
+    clip, frames, warnings = split(source, tmp_path / "out", fps=None)
+    assert (clip.width, clip.height, len(frames), warnings) == (180, 320, 60, [])
+    reader = cv2.VideoCapture(str(source))
+    reader.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
+    upright = cv2.cvtColor(reader.read()[1], cv2.COLOR_BGR2RGB)
+    assert np.abs(frames[0].astype(int) - upright).mean() < 3
+
+
+@pytest.mark.footage
+def test_variable_rate_keeps_true_timestamps(tmp_path):
+    source = footage("odd-video/vfr.mp4")
+    clip, frames, _ = split(source, tmp_path / "out", fps=None)
+    with av.open(str(source)) as container:
+        truth = [float(frame.pts * frame.time_base) for frame in container.decode(video=0)]
+    assert len(set(np.round(np.diff(truth), 3))) > 1
+    assert clip.timestamps_s == pytest.approx(np.array(truth) - truth[0], abs=1e-9)
+
+
+def test_target_rate_and_count_choose_frames_evenly_in_time(tmp_path):
+    source = make_clip(tmp_path / "a.mp4", seconds=2)
+    clip, frames, _ = split(source, tmp_path / "rate", fps=10)
+    assert len(frames) == 20 and clip.timestamps_s == pytest.approx(np.arange(20) / 10, abs=1e-6)
+    assert clip.fps == pytest.approx(30)
+    clip, frames, _ = split(source, tmp_path / "count", count=5)
+    assert len(frames) == 5 and clip.timestamps_s[-1] == pytest.approx(59 / 30)
+    _, every, _ = split(source, tmp_path / "every", fps=None, count=None)
+    assert len(every) == 60 and np.array_equal(every[-1], frames[-1]) and np.array_equal(every[0], frames[0])
+
+
+def test_same_input_gives_same_bytes(tmp_path):
+    source = make_clip(tmp_path / "a.mp4")
+    renamed = tmp_path / "b.mp4"
+    renamed.write_bytes(source.read_bytes())
+    split(source, tmp_path / "1")
+    split(renamed, tmp_path / "2")
+    files = sorted(str(p.relative_to(tmp_path / "1")) for p in (tmp_path / "1").rglob("*") if p.is_file())
+    assert filecmp.cmpfiles(tmp_path / "1", tmp_path / "2", files, shallow=False) == (files, [], [])
+
+
+@pytest.mark.parametrize("transfer", ["arib-std-b67", "smpte2084"])
+def test_ten_bit_hdr_is_tone_mapped_to_what_sdr_shows(tmp_path, transfer):
+    below_the_knee = "hue=s=0.4,format=rgb24,lutrgb=r=val*0.8:g=val*0.8:b=val*0.8"
+    plain = make_clip(tmp_path / "sdr.png", "-frames:v", "1", filters=below_the_knee)
+    to_hdr = (f"{below_the_knee},format=gbrp,setparams=color_trc=bt709:color_primaries=bt709:colorspace=gbr:range=pc,"
+              "zscale=t=linear:npl=203,format=gbrpf32le,zscale=p=bt2020,"
+              f"zscale=t={transfer}:m=bt2020nc:r=limited:npl=203,format=yuv420p10le")
+    hdr = make_clip(tmp_path / "hdr.mp4", "-c:v", "libx265", "-x265-params", "log-level=error:crf=8", "-tag:v", "hvc1",
+                  filters=to_hdr, seconds=0.2)
+    clip, frames, _ = split(hdr, tmp_path / "out")
+    truth = cv2.resize(read_frame(plain), None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA).astype(int)
+    got = cv2.resize(frames[0], None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA).astype(int)
+    assert transfer in clip.notes[0]
+    assert np.abs(got - truth).mean() < 4
+    assert got.max() > 190 and got.min() < 10
+
+
+def test_odd_sizes_and_tall_frames_keep_their_aspect(tmp_path):
+    source = make_clip(tmp_path / "a.mkv", "-c:v", "libx264", "-pix_fmt", "yuv444p", size="161x243", seconds=0.2)
+    clip, _, _ = split(source, tmp_path / "1")
+    assert (clip.width, clip.height) == (161, 243)
+    clip, _, _ = split(source, tmp_path / "2", max_height=100)
+    assert (clip.width, clip.height) == (66, 100)
+
+
+def test_pixels_become_square(tmp_path):
+    source = make_clip(tmp_path / "a.mp4", seconds=0.2, filters="setsar=2")
+    clip, _, _ = split(source, tmp_path / "out")
+    assert (clip.width, clip.height) == (320, 120)
+
+
+@pytest.mark.parametrize(("name", "encode"), [
+    ("a.webm", ["-c:v", "libvpx-vp9", "-pix_fmt", "yuva420p", "-crf", "10", "-b:v", "0"]),
+    ("a.mov", ["-c:v", "png", "-pix_fmt", "rgba"]),
+])
+def test_transparency_is_composited_over_black(tmp_path, name, encode):
+    source = tmp_path / name
+    # White that is transparent on the left and opaque on the right.
+    ffmpeg("-f", "lavfi", "-i", "color=white:size=64x48:rate=10:duration=0.3", "-vf",
+           "format=rgba,geq=r=255:g=255:b=255:a='255*gte(X,32)'", *encode, source)
+    clip, frames, _ = split(source, tmp_path / "out")
+    assert frames[0][:, :24].max() < 20 and frames[0][:, 40:].min() > 235
+    assert "black" in clip.notes[0]
+
+
+def test_a_truncated_video_keeps_what_decodes_and_says_how_many(tmp_path):
+    whole = make_clip(tmp_path / "a.mp4", "-g", "5", "-movflags", "+faststart", seconds=2, size="320x240")
+    cut = tmp_path / "cut.mp4"
+    cut.write_bytes(whole.read_bytes()[: int(whole.stat().st_size * 0.6)])
+    clip, frames, warnings = split(cut, tmp_path / "out", fps=None)
+    assert 10 < len(frames) < 59 and clip.timestamps_s == pytest.approx(np.arange(len(frames)) / 30, abs=1e-6)
+    assert "60 frames" in warnings[0] and str(len(frames)) in warnings[0]
+
+
+def test_a_video_without_its_index_is_bad_input(tmp_path):
+    whole = make_clip(tmp_path / "a.mp4")
+    cut = tmp_path / "cut.mp4"
+    cut.write_bytes(whole.read_bytes()[:3000])
+    with pytest.raises(BadInput, match="cut.mp4"):
+        split(cut, tmp_path / "out")
+
+
+@pytest.mark.parametrize("content", [b"", b"hello, this is no video\n" * 50, bytes(range(256)) * 40])
+def test_what_is_not_a_video_is_bad_input(tmp_path, content):
+    source = tmp_path / "notes.mp4"
+    source.write_bytes(content)
+    with pytest.raises(BadInput, match="notes.mp4"):
+        split(source, tmp_path / "out")
+
+
+def test_sound_alone_is_bad_input(tmp_path):
+    ffmpeg("-f", "lavfi", "-i", "sine=duration=0.3", tmp_path / "a.m4a")
+    with pytest.raises(BadInput, match="no video stream"):
+        split(tmp_path / "a.m4a", tmp_path / "out")
+
+
+def test_a_missing_file_is_bad_input(tmp_path):
+    with pytest.raises(BadInput, match="no such file"):
+        split(tmp_path / "gone.mp4", tmp_path / "out")
+
+
+def test_one_frame_works_with_a_warning(tmp_path):
+    source = make_clip(tmp_path / "a.mp4", "-frames:v", "1")
+    clip, frames, warnings = split(source, tmp_path / "out")
+    assert len(frames) == 1 and clip.timestamps_s == [0.0] and "one frame" in warnings[0]
+
+
+def test_a_container_without_timestamps_still_gives_rising_ones(tmp_path):
+    source = make_clip(tmp_path / "a.avi", "-c:v", "mpeg4", "-bf", "2")
+    clip, frames, _ = split(source, tmp_path / "out", fps=None)
+    assert len(frames) >= 29 and np.diff(clip.timestamps_s) == pytest.approx(1 / 30, abs=1e-3)
+
+
+def test_odd_paths_are_only_names(tmp_path):
+    folder = tmp_path / "100% a:b %06d"
+    folder.mkdir()
+    source = make_clip(tmp_path / "a.mp4", seconds=0.2)
+    (folder / "c'l p.mp4").write_bytes(source.read_bytes())
+    _, frames, _ = split(folder / "c'l p.mp4", folder / "out")
+    assert len(frames) == 2
+
+
+def test_the_focal_length_a_phone_writes_is_used(tmp_path):
+    source = make_clip(tmp_path / "a.mov", "-movflags", "use_metadata_tags", "-metadata",
+                     "com.apple.quicktime.camera.focal_length.35mm_equivalent=26", size="300x400", seconds=0.2)
+    clip, _, _ = split(source, tmp_path / "out")
+    assert clip.focal_px == pytest.approx(26 / np.hypot(36, 24) * 500)
+
+
+@pytest.mark.slow
+def test_ten_thousand_frames_are_capped(tmp_path):
+    source = make_clip(tmp_path / "long.mp4", "-preset", "ultrafast", size="64x48", rate=50, seconds=200)
+    clip, frames, _ = split(source, tmp_path / "capped")
+    assert len(frames) == 120 and clip.timestamps_s[-1] == pytest.approx(9999 / 50)
+    clip, frames, _ = split(source, tmp_path / "most", fps=20, count=None)
+    assert len(frames) == 4000
+
+
+def test_progress_counts_up_to_the_kept_frames(tmp_path):
+    source = make_clip(tmp_path / "a.mp4")
+    seen = []
+    (tmp_path / "out").mkdir()
+    run(Job({"clip": source}, tmp_path / "out", SplitConfig(), progress=lambda *step: seen.append(step)))
+    assert seen == [(i + 1, 10, "frames") for i in range(10)]
