@@ -1,0 +1,88 @@
+"""Digests of files, trees and text: sha256 in hex. `key` specifies what is hashed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import stat as modes
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.errors import CacheError
+from gsac.cache.memo import Memo, memo_in
+from gsac.cache.root import default_root
+
+Manifest = dict[str, list]
+"""Relative path with `/` -> [sha256 of the content, size in bytes]; a single file is the one entry ''."""
+
+
+def typed_digest(kind: str, payload: bytes) -> str:
+    """sha256 with the kind of thing in front, so that no two kinds can ever share a pre-image."""
+    return hashlib.sha256(f"gsac {kind}\n".encode() + payload).hexdigest()
+
+
+def canonical(value: Any) -> bytes:
+    """The one JSON text of a value: sorted keys, no spaces, ASCII, floats by repr; NaN or infinity is a ValueError."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode()
+
+
+def text_digest(text: str) -> str:
+    return typed_digest("text 1", text.encode("utf-8", "surrogatepass"))
+
+
+def file_digest(path: Path, memo: Memo | None = None) -> str:
+    """Plain sha256 of a file's content, remembered by its stat (in the default store unless a memo is given)."""
+    memo = memo or memo_in(default_root())
+    digest = _file_digest(Path(path), memo)
+    memo.flush()
+    return digest
+
+
+def tree_digest(path: Path, memo: Memo | None = None) -> tuple[str, Manifest]:
+    """Digest and manifest of a file or folder; the name of the file or folder itself does not count.
+
+    Links to files are followed; links to folders and special files raise CacheError. Empty folders do not count.
+    """
+    memo = memo or memo_in(default_root())
+    manifest = {
+        name: [_file_digest(file, memo), file.stat().st_size] for name, file in sorted(tree_files(Path(path)).items())
+    }
+    memo.flush()
+    return manifest_digest(manifest), manifest
+
+
+def manifest_digest(manifest: Manifest) -> str:
+    return typed_digest("tree 1", canonical(manifest))
+
+
+def tree_files(path: Path) -> dict[str, Path]:
+    """Relative name -> file; {'': path} for a file."""
+    if path.is_file():
+        return {"": path}
+    files: dict[str, Path] = {}
+    folders = [("", str(path))]
+    while folders:
+        prefix, folder = folders.pop()
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append((f"{prefix}{entry.name}/", entry.path))
+                elif entry.is_file():
+                    files[prefix + entry.name] = Path(entry.path)
+                else:
+                    raise CacheError(f"{entry.path} is neither a file nor a folder (a link to nothing or to a folder?)")
+    return files
+
+
+def _file_digest(path: Path, memo: Memo) -> str:
+    before = path.stat()
+    known = memo.get("file", before)
+    if known is not None:
+        return known
+    with path.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        after = os.fstat(stream.fileno())
+    if modes.S_ISREG(after.st_mode) and after == before:
+        memo.put("file", before, digest)
+    return digest

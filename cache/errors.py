@@ -1,0 +1,40 @@
+"""What can go wrong with the store, said so that a person knows which folder it is and what to do."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+READ_ONLY = "runs may go on without keeping their results, or set GSAC_CACHE to a folder that you may write"
+FULL = "nothing that was kept before is lost; free space, run `gsac cache gc`, or set GSAC_CACHE to a larger disk"
+INTEGRITY = "run `gsac cache verify`; what it finds damaged is moved to quarantine/ and computed again"
+
+
+class CacheError(Exception):
+    """The store cannot do what was asked. `hint` says what to do about it."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(f"{message}; {hint}" if hint else message)
+        self.hint = hint
+
+
+class CacheReadOnlyError(CacheError):
+    """The store's folder may be read but not written."""
+
+
+class CacheFullError(CacheError):
+    """The disk or the quota of the store's folder is used up."""
+
+
+class IntegrityError(CacheError):
+    """What lies in the store is not what was put there."""
+
+
+def from_os_error(error: OSError, folder: Path, needed: int | None = None) -> CacheError:
+    """The CacheError that an OSError under `folder` means; needed: bytes that were to be written, if known."""
+    if error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+        return CacheReadOnlyError(f"the cache folder {folder} cannot be written ({error.strerror})", READ_ONLY)
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        size = "" if needed is None else f" for a result of {needed:,} bytes"
+        return CacheFullError(f"no room left in the cache folder {folder}{size}", FULL)
+    return CacheError(f"the cache folder {folder} failed: {error}")

@@ -1,0 +1,142 @@
+"""Forgetting: old results, rubbish of dead runs. Never what a run in progress uses.
+
+gc holds the store's lock alone while it marks and moves its victims aside, so no publish is half-way. It deletes after.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gsac.cache import objects
+from gsac.cache.errors import from_os_error
+from gsac.cache.lease import live_keys
+from gsac.cache.lock import common, if_free
+from gsac.cache.record import Record
+from gsac.cache.store import Store
+
+GRACE_S = 3600.0
+"""A result used within this time stays, lease or not."""
+QUARANTINE_S = 7 * 86400.0
+
+
+@dataclass
+class GcReport:
+    """What was removed, or would be on a dry run."""
+
+    records: list[str] = field(default_factory=list)
+    """`<stage>/<key>`"""
+    objects: list[str] = field(default_factory=list)
+    temps: list[str] = field(default_factory=list)
+    quarantined: list[str] = field(default_factory=list)
+    freed_bytes: int = 0
+    kept_bytes: int = 0
+    dry_run: bool = False
+
+
+@dataclass
+class _Entry:
+    file: Path
+    record: Record
+    used: float
+    kept: bool
+    doomed: bool = False
+
+    @property
+    def names(self) -> set[str]:
+        return {objects.object_name(digest, output) for output, digest in self.record.outputs.items()}
+
+
+def collect(
+    store: Store,
+    keep_days: float | None = None,
+    max_bytes: int | None = None,
+    dry_run: bool = False,
+    grace_s: float = GRACE_S,
+) -> GcReport:
+    """Removes results not used for `keep_days`, then the longest unused until `max_bytes` hold, then all rubbish.
+
+    With neither bound only rubbish goes: objects of no record, folders of dead runs, old quarantine.
+    """
+    report = GcReport(dry_run=dry_run)
+    try:
+        with store.private("gc") as aside, common(store.root / "lock", alone=True):
+            entries, broken = _entries(store, grace_s)
+            stored = {path.name: path for path in (store.root / "objects").glob("*/*")}
+            _choose(entries, {name: _bytes(path) for name, path in stored.items()}, keep_days, max_bytes)
+            doomed = [entry for entry in entries if entry.doomed]
+            wanted = {name for entry in entries if not entry.doomed for name in entry.names}
+            rubbish = [path for name, path in stored.items() if name not in wanted]
+            temps = _orphans(store)
+            damaged = [path for path in (store.root / "quarantine").iterdir() if _age(path) > QUARANTINE_S]
+            report.records = sorted(f"{entry.record.parts.stage}/{entry.record.key}" for entry in doomed)
+            report.objects = sorted(path.name for path in rubbish)
+            report.temps = sorted(path.name for path in temps)
+            report.quarantined = sorted(path.name for path in damaged)
+            report.freed_bytes = sum(map(_bytes, [*rubbish, *temps, *damaged]))
+            report.kept_bytes = sum(_bytes(path) for name, path in stored.items() if name in wanted)
+            if not dry_run:
+                for file in [*broken, *(entry.file for entry in doomed)]:
+                    file.unlink()
+                for number, path in enumerate([*rubbish, *temps, *damaged]):
+                    objects.unseal_folders(path)
+                    os.rename(path, aside / str(number))
+    except OSError as error:
+        raise from_os_error(error, store.root) from error
+    return report
+
+
+def _entries(store: Store, grace_s: float) -> tuple[list[_Entry], list[Path]]:
+    """Whole records, longest unused first, and the files of records that are not whole."""
+    live, now = live_keys(store), time.time()
+    entries, broken = [], []
+    for file in store.record_files():
+        record, used = store.read(file), file.stat().st_mtime
+        if record is None:
+            broken.append(file)
+        else:
+            entries.append(_Entry(file, record, used, kept=record.key in live or now - used < grace_s))
+    return sorted(entries, key=lambda entry: entry.used), broken
+
+
+def _choose(entries: list[_Entry], sizes: dict[str, int], keep_days: float | None, max_bytes: int | None) -> None:
+    """Marks as doomed what is too old, then the longest unused until the rest fits; shared objects count once."""
+    if keep_days is not None:
+        oldest = time.time() - keep_days * 86400
+        for entry in entries:
+            entry.doomed = not entry.kept and entry.used < oldest
+    if max_bytes is None:
+        return
+    users = Counter(name for entry in entries if not entry.doomed for name in entry.names)
+    total = sum(sizes.get(name, 0) for name in users)
+    for entry in entries:
+        if total <= max_bytes:
+            break
+        if not entry.kept and not entry.doomed:
+            entry.doomed = True
+            users.subtract(entry.names)
+            total -= sum(sizes.get(name, 0) for name in entry.names if users[name] == 0)
+
+
+def _orphans(store: Store) -> list[Path]:
+    """Folders and lock files in tmp/ whose owner is dead."""
+    orphans = []
+    for name in sorted({path.stem for path in (store.root / "tmp").iterdir()}):
+        folder = store.root / "tmp" / name
+        with if_free(folder.with_suffix(".lock")) as free:
+            if free:
+                orphans += [path for path in (folder, folder.with_suffix(".lock")) if path.exists()]
+    return orphans
+
+
+def _age(path: Path) -> float:
+    """Seconds since the file or folder came to lie where it lies."""
+    return time.time() - path.lstat().st_ctime
+
+
+def _bytes(path: Path) -> int:
+    footprint = objects.measure(path)
+    return footprint.bytes if footprint else 0

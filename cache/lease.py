@@ -1,0 +1,73 @@
+"""Living claims on the store: one run at a time computes a key, and gc keeps off what a run in progress uses."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from gsac.cache.errors import CacheReadOnlyError, from_os_error
+from gsac.cache.lock import common, exclusive, if_free
+from gsac.cache.record import Record
+from gsac.cache.store import Store
+
+
+@contextlib.contextmanager
+def single_flight(store: Store, key: str, waiting: Callable[[], None] = lambda: None) -> Iterator[Record | None]:
+    """Holds the key alone and gives what is published under it by then: None means that it is ours to compute.
+
+    `waiting` is called once if another run is at it. Should that run die, the next one gets the key at once.
+    A read-only store cannot be locked: then every run computes for itself.
+    """
+    with contextlib.ExitStack() as held:
+        with contextlib.suppress(CacheReadOnlyError):
+            try:
+                held.enter_context(exclusive(store.root / "leases" / f"{key}.lock", waiting))
+            except OSError as error:
+                raise from_os_error(error, store.root) from error
+        yield store.lookup(key)
+
+
+class Lease:
+    """The keys that a run in progress uses; `add` a key before looking it up."""
+
+    def __init__(self, store: Store, file: Path | None, descriptor: int | None) -> None:
+        self._store, self._file, self._descriptor = store, file, descriptor
+
+    def add(self, *keys: str) -> None:
+        if self._descriptor is not None:
+            with common(self._store.root / "lock"):  # not while gc sweeps
+                os.write(self._descriptor, "".join(f"{key}\n" for key in keys).encode())
+
+
+@contextlib.contextmanager
+def in_use(store: Store, keys: Iterable[str] = ()) -> Iterator[Lease]:
+    """While open, gc keeps the records and outputs of these keys and of those added later."""
+    file = store.root / "leases" / f"{os.getpid()}-{secrets.token_hex(6)}.run"
+    with contextlib.ExitStack() as held:
+        try:
+            lease = Lease(store, file, held.enter_context(exclusive(file)))
+        except OSError:
+            lease = Lease(store, None, None)  # read-only: gc cannot run on it either
+        lease.add(*keys)
+        yield lease
+
+
+def live_keys(store: Store) -> set[str]:
+    """Keys that living runs use or compute; the leases of dead runs are removed."""
+    keys: set[str] = set()
+    for file in (store.root / "leases").glob("*.run"):
+        with if_free(file) as free, contextlib.suppress(OSError):
+            if free:
+                file.unlink()
+            else:
+                keys.update(file.read_text().split())
+    for file in (store.root / "leases").glob("*.lock"):
+        with if_free(file) as free, contextlib.suppress(OSError):
+            if free:
+                file.unlink()
+            else:
+                keys.add(file.stem)
+    return keys

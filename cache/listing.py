@@ -1,0 +1,30 @@
+"""What lies in the store, one row a result."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from gsac.cache.store import Store
+
+
+@dataclass(frozen=True)
+class Row:
+    stage: str
+    key: str
+    bytes: int
+    age_s: float
+    """Since it was last used."""
+    seconds: float
+    """What the run that made it took."""
+
+
+def ls(store: Store) -> list[Row]:
+    """Every result, the last used first."""
+    now, rows = time.time(), []
+    for file in store.record_files():
+        record = store.read(file)
+        if record is not None:
+            age = max(0.0, now - file.stat().st_mtime)
+            rows.append(Row(record.parts.stage, record.key, record.bytes, age, record.info.seconds))
+    return sorted(rows, key=lambda row: row.age_s)

@@ -1,0 +1,73 @@
+"""Lock files under flock: the kernel frees them when their holder dies, however it dies."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+
+@contextlib.contextmanager
+def exclusive(path: Path, waiting: Callable[[], None] = lambda: None) -> Iterator[int]:
+    """Holds `path` alone, gives its descriptor, removes it at the end; `waiting` is called once if it blocks."""
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        if not _try(descriptor, fcntl.LOCK_EX):
+            waiting()
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        if _is(path, descriptor):
+            break
+        os.close(descriptor)  # the holder before us removed the file that we waited on
+    try:
+        yield descriptor
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+        fcntl.flock(descriptor, fcntl.LOCK_UN)  # also for children that inherited the descriptor
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
+def common(path: Path, alone: bool = False) -> Iterator[None]:
+    """Holds the lasting lock file `path`, together with others or alone."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
+        yield
+    finally:
+        fcntl.flock(descriptor, fcntl.LOCK_UN)
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
+def if_free(path: Path) -> Iterator[bool]:
+    """True, holding `path` alone, where no living process holds it; else False at once."""
+    try:
+        descriptor = os.open(path, os.O_RDWR)
+    except FileNotFoundError:
+        yield True
+        return
+    try:
+        yield _try(descriptor, fcntl.LOCK_EX)
+    finally:
+        os.close(descriptor)
+
+
+def _try(descriptor: int, mode: int) -> bool:
+    try:
+        fcntl.flock(descriptor, mode | fcntl.LOCK_NB)
+        return True
+    except OSError as error:
+        if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+            return False
+        raise
+
+
+def _is(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False

@@ -1,0 +1,123 @@
+"""How a result becomes part of the store: whole or not at all, whenever the process dies.
+
+The steps run in the order of STEPS. Up to the last rename nothing can be found by anybody; the action record is written
+last and only it makes a result count. An object without a record is rubbish that gc sweeps.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gsac.cache import objects
+from gsac.cache.digest import tree_digest
+from gsac.cache.errors import CacheError, IntegrityError, from_os_error
+from gsac.cache.key import KeyParts
+from gsac.cache.lock import common
+from gsac.cache.record import Record, RunInfo
+
+if TYPE_CHECKING:
+    from gsac.cache.store import Store
+
+STEPS = (
+    "started",
+    "hashed",
+    "sealed",
+    "synced",
+    "placed",
+    "places synced",
+    "record written",
+    "recorded",
+    "record synced",
+)
+"""`placed` comes once an output. A test kills the process right after each."""
+
+
+def publish(
+    store: Store,
+    parts: KeyParts,
+    folder: Path,
+    outputs: tuple[str, ...],
+    info: RunInfo,
+    replace: bool = False,
+    step: Callable[[str], None] = lambda name: None,
+) -> Record:
+    """Moves `folder/<output>` into the store and writes the record; an equal key that is published already wins.
+
+    replace: the new result takes the place of a published one (a forced run). Returns the record that now counts.
+    Raises CacheReadOnlyError, CacheFullError or CacheError; then nothing has changed that a lookup could see.
+    """
+    needed = None
+    try:
+        step("started")
+        digests, footprints = {}, {}
+        for output in outputs:
+            objects.require_plain(folder / output, output)
+            digests[output] = tree_digest(folder / output, objects.NO_MEMO)[0]
+            footprints[output] = objects.measure(folder / output)
+        needed = sum(f.bytes for f in footprints.values())
+        step("hashed")
+        for output in outputs:
+            objects.seal_files(folder / output)
+        step("sealed")
+        for output in outputs:
+            objects.sync(folder / output)
+        step("synced")
+        with common(store.root / "lock"):
+            for output in outputs:
+                footprints[output] = _place(store, folder / output, digests[output], output)
+                step("placed")
+            for place in {objects.object_path(store.root, d, o).parent for o, d in digests.items()}:
+                objects.sync_one(place)
+            objects.sync_one(store.root / "objects")
+            step("places synced")
+            return _record(store, Record(parts.key(), parts, digests, info, footprints), replace, step)
+    except OSError as error:
+        raise from_os_error(error, store.root, needed) from error
+
+
+def _place(store: Store, source: Path, digest: str, output: str) -> objects.Footprint:
+    target = objects.object_path(store.root, digest, output)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.exists() and not objects.is_sound(target, digest):
+        store.quarantine(target, digest)
+    if not target.exists():
+        try:
+            os.rename(source, target)
+        except OSError:
+            if not target.exists():  # else another publisher was first with the same content
+                raise
+        objects.seal_folders(target)
+    footprint = objects.measure(target)
+    if footprint is None:
+        raise IntegrityError(f"output {output} could not be placed at {target}")
+    return footprint
+
+
+def _record(store: Store, record: Record, replace: bool, step: Callable[[str], None]) -> Record:
+    final = store.record_path(record.parts.stage, record.key)
+    final.parent.mkdir(parents=True, exist_ok=True)
+    with store.private(record.parts.stage) as folder:
+        temp = folder / "record.json"
+        temp.write_text(record.to_json())
+        objects.sync_one(temp)
+        step("record written")
+        for _ in range(3):
+            if replace:
+                os.replace(temp, final)
+                break
+            try:
+                os.link(temp, final)
+                break
+            except FileExistsError:
+                first = store.lookup(record.key)  # removes a record that is not whole
+                if first is not None:
+                    return first
+        else:
+            raise CacheError(f"the record {final} is neither whole nor can it be replaced")
+    step("recorded")
+    objects.sync_one(final.parent)
+    step("record synced")
+    return record

@@ -1,0 +1,153 @@
+"""The store: a folder of objects named by content and of action records that say which run made them.
+
+objects/ab/<digest>[suffix]      outputs, files or folders, read-only
+actions/<stage>/<key>.json       records; a result counts from the moment its record is there
+tmp/ leases/ quarantine/         work in progress, locks, what was found damaged
+models/<sha256>/<name>           model files, kept by hand
+memo.sqlite lock                 stat memo; held in common by publishers, alone by gc
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from gsac.cache import objects
+from gsac.cache.errors import from_os_error
+from gsac.cache.key import KeyParts
+from gsac.cache.lock import exclusive
+from gsac.cache.memo import Memo, memo_in
+from gsac.cache.publish import publish
+from gsac.cache.record import Record, RunInfo
+from gsac.cache.root import default_root
+
+FOLDERS = ("objects", "actions", "tmp", "leases", "quarantine", "models")
+USED_AGAIN_S = 3600
+"""A hit renews the record's date (gc goes by it) at most this often."""
+
+
+class Store:
+    """Results by key. `say` gets full sentences about what was found damaged."""
+
+    def __init__(self, root: Path, say: Callable[[str], None] = lambda message: None) -> None:
+        self.root = Path(root).absolute()
+        self.say = say
+        with contextlib.suppress(OSError):  # a read-only store can still be read; whoever writes gets the error
+            for name in FOLDERS:
+                (self.root / name).mkdir(parents=True, exist_ok=True)
+
+    @classmethod
+    def open(cls, root: Path | None = None, say: Callable[[str], None] = lambda message: None) -> Store:
+        """The store at `root`, else $GSAC_CACHE, else ~/.cache/gsac."""
+        return cls(root or default_root(), say)
+
+    @property
+    def memo(self) -> Memo:
+        return memo_in(self.root)
+
+    @property
+    def writable(self) -> bool:
+        return os.access(self.root / "tmp", os.W_OK) and os.access(self.root / "actions", os.W_OK)
+
+    def record_path(self, stage: str, key: str) -> Path:
+        return self.root / "actions" / stage / f"{key}.json"
+
+    def record_files(self, stage: str = "*") -> list[Path]:
+        return list((self.root / "actions").glob(f"{stage}/*.json"))
+
+    def path(self, record: Record, output: str) -> Path:
+        """The output in the store; not to be written."""
+        return objects.object_path(self.root, record.outputs[output], output)
+
+    def lookup(self, key: str, deep: bool = False) -> Record | None:
+        """The record of a finished run, if its outputs are all there and as they were.
+
+        A file whose size or time is not as recorded is hashed again; deep reads every byte. What is damaged goes to
+        quarantine, the record with it, and the answer is None: a miss, not an error.
+        """
+        for file in (self.root / "actions").glob(f"*/{key}.json"):
+            record = self.read(file)
+            if record is not None and all([self._holds(record, output, deep) for output in record.outputs]):
+                self._used(file)
+                return record
+            with contextlib.suppress(OSError):
+                file.unlink()
+        return None
+
+    def read(self, file: Path) -> Record | None:
+        """The record in a file, None if it is not whole or of another version."""
+        try:
+            return Record.from_json(file.read_text())
+        except (OSError, UnicodeDecodeError):
+            return None
+
+    @contextlib.contextmanager
+    def private(self, stage: str) -> Iterator[Path]:
+        """An empty folder of one's own on the store's filesystem, removed at the end, or by gc if its owner died."""
+        folder = self.root / "tmp" / f"{stage}-{os.getpid()}-{secrets.token_hex(6)}"
+        try:
+            lock = contextlib.ExitStack()
+            lock.enter_context(exclusive(folder.with_suffix(".lock")))
+            folder.mkdir()
+        except OSError as error:
+            lock.close()
+            raise from_os_error(error, self.root) from error
+        with lock:
+            try:
+                yield folder
+            finally:
+                objects.remove(folder)
+
+    def publish(
+        self,
+        parts: KeyParts,
+        folder: Path,
+        outputs: tuple[str, ...],
+        info: RunInfo,
+        replace: bool = False,
+        step: Callable[[str], None] = lambda name: None,
+    ) -> Record:
+        """See `publish.publish`."""
+        return publish(self, parts, folder, outputs, info, replace, step)
+
+    def previous(self, stage: str, like: KeyParts) -> Record | None:
+        """The record of the stage that differs least from `like` (the newest of equals), to explain a new key."""
+        newest = sorted(self.record_files(stage), key=_mtime, reverse=True)[:200]
+        records = [record for record in map(self.read, newest) if record is not None]
+        return min(records, key=lambda record: len(record.parts.diff(like)), default=None)
+
+    def quarantine(self, path: Path, digest: str) -> None:
+        """Moves a damaged object out of the way, unless somebody has put a sound one in its place meanwhile."""
+        with contextlib.suppress(OSError), exclusive(self.root / "leases" / f"{path.name}.quarantine"):
+            if path.exists() and not objects.is_sound(path, digest):
+                target = self.root / "quarantine" / f"{path.name}.{time.time_ns()}"
+                objects.unseal_folders(path)
+                os.rename(path, target)
+                self.say(f"the cached object {path.name} was damaged: moved to {target}, to be computed again")
+
+    def _holds(self, record: Record, output: str, deep: bool) -> bool:
+        path, digest = self.path(record, output), record.outputs[output]
+        seen = objects.measure(path)
+        if seen is not None and not deep and seen == record.footprints[output]:
+            return True
+        if seen is not None and objects.is_sound(path, digest, None if deep else self.memo):
+            return True
+        if path.exists():
+            self.quarantine(path, digest)
+        return False
+
+    def _used(self, file: Path) -> None:
+        with contextlib.suppress(OSError):
+            if time.time() - _mtime(file) > USED_AGAIN_S:
+                os.utime(file)
+
+
+def _mtime(file: Path) -> float:
+    try:
+        return file.stat().st_mtime
+    except OSError:
+        return 0.0

@@ -1,0 +1,62 @@
+"""What a Python source says, without how it is written: comments, formatting and docstrings do not count."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from typing import Any
+
+from gsac.cache.digest import canonical, typed_digest
+
+WRITING = ("kind", "type_comment", "ctx")
+"""Fields that say how something is written, or what its place says anyway."""
+
+
+def read_source(source: bytes, package: str) -> tuple[str, set[str]]:
+    """Digest of the normalised syntax tree, and the names and strings that may refer to modules or files beside it.
+
+    package: the package that relative imports start from. `from a import b` refers to a and a.b.
+    A source that cannot be parsed counts byte by byte.
+    """
+    try:
+        tree = ast.parse(source)
+    except (SyntaxError, ValueError):
+        return typed_digest("module unparsed 1", source), set()
+    return typed_digest("module 1", canonical(normalised(tree))), set(_references(tree, package))
+
+
+def normalised(node: Any) -> Any:
+    """The tree as nested lists. Empty fields are left out, so that a field new in a later Python changes nothing."""
+    if isinstance(node, ast.AST):
+        fields = [
+            [name, normalised(value)]
+            for name, value in ast.iter_fields(node)
+            if name not in WRITING and (value not in (None, []) or isinstance(node, ast.Constant))
+        ]
+        return [type(node).__name__, *fields]
+    if isinstance(node, list):
+        return [normalised(item) for item in node if not _is_bare_string(item)]
+    if node is None or isinstance(node, (str, int)):
+        return node
+    return [type(node).__name__, repr(node)]  # bytes, floats, complex numbers, the ellipsis
+
+
+def _is_bare_string(node: Any) -> bool:
+    """A docstring, or a string that documents the line above."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+def _references(tree: ast.AST, package: str) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                start = package.rsplit(".", node.level - 1)[0] if node.level > 1 else package
+                base = f"{start}.{base}" if base else start
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and 0 < len(node.value) < 200:
+            if "\n" not in node.value and " " not in node.value:
+                yield node.value
