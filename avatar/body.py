@@ -1,0 +1,178 @@
+"""The body model: one loader, one file layout (SMPL-X's npz keys), whichever body is inside.
+
+B betas, E expression size, J = 55 joints in SMPL-X's order, V vertices, F faces, T frames, K = 133 keypoints.
+Canonical body: metres, right-handed, y up, facing +z, left = +x, T-pose at zero rotation. Linear blend skinning with
+axis-angle joint rotations; `global_orient` turns the body about its pelvis joint, then `transl` moves it.
+Source: SMPL-X (Pavlakos et al. 2019), eq. 1-7; the open body is baked by `open_body/bake.py`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from gsac.avatar.artifacts import BODY_SHAPES, ArtifactError, check_arrays, write_arrays
+from gsac.avatar.camera import Camera
+from gsac.avatar.skinning import joint_transforms, skin
+
+OPEN_BODY = Path(__file__).parent / "open_body" / "open_body.npz"
+J = 55
+SMPLX_JOINTS = (
+    "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 left_foot right_foot neck "
+    "left_collar right_collar head left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist jaw "
+    "left_eye_smplhf right_eye_smplhf"
+).split() + [f"{side}_{finger}{i}" for side in ("left", "right")
+             for finger in ("index", "middle", "pinky", "ring", "thumb") for i in (1, 2, 3)]
+SMPLX_EXPRESSIONS = 100
+"""How many of an official file's last shape directions are expressions (v1.1: 300 + 100; older files: 10 + 10)."""
+
+
+@dataclass
+class BodyParams:
+    """Everything that poses a body over T frames: the arrays of `body.npz`."""
+
+    betas: np.ndarray  # (B,)
+    expression: np.ndarray  # (T, E)
+    global_orient: np.ndarray  # (T, 3) axis-angle
+    body_pose: np.ndarray  # (T, 63)
+    left_hand_pose: np.ndarray  # (T, 45)
+    right_hand_pose: np.ndarray  # (T, 45)
+    jaw_pose: np.ndarray  # (T, 3)
+    leye_pose: np.ndarray  # (T, 3)
+    reye_pose: np.ndarray  # (T, 3)
+    transl: np.ndarray  # (T, 3) m
+    joint_offset: np.ndarray  # (55, 3) m, canonical
+    joints: np.ndarray  # (T, 55, 3) m, camera frame
+    focal: np.ndarray  # (2,) px
+    center: np.ndarray  # (2,) px
+    sigma_joints: np.ndarray  # (T, 55) m
+    model: str  # digest of the body file
+
+    @classmethod
+    def read(cls, path: Path) -> BodyParams:
+        arrays = check_arrays(path, BODY_SHAPES)
+        return cls(**{f.name: arrays[f.name] for f in fields(cls) if f.name != "model"}, model=str(arrays["model"]))
+
+    def write(self, path: Path) -> None:
+        arrays = {f.name: np.asarray(getattr(self, f.name), np.float32) for f in fields(self) if f.name != "model"}
+        write_arrays(path, **arrays, model=np.array(self.model))
+
+    @classmethod
+    def from_pose(cls, pose: np.ndarray, transl: np.ndarray, betas: np.ndarray, expression: np.ndarray, focal, center,
+                  joint_offset: np.ndarray | None = None, model: str = "") -> BodyParams:
+        """pose: (T, 55, 3) axis-angle; transl: (T, 3); expression: (T, E). `joints` is left zero: see `Body.posed`."""
+        t = len(pose)
+        flat = np.asarray(pose, np.float32).reshape(t, J * 3)
+        return cls(
+            betas=np.asarray(betas, np.float32), expression=np.asarray(expression, np.float32),
+            global_orient=flat[:, :3], body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69], leye_pose=flat[:, 69:72],
+            reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120], right_hand_pose=flat[:, 120:165],
+            transl=np.asarray(transl, np.float32),
+            joint_offset=np.zeros((J, 3), np.float32) if joint_offset is None else np.asarray(joint_offset, np.float32),
+            joints=np.zeros((t, J, 3), np.float32), focal=np.broadcast_to(np.asarray(focal, np.float32), (2,)).copy(),
+            center=np.asarray(center, np.float32), sigma_joints=np.zeros((t, J), np.float32), model=model,
+        )
+
+    @property
+    def frames(self) -> int:
+        return len(self.transl)
+
+    @property
+    def pose(self) -> np.ndarray:
+        """(T, 55, 3) axis-angle in joint order."""
+        parts = (self.global_orient, self.body_pose, self.jaw_pose, self.leye_pose, self.reye_pose,
+                 self.left_hand_pose, self.right_hand_pose)
+        return np.concatenate(parts, 1).reshape(-1, J, 3)
+
+    def camera(self, width: int, height: int) -> Camera:
+        return Camera(tuple(map(float, self.focal)), tuple(map(float, self.center)), width, height)
+
+
+@dataclass
+class Body:
+    """A loaded body file. Nothing above the loader knows which file it was."""
+
+    v_template: np.ndarray  # (V, 3) m
+    faces: np.ndarray  # (F, 3) int32
+    shapedirs: np.ndarray  # (V, 3, B) m
+    exprdirs: np.ndarray  # (V, 3, E) m
+    J_regressor: np.ndarray  # (55, V)
+    weights: np.ndarray  # (V, 55), at most four a row
+    parents: np.ndarray  # (55,) int, -1 for the pelvis
+    joint_names: tuple[str, ...]
+    expression_names: tuple[str, ...]
+    jaw_actions: np.ndarray  # (E, 3) expression that a jaw rotation stands for; zeros where the jaw has skin of its own
+    keypoint_matrix: object  # (133, V) scipy CSR; an all-zero row is a keypoint that this body does not carry
+    vt: np.ndarray | None  # (U, 2)
+    ft: np.ndarray | None  # (F, 3) int32
+    digest: str
+    """sha256 of the file."""
+
+    @classmethod
+    def load(cls, path: Path | str | None = None) -> Body:
+        """The open body, or an official `SMPLX_*.npz`. Raises `ArtifactError` naming the array that is wrong."""
+        from gsac.avatar.body_file import read_body_file
+
+        path = Path(path) if path else OPEN_BODY
+        if not path.is_file():
+            raise ArtifactError(f"{path}: there is no body model file; give an SMPLX_*.npz or leave the parameter empty")
+        return cls(**read_body_file(path), digest=hashlib.sha256(path.read_bytes()).hexdigest())
+
+    @cached_property
+    def skin_index(self) -> np.ndarray:
+        """(V, 4) int32 joints of each vertex, heaviest first."""
+        return np.argsort(-self.weights, 1, kind="stable")[:, :4].astype(np.int32)
+
+    @cached_property
+    def skin_weight(self) -> np.ndarray:
+        """(V, 4) weights, rows sum to one."""
+        w = np.take_along_axis(self.weights, self.skin_index.astype(np.int64), 1)
+        return (w / w.sum(1, keepdims=True)).astype(np.float32)
+
+    @property
+    def num_betas(self) -> int:
+        return self.shapedirs.shape[2]
+
+    def rest(self, betas: np.ndarray, expression: np.ndarray | None = None,
+             joint_offset: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Shaped T-pose: vertices (V, 3) and joints (55, 3). Joints follow the betas, not the expression."""
+        vertices = self.v_template + self.shapedirs[:, :, : len(betas)] @ np.asarray(betas, np.float32)
+        joints = self.J_regressor @ vertices
+        if joint_offset is not None:
+            joints = joints + joint_offset
+        if expression is not None and np.any(expression):
+            vertices = vertices + self.exprdirs @ np.asarray(expression, np.float32)
+        return np.asarray(vertices, np.float32), np.asarray(joints, np.float32)
+
+    def effective_expression(self, params: BodyParams, t: int) -> np.ndarray:
+        """(E,) expression of frame t with the jaw's rotation turned into actions where the body moves its jaw so."""
+        return params.expression[t] + self.jaw_actions @ params.jaw_pose[t]
+
+    def posed(self, params: BodyParams, frames: list[int] | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (T, V, 3) and joints (T, 55, 3), m, camera frame, of all or the named frames."""
+        frames = list(range(params.frames)) if frames is None else list(frames)
+        shaped, joints = self.rest(params.betas, None, params.joint_offset)
+        transforms = joint_transforms(params.pose[frames], joints, self.parents)
+        vertices = np.empty((len(frames), len(shaped), 3), np.float32)
+        posed_joints = np.empty((len(frames), J, 3), np.float32)
+        for i, t in enumerate(frames):
+            rest = shaped + self.exprdirs @ self.effective_expression(params, t)
+            vertices[i] = skin(rest, transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
+            posed_joints[i] = np.einsum("jab,jb->ja", transforms[i, :, :, :3], joints) + transforms[i, :, :, 3]
+        return vertices, posed_joints + params.transl[frames][:, None]
+
+    def keypoints(self, vertices: np.ndarray) -> np.ndarray:
+        """COCO-WholeBody points (..., 133, 3) of posed vertices (..., V, 3); NaN where the body carries no such point."""
+        flat = np.asarray(vertices).reshape(-1, len(self.v_template), 3)
+        out = np.stack([self.keypoint_matrix @ v for v in flat])
+        out[:, ~self.known_keypoints] = np.nan
+        return out.reshape(*np.shape(vertices)[:-2], 133, 3)
+
+    @cached_property
+    def known_keypoints(self) -> np.ndarray:
+        """(133,) bool, whether the body carries the keypoint."""
+        return np.diff(self.keypoint_matrix.indptr) > 0

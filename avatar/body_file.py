@@ -1,0 +1,123 @@
+"""Reads a body file and says exactly what is wrong with one that is not.
+
+Two kinds speak the same keys: the open body (`open_body/open_body.npz`, CC0 data) and the official SMPL-X npz that a user
+owns. Pickles are refused: they run code.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+
+from gsac.avatar.artifacts import ArtifactError
+
+ALWAYS = {"v_template": 2, "f": 2, "shapedirs": 3, "J_regressor": 2, "weights": 2, "kintree_table": 2}
+"""Array -> number of dimensions."""
+SMPLX_KEYPOINT_JOINTS = {
+    5: 16, 6: 17, 7: 18, 8: 19, 9: 20, 10: 21, 11: 1, 12: 2, 13: 4, 14: 5, 15: 7, 16: 8, 91: 20, 112: 21,
+} | {91 + 1 + 4 * f + i: 25 + 3 * g + i for f, g in enumerate((4, 0, 1, 3, 2)) for i in range(3)} \
+  | {112 + 1 + 4 * f + i: 40 + 3 * g + i for f, g in enumerate((4, 0, 1, 3, 2)) for i in range(3)}
+"""COCO-WholeBody keypoint -> joint, for a file without a keypoint matrix (hand fingers: thumb, index, middle, ring, pinky)."""
+
+
+def read_body_file(path: Path) -> dict:
+    """Fields of `Body` but its digest. Raises `ArtifactError`."""
+    if path.suffix != ".npz":
+        raise ArtifactError(f"{path}: a body model must be an .npz file (pickles run code when read, so .pkl is refused); "
+                            "SMPL-X is distributed as SMPLX_NEUTRAL.npz, SMPLX_MALE.npz and SMPLX_FEMALE.npz")
+    a = read_arrays_of_body(path)
+    v = len(a["v_template"])
+    check_sizes(path, a, v)
+    shapes = np.asarray(a["shapedirs"], np.float32)
+    names = [str(n) for n in a["expression_names"]] if "expression_names" in a else None
+    betas = int(a["num_betas"]) if "num_betas" in a else official_betas(path, shapes.shape[2])
+    expressions = shapes.shape[2] - betas
+    matrix = keypoint_matrix(a, v)
+    from gsac.avatar.body import SMPLX_JOINTS
+
+    return {
+        "v_template": np.asarray(a["v_template"], np.float32), "faces": np.asarray(a["f"], np.int32),
+        "shapedirs": np.ascontiguousarray(shapes[:, :, :betas]), "exprdirs": np.ascontiguousarray(shapes[:, :, betas:]),
+        "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": four_heaviest(np.asarray(a["weights"], np.float32)),
+        "parents": parents_of(a["kintree_table"]), "joint_names": tuple(SMPLX_JOINTS),
+        "expression_names": tuple(names or (f"expression{i}" for i in range(expressions))),
+        "jaw_actions": np.asarray(a.get("jaw_actions", np.zeros((expressions, 3))), np.float32),
+        "keypoint_matrix": matrix, "vt": np.asarray(a["vt"], np.float32) if "vt" in a else None,
+        "ft": np.asarray(a["ft"], np.int32) if "ft" in a else None,
+    }
+
+
+def read_arrays_of_body(path: Path) -> dict[str, np.ndarray]:
+    """The npz's arrays; official files also hold object arrays, which are left out."""
+    try:
+        with np.load(path, allow_pickle=False) as z:
+            arrays = {}
+            for key in z.files:
+                try:
+                    arrays[key] = z[key]
+                except ValueError:
+                    continue
+    except (OSError, ValueError) as e:
+        raise ArtifactError(f"{path}: not a readable body model npz ({e})") from e
+    for name, dims in ALWAYS.items():
+        if name not in arrays:
+            raise ArtifactError(f"{path}: array {name} is missing; a body model has {', '.join(ALWAYS)}")
+        if arrays[name].ndim != dims:
+            raise ArtifactError(f"{path}: array {name} has {arrays[name].ndim} dimensions, expected {dims}")
+    return arrays
+
+
+def check_sizes(path: Path, a: dict, v: int) -> None:
+    wanted = {"v_template": (v, 3), "f": (len(a["f"]), 3), "shapedirs": (v, 3, a["shapedirs"].shape[2]),
+              "J_regressor": (55, v), "weights": (v, 55), "kintree_table": (2, 55)}
+    for name, shape in wanted.items():
+        if a[name].shape != shape:
+            raise ArtifactError(f"{path}: array {name} has shape {a[name].shape}, expected {shape}"
+                                + ("; SMPL and SMPL-H files have fewer joints, SMPL-X is needed" if 55 in shape else ""))
+    if a["f"].min() < 0 or a["f"].max() >= v:
+        raise ArtifactError(f"{path}: array f names vertex {a['f'].max()}, but there are {v}")
+    if not np.allclose(np.asarray(a["weights"], np.float32).sum(1), 1, atol=2e-2):
+        raise ArtifactError(f"{path}: rows of weights must sum to one")
+
+
+def official_betas(path: Path, directions: int) -> int:
+    from gsac.avatar.body import SMPLX_EXPRESSIONS
+
+    if directions == 20:
+        return 10
+    if directions <= SMPLX_EXPRESSIONS:
+        raise ArtifactError(f"{path}: shapedirs has {directions} directions; expected 400 (300 shape + 100 expression) or 20")
+    return directions - SMPLX_EXPRESSIONS
+
+
+def parents_of(kintree: np.ndarray) -> np.ndarray:
+    """(55,) int; official files write the root's parent as 2**32 - 1."""
+    parents = np.asarray(kintree[0], np.int64).copy()
+    parents[0] = -1
+    return parents
+
+
+def four_heaviest(weights: np.ndarray) -> np.ndarray:
+    """(V, 55) with at most four weights a row, renormalised: what Unity and the browser skin with."""
+    keep = np.argsort(-weights, 1, kind="stable")[:, :4]
+    out = np.zeros_like(weights)
+    np.put_along_axis(out, keep, np.take_along_axis(weights, keep, 1), 1)
+    return out / out.sum(1, keepdims=True)
+
+
+def keypoint_matrix(a: dict, v: int) -> sparse.csr_matrix:
+    """(133, V); official files have the joints' regressors for body and hands, and their face landmarks."""
+    if "keypoint_row" in a:
+        entries = (np.asarray(a["keypoint_weight"], np.float32), (a["keypoint_row"].astype(int), a["keypoint_vertex"].astype(int)))
+        return sparse.csr_matrix(entries, shape=(133, v))
+    dense = sparse.lil_matrix((133, v), dtype=np.float32)
+    regressor = np.asarray(a["J_regressor"], np.float32)
+    for keypoint, joint in SMPLX_KEYPOINT_JOINTS.items():
+        dense[keypoint] = regressor[joint]
+    if "lmk_faces_idx" in a and "lmk_bary_coords" in a:
+        for i, (face, bary) in enumerate(zip(a["lmk_faces_idx"], a["lmk_bary_coords"], strict=True)):
+            for vertex, weight in zip(a["f"][int(face)], bary, strict=True):
+                dense[40 + i, int(vertex)] += float(weight)
+    return dense.tocsr()
