@@ -1,0 +1,109 @@
+"""The avatar's gaussians: bound to faces of the body mesh, as stored in avatar.npz."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from gsac.avatar import artifacts
+
+FLATNESS = 0.15
+"""Thickness of a fresh gaussian along the face's normal, as a share of its width."""
+SPREAD = 0.55
+"""Standard deviation of a fresh gaussian over the square root of the area that it stands for."""
+
+
+@dataclass
+class Gaussians:
+    face: np.ndarray
+    """(N,) int32, index of the face that carries it."""
+    mu: np.ndarray
+    """(N, 3) centre in the face frame, before the face's scale k."""
+    quat: np.ndarray
+    """(N, 4) wxyz rotation in the face frame, any length."""
+    log_scale: np.ndarray
+    """(N, 3) log of the standard deviations, before the face's scale k."""
+    rgb: np.ndarray
+    """(N, 3) colour in 0..1."""
+    opacity: np.ndarray
+    """(N,) in 0..1."""
+
+    def __len__(self) -> int:
+        return len(self.face)
+
+    def __getitem__(self, which) -> Gaussians:
+        """The gaussians that an index array, mask or slice picks."""
+        return Gaussians(*(np.ascontiguousarray(getattr(self, f.name)[which]) for f in fields(self)))
+
+    def write(self, path: Path) -> None:
+        """avatar.npz: float32, face int32."""
+        arrays = {f.name: np.asarray(getattr(self, f.name), np.float32) for f in fields(self)}
+        artifacts.write_arrays(path, **(arrays | {"face": np.asarray(self.face, np.int32)}))
+
+    @classmethod
+    def read(cls, path: Path) -> Gaussians:
+        """From avatar.npz; `artifacts.ArtifactError` where an array is missing or has another shape."""
+        arrays = artifacts.check_arrays(path, artifacts.AVATAR_SHAPES)
+        return cls(*(arrays[f.name] for f in fields(cls)))
+
+    @classmethod
+    def per_face(cls, vertices: np.ndarray, faces: np.ndarray, rgb=(0.5, 0.5, 0.5), opacity: float = 0.9) -> Gaussians:
+        """One gaussian at the middle of every face that has an area.
+
+        vertices: (V, 3) m; faces: (F, 3). HAHA's start, with scales from the face's area.
+        """
+        areas = _areas(vertices, faces)
+        face = np.flatnonzero(areas > 0).astype(np.int32)
+        return cls._flat(vertices, faces, face, np.zeros((len(face), 3), np.float32), areas[face], rgb, opacity)
+
+    @classmethod
+    def area(cls, vertices: np.ndarray, faces: np.ndarray, count: int, seed: int = 0, rgb=(0.5, 0.5, 0.5),
+             opacity: float = 0.9, power: float = 0.85) -> Gaussians:
+        """`count` gaussians at random points of faces, a face drawn with probability area ** power.
+
+        The gaussians of a face share its area, so small faces (eyes, mouth) do not collect sub-pixel gaussians.
+        """
+        random = np.random.default_rng(seed)
+        areas = _areas(vertices, faces)
+        chance = np.where(areas > 0, areas, 0) ** power
+        expected = count * chance / chance.sum()
+        whole = np.floor(expected).astype(np.int64)
+        rest = expected - whole
+        extra = random.choice(len(faces), size=count - whole.sum(), replace=False, p=rest / rest.sum())
+        whole[extra] += 1
+        face = np.repeat(np.arange(len(faces), dtype=np.int32), whole)
+        u, v = random.random((2, count))
+        flip = u + v > 1
+        u, v = np.where(flip, 1 - u, u), np.where(flip, 1 - v, v)
+        corners = vertices[faces[face]].astype(np.float64)
+        points = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
+        from gsac.avatar.binding import face_frames
+
+        frames = face_frames(vertices.astype(np.float64), faces)
+        scale = np.where(frames.k[face] > 0, frames.k[face], 1)
+        local = np.einsum("nji,nj->ni", frames.R[face], points - frames.T[face]) / scale[:, None]
+        return cls._flat(vertices, faces, face, local.astype(np.float32), (areas / np.maximum(whole, 1))[face], rgb, opacity)
+
+    @classmethod
+    def _flat(cls, vertices, faces, face, mu, area, rgb, opacity) -> Gaussians:
+        """Discs in the face's plane (the frame's middle axis is the normal), sized by the area each stands for."""
+        from gsac.avatar.binding import face_frames
+
+        k = face_frames(np.asarray(vertices, np.float64), faces).k[face]
+        width = np.log(SPREAD * np.sqrt(np.maximum(area, 1e-16)) / np.where(k > 0, k, 1))
+        log_scale = np.stack([width, width + np.log(FLATNESS), width], 1).astype(np.float32)
+        quat = np.zeros((len(face), 4), np.float32)
+        quat[:, 0] = 1
+        colour = np.broadcast_to(np.asarray(rgb, np.float32), (len(face), 3)).copy()
+        return cls(face, mu, quat, log_scale, colour, np.full(len(face), opacity, np.float32))
+
+
+def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F,) m2, 0 for faces whose frame is not defined."""
+    from gsac.avatar.binding import face_frames
+
+    v = np.asarray(vertices, np.float64)[faces]
+    area = 0.5 * np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
+    return np.where(face_frames(np.asarray(vertices, np.float64), faces).valid, area, 0)

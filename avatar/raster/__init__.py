@@ -1,0 +1,179 @@
+"""Differentiable CPU rasteriser of 3-D gaussians.
+
+`render` and `render_bound` give the image and a state; `render_backward` and `render_bound_backward` take the image's gradient back.
+EWA splatting in 32x32 tiles, one global depth sort, gradients in one slot for each (tile, gaussian): results are bitwise the
+same for any number of threads. float32; float64 in, float64 out (tests).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from gsac.avatar import binding, threads
+from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.raster import backward, forward, project, tiles
+
+
+class Workspace:
+    """Buffers kept from step to step. A rendering and its gradients live in them until the next use of the workspace."""
+
+    def __init__(self, workers: int | None = None):
+        """workers: threads to use; all available cores unless given."""
+        self.workers = workers or threads.available()
+        self._buffers: dict[str, np.ndarray] = {}
+
+    def take(self, name: str, shape: tuple[int, ...], dtype) -> np.ndarray:
+        """An array with any content; the same memory for the same name."""
+        size = int(np.prod(shape))
+        buffer = self._buffers.get(name)
+        if buffer is None or buffer.size < size or buffer.dtype != dtype:
+            buffer = self._buffers[name] = np.empty(size + size // 8, dtype)
+        return buffer[:size].reshape(shape)
+
+
+@dataclass
+class State:
+    """What the backward pass needs of a rendering."""
+
+    camera: Camera
+    workspace: Workspace
+    means: np.ndarray
+    rotations: np.ndarray
+    scales: np.ndarray
+    lens: np.ndarray
+    lattice: np.ndarray
+    splats: np.ndarray
+    slot_start: np.ndarray
+    tile_order: np.ndarray
+    tile_start: np.ndarray
+    pair_gaussian: np.ndarray
+    pair_slot: np.ndarray
+    columns: int
+    rgb: np.ndarray
+    alpha: np.ndarray
+    bound: tuple = field(default=())
+    """vertices, faces, face, mu, quat, log_scale of `render_bound`."""
+
+
+class Rendering(NamedTuple):
+    rgb: np.ndarray
+    """(H, W, 3) premultiplied, without background: an image is rgb + (1 - alpha) background."""
+    alpha: np.ndarray
+    """(H, W)."""
+    state: State
+
+
+class Gradients(NamedTuple):
+    means: np.ndarray
+    """(N, 3)."""
+    rotations: np.ndarray
+    """(N, 3, 3), of the free matrix."""
+    scales: np.ndarray
+    """(N, 3)."""
+    rgb: np.ndarray
+    """(N, 3)."""
+    opacity: np.ndarray
+    """(N,)."""
+
+
+class BoundGradients(NamedTuple):
+    mu: np.ndarray
+    """(N, 3)."""
+    quat: np.ndarray
+    """(N, 4)."""
+    log_scale: np.ndarray
+    """(N, 3)."""
+    rgb: np.ndarray
+    """(N, 3)."""
+    opacity: np.ndarray
+    """(N,)."""
+    vertices: np.ndarray
+    """(V, 3)."""
+
+
+def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Workspace | None = None) -> Rendering:
+    """means: (N, 3) m, camera frame; rotations: (N, 3, 3); scales: (N, 3) m; rgb: (N, 3); opacity: (N,) 0..1."""
+    means = binding.plain(means)
+    real = means.dtype
+    rotations, scales, rgb, opacity = (binding.plain(a, real) for a in (rotations, scales, rgb, opacity))
+    workspace = workspace or Workspace()
+    workers, take, count = workspace.workers, workspace.take, len(means)
+    lens = np.array([*camera.focal, *camera.center], real)
+    splats, boxes = take("splats", (count, project.SPLAT), real), take("boxes", (count, 4), np.int32)
+    threads.share(workers, project.project, means, rotations, scales, rgb, opacity, lens, camera.width, camera.height,
+                  splats, boxes)
+
+    columns, rows = -(-camera.width // project.TILE), -(-camera.height // project.TILE)
+    slot_start = take("slot_start", (count + 1,), np.int32)
+    seen = tiles.slots(boxes, slot_start)
+    unsigned = np.uint32 if real == np.float32 else np.uint64
+    order = tiles.depth_order(splats, slot_start, take("keys", (count,), unsigned), take("order", (count,), np.int32),
+                              take("spare_keys", (count,), unsigned), take("spare", (count,), np.int32))
+    pairs = int(slot_start[count])
+    tile_start = take("tile_start", (columns * rows + 1,), np.int32)
+    pair_gaussian, pair_slot = take("pair_gaussian", (pairs,), np.int32), take("pair_slot", (pairs,), np.int32)
+    tiles.fill(order, seen, boxes, slot_start, columns, tile_start, pair_gaussian, pair_slot)
+    # heavy tiles first, so that they spread evenly over the workers
+    tile_order = np.argsort(-np.diff(tile_start), kind="stable")
+
+    inside = np.arange(forward.LANES)
+    lattice = np.concatenate([inside % forward.BLOCK, inside // forward.BLOCK]).astype(real) + real.type(0.5)
+    image = take("rgb", (camera.height, camera.width, 3), real)
+    alpha = take("alpha", (camera.height, camera.width), real)
+    scratch = take("forward", (workers, forward.PLANES * project.TILE ** 2), real)
+    threads.share(workers, forward.composite, tile_order, tile_start, pair_gaussian, splats, lattice, columns, scratch,
+                  image, alpha)
+    state = State(camera, workspace, means, rotations, scales, lens, lattice, splats, slot_start, tile_order, tile_start,
+                  pair_gaussian, pair_slot, columns, image, alpha)
+    return Rendering(image, alpha, state)
+
+
+def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) -> Gradients:
+    """grad_rgb: (H, W, 3), grad_alpha: (H, W): gradient of a loss with respect to the rendering that gave `state`."""
+    real, count = state.means.dtype, len(state.means)
+    workers, take = state.workspace.workers, state.workspace.take
+    moments = take("moments", (len(state.pair_slot), project.MOMENTS), real)
+    scratch = take("backward", (workers, backward.PLANES * project.TILE ** 2), real)
+    threads.share(workers, backward.composite_backward, state.tile_order, state.tile_start, state.pair_gaussian,
+                  state.pair_slot, state.splats, state.lattice, state.columns, scratch, state.rgb, state.alpha,
+                  binding.plain(grad_rgb, real), binding.plain(grad_alpha, real), moments)
+    gradients = Gradients(take("grad_means", (count, 3), real), take("grad_rotations", (count, 3, 3), real),
+                          take("grad_scales", (count, 3), real), take("grad_rgb", (count, 3), real),
+                          take("grad_opacity", (count,), real))
+    threads.share(workers, project.project_backward, state.means, state.rotations, state.scales, state.lens,
+                  state.camera.width, state.camera.height, state.splats, state.slot_start, moments, *gradients)
+    return gradients
+
+
+def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, camera: Camera,
+                 workspace: Workspace | None = None) -> Rendering:
+    """vertices: (V, 3) m, camera frame; faces: (F, 3) int: the gaussians bound to the posed mesh, rendered."""
+    vertices = binding.plain(vertices)
+    real = vertices.dtype
+    faces, face = binding.plain(faces, np.int32), binding.plain(gaussians.face, np.int32)
+    mu, quat, log_scale = (binding.plain(a, real) for a in (gaussians.mu, gaussians.quat, gaussians.log_scale))
+    workspace = workspace or Workspace()
+    take, n, f = workspace.take, len(face), len(faces)
+    frames = binding.FaceFrames(take("R", (f, 3, 3), real), take("T", (f, 3), real), take("k", (f,), real),
+                                take("valid", (f,), np.bool_))
+    bound = binding.Bound(take("means", (n, 3), real), take("rotations", (n, 3, 3), real), take("scales", (n, 3), real))
+    binding.forward(workspace.workers, vertices, faces, take("used", (f,), np.bool_), frames, face, mu, quat, log_scale, bound)
+    rendering = render(*bound, gaussians.rgb, gaussians.opacity, camera, workspace)
+    rendering.state.bound = (vertices, faces, face, mu, quat, log_scale)
+    return rendering
+
+
+def render_bound_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) -> BoundGradients:
+    """As `render_backward`, for the state of `render_bound`: gradients of the gaussians' own values and of the vertices."""
+    gradients = render_backward(state, grad_rgb, grad_alpha)
+    vertices, faces, face, mu, quat, log_scale = state.bound
+    real, take, n = mu.dtype, state.workspace.take, len(mu)
+    out = binding.BindingGradients(take("grad_mu", (n, 3), real), take("grad_quat", (n, 4), real),
+                                   take("grad_log_scale", (n, 3), real), take("grad_vertices", vertices.shape, real))
+    binding.backward(state.workspace.workers, vertices, faces, face, mu, quat, log_scale, gradients.means,
+                     gradients.rotations, gradients.scales, take("corners", (n, 9), real), out)
+    return BoundGradients(out.mu, out.quat, out.log_scale, gradients.rgb, gradients.opacity, out.vertices)

@@ -1,0 +1,44 @@
+"""What the rasteriser must give: every gaussian at every pixel, in plain torch. Slow; for tests."""
+
+from __future__ import annotations
+
+import torch
+
+from gsac.avatar.camera import Camera
+from gsac.avatar.raster.forward import MAX_ALPHA, STOP
+from gsac.avatar.raster.project import BLUR, FRUSTUM, NEAR
+
+
+def render(means, rotations, scales, rgb, opacity, camera: Camera):
+    """means (N, 3), rotations (N, 3, 3), scales (N, 3), rgb (N, 3), opacity (N,) tensors -> rgb (H, W, 3), alpha (H, W)."""
+    front = means[:, 2] > NEAR
+    means, rotations, scales, rgb, opacity = (t[front] for t in (means, rotations, scales, rgb, opacity))
+    order = torch.argsort(means[:, 2], stable=True)
+    means, rotations, scales, rgb, opacity = (t[order] for t in (means, rotations, scales, rgb, opacity))
+    z = means[:, 2]
+    centre, jacobian = [], torch.zeros(len(z), 2, 3, dtype=means.dtype)
+    rows = []
+    for axis, size in enumerate((camera.width, camera.height)):
+        f, c = camera.focal[axis], camera.center[axis]
+        ratio = means[:, axis] / z
+        centre.append(f * ratio + c)
+        margin = 0.5 * FRUSTUM * size / f
+        clamped = ratio.clamp(-c / f - margin, (size - c) / f + margin)
+        row = [torch.zeros_like(z)] * 3
+        row[axis], row[2] = f / z, -f * clamped / z
+        rows.append(torch.stack(row, 1))
+    jacobian = torch.stack(rows, 1)
+    half = jacobian @ rotations * scales[:, None, :]
+    covariance = half @ half.transpose(1, 2) + BLUR * torch.eye(2, dtype=means.dtype)
+    inverse = torch.linalg.inv(covariance)
+
+    y, x = torch.meshgrid(torch.arange(camera.height, dtype=means.dtype) + 0.5,
+                          torch.arange(camera.width, dtype=means.dtype) + 0.5, indexing="ij")
+    offset = torch.stack([x - centre[0][:, None, None], y - centre[1][:, None, None]], -1)
+    s = 0.5 * torch.einsum("nhwi,nij,nhwj->nhw", offset, inverse, offset)
+    alpha = (opacity[:, None, None] * torch.exp(-s)).clamp(max=MAX_ALPHA)
+    alpha = torch.where(alpha >= 1 / 255, alpha, torch.zeros_like(alpha))
+    after = torch.cumprod(1 - alpha, 0)
+    before = torch.cat([torch.ones_like(after[:1]), after[:-1]])
+    weight = torch.where(after > STOP, before * alpha, torch.zeros_like(alpha))
+    return torch.einsum("nhw,nc->hwc", weight, rgb), weight.sum(0)
