@@ -41,7 +41,7 @@ def decode(raw: np.ndarray, logits: np.ndarray, centers: np.ndarray, size: int, 
     score = sigmoid(logits[:, 0])
     order = np.argsort(-score, kind="stable")
     keep = order[score[order] >= threshold]
-    values = raw[keep].reshape(len(keep), -1, 2) / size
+    values = raw[keep].reshape(len(keep), raw.shape[1] // 2, 2) / size
     middle, extent, points = values[:, 0] + centers[keep], values[:, 1], values[:, 2:] + centers[keep][:, None]
     return Detections(np.hstack([middle - extent / 2, middle + extent / 2]), points, score[keep])
 
@@ -67,5 +67,5 @@ def suppress(found: Detections, overlap: float = 0.3) -> Detections:
         points.append(np.tensordot(weight, found.points[group], axes=1))
         score.append(found.score[rest[0]])
         rest = rest[~similar]
-    return Detections(np.reshape(box, (-1, 4)), np.reshape(points, (len(score), *found.points.shape[1:])),
+    return Detections(np.reshape(box, (-1, 4)), np.reshape(points, (-1, *found.points.shape[1:])),
                       np.array(score))

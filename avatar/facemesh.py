@@ -1,0 +1,126 @@
+"""The 468-point face mesh: where to look, the network, and its correspondence to the 68 iBUG points.
+
+BlazeFace short range on a crop about a rough face box, then the face mesh, then the face mesh again on the crop that
+its own points ask for. Crop factors are the ones the networks were trained with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from gsac.avatar.detections import anchor_centers, decode, suppress
+from gsac.avatar.region import Region, around_points, crop, upright_angle
+from gsac.avatar.tflite import Network, sigmoid
+
+MODELS = ("face_detection_short_range", "face_landmark")
+POINTS = 468
+RIGHT_EYE, LEFT_EYE = 33, 263
+"""Outer corners; right is the person's right."""
+RIGHT_SIDE, LEFT_SIDE = 234, 454
+"""Where the face ends before the ears."""
+EYE_POINTS = {"right": (33, 133, 159, 145), "left": (263, 362, 386, 374)}
+"""Corners and lids; their mean is the eye."""
+NOSE_TIP = 4
+YAW_LIMIT = np.radians(115)
+YAW_DOUBT = np.radians(40)
+
+IBUG68 = np.array([
+    162, 234, 93, 58, 172, 136, 149, 148, 152, 377, 378, 365, 397, 288, 323, 454, 389,
+    70, 63, 105, 66, 107, 336, 296, 334, 293, 300, 168, 197, 5, 4, 75, 97, 2, 326, 305,
+    33, 160, 158, 133, 153, 144, 362, 385, 387, 263, 373, 380,
+    61, 39, 37, 0, 267, 269, 291, 405, 314, 17, 84, 181, 78, 82, 13, 312, 308, 317, 14, 87])
+"""(68,) mesh point of each iBUG-68 point: contour, brows, nose, eyes, mouth."""
+
+
+@dataclass(frozen=True)
+class Face:
+    points: np.ndarray
+    """(468, 3) px; z away from the camera, in pixels at the face's scale, 0 near the face's middle."""
+    presence: float
+    """0..1, the network's own."""
+
+    @property
+    def yaw(self) -> float:
+        """Radians: 0 looks at the camera, + to the frame's right."""
+        across = self.points[LEFT_SIDE] - self.points[RIGHT_SIDE]
+        return float(np.arctan2(across[2], across[0]))
+
+    def facing(self) -> np.ndarray:
+        """(468,) 0..1: 1 for points that face the camera, down to 0 for those that the head itself hides.
+
+        The outward direction is taken as that from the middle between the ears."""
+        out = self.points - (self.points[LEFT_SIDE] + self.points[RIGHT_SIDE]) / 2
+        toward = -out[:, 2] / np.maximum(np.linalg.norm(out, axis=1), 1e-6)
+        return np.clip(toward / 0.3 + 1, 0, 1)
+
+
+class FaceMesh:
+    """models: name -> file, at least `MODELS`."""
+
+    def __init__(self, models: dict[str, Path], threads: int | None = None):
+        self._detector = Network(models["face_detection_short_range"], threads)
+        self._mesh = Network(models["face_landmark"], threads)
+        self._anchors = anchor_centers(self._detector.width, (8, 16, 16, 16))
+
+    def find(self, image: np.ndarray, rough: Region, yaw: float | None = None, threshold: float = 0.5) -> Face | None:
+        """image: (H, W, 3) uint8; rough: a region about three face boxes wide, eyes level; yaw: radians, where the
+        body's points say the head looks (0 at the camera, + to the frame's right), None when that is not known.
+
+        On a profile the networks like to lay a frontal mesh over half a face and to believe in it, so a mesh that looks
+        more than `YAW_DOUBT` away from the body's head is not taken, and a head turned beyond `YAW_LIMIT` has no face.
+        None when no look gives a mesh that both the network and the head's direction support.
+        """
+        if yaw is not None and abs(yaw) > YAW_LIMIT:
+            return None
+        for look in (rough, Region(rough.center, rough.side), rough.scaled(2 / 3), rough.scaled(4 / 3)):
+            region = self.detect(image, look, threshold)
+            if region is None:
+                continue
+            first = self.read(image, region)
+            again = self.read(image, self.region_of(first.points))
+            for face in (again, first):
+                if face.presence >= threshold and (yaw is None or abs(_turn(face.yaw - yaw)) < YAW_DOUBT):
+                    return face
+        return None
+
+    def detect(self, image: np.ndarray, rough: Region, threshold: float = 0.5) -> Region | None:
+        """The mesh network's region from the best detection inside `rough`."""
+        size = self._detector.width
+        raw, logits = self._detector(crop(image, rough, size, outside="black") * 2 - 1)
+        found = suppress(decode(raw, logits, self._anchors, size, threshold))
+        if not len(found):
+            return None
+        points = rough.to_frame(found.points[0])
+        right, left = points[0], points[1]
+        return around_points(points, upright_angle(right, left, 0.0)).scaled(2.0).moved(0.0, -0.1)
+
+    def read(self, image: np.ndarray, region: Region) -> Face:
+        """One look of the mesh network."""
+        size = self._mesh.width
+        raw, presence = self._mesh(crop(image, region, size))
+        points = raw.reshape(POINTS, 3).astype(np.float64) / size
+        xy = region.to_frame(points[:, :2])
+        return Face(np.hstack([xy, points[:, 2:] * region.side]), float(sigmoid(presence.reshape(-1)[0])))
+
+    @staticmethod
+    def region_of(points: np.ndarray) -> Region:
+        """points: (468, 2 or 3) px. The region that centres them as the network was trained."""
+        angle = upright_angle(points[RIGHT_EYE, :2], points[LEFT_EYE, :2], 0.0)
+        return around_points(points[:, :2], angle).scaled(1.5)
+
+
+def _turn(angle: float) -> float:
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def region_of_head(points: np.ndarray) -> Region:
+    """points: (11, 2) px, BlazePose's nose, eyes, ears and mouth. The rough region for `FaceMesh.find`."""
+    return around_points(points, upright_angle(points[5], points[2], 0.0)).scaled(3.0)
+
+
+def head_yaw(world: np.ndarray) -> float:
+    """world: (11, 3) m, BlazePose's head points. Radians as `Face.yaw`."""
+    forward = world[0] - (world[7] + world[8]) / 2
+    return float(np.arctan2(forward[0], -forward[2]))

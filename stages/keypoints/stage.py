@@ -1,0 +1,73 @@
+"""Runs the detector over the clip, writes keypoints.npz and says what was not seen."""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
+from gsac.avatar.wholebody import FACE, HANDS
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.keypoints.frame import ARRAYS, Frame
+from gsac.stages.keypoints.mediapipe import Mediapipe
+
+DETECTORS = {"mediapipe": Mediapipe}
+EDGE = 0.004
+"""Width of the rim of the frame, as a part of its longer side, that counts as touching it."""
+
+
+def run(job: Job) -> None:
+    clip = Clip.read(job.inputs["split/clip.json"])
+    paths = frame_paths(job.inputs["split/frames"])
+    detector = DETECTORS[job.config.detector](job.models, job.config)
+    frames, at_edge = [], []
+    for t, path in enumerate(paths):
+        image = read_frame(path)
+        frame = detector.look(image)
+        frames.append(frame)
+        at_edge.append(frame.seen and touches_edge(frame, image.shape[1], image.shape[0]))
+        job.progress(t + 1, len(paths), "frames")
+    say(job, clip, frames, at_edge)
+    arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in ARRAYS}
+    write_arrays(job.out / "keypoints.npz", detector=np.array(job.config.detector), **arrays)
+
+
+def touches_edge(frame: Frame, width: int, height: int) -> bool:
+    """Whether a point of the body, or the crown above the eyes, lies on the frame's rim or outside of it."""
+    xy = frame.pose33[:, :2] if frame.pose33.any() else frame.xy[:23][frame.score[:23] > 0]
+    if frame.pose33.any():
+        eyes, mouth = xy[[2, 5]].mean(axis=0), xy[[9, 10]].mean(axis=0)
+        xy = np.vstack([xy, eyes + 1.6 * (eyes - mouth)])
+    rim = EDGE * max(width, height)
+    return bool((xy < rim).any() or (xy[:, 0] > width - rim).any() or (xy[:, 1] > height - rim).any())
+
+
+def say(job: Job, clip: Clip, frames: list[Frame], at_edge: list[bool]) -> None:
+    """Warns of what the later stages have to do without; nobody anywhere is an error."""
+    seen = np.array([f.seen for f in frames])
+    if not seen.any():
+        raise BadInput(f"{clip.source_name or 'the clip'}: no person was found in any of its {len(frames)} frames; "
+                       "film one whole person, upright, at least a third of the frame high, in good light")
+    if not seen.all():
+        job.warn(f"No person was found in {name_frames(~seen)}; these frames carry no points.")
+    second = np.array([f.person2_score > 0 for f in frames])
+    if second.any():
+        job.warn(f"A second person was seen in {name_frames(second)}; only the first one is followed. "
+                 "Keep others out of the picture or cut these frames.")
+    if any(at_edge):
+        job.warn(f"The person touches the edge of the picture in {name_frames(np.array(at_edge))}; "
+                 "parts outside of it are guessed.")
+    for side, points in HANDS.items():
+        if not any(f.score[points].any() for f in frames):
+            job.warn(f"The {side} hand was never seen; its fingers stay at rest.")
+    if not any(f.score[FACE].any() for f in frames):
+        job.warn("The face was never seen from the front; it stays without expression.")
+
+
+def name_frames(mask: np.ndarray) -> str:
+    """`frame 3` or `12 of 60 frames (0-3, 17, 40-46)`; long lists are cut."""
+    index = np.flatnonzero(mask)
+    if len(index) == 1:
+        return f"frame {index[0]}"
+    runs = np.split(index, np.flatnonzero(np.diff(index) > 1) + 1)
+    words = [str(r[0]) if len(r) == 1 else f"{r[0]}-{r[-1]}" for r in runs]
+    more = ", ..." if len(words) > 8 else ""
+    return f"{len(index)} of {len(mask)} frames ({', '.join(words[:8])}{more})"
