@@ -1,0 +1,25 @@
+"""export: the trained avatar as files that other tools open.
+
+takes  split/clip.json, train/avatar.npz, train/body.npz
+gives  avatar.gsac: everything in one container (docs/gsac-format.md)
+       avatar.ply: standard 3DGS, posed, metres, 3DGS axes
+       avatar.glb: skinned animated mesh, and the gaussians with KHR_gaussian_splatting
+       viewer.html: one page that opens from disk
+"""
+
+from gsac.avatar.artifacts import check_file
+from gsac.stages.contract import Output, Stage
+from gsac.stages.export.config import ExportConfig
+
+STAGE = Stage(
+    name="export",
+    inputs=("split/clip.json", "train/avatar.npz", "train/body.npz"),
+    outputs=(
+        Output("avatar.gsac", check_file),
+        Output("avatar.ply", check_file),
+        Output("avatar.glb", check_file),
+        Output("viewer.html", check_file),
+    ),
+    config=ExportConfig,
+    packages=("numpy", "scipy"),
+)

@@ -1,0 +1,180 @@
+"""`avatar.glb`: a skinned, vertex-coloured, animated mesh for any glTF tool, with the gaussians beside it.
+
+Mesh: 55 joints with identity rest rotations, at most 4 weights a vertex, y up, facing +z, feet at y = 0.
+Gaussians: a POINTS primitive in T-pose with KHR_gaussian_splatting, on the same skin, each with the mesh face that it
+is bound to in `_GSAC_FACE`.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gsac.stages.export.ply import SH0
+from gsac.stages.export.rigged import Clip, RiggedAvatar
+
+FLOAT, U16, U32, U8 = 5126, 5123, 5125, 5121
+CODES = {np.dtype("<f4"): FLOAT, np.dtype("<u2"): U16, np.dtype("<u4"): U32, np.dtype("u1"): U8}
+KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+ARRAY_BUFFER, ELEMENT_BUFFER = 34962, 34963
+POINTS, TRIANGLES = 0, 4
+SPLATS = "KHR_gaussian_splatting"
+BARE = (0.6, 0.6, 0.6)
+"""sRGB of an avatar without gaussians."""
+
+
+def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales: np.ndarray) -> bytes:
+    """The file's bytes. means (N, 3) m, quats (N, 4) wxyz, scales (N, 3) m: the gaussians in
+    T-pose, feet at y = 0."""
+    file = _Buffer()
+    J, g = len(avatar.joints), avatar.gaussians
+    ground = np.array([0, avatar.ground, 0], np.float32)
+    vertices, joints = avatar.vertices - ground, avatar.joints - ground
+    inverse = np.tile(np.eye(4, dtype=np.float32), (J, 1, 1))
+    inverse[:, 3, :3] = -joints
+    nodes = []
+    for j, (name, parent) in enumerate(zip(avatar.joint_names, avatar.parents, strict=True)):
+        node = {"name": name, "translation": (joints[j] - (joints[parent] if parent >= 0 else 0)).tolist()}
+        children = np.flatnonzero(avatar.parents == j).tolist()
+        nodes.append(node | ({"children": children} if children else {}))
+    root = int(np.flatnonzero(avatar.parents < 0)[0])
+    mesh = {"primitives": [{
+        "mode": TRIANGLES, "material": 0, "indices": file.add(avatar.faces.reshape(-1).astype("<u4"), ELEMENT_BUFFER),
+        "attributes": {
+            "POSITION": file.add(vertices, ARRAY_BUFFER, bounds=True),
+            "NORMAL": file.add(vertex_normals(vertices, avatar.faces), ARRAY_BUFFER),
+            "COLOR_0": file.add(_linear(vertex_colours(avatar)), ARRAY_BUFFER),
+            **_skin_attributes(file, avatar.skin_index, avatar.skin_weight),
+        }}], "name": "body"}
+    corners = avatar.faces[g["face"]]
+    rgb = np.clip(g["rgb"], 0, 1)
+    points = {"primitives": [{
+        "mode": POINTS, "attributes": {
+            "POSITION": file.add(means.astype("<f4"), ARRAY_BUFFER, bounds=True),
+            "COLOR_0": file.add(np.column_stack([_linear(rgb), g["opacity"]]).astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:ROTATION": file.add(quats[:, [1, 2, 3, 0]].astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:SCALE": file.add(scales.astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:OPACITY": file.add(g["opacity"].astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:SH_DEGREE_0_COEF_0": file.add(((g["rgb"] - 0.5) / SH0).astype("<f4"), ARRAY_BUFFER),
+            "_GSAC_FACE": file.add(g["face"].astype("<f4"), ARRAY_BUFFER),
+            **_skin_attributes(file, *_point_skin(avatar, corners)),
+        }, "extensions": {SPLATS: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display",
+                                   "projection": "perspective", "sortingMethod": "cameraDistance"}}}],
+        "name": "gaussians"}
+    nodes += [{"name": "body", "mesh": 0, "skin": 0}, {"name": "gaussians", "mesh": 1, "skin": 0}]
+    document = {
+        "asset": {"version": "2.0", "generator": "gsac", "copyright": "; ".join(avatar.licence.values())},
+        "extensionsUsed": [SPLATS], "scene": 0,
+        "scenes": [{"name": "avatar", "nodes": [root, J, J + 1]}], "nodes": nodes, "meshes": [mesh, points],
+        "skins": [{"joints": list(range(J)), "skeleton": root, "inverseBindMatrices": file.add(inverse.reshape(J, 16))}],
+        "materials": [{"name": "vertex colours",
+                       "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.9}}],
+    }
+    if avatar.clips:
+        document["animations"] = [
+            _animation(file, name, clip, avatar, document["nodes"][root]["translation"], root)
+            for name, clip in avatar.clips.items()]
+    return file.glb(document)
+
+
+def vertex_colours(avatar: RiggedAvatar) -> np.ndarray:
+    """(V, 3) float32 sRGB: mean of the gaussians on a vertex's faces by opacity; others take the nearest coloured one."""
+    from scipy.spatial import cKDTree
+
+    g, V = avatar.gaussians, len(avatar.vertices)
+    total, weight = np.zeros((V, 3)), np.zeros(V)
+    for corner in avatar.faces[g["face"]].T:
+        np.add.at(total, corner, np.clip(g["rgb"], 0, 1) * g["opacity"][:, None])
+        np.add.at(weight, corner, g["opacity"])
+    seen = weight > 1e-6
+    if not seen.any():
+        return np.tile(np.float32(BARE), (V, 1))
+    colours = total / np.maximum(weight, 1e-6)[:, None]
+    nearest = cKDTree(avatar.vertices[seen]).query(avatar.vertices[~seen])[1]
+    colours[~seen] = colours[seen][nearest]
+    return colours.astype(np.float32)
+
+
+def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(V, 3) float32, unit, area-weighted; +z at a vertex without a face."""
+    v0, v1, v2 = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
+    face_normal = np.cross(v1 - v0, v2 - v0)
+    normal = np.zeros((len(vertices), 3))
+    for i in range(3):
+        np.add.at(normal, faces[:, i], face_normal)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.where(length > 1e-12, normal / np.maximum(length, 1e-12), (0, 0, 1)).astype(np.float32)
+
+
+def _linear(srgb: np.ndarray) -> np.ndarray:
+    """glTF's COLOR_0 is linear light."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def _skin_attributes(file: _Buffer, index: np.ndarray, weight: np.ndarray) -> dict[str, int]:
+    """index, weight: (n, 4). Joints without weight are 0, as the glTF validator asks."""
+    weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
+    return {"JOINTS_0": file.add(np.where(weight > 0, index, 0).astype("u1"), ARRAY_BUFFER),
+            "WEIGHTS_0": file.add(weight, ARRAY_BUFFER)}
+
+
+def _point_skin(avatar: RiggedAvatar, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """corners: (N, 3) vertices of each gaussian's face. Returns index, weight (N, 4): their mean, four largest kept."""
+    dense = np.zeros((len(corners), len(avatar.joints)))
+    rows = np.arange(len(corners))[:, None]
+    for corner in corners.T:
+        np.add.at(dense, (rows, avatar.skin_index[corner]), avatar.skin_weight[corner])
+    index = np.argsort(-dense, axis=1, kind="stable")[:, :4]
+    return index, np.take_along_axis(dense, index, axis=1)
+
+
+def _animation(file: _Buffer, name: str, clip: Clip, avatar: RiggedAvatar, rest: list[float], root: int) -> dict:
+    """glTF animation; a looping clip ends with its first key."""
+    closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]
+    times = file.add((np.arange(len(closed)) / clip.fps).astype("<f4"), bounds=True)
+    samplers, channels = [], []
+
+    def track(node: int, path: str, values: np.ndarray) -> None:
+        samplers.append({"input": times, "output": file.add(values.astype("<f4"))})
+        channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
+
+    for j, joint in enumerate(clip.joints):
+        quats = Rotation.from_rotvec(clip.rotation[closed, j]).as_quat()
+        track(avatar.joint_names.index(joint), "rotation", np.where(quats[:, 3:] < 0, -quats, quats))
+    track(root, "translation", clip.transl[closed] + np.asarray(rest))
+    return {"name": name, "samplers": samplers, "channels": channels}
+
+
+class _Buffer:
+    """The binary chunk and its accessors, filled in order."""
+
+    def __init__(self) -> None:
+        self.data, self.views, self.accessors = bytearray(), [], []
+
+    def add(self, array: np.ndarray, target: int | None = None, bounds: bool = False) -> int:
+        """array: (n,) or (n, width). Returns the accessor's index."""
+        array = np.ascontiguousarray(array)
+        width = 1 if array.ndim == 1 else array.shape[1]
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes}
+        self.views.append(view | ({"target": target} if target else {}))
+        accessor = {"bufferView": len(self.views) - 1, "componentType": CODES[array.dtype], "count": len(array),
+                    "type": KINDS[width]}
+        if bounds:
+            flat = array.reshape(len(array), width)
+            accessor |= {"min": flat.min(0).tolist(), "max": flat.max(0).tolist()}
+        self.accessors.append(accessor)
+        self.data += array.tobytes()
+        self.data += b"\0" * (-len(self.data) % 4)
+        return len(self.accessors) - 1
+
+    def glb(self, document: dict) -> bytes:
+        document = document | {"buffers": [{"byteLength": len(self.data)}], "bufferViews": self.views,
+                               "accessors": self.accessors}
+        text = json.dumps(document, sort_keys=True, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        size = 12 + 8 + len(text) + 8 + len(self.data)
+        return (struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON") + text
+                + struct.pack("<I4s", len(self.data), b"BIN\0") + bytes(self.data))

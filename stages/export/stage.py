@@ -1,0 +1,79 @@
+"""Runs `export`: body and gaussians -> one avatar in memory -> each file from that."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gsac.avatar.artifacts import Clip
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.gaussians import Gaussians
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.export.glb import glb_bytes
+from gsac.stages.export.motion import add_motion
+from gsac.stages.export.page import page_bytes
+from gsac.stages.export.ply import ply_bytes
+from gsac.stages.export.rigged import RiggedAvatar
+
+MOVED = 1e-4
+"""m: a vertex that an expression moves less than this is left out."""
+
+
+def run(job: Job) -> None:
+    params = BodyParams.read(job.inputs["train/body.npz"])
+    body = Body.load(job.models.get("body"))
+    if params.model and params.model != body.digest:
+        raise BadInput(f"{job.inputs['train/body.npz']}: it was fitted with the body model {params.model[:12]}, "
+                       f"but the one at hand is {body.digest[:12]}; run again from smplx with this body model")
+    gaussians = Gaussians.read(job.inputs["train/avatar.npz"])
+    if not len(gaussians) or gaussians.face.min() < 0 or gaussians.face.max() >= len(body.faces):
+        raise BadInput(f"{job.inputs['train/avatar.npz']}: its {len(gaussians)} gaussians must be at least one and lie on "
+                       f"the faces 0..{len(body.faces) - 1} of the body")
+    clip = Clip.read(job.inputs["split/clip.json"])
+    avatar = rigged(body, params, gaussians)
+    avatar.licence = {"avatar": job.config.licence, "body": "the body model's own terms; the embedded open body is CC0-1.0"}
+    avatar.provenance = {"gsac": version("gsac"), "body_model": body.digest, "clip_sha256": clip.source_sha256}
+    add_motion(avatar, job.config.clip_names())
+
+    container = avatar.to_bytes()
+    files = {
+        "avatar.gsac": lambda: container,
+        "avatar.ply": lambda: ply_bytes(*posed_gaussians(avatar, avatar.pose(job.config.ply_pose.upper())),
+                                        avatar.gaussians["rgb"], avatar.gaussians["opacity"], job.config.ply_pad_sh),
+        "avatar.glb": lambda: glb_bytes(avatar, *posed_gaussians(avatar, avatar.pose("T"))),
+        "viewer.html": lambda: page_bytes(container),
+    }
+    for done, (name, make) in enumerate(files.items()):
+        job.progress(done, len(files), "files")
+        (job.out / name).write_bytes(make())
+    job.progress(len(files), len(files), "files")
+
+
+def rigged(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar:
+    """The avatar at rest: betas and joint offsets applied, no expression."""
+    vertices, joints = body.rest(params.betas, None, params.joint_offset)
+    moves = [np.flatnonzero(np.linalg.norm(body.exprdirs[:, :, e], axis=1) > MOVED)
+             for e in range(len(body.expression_names))]
+    return RiggedAvatar(
+        vertices=vertices, faces=body.faces.astype(np.int32), joints=joints, parents=body.parents.astype(np.int32),
+        joint_names=list(body.joint_names), skin_index=body.skin_index, skin_weight=body.skin_weight,
+        expression_names=list(body.expression_names),
+        expression_start=np.cumsum([0, *map(len, moves)]).astype(np.int32),
+        expression_vertex=np.concatenate([*moves, []]).astype(np.int32),
+        expression_delta=np.concatenate([*(body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
+        jaw_actions=body.jaw_actions.astype(np.float32),
+        gaussians={name: getattr(gaussians, name) for name in ("face", "mu", "quat", "log_scale", "rgb", "opacity")},
+    )
+
+
+def posed_gaussians(avatar: RiggedAvatar, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """pose: (J, 3). Returns means (N, 3) m, quats (N, 4) wxyz, scales (N, 3) m in canonical axes, feet at y = 0."""
+    vertices = avatar.posed(pose)
+    vertices = vertices - np.array([0, avatar.ground, 0], np.float32)
+    g = avatar.gaussians
+    bound = bind(face_frames(vertices, avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    xyzw = Rotation.from_matrix(bound.rotations).as_quat()
+    return bound.means, xyzw[:, [3, 0, 1, 2]].astype(np.float32), bound.scales

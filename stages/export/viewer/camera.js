@@ -1,0 +1,88 @@
+// Orbit camera with OpenCV axes (x right, y down, z forward), and the gestures that move it.
+
+class OrbitCamera {
+  constructor(low, high) {
+    this.low = low;
+    this.high = high;
+    this.fov = 30;
+    this.view = new Float32Array(12);
+    this.reset(1);
+  }
+
+  // aspect: width over height; puts the whole figure into the picture.
+  reset(aspect) {
+    this.yaw = 0;
+    this.pitch = 4;
+    this.target = this.low.map((l, i) => (l + this.high[i]) / 2);
+    const tall = (this.high[1] - this.low[1]) * 0.62, wide = (this.high[0] - this.low[0]) * 0.56 / aspect;
+    this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (this.high[2] - this.low[2]) / 2;
+  }
+
+  focal(height) {
+    return height / 2 / Math.tan(this.fov * Math.PI / 360);
+  }
+
+  // Fills this.view: 3x4, row by row, world to camera.
+  update() {
+    const y = this.yaw * Math.PI / 180, p = this.pitch * Math.PI / 180;
+    const back = [Math.sin(y) * Math.cos(p), Math.sin(p), Math.cos(y) * Math.cos(p)];
+    const right = [Math.cos(y), 0, -Math.sin(y)], forward = back.map((v) => -v);
+    const down = [forward[1] * right[2] - forward[2] * right[1], forward[2] * right[0] - forward[0] * right[2],
+      forward[0] * right[1] - forward[1] * right[0]];
+    const eye = this.target.map((t, i) => t + this.distance * back[i]);
+    [right, down, forward].forEach((axis, r) => {
+      this.view.set(axis, r * 4);
+      this.view[r * 4 + 3] = -(axis[0] * eye[0] + axis[1] * eye[1] + axis[2] * eye[2]);
+    });
+  }
+
+  turn(dx, dy) {
+    this.yaw -= dx * 0.35;
+    this.pitch = Math.min(85, Math.max(-30, this.pitch + dy * 0.3));
+  }
+
+  zoom(factor) {
+    this.distance = Math.min(30, Math.max(0.35, this.distance * factor));
+  }
+
+  pan(dx, dy, height) {
+    const step = this.distance / this.focal(height);
+    for (let i = 0; i < 3; i++) this.target[i] -= step * (dx * this.view[i] + dy * this.view[4 + i]);
+  }
+
+  // onMove is called with each gesture.
+  listen(element, onMove) {
+    const fingers = new Map();
+    element.addEventListener("contextmenu", (e) => e.preventDefault());
+    element.addEventListener("pointerdown", (e) => {
+      element.setPointerCapture(e.pointerId);
+      fingers.set(e.pointerId, [e.clientX, e.clientY]);
+    });
+    const lift = (e) => fingers.delete(e.pointerId);
+    element.addEventListener("pointerup", lift);
+    element.addEventListener("pointercancel", lift);
+    element.addEventListener("pointermove", (e) => {
+      const old = fingers.get(e.pointerId);
+      if (!old) return;
+      const dx = e.clientX - old[0], dy = e.clientY - old[1];
+      if (fingers.size === 2) {
+        const other = [...fingers].find(([id]) => id !== e.pointerId)[1];
+        const before = Math.hypot(old[0] - other[0], old[1] - other[1]);
+        const after = Math.hypot(e.clientX - other[0], e.clientY - other[1]);
+        if (after > 1) this.zoom(before / after);
+        this.pan(dx / 2, dy / 2, element.clientHeight);
+      } else if (e.buttons & 6 || e.shiftKey) {
+        this.pan(dx, dy, element.clientHeight);
+      } else {
+        this.turn(dx, dy);
+      }
+      fingers.set(e.pointerId, [e.clientX, e.clientY]);
+      onMove();
+    });
+    element.addEventListener("wheel", (e) => {
+      e.preventDefault();
+      this.zoom(Math.exp(Math.sign(e.deltaY) * Math.min(Math.abs(e.deltaY), 100) * 0.0015));
+      onMove();
+    }, { passive: false });
+  }
+}

@@ -1,0 +1,191 @@
+// Draws the sorted gaussians with WebGL2: one indexed draw of four corners a gaussian, blended from far to near.
+// As trained: covariance + 0.3 px, alpha = min(0.999, opacity exp(-s)), nothing below 1/255.
+
+const SPLAT_VERTEX = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp usampler2D;
+uniform sampler2D gaussians;
+uniform sampler2D colours;
+uniform usampler2D order;
+uniform vec4 view[3];
+uniform vec2 size;
+uniform float focal;
+uniform vec3 blend;
+out vec4 colour;
+out vec2 sigmas;
+
+void main() {
+  int rank = gl_VertexID >> 2;
+  int id = int(texelFetch(order, ivec2(rank % ORDER_ROW, rank / ORDER_ROW), 0).r);
+  ivec2 at = ivec2(id % DATA_ROW, id / DATA_ROW);
+  vec4 d0 = texelFetch(gaussians, ivec2(at.x * 3, at.y), 0);
+  vec4 d1 = texelFetch(gaussians, ivec2(at.x * 3 + 1, at.y), 0);
+  vec4 d2 = texelFetch(gaussians, ivec2(at.x * 3 + 2, at.y), 0);
+  colour = texelFetch(colours, at, 0);
+  sigmas = vec2(0);
+  gl_Position = vec4(0, 0, 2, 1);
+  vec4 p = vec4(d0.xyz, 1);
+  vec3 c = vec3(dot(view[0], p), dot(view[1], p), dot(view[2], p));
+  if (c.z < NEAR || colour.a < blend.z) return;
+
+  mat3 world = mat3(d0.w, d1.x, d1.y, d1.x, d1.z, d1.w, d1.y, d1.w, d2.x);
+  vec2 tangent = clamp(c.xy / c.z, -WIDE * size / (2.0 * focal), WIDE * size / (2.0 * focal));
+  vec3 row0 = (view[0].xyz - tangent.x * view[2].xyz) * (focal / c.z);
+  vec3 row1 = (view[1].xyz - tangent.y * view[2].xyz) * (focal / c.z);
+  vec3 side0 = world * row0;
+  float xx = dot(row0, side0) + blend.x, xy = dot(row1, side0), yy = dot(row1, world * row1) + blend.x;
+
+  float middle = 0.5 * (xx + yy), spread = length(vec2(0.5 * (xx - yy), xy));
+  float large = middle + spread, small = max(middle - spread, 1e-6);
+  vec2 axis = spread < 1e-6 * middle ? vec2(1, 0) : normalize(xx > yy ? vec2(large - yy, xy) : vec2(xy, large - xx));
+  float reach = sqrt(2.0 * log(colour.a / blend.z)) + 1e-3;
+  sigmas = reach * vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
+  vec2 offset = sigmas.x * sqrt(large) * axis + sigmas.y * sqrt(small) * vec2(-axis.y, axis.x);
+  vec2 pixel = focal * c.xy / c.z + offset;
+  gl_Position = vec4(2.0 * pixel / size * vec2(1, -1), 0, 1);
+}`;
+
+const SPLAT_FRAGMENT = `#version 300 es
+precision highp float;
+uniform vec3 blend;
+in vec4 colour;
+in vec2 sigmas;
+out vec4 pixel;
+
+void main() {
+  float alpha = min(blend.y, colour.a * exp(-0.5 * dot(sigmas, sigmas)));
+  if (alpha < blend.z) discard;
+  pixel = vec4(colour.rgb * alpha, alpha);
+}`;
+
+const FLOOR_VERTEX = `#version 300 es
+precision highp float;
+uniform vec4 view[3];
+uniform vec2 size;
+uniform float focal;
+uniform vec4 disc;
+out vec2 place;
+
+void main() {
+  place = vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
+  vec4 p = vec4(disc.x + place.x * disc.w, disc.y, disc.z + place.y * disc.w, 1);
+  vec3 c = vec3(dot(view[0], p), dot(view[1], p), dot(view[2], p));
+  gl_Position = vec4(2.0 * focal * c.xy / size * vec2(1, -1), 0, c.z);
+}`;
+
+const FLOOR_FRAGMENT = `#version 300 es
+precision highp float;
+uniform float strength;
+in vec2 place;
+out vec4 pixel;
+
+void main() {
+  float r = length(place);
+  pixel = vec4(0, 0, 0, strength * smoothstep(1.0, 0.0, r) * smoothstep(1.0, 0.0, r));
+}`;
+
+const NEAR = 0.05;
+const WIDE = 1.3;
+
+class Painter {
+  constructor(canvas, avatar, binding, sort) {
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true,
+      powerPreference: "high-performance" });
+    if (!gl) throw new Error("this browser offers no WebGL2, which the viewer draws with");
+    Object.assign(this, { gl, canvas, avatar, binding, sort });
+    const { low_pass_px2: lowPass = 0.3, alpha_max: most = 0.999, alpha_min: least = 1 / 255 } = avatar.head.blend || {};
+    this.blend = [lowPass, most, least];
+    const constants = { ORDER_ROW: DepthSort.PER_ROW, DATA_ROW: Binding.PER_ROW, NEAR: NEAR.toFixed(3), WIDE: WIDE.toFixed(3) };
+    const vertex = Object.entries(constants).reduce((text, [name, value]) => text.replaceAll(name, value), SPLAT_VERTEX);
+    this.splats = this.program(vertex, SPLAT_FRAGMENT);
+    this.floor = this.program(FLOOR_VERTEX, FLOOR_FRAGMENT);
+    this.gaussians = this.texture(gl.RGBA32F, Binding.PER_ROW * 3, binding.rows);
+    this.order = this.texture(gl.R32UI, DepthSort.PER_ROW, sort.order.length / DepthSort.PER_ROW);
+    this.colours = this.texture(gl.RGBA32F, Binding.PER_ROW, binding.rows);
+    const colours = new Float32Array(binding.rows * Binding.PER_ROW * 4);
+    for (let i = 0; i < binding.count; i++) {
+      colours.set(avatar.rgb.subarray(i * 3, i * 3 + 3), i * 4);
+      colours[i * 4 + 3] = avatar.opacity[i];
+    }
+    this.fill(this.colours, Binding.PER_ROW, binding.rows, gl.RGBA, gl.FLOAT, colours);
+    const corners = new Uint32Array(binding.count * 6);
+    for (let i = 0; i < binding.count; i++) corners.set([0, 1, 2, 2, 1, 3].map((c) => i * 4 + c), i * 6);
+    gl.bindVertexArray(gl.createVertexArray());
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  }
+
+  program(vertex, fragment) {
+    const gl = this.gl, program = gl.createProgram();
+    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+    const places = {};
+    for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
+      const name = gl.getActiveUniform(program, i).name.replace("[0]", "");
+      places[name] = gl.getUniformLocation(program, name);
+    }
+    return { program, places };
+  }
+
+  texture(format, width, height) {
+    const gl = this.gl, texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    return texture;
+  }
+
+  fill(texture, width, height, format, type, data) {
+    const gl = this.gl;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, format, type, data);
+  }
+
+  // background: rgb in 0..1; shadow: {x, y, z, radius} on the floor, or null.
+  draw(camera, background, shadow) {
+    const { gl, canvas, binding, sort } = this, width = canvas.width, height = canvas.height;
+    camera.update();
+    sort.update(binding.data, camera.view);
+    this.fill(this.gaussians, Binding.PER_ROW * 3, binding.rows, gl.RGBA, gl.FLOAT, binding.data);
+    this.fill(this.order, DepthSort.PER_ROW, sort.order.length / DepthSort.PER_ROW, gl.RED_INTEGER, gl.UNSIGNED_INT, sort.order);
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(background[0], background[1], background[2], 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    if (shadow && camera.pitch > 0) {
+      this.use(this.floor, camera, width, height);
+      gl.uniform4f(this.floor.places.disc, shadow.x, shadow.y, shadow.z, shadow.radius);
+      gl.uniform1f(this.floor.places.strength, 0.5);
+      gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    }
+    this.use(this.splats, camera, width, height);
+    const places = this.splats.places;
+    gl.uniform3fv(places.blend, this.blend);
+    [[this.gaussians, places.gaussians], [this.colours, places.colours], [this.order, places.order]].forEach(([texture, place], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(place, unit);
+    });
+    gl.activeTexture(gl.TEXTURE0);
+    gl.drawElements(gl.TRIANGLES, binding.count * 6, gl.UNSIGNED_INT, 0);
+  }
+
+  use(program, camera, width, height) {
+    const gl = this.gl;
+    gl.useProgram(program.program);
+    gl.uniform4fv(program.places.view, camera.view);
+    gl.uniform2f(program.places.size, width, height);
+    gl.uniform1f(program.places.focal, camera.focal(height));
+  }
+}

@@ -1,0 +1,99 @@
+"""A small asymmetric figure with the 55 joints: a tube around each bone, gaussians on every face, the left hand red."""
+
+import numpy as np
+import pytest
+from gsac.stages.export.motion import add_motion
+from gsac.stages.export.rigged import RiggedAvatar
+
+BODY = [  # name, parent, rest place in m (y up, left = +x)
+    ("pelvis", -1, (0, 0, 0)), ("left_hip", 0, (.09, -.08, 0)), ("right_hip", 0, (-.09, -.08, 0)),
+    ("spine1", 0, (0, .12, 0)), ("left_knee", 1, (.1, -.46, 0)), ("right_knee", 2, (-.1, -.46, 0)),
+    ("spine2", 3, (0, .25, 0)), ("left_ankle", 4, (.1, -.86, -.02)), ("right_ankle", 5, (-.1, -.86, -.02)),
+    ("spine3", 6, (0, .34, 0)), ("left_foot", 7, (.11, -.92, .12)), ("right_foot", 8, (-.11, -.92, .12)),
+    ("neck", 9, (0, .52, 0)), ("left_collar", 9, (.07, .45, 0)), ("right_collar", 9, (-.07, .45, 0)),
+    ("head", 12, (0, .62, .02)), ("left_shoulder", 13, (.18, .46, 0)), ("right_shoulder", 14, (-.18, .46, 0)),
+    ("left_elbow", 16, (.44, .46, 0)), ("right_elbow", 17, (-.44, .46, 0)), ("left_wrist", 18, (.69, .46, 0)),
+    ("right_wrist", 19, (-.69, .46, 0)), ("jaw", 15, (0, .63, .06)), ("left_eye_smplhf", 15, (.03, .70, .1)),
+    ("right_eye_smplhf", 15, (-.03, .70, .1)),
+]
+FINGERS = {"index": .03, "middle": .01, "pinky": -.03, "ring": -.01, "thumb": .05}
+
+
+def skeleton():
+    """joint names, parents, joints (55, 3)."""
+    rows = list(BODY)
+    for side, wrist, out in (("left", 20, 1), ("right", 21, -1)):
+        for finger, z in FINGERS.items():
+            for k in range(3):
+                parent = wrist if k == 0 else len(rows) - 1
+                reach = .69 + .05 + .03 * k if finger != "thumb" else .69 + .02 + .02 * k
+                rows.append((f"{side}_{finger}{k + 1}", parent, (out * reach, .46, z)))
+    names, parents, places = zip(*rows, strict=True)
+    return list(names), np.array(parents, np.int32), np.array(places, np.float32)
+
+
+def tube(start, end, radius, sides=6, rings=3):
+    """Closed tube: vertices (n, 3), faces (m, 3) wound outwards, position along the bone (n,)."""
+    axis = (end - start) / np.linalg.norm(end - start)
+    side = np.cross(axis, (0, 0, 1.0) if abs(axis[2]) < .9 else (0, 1.0, 0))
+    side /= np.linalg.norm(side)
+    other = np.cross(axis, side)
+    angle = np.arange(sides) * 2 * np.pi / sides
+    ring = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * other
+    along = np.linspace(0, 1, rings)
+    vertices = np.concatenate([start + a * (end - start) + radius * ring for a in along] + [[start], [end]])
+    faces = []
+    for r in range(rings - 1):
+        for i in range(sides):
+            a, b, c, d = r * sides + i, r * sides + (i + 1) % sides, (r + 1) * sides + i, (r + 1) * sides + (i + 1) % sides
+            faces += [(a, b, d), (a, d, c)]
+    last, first = len(vertices) - 1, len(vertices) - 2
+    for i in range(sides):
+        faces += [(first, (i + 1) % sides, i), (last, (rings - 1) * sides + i, (rings - 1) * sides + (i + 1) % sides)]
+    return vertices, np.array(faces), np.concatenate([np.repeat(along, sides), [0, 1]])
+
+
+def make_figure(per_face=1, seed=0):
+    """A RiggedAvatar; rgb: left hand red, right hand blue, front green-ish, rest grey."""
+    rng = np.random.default_rng(seed)
+    names, parents, joints = skeleton()
+    vertices, faces, index, weight = [], [], [], []
+    for j in range(1, len(names)):
+        p = parents[j]
+        radius = .008 if "1" <= names[j][-1] <= "3" and "spine" not in names[j] else .06
+        if names[j] == "head":
+            radius = .09
+        v, f, along = tube(joints[p].astype(float), joints[j].astype(float) + 1e-3, radius)
+        faces.append(f + sum(map(len, vertices)))
+        vertices.append(v)
+        blend = np.clip(along - .75, 0, .25) * 2
+        index.append(np.stack([np.full(len(v), p), np.full(len(v), j), *[np.zeros(len(v), int)] * 2], 1))
+        weight.append(np.stack([1 - blend, blend, 0 * blend, 0 * blend], 1))
+    vertices, faces = np.concatenate(vertices).astype(np.float32), np.concatenate(faces).astype(np.int32)
+    face = np.repeat(np.arange(len(faces), dtype=np.int32), per_face)
+    N, centre = len(face), vertices[faces].mean(1)[face]
+    rgb = np.where(centre[:, 2:] > 0, (.45, .7, .45), (.45, .45, .45))
+    rgb = np.where(centre[:, :1] > .71, (.9, .1, .1), np.where(centre[:, :1] < -.71, (.1, .1, .9), rgb))
+    quat = rng.normal(size=(N, 4)) * .3 + (1, 0, 0, 0)
+    nose = np.flatnonzero((vertices[:, 1] > .5) & (vertices[:, 2] > .05))
+    avatar = RiggedAvatar(
+        vertices=vertices, faces=faces, joints=joints, parents=parents, joint_names=names,
+        skin_index=np.concatenate(index).astype(np.int32), skin_weight=np.concatenate(weight).astype(np.float32),
+        expression_names=["jawOpen", "browInnerUp"], expression_start=np.array([0, len(nose), len(nose)], np.int32),
+        expression_vertex=nose.astype(np.int32),
+        expression_delta=np.tile(np.float32([0, -.02, 0]), (len(nose), 1)),
+        jaw_actions=np.float32([[4, 0, 0], [0, 0, 0]]),
+        gaussians={
+            "face": face, "mu": rng.normal(size=(N, 3)).astype(np.float32) * .004,
+            "quat": (quat / np.linalg.norm(quat, axis=1, keepdims=True)).astype(np.float32),
+            "log_scale": np.log(rng.uniform(.008, .02, (N, 3)) * (1, .3, 1)).astype(np.float32),
+            "rgb": np.clip(rgb + rng.normal(size=(N, 3)) * .03, 0, 1).astype(np.float32),
+            "opacity": rng.uniform(.6, 1, N).astype(np.float32)},
+        licence={"avatar": "test figure"}, provenance={"gsac": "0"})
+    add_motion(avatar, ("wave", "walk"))
+    return avatar
+
+
+@pytest.fixture(scope="session")
+def figure():
+    return make_figure()
