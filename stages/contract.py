@@ -1,13 +1,13 @@
 """What a stage declares and what it is handed.
 
 A stage folder holds `__init__.py` with one `STAGE = Stage(...)` (light: no heavy import) and `stage.py` with one
-`run(job: Job) -> dict`. The engine reads `STAGE`, builds the key, and calls `run` with read-only inputs and a private
+`run(job: Job) -> None`. The engine reads `STAGE`, builds the key, and calls `run` with read-only inputs and a private
 output folder. A stage never imports another stage, the engine or the cache.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import typing
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,12 +73,26 @@ class BadInput(StageError):
 
 def make_config(stage: Stage, values: dict[str, Any]) -> Any:
     """Config instance from parameter values; unknown names and wrong types raise `BadInput` that names them."""
-    known = {f.name: f for f in dataclasses.fields(stage.config)}
+    known = typing.get_type_hints(stage.config)
     for name in values:
         if name not in known:
             raise BadInput(f"unknown parameter {stage.name}.{name}; known: {', '.join(sorted(known)) or 'none'}")
-    config = stage.config(**values)
+    config = stage.config(**{name: _typed(f"{stage.name}.{name}", v, known[name]) for name, v in values.items()})
     check = getattr(config, "check", None)
     if check is not None:
         check()
     return config
+
+
+def _typed(name: str, value: Any, hint: Any) -> Any:
+    """The value as the field's type; 1 becomes 1.0 for a float, and YAML 1.1's text `4e-4` a number."""
+    kinds = typing.get_args(hint) or (hint,)
+    if type(value) in kinds:
+        return value
+    if float in kinds and isinstance(value, (int, str)) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except ValueError:
+            pass
+    words = " or ".join("null" if k is type(None) else k.__name__ for k in kinds)
+    raise BadInput(f"parameter {name} is {value!r}; expected {words}")

@@ -1,0 +1,84 @@
+"""One stage, once: from the cache if it is there, else computed in a process of its own, checked and published."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.key import KeyParts
+from gsac.cache.lease import single_flight
+from gsac.cache.record import Record, RunInfo
+from gsac.cache.store import Store
+from gsac.pipeline.child import run_child, tail
+from gsac.pipeline.events import PlainReporter
+from gsac.pipeline.keys import Keys
+from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.params import plain
+from gsac.pipeline.plan import Verdict
+
+METRICS_OUTPUT = "metrics.json"
+"""An output of this name is also kept in the action record."""
+
+
+@dataclass
+class Actor:
+    """Does stages for one run."""
+
+    keys: Keys
+    store: Store
+    reporter: PlainReporter
+    logs: Path
+    """Folder for `<stage>.log`."""
+
+    def act(self, verdict: Verdict, inputs: dict[str, Path], forced: bool = False,
+            still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
+        """inputs: port -> read-only path. `still_valid` is asked before publishing and raises if the inputs have changed.
+
+        Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
+        """
+        name, parts = verdict.stage, verdict.parts
+        with single_flight(self.store, parts.key(), lambda: self._waiting(name)) as there:
+            if there is not None and not forced:
+                return Outcome.CACHED, there
+            models = self.keys.models.need(parts.models, self.reporter.note)
+            self.reporter.starts(name, verdict.sentence)
+            stage = self.keys.project.stage(name)
+            with self.store.private(name) as folder:
+                info = self._compute(parts, inputs, models, folder)
+                still_valid()
+                outputs = tuple(output.path for output in stage.outputs)
+                if METRICS_OUTPUT in outputs:
+                    info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
+                record = self.store.publish(parts, folder, outputs, info, replace=forced)
+        self.reporter.ends(name, Outcome.RAN, info.seconds)
+        return Outcome.RAN, record
+
+    def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path) -> RunInfo:
+        name, project = parts.stage, self.keys.project
+        info = RunInfo(started=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), device=self.keys.device)
+
+        def hear(event: dict[str, Any]) -> None:
+            if event["event"] == "progress":
+                self.reporter.progress(name, event["done"], event["total"], event["unit"])
+            else:
+                info.warnings.append(event["message"])
+                self.reporter.warning(name, event["message"])
+
+        self.logs.mkdir(parents=True, exist_ok=True)
+        log = self.logs / f"{name}.log"
+        end = run_child({
+            "declaration": f"{project.package}.{name}", "entry": project.entry(name),
+            "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
+            "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
+            "device": self.keys.device,
+        }, log, hear)
+        info.seconds, info.cpu_seconds, info.peak_rss_mb = end["seconds"], end["cpu_seconds"], end["peak_rss_mb"]
+        info.log_tail = tail(log)
+        return info
+
+    def _waiting(self, name: str) -> None:
+        self.reporter.note(f"{name}: another run computes the same result; waiting for it")

@@ -1,0 +1,39 @@
+"""Arguments that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.store import Store
+from gsac.pipeline.events import PlainReporter
+from gsac.pipeline.params import resolve
+from gsac.pipeline.project import Project
+from gsac.pipeline.workspace import Workspace
+
+
+def add_params(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--params", type=Path, metavar="FILE", help="YAML file with sections of parameters")
+    command.add_argument("--set", action="append", default=[], metavar="stage.key=value", help="one parameter; may be repeated")
+
+
+def add_json(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--json", action="store_true", help="one JSON object as the last line of stdout")
+
+
+def add_workspace(command: argparse.ArgumentParser) -> None:
+    command.add_argument("folder", nargs="?", type=Path, default=Path("."), help="the folder of a run (default: here)")
+
+
+def open_store(reporter: PlainReporter) -> Store:
+    """The store of GSAC_CACHE, which says aloud what it finds damaged."""
+    return Store.open(say=reporter.note)
+
+
+def open_workspace(arguments: argparse.Namespace, start: Path) -> tuple[Workspace, Project, dict[str, Any]]:
+    """The folder of a run, its stages, and its parameters with --params and --set on top."""
+    workspace = Workspace.around(start)
+    project = workspace.project(Project.at_hand())
+    file = getattr(arguments, "params", None) or workspace.params
+    return workspace, project, resolve(project, file, arguments.set)

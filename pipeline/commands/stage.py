@@ -1,0 +1,96 @@
+"""gsac stage NAME: on the folder of a run (so DVC calls it), or on fixture artifacts (so CI does)."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from gsac.cache.digest import tree_digest
+from gsac.cache.lease import in_use
+from gsac.cache.store import Store
+from gsac.pipeline.action import Actor
+from gsac.pipeline.cli import emit
+from gsac.pipeline.commands.options import add_json, add_params, open_store, open_workspace
+from gsac.pipeline.events import PlainReporter, reporter
+from gsac.pipeline.graph import CLIP
+from gsac.pipeline.keys import Keys
+from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.params import resolve
+from gsac.pipeline.plan import judge
+from gsac.pipeline.project import Project
+from gsac.pipeline.run import StageFailedError, StageResult
+from gsac.pipeline.workspace import link
+from gsac.stages.contract import BadInput, StageError
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    command.add_argument("name", metavar="NAME")
+    command.add_argument("--inputs", type=Path, metavar="DIR", help="artifacts: DIR/<input stage>/..., DIR/clip")
+    command.add_argument("--out", type=Path, metavar="DIR", help="where the outputs go, with --inputs")
+    command.add_argument("--force", action="store_true", help="run it even if its result is in the cache")
+    add_params(command)
+    add_json(command)
+    command.set_defaults(do=do)
+
+
+def do(arguments: argparse.Namespace) -> ExitCode:
+    if (arguments.inputs is None) != (arguments.out is None):
+        raise BadInput("--inputs and --out go together; without both, the folder of a run is used")
+    with reporter(plain=arguments.json) as voice:
+        store = open_store(voice)
+        if arguments.inputs is None:
+            workspace, project, configs = open_workspace(arguments, Path.cwd())
+            step = project.graph.step(arguments.name)
+            digests = {port: workspace.digest(port, store) for port in step.deps}
+            paths = {port: workspace.path(port).resolve() for port in step.deps}
+            out, logs = workspace.root / arguments.name, workspace.root / "logs"
+        else:
+            project = Project.at_hand()
+            configs = resolve(project, arguments.params, arguments.set)
+            paths = fixture_paths(project, arguments.name, arguments.inputs)
+            digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
+            out, logs = arguments.out.absolute(), arguments.out.absolute() / "logs"
+        result = do_one(Keys(project, configs, store), store, voice, arguments.name, digests, paths, out, logs,
+                        arguments.force)
+    if arguments.json:
+        ports = {output.path: str(out / output.path) for output in project.stage(arguments.name).outputs}
+        emit({"stages": [result.to_json()], "outputs": {f"{arguments.name}/{o}": path for o, path in ports.items()},
+              "metrics": result.metrics})
+    return ExitCode.OK
+
+
+def do_one(keys: Keys, store: Store, voice: PlainReporter, name: str, digests: dict[str, str], paths: dict[str, Path],
+           out: Path, logs: Path, force: bool) -> StageResult:
+    """One stage through the store; its outputs are shown at `out/<output>`."""
+    parts = keys.parts(name, digests)
+    with in_use(store, [parts.key()]):
+        verdict = judge(store, parts, force)
+        outcome, record = Outcome.CACHED, verdict.record
+        if not verdict.current:
+            try:
+                outcome, record = Actor(keys, store, voice, logs).act(verdict, paths, forced=force)
+            except StageError as error:
+                raise StageFailedError(name, error, logs / f"{name}.log") from error
+        if outcome is Outcome.CACHED:
+            voice.ends(name, outcome, record.info.seconds)
+        for output in record.outputs:
+            link(store.path(record, output), out / output)
+    return StageResult.of(verdict, outcome, record, keys.configs[name])
+
+
+def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:
+    """Port -> path under the folder of artifacts, each checked as its own stage promises it."""
+    graph = project.graph
+    paths = {}
+    for port in graph.step(name).deps:
+        path = (folder / port).resolve()
+        if not path.exists():
+            raise BadInput(f"{folder / port}: missing; stage {name} reads {', '.join(graph.step(name).deps)}")
+        if port != CLIP:
+            output = next(o for o in project.stage(graph.producer[port]).outputs if port == f"{graph.producer[port]}/{o.path}")
+            try:
+                output.check(path)
+            except Exception as error:
+                raise BadInput(f"{folder / port} is not what {port} promises: {error}") from error
+        paths[port] = path
+    return paths

@@ -1,0 +1,39 @@
+"""gsac status"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+
+from gsac.pipeline.cli import emit
+from gsac.pipeline.commands.options import add_json, add_params, add_workspace, open_store, open_workspace
+from gsac.pipeline.events import reporter
+from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.plan import Reason
+from gsac.pipeline.run import Chain, Options
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    add_workspace(command)
+    add_params(command)
+    add_json(command)
+    command.set_defaults(do=do)
+
+
+def do(arguments: argparse.Namespace) -> ExitCode:
+    workspace, project, configs = open_workspace(arguments, arguments.folder)
+    with reporter(plain=True) as voice:
+        store = open_store(voice)
+        chain = Chain(project, configs, store, workspace, voice)
+        verdicts = [
+            dataclasses.replace(v, reason=Reason.OUTPUT) if v.current and not workspace.shows(store, v.record) else v
+            for v in chain.forecast(workspace.require_clip(), Options())
+        ]
+        for verdict in verdicts:
+            voice.note(f"{verdict.stage:<10} {verdict.reason.value:<18} {verdict.sentence if not verdict.current else ''}".rstrip())
+    current = all(verdict.current for verdict in verdicts)
+    if arguments.json:
+        emit({"up_to_date": current, "stages": [
+            {"name": v.stage, "up_to_date": v.current, "reason": v.reason.value, "why": v.sentence,
+             "key": v.parts.key() if v.parts else None} for v in verdicts]})
+    return ExitCode.OK if current else ExitCode.STALE

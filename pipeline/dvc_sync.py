@@ -1,0 +1,74 @@
+"""dvc.lock as DVC itself would write it, so that `dvc status` agrees after a run. DVC is never imported.
+
+Schema 2.0: a file is its md5 and size; a folder the md5 of the JSON list of its files, `.dir`, with size and count.
+Outputs are `cache: false` in dvc.yaml, so DVC wants no objects of its own: they stay in gsac's store.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.digest import tree_files
+from gsac.cache.store import Store
+from gsac.pipeline.graph import Graph, Step, read_yaml
+from gsac.pipeline.params import plain
+from gsac.pipeline.workspace import PARAMS, Workspace, write_text
+from gsac.stages.contract import BadInput
+
+LOCK = "dvc.lock"
+MEMO_KIND = "md5"
+
+
+def write_lock(workspace: Workspace, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
+    """Entries of the steps that have just finished; those of others stay as they were."""
+    import yaml
+
+    if not steps:
+        return
+    known = _entries(workspace.root / LOCK)
+    fresh = {name: _entry(workspace, graph.step(name), configs[name], store) for name in steps}
+    entries = {name: fresh.get(name) or known[name] for name in graph.steps if name in fresh or name in known}
+    store.memo.flush()
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    dumper.ignore_aliases = lambda self, data: True
+    write_text(workspace.root / LOCK, yaml.dump({"schema": "2.0", "stages": entries}, Dumper=dumper, sort_keys=False))
+
+
+def _entries(path: Path) -> dict[str, Any]:
+    try:
+        return dict(read_yaml(path).get("stages") or {}) if path.is_file() else {}
+    except BadInput:
+        return {}
+
+
+def _entry(workspace: Workspace, step: Step, config: Any, store: Store) -> dict[str, Any]:
+    entry: dict[str, Any] = {"cmd": step.cmd, "deps": [_hash(workspace, port, store) for port in sorted(step.deps)]}
+    if step.params:
+        entry["params"] = {PARAMS: {step.name: plain(config)}}
+    entry["outs"] = [_hash(workspace, port, store) for port in sorted(step.outs)]
+    return entry
+
+
+def _hash(workspace: Workspace, port: str, store: Store) -> dict[str, Any]:
+    path = workspace.path(port).resolve()
+    files = tree_files(path)
+    sizes = sum(file.stat().st_size for file in files.values())
+    entry = {"path": port, "hash": "md5"}
+    if "" in files:
+        return entry | {"md5": _md5(path, store), "size": sizes}
+    listing = [{"md5": _md5(files[name], store), "relpath": name} for name in sorted(files)]
+    digest = hashlib.md5(json.dumps(listing, sort_keys=True).encode(), usedforsecurity=False).hexdigest()
+    return entry | {"md5": f"{digest}.dir", "size": sizes, "nfiles": len(listing)}
+
+
+def _md5(path: Path, store: Store) -> str:
+    stat = path.stat()
+    digest = store.memo.get(MEMO_KIND, stat)
+    if digest is None:
+        with path.open("rb") as stream:
+            digest = hashlib.file_digest(stream, lambda: hashlib.md5(usedforsecurity=False)).hexdigest()
+        store.memo.put(MEMO_KIND, stat, digest)
+    return digest

@@ -1,0 +1,164 @@
+"""dvc.yaml as a graph: steps in running order, and who needs whom.
+
+Reads the part of DVC's file that one clip needs, and names what it does not read:
+`cmd: gsac stage NAME`, `deps`, `params` (whole sections), `outs` (optionally `cache: false`), `desc`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gsac.stages.contract import BadInput
+
+CLIP = "clip"
+"""The port of the source clip; no step makes it."""
+STEP_KEYS = ("cmd", "deps", "params", "outs", "desc")
+OUT_OPTIONS = ("cache",)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One entry of dvc.yaml."""
+
+    name: str
+    cmd: str
+    deps: tuple[str, ...]
+    """Ports read: `clip` or `<step>/<output path>`."""
+    params: tuple[str, ...]
+    """Sections of params.yaml."""
+    outs: tuple[str, ...]
+    """Ports made, `<name>/<output path>`."""
+
+
+class Graph:
+    """Steps by name, in an order that runs every step after what it reads."""
+
+    def __init__(self, steps: list[Step], source: str = "dvc.yaml"):
+        self.source = source
+        self.producer: dict[str, str] = {}
+        for step in steps:
+            for port in step.outs:
+                if port in self.producer:
+                    raise BadInput(f"{source}: {port} is made by both {self.producer[port]} and {step.name}")
+                self.producer[port] = step.name
+        for step in steps:
+            for port in step.deps:
+                if port != CLIP and port not in self.producer:
+                    raise BadInput(f"{source}: step {step.name} reads {port}, which no step makes")
+        self.steps = self._ordered(steps)
+
+    @classmethod
+    def load(cls, path: Path) -> Graph:
+        """Raises BadInput naming the file, the step and the key that is not understood."""
+        return cls(_parse(read_yaml(path), str(path)), str(path))
+
+    def _ordered(self, steps: list[Step]) -> dict[str, Step]:
+        done: dict[str, Step] = {}
+        waiting = list(steps)
+        while waiting:
+            ready = next((s for s in waiting if all(p == CLIP or self.producer[p] in done for p in s.deps)), None)
+            if ready is None:
+                raise BadInput(f"{self.source}: {', '.join(s.name for s in waiting)} need each other in a circle")
+            done[ready.name] = ready
+            waiting.remove(ready)
+        return done
+
+    def step(self, name: str) -> Step:
+        if name not in self.steps:
+            raise BadInput(f"unknown stage {name}; known: {', '.join(self.steps)}")
+        return self.steps[name]
+
+    def parents(self, name: str) -> set[str]:
+        return {self.producer[p] for p in self.step(name).deps if p != CLIP}
+
+    def above(self, name: str) -> set[str]:
+        """Every step that `name` needs, directly or not."""
+        found: set[str] = set()
+        todo = [name]
+        while todo:
+            new = self.parents(todo.pop()) - found
+            found |= new
+            todo.extend(new)
+        return found
+
+    def below(self, name: str) -> set[str]:
+        """Every step that needs `name`, directly or not."""
+        self.step(name)
+        return {other for other in self.steps if name in self.above(other)}
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Mapping of a YAML file; {} for an empty one."""
+    try:
+        text = Path(path).read_text()
+    except (OSError, UnicodeDecodeError) as e:
+        raise BadInput(f"{path}: cannot be read ({getattr(e, 'strerror', None) or e})") from e
+    return parse_yaml(text, str(path)) or {}
+
+
+def parse_yaml(text: str, source: str) -> Any:
+    import yaml
+
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    try:
+        return yaml.load(text, loader)  # noqa: S506, both loaders are safe ones
+    except yaml.YAMLError as e:
+        raise BadInput(f"{source}: not valid YAML ({' '.join(str(e).split())})") from e
+
+
+def _parse(document: Any, source: str) -> list[Step]:
+    if not isinstance(document, dict) or not isinstance(document.get("stages"), dict):
+        raise BadInput(f"{source}: expected a mapping with `stages`")
+    _only(document, ("stages",), source, "the file")
+    return [_step(name, body, source) for name, body in document["stages"].items()]
+
+
+def _step(name: str, body: Any, source: str) -> Step:
+    where = f"step {name}"
+    if not isinstance(body, dict):
+        raise BadInput(f"{source}: {where} must be a mapping")
+    _only(body, STEP_KEYS, source, where)
+    cmd = body.get("cmd")
+    if cmd != f"gsac stage {name}":
+        raise BadInput(f"{source}: {where} has the command {cmd!r}; gsac only reads `gsac stage {name}`")
+    outs = tuple(_out(out, source, where) for out in _list(body, "outs", source, where))
+    for out in outs:
+        if not out.startswith(f"{name}/"):
+            raise BadInput(f"{source}: {where} makes {out}; outputs must lie in {name}/")
+    deps = tuple(_text(d, "deps", source, where) for d in _list(body, "deps", source, where))
+    params = tuple(_text(p, "params", source, where) for p in _list(body, "params", source, where))
+    for section in params:
+        if section != name:
+            raise BadInput(f"{source}: {where} reads the parameters {section!r}; it may only read its section {name!r}")
+    return Step(name, cmd, deps, params, outs)
+
+
+def _only(mapping: dict, known: tuple[str, ...], source: str, where: str) -> None:
+    for key in mapping:
+        if key not in known:
+            raise BadInput(f"{source}: {where} uses {key!r}, which gsac does not read; it reads {', '.join(known)}")
+
+
+def _list(body: dict, key: str, source: str, where: str) -> list:
+    value = body.get(key) or []
+    if not isinstance(value, list):
+        raise BadInput(f"{source}: {where}: {key} must be a list")
+    return value
+
+
+def _text(value: Any, key: str, source: str, where: str) -> str:
+    if not isinstance(value, str):
+        raise BadInput(f"{source}: {where}: {key} has the entry {value!r}; gsac only reads plain names there")
+    return value
+
+
+def _out(value: Any, source: str, where: str) -> str:
+    if isinstance(value, dict) and len(value) == 1:
+        path, options = next(iter(value.items()))
+        if not isinstance(options, dict):
+            raise BadInput(f"{source}: {where}: output {path}: options must be a mapping")
+        _only(options, OUT_OPTIONS, source, f"{where}: output {path}")
+        value = path
+    return _text(value, "outs", source, where)

@@ -1,0 +1,114 @@
+"""Parameters: defaults of the stages' dataclasses, then --params FILE, then --set; and params.yaml made from them."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import textwrap
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from gsac.pipeline.graph import parse_yaml, read_yaml
+from gsac.pipeline.project import Project
+from gsac.stages.contract import BadInput, make_config
+
+Values = dict[str, dict[str, Any]]
+"""Section -> parameter -> value."""
+
+
+def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()) -> dict[str, Any]:
+    """Config instance of every stage. BadInput names the parameter and where it came from."""
+    sources: list[tuple[str, Values]] = []
+    if file is not None:
+        sources.append((str(file), _sections(read_yaml(file), str(file))))
+    sources.extend((f"--set {text}", _assignment(text)) for text in sets)
+    values: Values = {name: {} for name in project.graph.steps}
+    configs = {}
+    for source, sections in sources:
+        for section, parameters in sections.items():
+            if section not in values:
+                known = ", ".join(project.graph.steps)
+                raise BadInput(f"{source}: unknown section {section!r}; known: {known}")
+            values[section] |= parameters
+            try:
+                configs[section] = make_config(project.stage(section), values[section])
+            except BadInput as e:
+                raise BadInput(f"{source}: {e}") from e
+    for name in project.graph.steps:
+        if name not in configs:
+            configs[name] = make_config(project.stage(name), {})
+    return configs
+
+
+def plain(config: Any) -> dict[str, Any]:
+    """Config instance as parameter -> value."""
+    return dataclasses.asdict(config)
+
+
+def to_yaml(configs: dict[str, Any], notes: bool = True) -> str:
+    """params.yaml with every parameter; notes: with the meaning of each above it."""
+    blocks = []
+    for section, config in configs.items():
+        values = plain(config)
+        if not values:
+            blocks.append(f"{section}: {{}}\n")
+            continue
+        meaning = meanings(type(config)) if notes else {}
+        lines = [f"{section}:"]
+        for name, value in values.items():
+            if name in meaning:
+                lines.extend(textwrap.wrap(meaning[name], 116, initial_indent="  # ", subsequent_indent="  # "))
+            lines.append(f"  {name}: {_scalar(value)}")
+        blocks.append("\n".join(lines) + "\n")
+    return "\n".join(blocks)
+
+
+def defaults_yaml(project: Project) -> str:
+    """Text of the params.yaml that is shipped."""
+    head = "# Every parameter, its default and its meaning. Written by `python -m gsac.pipeline.params`; edit the dataclasses.\n\n"
+    return head + to_yaml(resolve(project))
+
+
+def meanings(config: type) -> dict[str, str]:
+    """Field -> the line of meaning under it in the dataclass's source."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(config))).body[0].body
+    found = {}
+    for field, after in zip(body, body[1:], strict=False):
+        if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+            found[field.target.id] = " ".join(str(after.value.value).split())
+    return found
+
+
+def _scalar(value: Any) -> str:
+    import yaml
+
+    return yaml.safe_dump(value, default_flow_style=True, width=10**6).removesuffix("...\n").strip()
+
+
+def _sections(document: Any, source: str) -> Values:
+    if not isinstance(document, dict):
+        raise BadInput(f"{source}: expected sections of parameters, found {type(document).__name__}")
+    for section, parameters in document.items():
+        if parameters is not None and not isinstance(parameters, dict):
+            raise BadInput(f"{source}: section {section} must hold parameters, found {parameters!r}")
+    return {section: parameters or {} for section, parameters in document.items()}
+
+
+def _assignment(text: str) -> Values:
+    name, equals, value = text.partition("=")
+    section, dot, parameter = name.strip().partition(".")
+    if not (equals and dot and section and parameter):
+        raise BadInput(f"--set {text}: expected stage.parameter=value, for example split.fps=8")
+    return {section: {parameter: parse_yaml(value, f"--set {text}")}}
+
+
+def main() -> None:
+    """Rewrites params.yaml beside the checkout's dvc.yaml."""
+    project = Project.at_hand()
+    project.dag.with_name("params.yaml").write_text(defaults_yaml(project))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""What has to run, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from gsac.cache.key import Change, ChangeKind, KeyParts
+from gsac.cache.record import Record
+from gsac.cache.store import Store
+
+
+class Reason(Enum):
+    """Why a stage has to run, or that it need not; the value is the word of `--json`."""
+
+    UP_TO_DATE = "up to date"
+    FORCED = "forced"
+    FIRST_RUN = "first run"
+    INPUT = "input changed"
+    PARAM = "parameter changed"
+    CODE = "code changed"
+    MODEL = "model file changed"
+    PACKAGE = "package changed"
+    DEVICE = "device changed"
+    UPSTREAM = "upstream"
+    OUTPUT = "output changed"
+
+    @property
+    def sentence(self) -> str:
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Reason.UP_TO_DATE: "its result is in the cache",
+    Reason.FORCED: "--force asks for it",
+    Reason.FIRST_RUN: "there is no result of it in the cache yet",
+    Reason.INPUT: "an input is not the one of any earlier run",
+    Reason.PARAM: "a parameter has another value",
+    Reason.CODE: "its code is another",
+    Reason.MODEL: "a model file is another",
+    Reason.PACKAGE: "a package has another version",
+    Reason.DEVICE: "the device class is another",
+    Reason.UPSTREAM: "it runs if the result of a stage above changes",
+    Reason.OUTPUT: "the output in the folder is not the one in the cache",
+}
+_BY_CHANGE = {
+    ChangeKind.INPUT: Reason.INPUT, ChangeKind.PARAM: Reason.PARAM, ChangeKind.CODE: Reason.CODE,
+    ChangeKind.MODEL: Reason.MODEL, ChangeKind.PACKAGE: Reason.PACKAGE, ChangeKind.DEVICE: Reason.DEVICE,
+}
+LEADING = (Reason.PARAM, Reason.CODE, Reason.MODEL, Reason.PACKAGE, Reason.DEVICE, Reason.INPUT)
+"""Of several reasons the one that a person can act on is named first."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is known about one stage before it runs."""
+
+    stage: str
+    reason: Reason
+    parts: KeyParts | None = None
+    """None where an input is not known yet."""
+    record: Record | None = None
+    """The finished run that stands for it."""
+    changes: list[Change] = field(default_factory=list)
+    """From the most similar earlier run to this one."""
+    detail: str = ""
+
+    @property
+    def current(self) -> bool:
+        return self.reason is Reason.UP_TO_DATE
+
+    @property
+    def sentence(self) -> str:
+        if self.detail:
+            return self.detail
+        if self.changes:
+            return "; ".join(change.sentence for change in self.changes)
+        return self.reason.sentence
+
+
+def judge(store: Store, parts: KeyParts, forced: bool = False) -> Verdict:
+    """Whether the result of this key is there; if not, what differs from the most similar earlier run."""
+    record = store.lookup(parts.key())
+    if forced:
+        return Verdict(parts.stage, Reason.FORCED, parts, record)
+    if record is not None:
+        return Verdict(parts.stage, Reason.UP_TO_DATE, parts, record)
+    before = store.previous(parts.stage, parts)
+    changes = before.parts.diff(parts) if before is not None else []
+    if not changes:
+        return Verdict(parts.stage, Reason.FIRST_RUN, parts)
+    reasons = {_BY_CHANGE[change.kind] for change in changes if change.kind in _BY_CHANGE}
+    return Verdict(parts.stage, next(r for r in LEADING if r in reasons), parts, changes=changes)
+
+
+def waits(stage: str, above: list[str]) -> Verdict:
+    """A stage whose inputs are not known before those above have run."""
+    return Verdict(stage, Reason.UPSTREAM, detail=f"runs if the result of {', '.join(above)} changes")

@@ -1,0 +1,218 @@
+"""Runs one clip's chain of stages, or says what would run."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.digest import tree_digest
+from gsac.cache.errors import CacheError
+from gsac.cache.lease import in_use
+from gsac.cache.record import Record
+from gsac.cache.store import Store
+from gsac.pipeline import dvc_sync
+from gsac.pipeline.action import Actor
+from gsac.pipeline.events import PlainReporter
+from gsac.pipeline.graph import CLIP
+from gsac.pipeline.keys import Keys
+from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.params import plain
+from gsac.pipeline.plan import Verdict, judge, waits
+from gsac.pipeline.project import Project
+from gsac.pipeline.workspace import METRICS, RUN, Workspace
+from gsac.stages.contract import BadInput, StageError
+
+
+class NotUpToDateError(Exception):
+    """Something that should be there already is not (exit code 3)."""
+
+
+class StageFailedError(Exception):
+    """A stage failed; `cause` says how. What was finished before it is kept."""
+
+    def __init__(self, stage: str, cause: Exception, log: Path):
+        seen = f" (log: {log})" if log.is_file() and log.stat().st_size else ""
+        super().__init__(f"stage {stage} failed: {cause}{seen}")
+        self.stage = stage
+        self.cause = cause
+
+
+@dataclass
+class StageResult:
+    """One row of run.json and --json."""
+
+    name: str
+    outcome: Outcome
+    reason: str
+    key: str = ""
+    seconds: float = 0.0
+    """Of the run that made the result, be it this one or an earlier one."""
+    cpu_seconds: float = 0.0
+    peak_rss_mb: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+    params: dict[str, Any] = field(default_factory=dict)
+    metrics: dict[str, Any] = field(default_factory=dict)
+    error: str | None = None
+
+    @classmethod
+    def of(cls, verdict: Verdict, outcome: Outcome, record: Record, config: Any) -> StageResult:
+        info = record.info
+        return cls(verdict.stage, outcome, verdict.sentence, record.key, info.seconds, info.cpu_seconds, info.peak_rss_mb,
+                   info.warnings, plain(config), info.metrics)
+
+    def to_json(self) -> dict[str, Any]:
+        row = {
+            "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
+            "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
+            "reason": self.reason, "warnings": self.warnings, "params": self.params,
+        }
+        return row | ({"error": self.error} if self.error else {})
+
+
+@dataclass
+class Options:
+    """What part of the chain, and how."""
+
+    until: str | None = None
+    """Last stage; what it does not need does not run."""
+    start: str | None = None
+    """First stage that may run; everything it needs must be in the cache (`--from`)."""
+    force: tuple[str, ...] = ()
+    """Stages that run whether their result is there or not."""
+
+
+class Chain:
+    """The stages of one clip in one workspace over one store."""
+
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, workspace: Workspace,
+                 reporter: PlainReporter):
+        self.graph = project.graph
+        self.configs = configs
+        self.store = store
+        self.workspace = workspace
+        self.reporter = reporter
+        self.keys = Keys(project, configs, store)
+        self.results: list[StageResult] = []
+        self.metrics: dict[str, Any] = {}
+
+    def selected(self, options: Options) -> list[str]:
+        """Stages in running order. BadInput names a stage that is unknown or left out."""
+        for name in (options.until, options.start, *options.force):
+            if name is not None:
+                self.graph.step(name)
+        wanted = set(self.graph.steps)
+        if options.until is not None:
+            wanted = self.graph.above(options.until) | {options.until}
+        for name in (options.start, *options.force):
+            if name is not None and name not in wanted:
+                raise BadInput(f"stage {name} does not run with --until {options.until}")
+        return [name for name in self.graph.steps if name in wanted]
+
+    def forecast(self, clip: Path, options: Options) -> list[Verdict]:
+        """What would run and why, as far as that is known without running anything."""
+        digests = {CLIP: self._clip_digest(clip)}
+        verdicts = []
+        for name in self.selected(options):
+            unknown = [p for p in self.graph.step(name).deps if p not in digests]
+            if unknown:
+                verdicts.append(waits(name, sorted({self.graph.producer[p] for p in unknown}, key=list(self.graph.steps).index)))
+                continue
+            verdict = self._judge(name, digests, options)
+            verdicts.append(verdict)
+            if verdict.current:
+                digests |= _ports(verdict.record)
+        return verdicts
+
+    def run(self, clip: Path, options: Options) -> None:
+        """Runs what has to; fills `results` and `metrics` and the workspace.
+
+        Raises StageFailedError, NotUpToDateError, CacheError; run.json and finished stages are kept in any case.
+        """
+        steps = self.selected(options)
+        required = self.graph.above(options.start) if options.start else set()
+        digests = {CLIP: self._clip_digest(clip)}
+        paths = {CLIP: clip}
+        actor = Actor(self.keys, self.store, self.reporter, self.workspace.root / "logs")
+        with in_use(self.store) as lease, self._kept(clip):
+            for name in steps:
+                inputs = {port: digests[port] for port in self.graph.step(name).deps}
+                lease.add(self.keys.parts(name, inputs).key())
+                verdict = self._judge(name, digests, options)
+                if verdict.current:
+                    outcome, record = Outcome.CACHED, verdict.record
+                elif name in required:
+                    raise NotUpToDateError(f"stage {name} is not up to date ({verdict.sentence}); run without --from {options.start}")
+                else:
+                    with self._failing(verdict, actor):
+                        outcome, record = actor.act(
+                            verdict, {port: paths[port] for port in inputs}, forced=name in options.force,
+                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, digests[CLIP]) if reads else None)
+                if outcome is Outcome.CACHED:
+                    self.reporter.ends(name, outcome, record.info.seconds)
+                self._done(verdict, outcome, record)
+                digests |= _ports(record)
+                paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
+
+    def _judge(self, name: str, digests: dict[str, str], options: Options) -> Verdict:
+        parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
+        return judge(self.store, parts, forced=name in options.force)
+
+    def _done(self, verdict: Verdict, outcome: Outcome, record: Record) -> None:
+        self.results.append(StageResult.of(verdict, outcome, record, self.configs[verdict.stage]))
+        self.metrics |= record.info.metrics
+        self.workspace.place(self.store, record)
+
+    @contextlib.contextmanager
+    def _failing(self, verdict: Verdict, actor: Actor) -> Iterator[None]:
+        try:
+            yield
+        except (StageError, CacheError) as error:
+            self.reporter.ends(verdict.stage, Outcome.FAILED, 0.0)
+            self.results.append(StageResult(verdict.stage, Outcome.FAILED, verdict.sentence, verdict.parts.key(),
+                                            params=plain(self.configs[verdict.stage]), error=str(error)))
+            raise StageFailedError(verdict.stage, error, actor.logs / f"{verdict.stage}.log") from error
+
+    @contextlib.contextmanager
+    def _kept(self, clip: Path) -> Iterator[None]:
+        """run.json, metrics.json and dvc.lock are written however the run ends."""
+        try:
+            yield
+        finally:
+            self.workspace.write_json(RUN, {"clip": str(clip), **self.summary()})
+            self.workspace.write_json(METRICS, self.metrics)
+            done = [r.name for r in self.results if r.outcome is not Outcome.FAILED]
+            dvc_sync.write_lock(self.workspace, self.graph, done, self.configs, self.store)
+
+    def summary(self) -> dict[str, Any]:
+        """The object of --json."""
+        done = {r.name for r in self.results if r.outcome is not Outcome.FAILED}
+        ports = [port for name in self.graph.steps if name in done for port in self.graph.step(name).outs]
+        return {
+            "stages": [result.to_json() for result in self.results],
+            "outputs": self.workspace.outputs(ports),
+            "metrics": self.metrics,
+        }
+
+    def _clip_digest(self, clip: Path) -> str:
+        return clip_digest(clip, self.store)
+
+    def _unchanged(self, clip: Path, digest: str) -> None:
+        if self._clip_digest(clip) != digest:
+            raise BadInput(f"{clip} changed while it was being read; run again when it is complete")
+
+
+def clip_digest(clip: Path, store: Store) -> str:
+    """Tree digest of a file or folder. BadInput where it is not there or cannot be read."""
+    if not clip.exists():
+        raise BadInput(f"{clip}: no such file or folder; give a video or a folder of photos")
+    try:
+        return tree_digest(clip, store.memo)[0]
+    except OSError as e:
+        raise BadInput(f"{clip}: cannot be read ({e.strerror})") from e
+
+
+def _ports(record: Record) -> dict[str, str]:
+    return {f"{record.parts.stage}/{output}": digest for output, digest in record.outputs.items()}

@@ -1,0 +1,128 @@
+"""The child process that does one stage: builds the Job, runs it, checks what it wrote, and says how it goes.
+
+Reads one JSON line from stdin (the order), writes events as JSON lines to the file descriptor that the order names.
+Stdin stays open as long as the parent lives; when it closes, the child and its children go.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import resource
+import signal
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any, TextIO
+
+from gsac.stages.contract import BadInput, Job, Stage, StageError, make_config
+
+LEAST_GAP_S = 0.1
+"""Progress is said at most this often."""
+
+
+class Voice:
+    """Events to the parent, one JSON object a line."""
+
+    def __init__(self, stream: TextIO):
+        self._stream = stream
+        self._lock = threading.Lock()
+        self._last = 0.0
+
+    def say(self, event: str, **fields: Any) -> None:
+        with self._lock:
+            self._stream.write(json.dumps({"event": event, **fields}) + "\n")
+            self._stream.flush()
+
+    def progress(self, done: int, total: int, unit: str) -> None:
+        now = time.monotonic()
+        if done >= total or now - self._last >= LEAST_GAP_S:
+            self._last = now
+            self.say("progress", done=int(done), total=int(total), unit=str(unit))
+
+    def warn(self, message: str) -> None:
+        self.say("warning", message=str(message))
+
+
+def main() -> None:
+    order = json.loads(sys.stdin.readline())
+    os.set_inheritable(order["events"], False)
+    voice = Voice(os.fdopen(order["events"], "w"))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
+    try:
+        _work(order, voice)
+    except Exception as error:  # whatever a stage does wrong, the parent must hear of it
+        traceback.print_exc()
+        voice.say("failed", kind=_kind(error), message=_message(error))
+    else:
+        voice.say("done", seconds=time.time() - order["started"], **cost())
+
+
+def _work(order: dict[str, Any], voice: Voice) -> None:
+    stage: Stage = importlib.import_module(order["declaration"]).STAGE
+    run = importlib.import_module(order["entry"]).run
+    out = Path(order["out"])
+    run(Job(
+        inputs={port: Path(path) for port, path in order["inputs"].items()},
+        out=out,
+        config=make_config(stage, order["params"]),
+        models={name: Path(path) for name, path in order["models"].items()},
+        device=order["device"],
+        progress=voice.progress,
+        warn=voice.warn,
+    ))
+    check_outputs(stage, out)
+
+
+def check_outputs(stage: Stage, folder: Path) -> None:
+    """Every declared output is there and what its port promises, else StageError."""
+    for output in stage.outputs:
+        path = folder / output.path
+        if not path.exists():
+            raise StageError(f"stage {stage.name} did not write {output.path}")
+        try:
+            output.check(path)
+        except Exception as error:
+            raise StageError(f"output {output.path} of stage {stage.name} is not what it should be: {error}") from error
+
+
+def cost() -> dict[str, float]:
+    """CPU seconds and peak memory of this process and the largest of its children."""
+    own, children = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
+    return {"cpu_seconds": cpu, "peak_rss_mb": max(_peak_kb(own.ru_maxrss), children.ru_maxrss) / 1024}
+
+
+def _peak_kb(fallback: int) -> int:
+    """ru_maxrss survives exec and so may be the parent's; Linux's VmHWM does not."""
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return int(next(line for line in lines if line.startswith("VmHWM:")).split()[1])
+    except (OSError, StopIteration, ValueError):
+        return fallback // (1024 if sys.platform == "darwin" else 1)
+
+
+def _kind(error: Exception) -> str:
+    if isinstance(error, BadInput):
+        return "bad input"
+    # An ArtifactError is known by name: toy stages in tests and a user's own need not import gsac.avatar.
+    return "stage" if isinstance(error, StageError) or type(error).__name__ == "ArtifactError" else "bug"
+
+
+def _message(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return "out of memory"
+    return str(error) if _kind(error) != "bug" else f"{type(error).__name__}: {error}"
+
+
+def _leave_with_parent() -> None:
+    sys.stdin.buffer.read()
+    os.killpg(os.getpgid(0), signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    main()
