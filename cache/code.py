@@ -3,7 +3,7 @@
 Nothing is imported to find out. Imports inside functions count, and so do the `__init__` of every package on the way,
 strings that are the full name of a first-party module (`"gsac.stages.handgap.gp"` in a table of methods), and text
 files beside a module that it names by a string (a CUDA kernel, a page template). Binary data (`.npz`, networks) is not
-code: a stage declares it as a model file. Imports whose names are put together at run time escape: name them in `extra`.
+code: a stage declares it as a model file. Imports whose names are put together at run time escape: `extra` names them.
 """
 
 from __future__ import annotations

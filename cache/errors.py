@@ -32,7 +32,7 @@ class IntegrityError(CacheError):
 
 def from_os_error(error: OSError, folder: Path, needed: int | None = None) -> CacheError:
     """The CacheError that an OSError under `folder` means; needed: bytes that were to be written, if known."""
-    if error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+    if error.errno in (errno.EROFS, errno.EACCES, errno.EPERM) or not folder.is_dir():
         return CacheReadOnlyError(f"the cache folder {folder} cannot be written ({error.strerror})", READ_ONLY)
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         size = "" if needed is None else f" for a result of {needed:,} bytes"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -45,7 +44,7 @@ class Lease:
 @contextlib.contextmanager
 def in_use(store: Store, keys: Iterable[str] = ()) -> Iterator[Lease]:
     """While open, gc keeps the records and outputs of these keys and of those added later."""
-    file = store.root / "leases" / f"{os.getpid()}-{secrets.token_hex(6)}.run"
+    file = store.root / "leases" / f"{os.getpid()}-{os.urandom(6).hex()}.run"
     with contextlib.ExitStack() as held:
         try:
             lease = Lease(store, file, held.enter_context(exclusive(file)))
@@ -58,16 +57,12 @@ def in_use(store: Store, keys: Iterable[str] = ()) -> Iterator[Lease]:
 def live_keys(store: Store) -> set[str]:
     """Keys that living runs use or compute; the leases of dead runs are removed."""
     keys: set[str] = set()
-    for file in (store.root / "leases").glob("*.run"):
+    for file in (store.root / "leases").iterdir():
         with if_free(file) as free, contextlib.suppress(OSError):
             if free:
                 file.unlink()
-            else:
+            elif file.suffix == ".run":
                 keys.update(file.read_text().split())
-    for file in (store.root / "leases").glob("*.lock"):
-        with if_free(file) as free, contextlib.suppress(OSError):
-            if free:
-                file.unlink()
             else:
                 keys.add(file.stem)
     return keys

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 from pathlib import Path, PurePosixPath
 
 from gsac.cache.digest import manifest_digest, tree_digest, tree_files
@@ -25,12 +24,24 @@ def object_path(root: Path, digest: str, output: str) -> Path:
 
 
 def measure(path: Path) -> Footprint | None:
-    """What is seen of an object without reading it; None where it is missing or not made of plain files."""
+    """What is seen of an object without reading it; None where it is missing."""
+    files = size = stamp = 0
+    folders = [path]
     try:
-        stats = [file.stat() for file in tree_files(path).values()]
-    except (OSError, CacheError):
+        if path.is_file():
+            stat = path.stat()
+            return Footprint(1, stat.st_size, stat.st_mtime_ns)
+        while folders:
+            with os.scandir(folders.pop()) as entries:
+                for entry in entries:
+                    if entry.is_dir(follow_symlinks=False):
+                        folders.append(entry.path)
+                    else:
+                        stat = entry.stat(follow_symlinks=False)
+                        files, size, stamp = files + 1, size + stat.st_size, stamp + stat.st_mtime_ns
+    except OSError:
         return None
-    return Footprint(len(stats), sum(s.st_size for s in stats), sum(s.st_mtime_ns for s in stats))
+    return Footprint(files, size, stamp)
 
 
 def is_sound(path: Path, digest: str, memo: Memo | None = None) -> bool:
@@ -58,13 +69,11 @@ def require_plain(path: Path, output: str) -> None:
 
 def sync(path: Path) -> None:
     """fsync of every file and folder of a tree."""
-    if path.is_dir():
-        for folder, _, files in os.walk(path):
-            for name in files:
-                sync_one(Path(folder, name))
-            sync_one(Path(folder))
-    else:
+    if not path.is_dir():
         sync_one(path)
+    for folder, _, files in os.walk(path):
+        for name in [*files, ""]:
+            sync_one(Path(folder, name))
 
 
 def sync_one(path: Path) -> None:
@@ -99,6 +108,8 @@ def remove(path: Path) -> None:
     """Removes a file or folder, sealed or not; what cannot be removed stays for the next gc."""
     with contextlib.suppress(OSError):
         if path.is_dir() and not path.is_symlink():
+            import shutil  # only where something is removed: it is slow to import
+
             unseal_folders(path)
             shutil.rmtree(path, ignore_errors=True)
         else:

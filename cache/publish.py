@@ -106,7 +106,8 @@ def _record(store: Store, record: Record, replace: bool, step: Callable[[str], N
         step("record written")
         for _ in range(3):
             if replace:
-                os.replace(temp, final)
+                with store.record_change(record.key):
+                    os.replace(temp, final)
                 break
             try:
                 os.link(temp, final)

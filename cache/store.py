@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,11 +30,17 @@ USED_AGAIN_S = 3600
 
 
 class Store:
-    """Results by key. `say` gets full sentences about what was found damaged."""
+    """Results by key. `say` gets full sentences about what was found damaged.
 
-    def __init__(self, root: Path, say: Callable[[str], None] = lambda message: None) -> None:
+    below: a store to read from where this one has nothing, such as a shared one that may not be written.
+    """
+
+    def __init__(
+        self, root: Path, say: Callable[[str], None] = lambda message: None, below: Store | None = None
+    ) -> None:
         self.root = Path(root).absolute()
         self.say = say
+        self.below = below
         with contextlib.suppress(OSError):  # a read-only store can still be read; whoever writes gets the error
             for name in FOLDERS:
                 (self.root / name).mkdir(parents=True, exist_ok=True)
@@ -61,7 +66,8 @@ class Store:
 
     def path(self, record: Record, output: str) -> Path:
         """The output in the store; not to be written."""
-        return objects.object_path(self.root, record.outputs[output], output)
+        path = objects.object_path(self.root, record.outputs[output], output)
+        return self.below.path(record, output) if self.below is not None and not path.exists() else path
 
     def lookup(self, key: str, deep: bool = False) -> Record | None:
         """The record of a finished run, if its outputs are all there and as they were.
@@ -70,25 +76,28 @@ class Store:
         quarantine, the record with it, and the answer is None: a miss, not an error.
         """
         for file in (self.root / "actions").glob(f"*/{key}.json"):
-            record = self.read(file)
+            text = _read(file)
+            record = Record.from_json(text)
             if record is not None and all([self._holds(record, output, deep) for output in record.outputs]):
                 self._used(file)
                 return record
-            with contextlib.suppress(OSError):
-                file.unlink()
-        return None
+            with contextlib.suppress(OSError), self.record_change(key):
+                if _read(file) == text:  # else a sound one has taken its place
+                    file.unlink(missing_ok=True)
+        return self.below.lookup(key, deep) if self.below is not None else None
 
     def read(self, file: Path) -> Record | None:
         """The record in a file, None if it is not whole or of another version."""
-        try:
-            return Record.from_json(file.read_text())
-        except (OSError, UnicodeDecodeError):
-            return None
+        return Record.from_json(_read(file))
+
+    def record_change(self, key: str) -> contextlib.AbstractContextManager:
+        """Held while a record that is there already is replaced or dropped."""
+        return exclusive(self.root / "leases" / f"{key}.record")
 
     @contextlib.contextmanager
     def private(self, stage: str) -> Iterator[Path]:
         """An empty folder of one's own on the store's filesystem, removed at the end, or by gc if its owner died."""
-        folder = self.root / "tmp" / f"{stage}-{os.getpid()}-{secrets.token_hex(6)}"
+        folder = self.root / "tmp" / f"{stage}-{os.getpid()}-{os.urandom(6).hex()}"
         try:
             lock = contextlib.ExitStack()
             lock.enter_context(exclusive(folder.with_suffix(".lock")))
@@ -118,6 +127,8 @@ class Store:
         """The record of the stage that differs least from `like` (the newest of equals), to explain a new key."""
         newest = sorted(self.record_files(stage), key=_mtime, reverse=True)[:200]
         records = [record for record in map(self.read, newest) if record is not None]
+        if self.below is not None:
+            records += filter(None, [self.below.previous(stage, like)])
         return min(records, key=lambda record: len(record.parts.diff(like)), default=None)
 
     def quarantine(self, path: Path, digest: str) -> None:
@@ -130,7 +141,8 @@ class Store:
                 self.say(f"the cached object {path.name} was damaged: moved to {target}, to be computed again")
 
     def _holds(self, record: Record, output: str, deep: bool) -> bool:
-        path, digest = self.path(record, output), record.outputs[output]
+        digest = record.outputs[output]
+        path = objects.object_path(self.root, digest, output)
         seen = objects.measure(path)
         if seen is not None and not deep and seen == record.footprints[output]:
             return True
@@ -144,6 +156,13 @@ class Store:
         with contextlib.suppress(OSError):
             if time.time() - _mtime(file) > USED_AGAIN_S:
                 os.utime(file)
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_text()
+    except (OSError, UnicodeDecodeError):
+        return ""
 
 
 def _mtime(file: Path) -> float:

@@ -32,7 +32,7 @@ def verify(store: Store) -> VerifyReport:
         report.objects += 1
         if objects.is_sound(path, digest):
             report.bytes += objects.measure(path).bytes
-        else:
+        elif path.exists():  # gc may have taken it meanwhile
             report.damaged.append(path.name)
             store.quarantine(path, digest)
     for file in sorted(store.record_files()):
