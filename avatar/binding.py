@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-
-from gsac.avatar.threads import share
+from gsac.avatar.workspace import Workspace
 
 kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
@@ -78,7 +77,7 @@ def bind_backward(vertices: np.ndarray, faces: np.ndarray, face: np.ndarray, mu:
     real = vertices.dtype
     mu = plain(mu, real)
     out = BindingGradients(np.empty_like(mu), np.empty((len(mu), 4), real), np.empty_like(mu), np.empty_like(vertices))
-    backward(1, vertices, plain(faces, np.int32), plain(face, np.int32), mu, plain(quat, real), plain(log_scale, real),
+    backward(Workspace(1).share, vertices, plain(faces, np.int32), plain(face, np.int32), mu, plain(quat, real), plain(log_scale, real),
              plain(grad_means, real), plain(grad_rotations, real), plain(grad_scales, real),
              np.empty((len(mu), 9), real), out)
     return out
@@ -91,16 +90,16 @@ def plain(array: np.ndarray, dtype=None) -> np.ndarray:
     return np.require(array, dtype, ["C", "W"])
 
 
-def forward(threads: int, vertices, faces, used, frames: FaceFrames, face, mu, quat, log_scale, out: Bound) -> None:
-    """Frames of the faces that carry gaussians, then the binding, into given buffers; used: (F,) bool scratch."""
+def forward(share, vertices, faces, used, frames: FaceFrames, face, mu, quat, log_scale, out: Bound) -> None:
+    """Frames of the faces that carry gaussians, then the binding, into given buffers; share: a workspace's; used: (F,) bool scratch."""
     _used_frames(vertices, faces, face, used, *frames)
-    share(threads, _bind, frames.R, frames.T, frames.k, face, mu, quat, log_scale, *out)
+    share(_bind, frames.R, frames.T, frames.k, face, mu, quat, log_scale, *out)
 
 
-def backward(threads: int, vertices, faces, face, mu, quat, log_scale, grad_means, grad_rotations, grad_scales, corners,
+def backward(share, vertices, faces, face, mu, quat, log_scale, grad_means, grad_rotations, grad_scales, corners,
              out: BindingGradients) -> None:
     """As `bind_backward`, into given buffers; corners: (N, 9) scratch."""
-    share(threads, _bind_backward, vertices, faces, face, mu, quat, log_scale, grad_means, grad_rotations, grad_scales,
+    share(_bind_backward, vertices, faces, face, mu, quat, log_scale, grad_means, grad_rotations, grad_scales,
           out.mu, out.quat, out.log_scale, corners)
     _scatter(faces, face, corners, out.vertices)
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-
 from gsac.avatar import artifacts
 
 FLATNESS = 0.15

@@ -11,28 +11,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-
-from gsac.avatar import binding, threads
+from gsac.avatar import binding
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import backward, forward, project, tiles
-
-
-class Workspace:
-    """Buffers kept from step to step. A rendering and its gradients live in them until the next use of the workspace."""
-
-    def __init__(self, workers: int | None = None):
-        """workers: threads to use; all available cores unless given."""
-        self.workers = workers or threads.available()
-        self._buffers: dict[str, np.ndarray] = {}
-
-    def take(self, name: str, shape: tuple[int, ...], dtype) -> np.ndarray:
-        """An array with any content; the same memory for the same name."""
-        size = int(np.prod(shape))
-        buffer = self._buffers.get(name)
-        if buffer is None or buffer.size < size or buffer.dtype != dtype:
-            buffer = self._buffers[name] = np.empty(size + size // 8, dtype)
-        return buffer[:size].reshape(shape)
+from gsac.avatar.workspace import Workspace
 
 
 @dataclass
@@ -101,10 +84,10 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Wo
     real = means.dtype
     rotations, scales, rgb, opacity = (binding.plain(a, real) for a in (rotations, scales, rgb, opacity))
     workspace = workspace or Workspace()
-    workers, take, count = workspace.workers, workspace.take, len(means)
+    share, take, count = workspace.share, workspace.take, len(means)
     lens = np.array([*camera.focal, *camera.center], real)
     splats, boxes = take("splats", (count, project.SPLAT), real), take("boxes", (count, 4), np.int32)
-    threads.share(workers, project.project, means, rotations, scales, rgb, opacity, lens, camera.width, camera.height,
+    share(project.project, means, rotations, scales, rgb, opacity, lens, camera.width, camera.height,
                   splats, boxes)
 
     columns, rows = -(-camera.width // project.TILE), -(-camera.height // project.TILE)
@@ -124,8 +107,8 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Wo
     lattice = np.concatenate([inside % forward.BLOCK, inside // forward.BLOCK]).astype(real) + real.type(0.5)
     image = take("rgb", (camera.height, camera.width, 3), real)
     alpha = take("alpha", (camera.height, camera.width), real)
-    scratch = take("forward", (workers, forward.PLANES * project.TILE ** 2), real)
-    threads.share(workers, forward.composite, tile_order, tile_start, pair_gaussian, splats, lattice, columns, scratch,
+    scratch = take("forward", (workspace.workers, forward.PLANES * project.TILE ** 2), real)
+    share(forward.composite, tile_order, tile_start, pair_gaussian, splats, lattice, columns, scratch,
                   image, alpha)
     state = State(camera, workspace, means, rotations, scales, lens, lattice, splats, slot_start, tile_order, tile_start,
                   pair_gaussian, pair_slot, columns, image, alpha)
@@ -135,16 +118,16 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Wo
 def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) -> Gradients:
     """grad_rgb: (H, W, 3), grad_alpha: (H, W): gradient of a loss with respect to the rendering that gave `state`."""
     real, count = state.means.dtype, len(state.means)
-    workers, take = state.workspace.workers, state.workspace.take
+    share, take = state.workspace.share, state.workspace.take
     moments = take("moments", (len(state.pair_slot), project.MOMENTS), real)
-    scratch = take("backward", (workers, backward.PLANES * project.TILE ** 2), real)
-    threads.share(workers, backward.composite_backward, state.tile_order, state.tile_start, state.pair_gaussian,
+    scratch = take("backward", (state.workspace.workers, backward.PLANES * project.TILE ** 2), real)
+    share(backward.composite_backward, state.tile_order, state.tile_start, state.pair_gaussian,
                   state.pair_slot, state.splats, state.lattice, state.columns, scratch, state.rgb, state.alpha,
                   binding.plain(grad_rgb, real), binding.plain(grad_alpha, real), moments)
     gradients = Gradients(take("grad_means", (count, 3), real), take("grad_rotations", (count, 3, 3), real),
                           take("grad_scales", (count, 3), real), take("grad_rgb", (count, 3), real),
                           take("grad_opacity", (count,), real))
-    threads.share(workers, project.project_backward, state.means, state.rotations, state.scales, state.lens,
+    share(project.project_backward, state.means, state.rotations, state.scales, state.lens,
                   state.camera.width, state.camera.height, state.splats, state.slot_start, moments, *gradients)
     return gradients
 
@@ -161,7 +144,7 @@ def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, 
     frames = binding.FaceFrames(take("R", (f, 3, 3), real), take("T", (f, 3), real), take("k", (f,), real),
                                 take("valid", (f,), np.bool_))
     bound = binding.Bound(take("means", (n, 3), real), take("rotations", (n, 3, 3), real), take("scales", (n, 3), real))
-    binding.forward(workspace.workers, vertices, faces, take("used", (f,), np.bool_), frames, face, mu, quat, log_scale, bound)
+    binding.forward(workspace.share, vertices, faces, take("used", (f,), np.bool_), frames, face, mu, quat, log_scale, bound)
     rendering = render(*bound, gaussians.rgb, gaussians.opacity, camera, workspace)
     rendering.state.bound = (vertices, faces, face, mu, quat, log_scale)
     return rendering
@@ -174,6 +157,6 @@ def render_bound_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.nda
     real, take, n = mu.dtype, state.workspace.take, len(mu)
     out = binding.BindingGradients(take("grad_mu", (n, 3), real), take("grad_quat", (n, 4), real),
                                    take("grad_log_scale", (n, 3), real), take("grad_vertices", vertices.shape, real))
-    binding.backward(state.workspace.workers, vertices, faces, face, mu, quat, log_scale, gradients.means,
+    binding.backward(state.workspace.share, vertices, faces, face, mu, quat, log_scale, gradients.means,
                      gradients.rotations, gradients.scales, take("corners", (n, 9), real), out)
     return BoundGradients(out.mu, out.quat, out.log_scale, gradients.rgb, gradients.opacity, out.vertices)

@@ -7,7 +7,6 @@ dL/d(alpha) at a pixel is T (v . c) - V_behind / (1 - alpha): no colour of what 
 from __future__ import annotations
 
 import numba
-
 from gsac.avatar.lanes import below_or_equal, falloff, load, spread, store, total
 from gsac.avatar.raster.forward import BLOCK, BLOCKS, LANES, MAX_ALPHA, STOP, block_columns, block_rows
 from gsac.avatar.raster.project import BLUE, GREEN, HA, HC, OPACITY, RED, S_MAX, TILE, B, X, Y

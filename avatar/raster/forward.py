@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-
 from gsac.avatar.lanes import below_or_equal, falloff, load, spread, store
 from gsac.avatar.raster.project import (
     BLUE,

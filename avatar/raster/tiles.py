@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-
 from gsac.avatar.raster.project import DEPTH
 
 kernel = numba.njit(cache=True, nogil=True)

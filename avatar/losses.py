@@ -1,0 +1,126 @@
+"""Image losses on the CPU, value and gradient with respect to the image at once.
+
+Images are (H, W, 3) in 0..1. `box` = (top, bottom, left, right) in pixels: the loss sees that crop as if it were the whole image.
+`weights` (H, W) >= 0 make every mean a weighted mean over pixels. The gradient of `factor` times the value is added to
+`gradient` (H, W, 3) where one is given (losses of one image add up in one array), else to a new array of zeros.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from gsac.avatar import sobel as _sobel
+from gsac.avatar import ssim as _ssim
+from gsac.avatar.lanes import WIDTH, load, spread, store, total
+from gsac.avatar.ssim import MARGIN
+from gsac.avatar.workspace import Workspace
+
+kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+
+
+class Loss(NamedTuple):
+    value: float
+    """Without the factor."""
+    gradient: np.ndarray
+    """(H, W, 3) of factor times the value, with respect to the image."""
+
+
+def l2(image, target, box=None, weights=None, factor: float = 1.0, gradient=None, workspace: Workspace | None = None) -> Loss:
+    """Mean squared difference over pixels and channels."""
+    job = _Crop(image, target, box, weights, gradient, workspace)
+    sums = np.empty(job.height, job.real)
+    tail = job.take("l2_tail", (job.workspace.workers, WIDTH))
+    job.workspace.share(_squares, *job.place, job.count, job.shares, job.real.type(factor), tail, job.flat_gradient, sums)
+    return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
+
+
+def ssim(image, target, box=None, weights=None, factor: float = 1.0, gradient=None, workspace: Workspace | None = None) -> Loss:
+    """Mean structural similarity (1 for equal images): 11x11 gaussian window, sigma 1.5, zero padding, data range 1."""
+    job = _Crop(image, target, box, weights, gradient, workspace)
+    scratch = job.take("ssim_scratch", (job.workspace.workers, _ssim.SCRATCH))
+    slopes = job.take("ssim_slopes", (3, job.height, job.stride))
+    sums = np.empty((job.height, -(-job.count // _ssim.STRIP)), job.real)
+    job.workspace.share(_ssim.similarity, *job.place, job.height, job.count, job.shares, scratch, slopes, sums)
+    job.workspace.share(_ssim.similarity_backward, *job.place, job.height, job.count, job.real.type(factor), scratch, slopes,
+                        job.flat_gradient)
+    return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
+
+
+def sobel(image, target, box=None, weights=None, factor: float = 1.0, gradient=None, workspace: Workspace | None = None) -> Loss:
+    """Mean over pixels and channels of the squared difference of Sobel responses, summed over the two directions."""
+    job = _Crop(image, target, box, weights, gradient, workspace)
+    padded = job.take("sobel_difference", (job.height + 2, job.stride))
+    across, down = (job.take(name, (job.height + 2, job.stride)) for name in ("sobel_across", "sobel_down"))
+    sums = np.empty(job.height, job.real)
+    tail = job.take("sobel_tail", (job.workspace.workers, WIDTH))
+    job.workspace.share(_sobel.difference, *job.place, job.height, job.count, padded)
+    job.workspace.share(_sobel.responses, padded, job.shares, across, down, sums)
+    job.workspace.share(_sobel.responses_backward, across, down, job.real.type(factor), job.pitch, job.start, job.count, tail,
+                        job.flat_gradient)
+    return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
+
+
+class _Crop:
+    """Images, weights and box as the kernels take them: flat arrays, where the crop starts, numbers (3 a pixel) of a row."""
+
+    def __init__(self, image, target, box, weights, gradient, workspace):
+        self.real = np.dtype(np.float64 if image.dtype == np.float64 else np.float32)
+        self.workspace = workspace or Workspace()
+        rows, columns, channels = image.shape
+        if channels != 3 or target.shape != image.shape:
+            raise ValueError(f"image {image.shape} and target {target.shape} must both be (H, W, 3)")
+        top, bottom, left, right = box or (0, rows, 0, columns)
+        if not (0 <= top < bottom <= rows and 0 <= left < right <= columns):
+            raise ValueError(f"box {box} (top, bottom, left, right) is empty or leaves the {rows}x{columns} image")
+        self.gradient = np.zeros(image.shape, self.real) if gradient is None else gradient
+        if self.gradient.shape != image.shape or self.gradient.dtype != self.real or not self.gradient.flags.c_contiguous:
+            raise ValueError(f"gradient must be a contiguous {self.real} array of shape {image.shape}")
+        self.pitch, self.start = 3 * columns, 3 * (top * columns + left)
+        self.height, self.count = bottom - top, 3 * (right - left)
+        self.stride = -(-self.count // WIDTH) * WIDTH + 2 * MARGIN
+        flat = [np.require(a, self.real, ["C", "W"]).reshape(-1) for a in (image, target)]
+        self.place = (*flat, self.pitch, self.start)
+        self.flat_gradient = self.gradient.reshape(-1)
+        self.shares = self._shares(None if weights is None else weights[top:bottom, left:right])
+
+    def _shares(self, weights) -> np.ndarray:
+        """(1 or height, stride) share of each number in the mean; zero in the margins."""
+        shares = self.take("shares", (1 if weights is None else self.height, self.stride))
+        shares[:, :MARGIN] = 0
+        shares[:, MARGIN + self.count:] = 0
+        if weights is None:
+            shares[:, MARGIN:MARGIN + self.count] = 1 / (self.height * self.count)
+        else:
+            norm = weights / max(3 * float(weights.sum(dtype=np.float64)), 1e-12)
+            shares[:, MARGIN:MARGIN + self.count] = np.repeat(norm, 3, axis=1)
+        return shares
+
+    def take(self, name: str, shape: tuple[int, ...]) -> np.ndarray:
+        return self.workspace.take(name, shape, self.real)
+
+
+@kernel
+def _squares(worker, workers, image, target, pitch, start, count, shares, factor, tails, gradient, sums):
+    real = image.dtype.type
+    twice = real(2) * factor
+    tail = tails[worker]
+    for row in range(worker, len(sums), workers):
+        share_row = shares[min(row, len(shares) - 1)]
+        value = spread(real(0))
+        rest = real(0)
+        for i in range(0, count, WIDTH):
+            at = start + row * pitch + i
+            part = load(share_row, MARGIN + i)
+            if i + WIDTH <= count:
+                d = load(image, at) - load(target, at)
+                value = value + d * d * part
+                store(gradient, at, load(gradient, at) + d * part * twice)
+            else:
+                store(tail, 0, part)
+                for j in range(count - i):
+                    e = image[at + j] - target[at + j]
+                    rest += e * e * tail[j]
+                    gradient[at + j] += e * tail[j] * twice
+        sums[row] = total(value) + rest

@@ -1,0 +1,56 @@
+"""Threads and buffers of the CPU kernels.
+
+A kernel releases the GIL and takes `(worker, workers, ...)`: it does every item `worker, worker + workers, ...`, or its contiguous
+share. What it writes for an item never depends on who does it, so results are bitwise the same for any number of threads.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+_pools: dict[int, ThreadPoolExecutor] = {}
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pools.clear)
+
+
+def available() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Workspace:
+    """Buffers kept from step to step, and the threads that work on them.
+
+    What a function gives back may live in its workspace: it holds until the next call of that function with the same one.
+    """
+
+    def __init__(self, workers: int | None = None):
+        """workers: threads to use; all available cores unless given."""
+        self.workers = workers or available()
+        self._buffers: dict[str, np.ndarray] = {}
+
+    def take(self, name: str, shape: tuple[int, ...], dtype) -> np.ndarray:
+        """An array with any content; the same memory for the same name."""
+        size = int(np.prod(shape))
+        buffer = self._buffers.get(name)
+        if buffer is None or buffer.size < size or buffer.dtype != dtype:
+            buffer = self._buffers[name] = np.empty(size + size // 8, dtype)
+        return buffer[:size].reshape(shape)
+
+    def share(self, kernel, *arguments) -> None:
+        """Calls `kernel(worker, workers, *arguments)` once for each worker and waits for all."""
+        if self.workers <= 1:
+            kernel(0, 1, *arguments)
+            return
+        pool = _pools.get(self.workers)
+        if pool is None:
+            pool = _pools[self.workers] = ThreadPoolExecutor(self.workers - 1, thread_name_prefix="kernel")
+        others = [pool.submit(kernel, worker, self.workers, *arguments) for worker in range(1, self.workers)]
+        try:
+            kernel(0, self.workers, *arguments)
+        finally:
+            for other in others:
+                other.result()
