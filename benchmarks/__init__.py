@@ -1,0 +1,1 @@
+"""Makes the truth clips and the charts: speed-accuracy, stability, size."""
