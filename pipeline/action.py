@@ -36,7 +36,7 @@ class Actor:
 
     def act(self, verdict: Verdict, inputs: dict[str, Path], forced: bool = False,
             still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
-        """inputs: port -> read-only path. `still_valid` is asked before publishing and raises if the inputs have changed.
+        """inputs: port -> read-only path. `still_valid` runs before publishing; it raises if inputs changed.
 
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
@@ -59,7 +59,8 @@ class Actor:
 
     def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path) -> RunInfo:
         name, project = parts.stage, self.keys.project
-        info = RunInfo(started=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), device=self.keys.device)
+        now = datetime.datetime.now(datetime.UTC)
+        info = RunInfo(started=now.isoformat(timespec="seconds"), device=self.keys.device)
 
         def hear(event: dict[str, Any]) -> None:
             if event["event"] == "progress":

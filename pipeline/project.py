@@ -12,7 +12,7 @@ from gsac.pipeline.graph import Graph, Step
 from gsac.stages.contract import BadInput, Stage
 
 OWN_STAGES = "GSAC_STAGES"
-"""Environment variable: an importable package with a dvc.yaml beside its `__init__.py`, instead of gsac's own stages."""
+"""Environment variable: a package below `gsac` with a dvc.yaml beside its `__init__.py`, instead of `gsac.stages`."""
 
 
 @dataclass(frozen=True)

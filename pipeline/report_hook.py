@@ -23,5 +23,6 @@ def refresh_report(workspace: Workspace, results: list[StageResult]) -> str | No
 
         write_report(workspace.root)
     except Exception as error:
-        return f"{page} could not be written ({type(error).__name__}: {error}); `gsac report {workspace.root}` tries again"
+        why = f"{type(error).__name__}: {error}"
+        return f"{page} could not be written ({why}); `gsac report {workspace.root}` tries again"
     return None

@@ -60,8 +60,8 @@ class StageResult:
     @classmethod
     def of(cls, verdict: Verdict, outcome: Outcome, record: Record, config: Any) -> StageResult:
         info = record.info
-        return cls(verdict.stage, outcome, verdict.sentence, record.key, info.seconds, info.cpu_seconds, info.peak_rss_mb,
-                   info.warnings, plain(config), info.metrics)
+        return cls(verdict.stage, outcome, verdict.sentence, record.key, info.seconds, info.cpu_seconds,
+                   info.peak_rss_mb, info.warnings, plain(config), info.metrics)
 
     def to_json(self) -> dict[str, Any]:
         row = {
@@ -118,7 +118,8 @@ class Chain:
         for name in self.selected(options):
             unknown = [p for p in self.graph.step(name).deps if p not in digests]
             if unknown:
-                verdicts.append(waits(name, sorted({self.graph.producer[p] for p in unknown}, key=list(self.graph.steps).index)))
+                makers = {self.graph.producer[p] for p in unknown}
+                verdicts.append(waits(name, [maker for maker in self.graph.steps if maker in makers]))
                 continue
             verdict = self._judge(name, digests, options)
             verdicts.append(verdict)
@@ -133,7 +134,8 @@ class Chain:
         """
         steps = self.selected(options)
         required = self.graph.above(options.start) if options.start else set()
-        digests = {CLIP: self._clip_digest(clip)}
+        source = self._clip_digest(clip)
+        digests = {CLIP: source}
         paths = {CLIP: clip}
         actor = Actor(self.keys, self.store, self.reporter, self.workspace.root / "logs")
         with in_use(self.store) as lease, self._kept(clip):
@@ -144,12 +146,13 @@ class Chain:
                 if verdict.current:
                     outcome, record = Outcome.CACHED, verdict.record
                 elif name in required:
-                    raise NotUpToDateError(f"stage {name} is not up to date ({verdict.sentence}); run without --from {options.start}")
+                    raise NotUpToDateError(f"stage {name} is not up to date ({verdict.sentence}); "
+                                           f"run without --from {options.start}")
                 else:
                     with self._failing(verdict, actor):
                         outcome, record = actor.act(
                             verdict, {port: paths[port] for port in inputs}, forced=name in options.force,
-                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, digests[CLIP]) if reads else None)
+                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
                 self._done(verdict, outcome, record)

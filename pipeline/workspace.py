@@ -26,6 +26,9 @@ from gsac.stages.contract import BadInput
 
 DAG, PARAMS, RUN, METRICS = "dvc.yaml", "params.yaml", "run.json", "metrics.json"
 
+OWN_STORE = ".store"
+"""Where results lie if the cache cannot be written."""
+
 
 class Workspace:
     """Paths of one clip's folder."""
@@ -40,7 +43,8 @@ class Workspace:
         for folder in (start, *start.parents):
             if (folder / DAG).is_file():
                 return cls(folder)
-        raise BadInput(f"{start} is not in the output folder of a run: no {DAG} here or above; give the folder, or `gsac run` first")
+        raise BadInput(f"{start} is not in the output folder of a run: no {DAG} here or above; "
+                       "give the folder, or `gsac run` first")
 
     @property
     def clip(self) -> Path:
@@ -113,7 +117,7 @@ class Workspace:
             try:
                 Graph.load(self.root / DAG)
             except BadInput as e:
-                raise BadInput(f"--out {self.root} holds the dvc.yaml of something else ({e}); choose another folder") from e
+                raise BadInput(f"--out {self.root} holds another project's {DAG} ({e}); choose another folder") from e
 
     def write_json(self, name: str, content: Any) -> None:
         write_text(self.root / name, json.dumps(content, indent=1) + "\n")

@@ -38,8 +38,10 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if arguments.json:
         emit({"stage": verdict.stage, "reason": verdict.reason.value,
               "key": verdict.parts.key() if verdict.parts else None,
-              "changes": [{"kind": c.kind.value, "name": c.name, "before": c.before, "after": c.after, "why": c.sentence}
-                          for c in verdict.changes]})
+              "changes": [
+                  {"kind": c.kind.value, "name": c.name, "before": c.before, "after": c.after, "why": c.sentence}
+                  for c in verdict.changes
+              ]})
     return ExitCode.OK
 
 

@@ -15,7 +15,8 @@ from gsac.pipeline.workspace import Workspace
 
 def add_params(command: argparse.ArgumentParser) -> None:
     command.add_argument("--params", type=Path, metavar="FILE", help="YAML file with sections of parameters")
-    command.add_argument("--set", action="append", default=[], metavar="stage.key=value", help="one parameter; may be repeated")
+    command.add_argument("--set", action="append", default=[], metavar="stage.key=value",
+                         help="one parameter; may be repeated")
 
 
 def add_json(command: argparse.ArgumentParser) -> None:
@@ -26,9 +27,16 @@ def add_workspace(command: argparse.ArgumentParser) -> None:
     command.add_argument("folder", nargs="?", type=Path, default=Path("."), help="the folder of a run (default: here)")
 
 
-def open_store(reporter: PlainReporter) -> Store:
-    """The store of GSAC_CACHE, which says aloud what it finds damaged."""
-    return Store.open(say=reporter.note)
+def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
+    """The store of GSAC_CACHE, which says aloud what it finds damaged.
+
+    Where it may only be read, results of this run go to `instead`, and what it holds is still used.
+    """
+    store = Store.open(say=reporter.note)
+    if instead is None or store.writable:
+        return store
+    reporter.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")
+    return Store(instead, say=reporter.note, below=store)
 
 
 def open_workspace(arguments: argparse.Namespace, start: Path) -> tuple[Workspace, Project, dict[str, Any]]:

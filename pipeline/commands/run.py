@@ -14,7 +14,7 @@ from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 from gsac.pipeline.report_hook import refresh_report
 from gsac.pipeline.run import Chain, Options
-from gsac.pipeline.workspace import Workspace
+from gsac.pipeline.workspace import OWN_STORE, Workspace
 from gsac.stages.contract import BadInput
 
 
@@ -22,8 +22,10 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("clip", type=Path, metavar="CLIP", help="a video, or a folder of photos")
     command.add_argument("--out", type=Path, metavar="DIR", help="where results are shown (default: ./<clip>-avatar)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
-    command.add_argument("--from", dest="start", metavar="STAGE", help="what this stage needs must be in the cache already")
-    command.add_argument("--force", action="append", default=[], metavar="STAGE", help="run this stage again; may be repeated")
+    command.add_argument("--from", dest="start", metavar="STAGE",
+                         help="what this stage needs must be in the cache already")
+    command.add_argument("--force", action="append", default=[], metavar="STAGE",
+                         help="run this stage again; may be repeated")
     add_params(command)
     command.add_argument("--dry-run", action="store_true", help="say what would run and why")
     add_json(command)
@@ -37,7 +39,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     workspace = Workspace(arguments.out or default_out(clip))
     options = Options(arguments.until, arguments.start, tuple(arguments.force))
     with reporter(plain=arguments.json) as voice:
-        store = open_store(voice)
+        store = open_store(voice, None if arguments.dry_run else workspace.root / OWN_STORE)
         chain = Chain(project, configs, store, workspace, voice)
         if arguments.dry_run:
             return foretell(chain, clip, options, voice, arguments.json)

@@ -19,7 +19,7 @@ from gsac.pipeline.params import resolve
 from gsac.pipeline.plan import judge
 from gsac.pipeline.project import Project
 from gsac.pipeline.run import StageFailedError, StageResult
-from gsac.pipeline.workspace import link
+from gsac.pipeline.workspace import OWN_STORE, link
 from gsac.stages.contract import BadInput, StageError
 
 
@@ -37,15 +37,16 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if (arguments.inputs is None) != (arguments.out is None):
         raise BadInput("--inputs and --out go together; without both, the folder of a run is used")
     with reporter(plain=arguments.json) as voice:
-        store = open_store(voice)
         if arguments.inputs is None:
             workspace, project, configs = open_workspace(arguments, Path.cwd())
+            store = open_store(voice, workspace.root / OWN_STORE)
             step = project.graph.step(arguments.name)
             digests = {port: workspace.digest(port, store) for port in step.deps}
             paths = {port: workspace.path(port).resolve() for port in step.deps}
             out, logs = workspace.root / arguments.name, workspace.root / "logs"
         else:
             project = Project.at_hand()
+            store = open_store(voice, arguments.out / OWN_STORE)
             configs = resolve(project, arguments.params, arguments.set)
             paths = fixture_paths(project, arguments.name, arguments.inputs)
             digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
@@ -87,7 +88,8 @@ def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:
         if not path.exists():
             raise BadInput(f"{folder / port}: missing; stage {name} reads {', '.join(graph.step(name).deps)}")
         if port != CLIP:
-            output = next(o for o in project.stage(graph.producer[port]).outputs if port == f"{graph.producer[port]}/{o.path}")
+            maker = graph.producer[port]
+            output = next(o for o in project.stage(maker).outputs if port == f"{maker}/{o.path}")
             try:
                 output.check(path)
             except Exception as error:

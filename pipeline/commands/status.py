@@ -30,7 +30,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
             for v in chain.forecast(workspace.require_clip(), Options())
         ]
         for verdict in verdicts:
-            voice.note(f"{verdict.stage:<10} {verdict.reason.value:<18} {verdict.sentence if not verdict.current else ''}".rstrip())
+            why = "" if verdict.current else verdict.sentence
+            voice.note(f"{verdict.stage:<10} {verdict.reason.value:<18} {why}".rstrip())
     current = all(verdict.current for verdict in verdicts)
     if arguments.json:
         emit({"up_to_date": current, "stages": [

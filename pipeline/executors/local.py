@@ -1,0 +1,80 @@
+"""A pool of processes on this machine, one process a clip: a clip that kills its process costs no other clip."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+
+from gsac.pipeline.executors import ClipJob, ClipResult
+from gsac.pipeline.outcomes import ExitCode
+
+THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""Shared out among the clips that run at once, where the user has not set them."""
+
+
+class LocalExecutor:
+    """workers: how many clips at once."""
+
+    def __init__(self, workers: int):
+        self._pool = ThreadPoolExecutor(workers)  # the threads only wait for their process
+        self._futures: list[Future[ClipResult]] = []
+        self._running: set[subprocess.Popen] = set()
+        share = str(max(1, (os.cpu_count() or 1) // workers))
+        self._environment = dict.fromkeys(THREADS, share) | os.environ
+
+    def __enter__(self) -> LocalExecutor:
+        return self
+
+    def __exit__(self, *exc) -> None:
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for process in list(self._running):
+            with contextlib.suppress(ProcessLookupError):
+                process.send_signal(signal.SIGINT)
+        self._pool.shutdown(wait=True)
+
+    def submit(self, job: ClipJob) -> None:
+        self._futures.append(self._pool.submit(self._run, job))
+
+    def collect(self) -> Iterator[ClipResult]:
+        for future in as_completed(self._futures):
+            yield future.result()
+
+    def _run(self, job: ClipJob) -> ClipResult:
+        began = time.monotonic()
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "gsac.pipeline.cli", "run", str(job.clip), "--out", str(job.out), "--json",
+             *job.arguments],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self._environment,
+            start_new_session=True,
+        )
+        self._running.add(process)
+        try:
+            out, words = process.communicate()
+        finally:
+            self._running.discard(process)
+        return ClipResult(job, process.returncode, time.monotonic() - began, _error(process.returncode, words),
+                          _summary(out))
+
+
+def _summary(out: str) -> dict:
+    lines = out.splitlines()
+    with contextlib.suppress(IndexError, ValueError):
+        return json.loads(lines[-1])
+    return {}
+
+
+def _error(code: int, words: str) -> str:
+    """The sentence with which a run ended."""
+    if code == ExitCode.OK:
+        return ""
+    if code < 0:
+        return f"its process was killed by {signal.Signals(-code).name}"
+    said = [line for line in words.splitlines() if line.startswith("gsac: ") and not line.startswith("gsac: warning: ")]
+    return said[-1].removeprefix("gsac: ") if said else (words.strip().splitlines() or ["no word of why"])[-1]
