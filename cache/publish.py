@@ -6,7 +6,9 @@ last and only it makes a result count. An object without a record is rubbish tha
 
 from __future__ import annotations
 
+import contextlib
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,7 +48,8 @@ def publish(
 ) -> Record:
     """Moves `folder/<output>` into the store and writes the record; an equal key that is published already wins.
 
-    replace: the new result takes the place of a published one (a forced run). Returns the record that now counts.
+    replace: the new result takes the place of a published one (a forced run), whose record stays beside it until gc
+    finds it unused. Returns the record that now counts.
     Raises CacheReadOnlyError, CacheFullError or CacheError; then nothing has changed that a lookup could see.
     """
     needed = None
@@ -107,6 +110,7 @@ def _record(store: Store, record: Record, replace: bool, step: Callable[[str], N
         for _ in range(3):
             if replace:
                 with store.record_change(record.key):
+                    _set_aside(final)
                     os.replace(temp, final)
                 break
             try:
@@ -122,3 +126,9 @@ def _record(store: Store, record: Record, replace: bool, step: Callable[[str], N
     objects.sync_one(final.parent)
     step("record synced")
     return record
+
+
+def _set_aside(record: Path) -> None:
+    """Keeps a record under a second name: runs in progress may be using its outputs."""
+    with contextlib.suppress(FileNotFoundError):
+        os.link(record, record.with_suffix(f".{time.time_ns()}.json"))

@@ -2,6 +2,7 @@
 
 objects/ab/<digest>[suffix]      outputs, files or folders, read-only
 actions/<stage>/<key>.json       records; a result counts from the moment its record is there
+actions/<stage>/<key>.<ns>.json  records of results that a forced run has replaced
 tmp/ leases/ quarantine/         work in progress, locks, what was found damaged
 models/<sha256>/<name>           model files, kept by hand
 memo.sqlite lock                 stat memo; held in common by publishers, alone by gc

@@ -85,13 +85,25 @@ def test_the_longest_unused_go_until_the_rest_fits_and_shared_objects_count_once
 
 
 def test_without_a_bound_only_rubbish_goes(store, make, parts_of, unused):
-    record = make(parts_of(), "first")
-    make(parts_of(), "forced", replace=True)
+    record, lost = make(parts_of(fps=5), "kept"), make(parts_of(fps=6), "lost")
+    store.record_path("split", lost.key).unlink()
     unused(record, 1000 * DAY)
     report = collect(store)
     assert report.records == []
     assert len(report.objects) == 2
-    assert store.lookup(record.key, deep=True) is not None
+    assert store.lookup(record.key, deep=True) == record
+
+
+def test_gc_keeps_a_result_in_use_that_a_forced_run_has_replaced(store, make, parts_of, contents):
+    first = make(parts_of(), "first")
+    with in_use(store, [first.key]):
+        forced = make(parts_of(), "forced", replace=True)
+        collect(store, keep_days=0, max_bytes=0, grace_s=0)
+        assert store.path(first, "clip.json").read_text() == "first"
+        assert store.lookup(forced.key, deep=True) == forced
+        assert verify(store).sound
+    collect(store, keep_days=0, grace_s=0)
+    assert list((store.root / "objects").glob("*/*")) == []
 
 
 def test_folders_of_dead_runs_go_and_those_of_living_ones_stay(store, child):
