@@ -66,16 +66,16 @@ def walk(avatar: RiggedAvatar) -> Clip:
     for side, phase, out in (("left", 0.0, 1.0), ("right", 0.5, -1.0)):
         p = (t + phase) % 1
         hip = _periodic(p, HIP)
-        tracks[f"{side}_hip"] = (_turn(t, y=0.03 * out) * _turn(t, x=-hip)).as_rotvec()
+        tracks[f"{side}_hip"] = (_turn(t, y=0.05 * out) * _turn(t, z=-0.07 * out) * _turn(t, x=-hip)).as_rotvec()
         tracks[f"{side}_knee"] = _about(t, x=_periodic(p, KNEE))
-        tracks[f"{side}_ankle"] = _about(t, x=-_periodic(p, ANKLE))
+        tracks[f"{side}_ankle"] = _about(t, x=-_periodic(p, ANKLE), z=0.05 * out)
         tracks[f"{side}_foot"] = _about(t, x=-_periodic(p, TOES))
-        swing = 0.42 * np.cos(2 * np.pi * p)
-        tracks[f"{side}_shoulder"] = (_turn(t, x=swing) * _turn(t, z=-1.22 * out)).as_rotvec()
-        tracks[f"{side}_elbow"] = _about(t, y=-out * (0.38 - 0.5 * np.minimum(swing, 0) + 0.12 * swing))
+        swing = 0.38 * np.cos(2 * np.pi * p)
+        tracks[f"{side}_shoulder"] = (_turn(t, x=swing) * _turn(t, z=-1.32 * out)).as_rotvec()
+        tracks[f"{side}_elbow"] = _about(t, y=-out * (0.30 - 0.35 * np.minimum(swing, 0)))
     tracks |= {
         "pelvis": _about(t, y=-0.07 * np.cos(turn), z=0.03 * np.sin(turn)),
-        "spine1": _about(t, x=0.05 + 0.01 * np.cos(2 * turn), z=-0.03 * np.sin(turn)),
+        "spine1": _about(t, x=0.02 + 0.01 * np.cos(2 * turn), z=-0.03 * np.sin(turn)),
         "spine2": _about(t, y=0.07 * np.cos(turn)),
         "spine3": _about(t, y=0.08 * np.cos(turn)),
         "neck": _about(t, y=-0.04 * np.cos(turn)),
@@ -86,9 +86,9 @@ def walk(avatar: RiggedAvatar) -> Clip:
 
 CLIPS = {"wave": wave, "walk": walk}
 
-HIP = ((0.0, 0.44), (0.12, 0.36), (0.3, 0.06), (0.5, -0.24), (0.58, -0.14), (0.72, 0.34), (0.86, 0.54))
+HIP = ((0.0, 0.40), (0.12, 0.32), (0.3, 0.02), (0.5, -0.26), (0.58, -0.16), (0.72, 0.28), (0.86, 0.47))
 """Angle in rad over the cycle, 0 = this heel strikes; the leg forward is positive."""
-KNEE = ((0.0, 0.09), (0.13, 0.30), (0.35, 0.10), (0.5, 0.32), (0.62, 0.88), (0.73, 1.02), (0.88, 0.38))
+KNEE = ((0.0, 0.05), (0.13, 0.22), (0.35, 0.04), (0.5, 0.28), (0.62, 0.84), (0.73, 0.98), (0.88, 0.34))
 """Bent is positive."""
 ANKLE = ((0.0, 0.0), (0.08, -0.10), (0.25, 0.08), (0.44, 0.19), (0.58, -0.30), (0.70, -0.04), (0.85, 0.04))
 """Toes up is positive."""
@@ -101,7 +101,7 @@ def _relaxed(t: np.ndarray) -> dict[str, np.ndarray]:
     tracks = {}
     breath = 0.012 * np.sin(2 * np.pi * t)
     for side, out in (("left", 1.0), ("right", -1.0)):
-        tracks[f"{side}_shoulder"] = _about(t, z=-out * (1.2 + breath))
+        tracks[f"{side}_shoulder"] = _about(t, z=-out * (1.3 + breath))
         tracks[f"{side}_elbow"] = _about(t, y=-out * 0.3)
         tracks[f"{side}_wrist"] = _about(t, z=-out * 0.05)
         for finger, bend in zip(FINGERS, (0.22, 0.28, 0.34, 0.40), strict=True):

@@ -1,21 +1,20 @@
 // Orbit camera with OpenCV axes (x right, y down, z forward), and the gestures that move it.
 
 class OrbitCamera {
-  constructor(low, high) {
-    this.low = low;
-    this.high = high;
+  constructor() {
     this.fov = 30;
+    // Share of the picture's height that controls cover at the bottom; the figure stands above it.
+    this.covered = 0;
     this.view = new Float32Array(12);
-    this.reset(1);
   }
 
-  // aspect: width over height; puts the whole figure into the picture.
-  reset(aspect) {
+  // Puts a box, m, into the picture, seen from the front; aspect: width over height.
+  frame(low, high, aspect) {
     this.yaw = 0;
     this.pitch = 4;
-    this.target = this.low.map((l, i) => (l + this.high[i]) / 2);
-    const tall = (this.high[1] - this.low[1]) * 0.62, wide = (this.high[0] - this.low[0]) * 0.56 / aspect;
-    this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (this.high[2] - this.low[2]) / 2;
+    this.target = low.map((l, i) => (l + high[i]) / 2);
+    const tall = (high[1] - low[1]) * 0.57 / (1 - this.covered), wide = (high[0] - low[0]) * 0.58 / aspect;
+    this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
   }
 
   focal(height) {

@@ -12,6 +12,7 @@ uniform usampler2D order;
 uniform vec4 view[3];
 uniform vec2 size;
 uniform float focal;
+uniform float rise;
 uniform vec3 blend;
 out vec4 colour;
 out vec2 sigmas;
@@ -43,7 +44,7 @@ void main() {
   float reach = sqrt(2.0 * log(colour.a / blend.z)) + 1e-3;
   sigmas = reach * vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
   vec2 offset = sigmas.x * sqrt(large) * axis + sigmas.y * sqrt(small) * vec2(-axis.y, axis.x);
-  vec2 pixel = focal * c.xy / c.z + offset;
+  vec2 pixel = focal * c.xy / c.z + offset - vec2(0, rise);
   gl_Position = vec4(2.0 * pixel / size * vec2(1, -1), 0, 1);
 }`;
 
@@ -65,6 +66,7 @@ precision highp float;
 uniform vec4 view[3];
 uniform vec2 size;
 uniform float focal;
+uniform float rise;
 uniform vec4 disc;
 out vec2 place;
 
@@ -72,7 +74,7 @@ void main() {
   place = vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
   vec4 p = vec4(disc.x + place.x * disc.w, disc.y, disc.z + place.y * disc.w, 1);
   vec3 c = vec3(dot(view[0], p), dot(view[1], p), dot(view[2], p));
-  gl_Position = vec4(2.0 * focal * c.xy / size * vec2(1, -1), 0, c.z);
+  gl_Position = vec4(2.0 * (focal * c.xy - vec2(0, rise) * c.z) / size * vec2(1, -1), 0, c.z);
 }`;
 
 const FLOOR_FRAGMENT = `#version 300 es
@@ -166,7 +168,7 @@ class Painter {
     if (shadow && camera.pitch > 0) {
       this.use(this.floor, camera, width, height);
       gl.uniform4f(this.floor.places.disc, shadow.x, shadow.y, shadow.z, shadow.radius);
-      gl.uniform1f(this.floor.places.strength, 0.5);
+      gl.uniform1f(this.floor.places.strength, 0.4);
       gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     }
     this.use(this.splats, camera, width, height);
@@ -187,5 +189,6 @@ class Painter {
     gl.uniform4fv(program.places.view, camera.view);
     gl.uniform2f(program.places.size, width, height);
     gl.uniform1f(program.places.focal, camera.focal(height));
+    gl.uniform1f(program.places.rise, camera.covered * height / 2);
   }
 }

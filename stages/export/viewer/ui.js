@@ -23,7 +23,8 @@ class Viewer {
     this.sort = new DepthSort(this.binding.count);
     this.canvas = document.getElementById("stage");
     this.painter = new Painter(this.canvas, avatar, this.binding, this.sort);
-    this.camera = new OrbitCamera(...bounds(avatar.vertices));
+    this.camera = new OrbitCamera();
+    [this.low, this.high] = bounds(avatar.vertices);
     this.expression = {};
     this.playing = { pose: "T" };
     this.clock = 0;
@@ -49,12 +50,14 @@ class Viewer {
     if (this.playing.clip) this.pose.clip(this.playing.clip, this.clock);
     else this.pose.still(this.playing.pose);
     if (this.fade < 1) this.pose.fadeFrom(this.before, this.fade * this.fade * (3 - 2 * this.fade));
-    if (this.turntable) this.camera.yaw += seconds * 30;
     this.skin.update(this.pose, this.expression);
     this.binding.update(this.skin.vertices);
+  }
+
+  draw() {
     this.resize();
-    const [x, , z] = this.camera.low.map((low, i) => (low + this.camera.high[i]) / 2);
-    const shadow = { x, y: this.camera.low[1], z, radius: 0.3 * (this.camera.high[1] - this.camera.low[1]) };
+    const [x, , z] = this.low.map((low, i) => (low + this.high[i]) / 2);
+    const shadow = { x, y: this.low[1], z, radius: 0.3 * (this.high[1] - this.low[1]) };
     this.painter.draw(this.camera, colour(this.background), this.still ? null : shadow);
   }
 
@@ -63,6 +66,8 @@ class Viewer {
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
+    const panel = this.still ? 0 : window.innerHeight - document.getElementById("panel").offsetTop;
+    this.camera.covered = Math.min(0.5, panel / window.innerHeight);
   }
 
   run() {
@@ -71,7 +76,10 @@ class Viewer {
       if (this.still) {
         last = null;
       } else {
-        this.step(last === null ? 0 : Math.min((now - last) / 1000, 0.25));
+        const seconds = last === null ? 0 : Math.min((now - last) / 1000, 0.25);
+        if (this.turntable) this.camera.yaw += seconds * 30;
+        this.step(seconds);
+        this.draw();
         this.count(now);
         last = now;
       }
@@ -93,13 +101,6 @@ class Viewer {
     const asked = new URLSearchParams(words), number = (name, fallback) => Number.parseFloat(asked.get(name) ?? fallback);
     this.still = asked.has("still");
     document.body.classList.toggle("bare", this.still);
-    this.resize();
-    this.camera.fov = number("fov", 30);
-    this.camera.reset(this.canvas.width / this.canvas.height);
-    this.camera.yaw = number("yaw", this.camera.yaw);
-    this.camera.pitch = number("pitch", this.camera.pitch);
-    this.camera.distance = number("dist", this.camera.distance);
-    if (asked.has("target")) this.camera.target = asked.get("target").split(",").map(Number);
     if (/^[0-9a-f]{6}$/i.test(asked.get("bg") ?? "")) this.background = `#${asked.get("bg")}`;
     this.turntable = asked.has("turntable");
     this.expression = {};
@@ -115,6 +116,19 @@ class Viewer {
     this.fade = 1;
     this.clock = number("t", 0);
     this.step(0);
+    this.camera.fov = number("fov", 30);
+    this.frame();
+    this.camera.yaw = number("yaw", this.camera.yaw);
+    this.camera.pitch = number("pitch", this.camera.pitch);
+    this.camera.distance = number("dist", this.camera.distance);
+    if (asked.has("target")) this.camera.target = asked.get("target").split(",").map(Number);
+    this.draw();
+  }
+
+  // The whole figure as it stands, from the front.
+  frame() {
+    this.resize();
+    this.camera.frame(...bounds(this.skin.vertices), this.canvas.width / this.canvas.height);
   }
 }
 
@@ -137,6 +151,7 @@ function markPressed(playing) {
   }
 }
 
+// Returns what makes the controls show the viewer's state.
 function addControls(viewer) {
   const find = (id) => document.getElementById(id);
   const button = (text, what) => {
@@ -153,8 +168,7 @@ function addControls(viewer) {
     viewer.turntable = !viewer.turntable;
     showTurntable();
   });
-  find("reset").addEventListener("click", () => viewer.camera.reset(viewer.canvas.width / viewer.canvas.height));
-  find("background").value = viewer.background;
+  find("reset").addEventListener("click", () => viewer.frame());
   find("background").addEventListener("input", (e) => { viewer.background = e.target.value; });
   for (const name of viewer.avatar.expressions) find("expression").append(new Option(name));
   find("faces").hidden = viewer.avatar.expressions.length === 0;
@@ -165,7 +179,11 @@ function addControls(viewer) {
     viewer.turntable = false;
     showTurntable();
   });
-  showTurntable();
+  return () => {
+    showTurntable();
+    markPressed(viewer.playing);
+    find("background").value = viewer.background;
+  };
 }
 
 function tell(error) {
@@ -178,10 +196,13 @@ function tell(error) {
 async function main() {
   const viewer = new Viewer(readAvatar(await inlinedAvatar()));
   window.gsac = viewer;
-  viewer.follow(location.hash.slice(1));
-  addControls(viewer);
-  markPressed(viewer.playing);
-  window.addEventListener("hashchange", () => viewer.follow(location.hash.slice(1)));
+  const showState = addControls(viewer);
+  const follow = () => {
+    viewer.follow(location.hash.slice(1));
+    showState();
+  };
+  follow();
+  window.addEventListener("hashchange", follow);
   viewer.run();
   document.documentElement.dataset.ready = "yes";
 }
