@@ -1,0 +1,86 @@
+"""Image metrics: one scorer for every row of every table.
+
+Images are (H, W, 3) float in 0..1 and are rounded to 8 bit before they are scored, as an image file would be. A
+render is scored as rgb premultiplied + alpha; the frame is cut out with the mask on the same background.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+WHITE, BLACK = 1.0, 0.0
+
+
+def composite(premultiplied: np.ndarray, alpha: np.ndarray, background: float) -> np.ndarray:
+    """premultiplied: (H, W, 3), alpha: (H, W). Returns (H, W, 3) float64 in 0..1, rounded to 8 bit."""
+    image = premultiplied.astype(np.float64) + (1 - alpha.astype(np.float64))[..., None] * background
+    return np.round(np.clip(image, 0, 1) * 255) / 255
+
+
+def psnr(mse: float) -> float | None:
+    """dB for a peak of 1; equal images count as 8-bit rounding alone, 59 dB. None for no measurement."""
+    return None if mse is None or not np.isfinite(mse) else float(-10 * np.log10(max(mse, 1 / 12 / 255**2)))
+
+
+def ssim(a: np.ndarray, b: np.ndarray) -> float:
+    """Mean SSIM of two (H, W, 3) images: Gaussian window of 11 taps, sigma 1.5, k1 .01, k2 .03, whole windows only."""
+    import cv2
+
+    if min(a.shape[:2]) < 11:
+        return float("nan")
+
+    def blur(x):
+        return cv2.GaussianBlur(x, (11, 11), 1.5)[5:-5, 5:-5]
+
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    ma, mb = blur(a), blur(b)
+    va, vb, cov = blur(a * a) - ma * ma, blur(b * b) - mb * mb, blur(a * b) - ma * mb
+    c1, c2 = 0.01**2, 0.03**2
+    return float(np.mean((2 * ma * mb + c1) * (2 * cov + c2) / ((ma**2 + mb**2 + c1) * (va + vb + c2))))
+
+
+def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> dict[str, float]:
+    """One image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1.
+
+    `mse_white`, `mse_black`: the whole frame on that background. `mse_fg`: the person only, that is pixels where mask
+    or alpha is at least 0.5, on white, so that a missing and an added limb both cost. `ssim`: whole frame on white.
+    `alpha_iou`: of alpha and mask at 0.5.
+    """
+    white, white_truth = composite(rgb, alpha, WHITE), composite(truth, mask, WHITE)
+    error = ((white - white_truth) ** 2).mean(2)
+    black = ((composite(rgb, alpha, BLACK) - composite(truth, mask, BLACK)) ** 2).mean()
+    both = (alpha >= 0.5) & (mask >= 0.5)
+    either = (alpha >= 0.5) | (mask >= 0.5)
+    return {
+        "mse_white": float(error.mean()), "mse_black": float(black),
+        "mse_fg": float(error[either].mean()) if either.any() else float("nan"),
+        "fg_pixels": int(either.sum()), "ssim": ssim(white, white_truth),
+        "alpha_iou": float(both.sum() / either.sum()) if either.any() else float("nan"),
+    }
+
+
+def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
+    """Of many images: `psnr_*` is the mean of the images' PSNR, `psnr_*_pooled` the PSNR of all their pixels together.
+
+    `lpips` is null: it needs a network that no package carries.
+    """
+    def mean(name):
+        values = [s[name] for s in scores if np.isfinite(s[name])]
+        return float(np.mean(values)) if values else None
+
+    def mean_psnr(name):
+        values = [psnr(s[name]) for s in scores if np.isfinite(s[name])]
+        return float(np.mean(values)) if values else None
+
+    def pooled(name, weight):
+        kept = [s for s in scores if np.isfinite(s[name]) and s[weight] > 0] if weight else scores
+        if not kept:
+            return None
+        return psnr(float(np.average([s[name] for s in kept], weights=[s[weight] for s in kept] if weight else None)))
+
+    return {
+        "psnr_full": mean_psnr("mse_white"), "psnr_full_pooled": pooled("mse_white", None),
+        "psnr_full_black": mean_psnr("mse_black"), "psnr_fg": mean_psnr("mse_fg"),
+        "psnr_fg_pooled": pooled("mse_fg", "fg_pixels"), "ssim": mean("ssim"), "lpips": None,
+        "alpha_iou": mean("alpha_iou"),
+    }

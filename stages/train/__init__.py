@@ -1,0 +1,22 @@
+"""train: gaussians bound to the body's faces, fitted to the frames; poses are refined on the way.
+
+takes  split/frames, split/clip.json, segment/alpha, smplx/body.npz
+gives  avatar.npz (the gaussians), body.npz (the refined poses), metrics.json, heldout/ (renders beside truth)
+"""
+
+from gsac.avatar.artifacts import check_avatar, check_body, check_folder, check_json
+from gsac.stages.contract import Output, Stage
+from gsac.stages.train.config import TrainConfig
+
+STAGE = Stage(
+    name="train",
+    inputs=("split/frames", "split/clip.json", "segment/alpha", "smplx/body.npz"),
+    outputs=(
+        Output("avatar.npz", check_avatar),
+        Output("body.npz", check_body),
+        Output("metrics.json", check_json),
+        Output("heldout", check_folder),
+    ),
+    config=TrainConfig,
+    packages=("numpy", "numba", "scipy", "opencv-contrib-python-headless", "OpenEXR"),
+)

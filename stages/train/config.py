@@ -1,0 +1,69 @@
+"""Parameters of `train`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gsac.stages.contract import BadInput
+
+RECIPES = ("fast",)
+
+
+@dataclass
+class TrainConfig:
+    recipe: str = "fast"
+    """Which optimisation fits the gaussians: fast."""
+    gaussians: int = 12000
+    """How many gaussians."""
+    steps: int = 1600
+    """Optimisation steps, one frame each."""
+    height: int = 540
+    """Height of the images that are trained on and judged, px; smaller frames are not enlarged."""
+    seed: int = 0
+    """Of the placement, the order of the frames and the backgrounds."""
+    holdout: int = 8
+    """Every k-th frame in the order of the body's yaw is kept for judging; 0, or a clip shorter than k, keeps none."""
+    mu_rate: float = 4e-4
+    """Adam rate of the places (face units) at the start; falls to a hundredth."""
+    rgb_rate: float = 1e-2
+    """Adam rate of the colours at the start; falls to a tenth, as do the three below."""
+    quat_rate: float = 1e-2
+    """Adam rate of the rotations."""
+    scale_rate: float = 1e-2
+    """Adam rate of the log scales."""
+    opacity_rate: float = 3e-2
+    """Adam rate of the opacity logits."""
+    pose_rate: float = 1e-3
+    """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; hands a tenth of it."""
+    pose_pull: float = 1e-3
+    """Weight of the squared distance of a refined pose from the fit, in units of 0.05 rad and 2 cm."""
+    exposure: bool = False
+    """Whether each frame gets a learned gain per colour channel."""
+    ssim: float = 0.1
+    """Weight of 1 - SSIM beside L2."""
+    sobel: float = 0.0
+    """Weight of the Sobel term beside L2."""
+    mask: float = 0.1
+    """Weight of the L2 between the avatar's alpha and the mask."""
+    needle: float = 4.0
+    """Longest axis of a gaussian over its middle one, at most."""
+    reach: float = 0.08
+    """How far a gaussian may lie from where it was placed on its face, m at rest."""
+    place_pull: float = 1e-3
+    """Share of that distance that each step takes back, relative to the rate of the places."""
+    pose_test_steps: int = 40
+    """Steps of the test-time pose optimisation behind the `*_ttpo` figures; 0 leaves these figures null."""
+
+    def check(self) -> None:
+        if self.recipe not in RECIPES:
+            raise BadInput(f"train.recipe is {self.recipe!r}; choices: {', '.join(RECIPES)}")
+        for name, low in (("gaussians", 100), ("steps", 1), ("height", 64), ("holdout", 0), ("pose_test_steps", 0),
+                          ("needle", 1)):
+            if getattr(self, name) < low:
+                raise BadInput(f"train.{name} is {getattr(self, name)}; it must be at least {low}")
+        if self.holdout == 1:
+            raise BadInput("train.holdout is 1: every frame would be held out; use 0 for none, or 2 and more")
+        for name in ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "pose_pull", "ssim",
+                     "sobel", "mask", "reach", "place_pull"):
+            if not 0 <= getattr(self, name) < 1e3:
+                raise BadInput(f"train.{name} is {getattr(self, name)}; it must be 0 or more")

@@ -1,0 +1,86 @@
+"""Judging: renders of frames that were not trained on, beside the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from gsac.avatar.artifacts import write_frame
+from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.metrics import WHITE, composite, score
+from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.workspace import Workspace
+from gsac.stages.train.kernels import on_background, through_background
+from gsac.stages.train.poses import Poses
+from gsac.stages.train.views import View, person_crop
+
+TEST_RATE = 3e-3
+"""Adam rate of the test-time pose optimisation, falls to a tenth (HAHA: 3e-3, halved after 70 of 100 steps)."""
+ERROR_FULL = 0.5
+"""Error that the error maps draw in their last colour."""
+
+
+def render_view(gaussians: Gaussians, poses: Poses, t: int, view: View, workspace: Workspace):
+    """rgb (H, W, 3) premultiplied and alpha (H, W) of frame t as it stands in poses; copies."""
+    rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
+    return rendering.rgb.copy(), rendering.alpha.copy()
+
+
+def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
+    """(H, W, 3) premultiplied and mask (H, W), 0..1."""
+    return view.pixels[..., :3] / np.float32(255), view.pixels[..., 3] / np.float32(255)
+
+
+def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
+          workspace: Workspace | None = None) -> list[dict]:
+    """One row of `metrics.score` a frame; with a folder also %06d_truth, _render and _error PNGs on white."""
+    workspace = workspace or Workspace()
+    rows = []
+    for t in map(int, frames):
+        rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
+        true_rgb, mask = truth(views[t])
+        rows.append({"frame": t} | score(rgb, alpha, true_rgb, mask))
+        if folder is not None:
+            render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
+            error = np.abs(render - real).mean(2) / ERROR_FULL
+            heat = cv2.applyColorMap(np.uint8(np.clip(error, 0, 1) * 255), cv2.COLORMAP_INFERNO)
+            write_frame(folder / f"{t:06d}_truth.png", np.uint8(np.round(real * 255)))
+            write_frame(folder / f"{t:06d}_render.png", np.uint8(np.round(render * 255)))
+            write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(heat, cv2.COLOR_BGR2RGB))
+    return rows
+
+
+def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: int) -> None:
+    """Test-time pose optimisation: moves the pose of frame t in `poses` to its own image; the avatar stays as it is."""
+    view, workspace = person_crop(view), Workspace()
+    background, gain, grad_gain = np.full(3, 1, np.float32), np.ones(3, np.float32), np.empty(3)
+    for step in range(steps):
+        rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
+        image, target = np.empty_like(rendering.rgb), np.empty_like(rendering.rgb)
+        on_background(rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
+        grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(rendering.alpha)
+        grad_image = (image - target) * np.float32(2 / image.size)
+        through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, 0.1, grad_rgb,
+                           grad_alpha, grad_gain)
+        grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
+        poses.step(t, grads.vertices, TEST_RATE * 0.1 ** (step / steps), 0.0)
+
+
+def turned(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:
+    """(2 size, 3 size, 3) uint8: the avatar in its T-pose from the front, both sides, the back, below and above."""
+    vertices, _ = poses.rest(0)
+    middle = (vertices.min(0) + vertices.max(0)) / 2
+    half = float(np.abs(vertices - middle).max()) * 1.1
+    upright = np.diag([1.0, -1.0, -1.0])
+    tiles = []
+    for about_y, about_x in ((0, 0), (90, 0), (180, 0), (-90, 0), (20, -65), (20, 50)):
+        y, x = np.radians(about_y), np.radians(about_x)
+        turn = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
+        tilt = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
+        posed = (vertices - middle) @ (tilt @ upright @ turn).T + np.array([0, 0, 5 * half])
+        camera = Camera((size * 2.4, size * 2.4), (size / 2, size / 2), size, size)
+        rendering = render_bound(posed.astype(np.float32), poses.body.faces, gaussians, camera)
+        tiles.append(np.uint8(np.round(composite(rendering.rgb, rendering.alpha, WHITE) * 255)))
+    return np.vstack([np.hstack(tiles[:3]), np.hstack(tiles[3:])])

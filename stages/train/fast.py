@@ -1,0 +1,153 @@
+"""Recipe `fast`: area-weighted placement, coarse to fine, one frame a step, poses refined on the way.
+
+Rates and their decay follow the measured tables of the project's own prototypes: half the size first, pose rate 1e-3
+decayed, one gaussian budget from the start (no densification). Gaussians are limited after every step instead of
+being punished in the loss: no needle, no giant and no floater can arise, whatever the weights.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar import losses
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.workspace import Workspace
+from gsac.stages.contract import StageError
+from gsac.stages.train.colours import PosedFrame, fill_unseen, read_colours
+from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
+from gsac.stages.train.task import Fit, Task
+from gsac.stages.train.views import View, person_crop
+
+COARSE_SHARE = 0.45
+"""Part of the steps that run at half the size."""
+COLOUR_FRAMES = 24
+"""How many frames the first colours are read from."""
+LARGEST = 0.05
+"""Longest axis of a gaussian, m at rest."""
+GAIN_RATE = 2e-3
+CHECKPOINTS = 20
+
+
+def fit(task: Task) -> Fit:
+    """Raises StageError naming the step and the quantity that is no longer finite."""
+    config, poses = task.config, task.poses
+    rng = np.random.default_rng(config.seed)
+    fine = {int(t): person_crop(task.views[t]) for t in task.trained}
+    coarse = {t: v.halved() for t, v in fine.items()}
+    gaussians, seen = start(task, coarse)
+    trainer = Trainer(gaussians, task, poses.rest(int(task.trained[0]))[0])
+    order, loss_sum, since = [], 0.0, 0
+    for step in range(config.steps):
+        if not order:
+            order = list(rng.permutation(task.trained))
+        t, done = int(order.pop()), step / config.steps
+        loss_sum += trainer.step(t, (coarse if done < COARSE_SHARE else fine)[t], done, rng.random(3), step)
+        since += 1
+        if (step + 1) * CHECKPOINTS // config.steps > step * CHECKPOINTS // config.steps or step + 1 == config.steps:
+            task.checkpoint(step + 1, loss_sum / since, trainer.gaussians())
+            loss_sum, since = 0.0, 0
+        task.progress(step + 1, config.steps, "steps")
+    return Fit(trainer.gaussians(), seen, dict(trainer.gains))
+
+
+def start(task: Task, coarse: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
+    """Gaussians spread over the body of the first frame, coloured from the frames; and which of them frames show."""
+    faces = task.poses.body.faces
+    rest = task.poses.rest(int(task.trained[0]))[0]
+    gaussians = Gaussians.area(rest, faces, task.config.gaussians, task.config.seed)
+    every = -(-len(task.trained) // COLOUR_FRAMES)
+    frames = [PosedFrame(task.poses.vertices(int(t)), coarse[int(t)].camera, coarse[int(t)].pixels)
+              for t in task.trained[::every]]
+    rgb, seen = read_colours(frames, faces, gaussians)
+    gaussians.rgb = fill_unseen(rgb, seen, places(gaussians, rest, faces))
+    return gaussians, seen
+
+
+def places(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(N, 3) m, centres of the gaussians on a mesh."""
+    return bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means
+
+
+class Trainer:
+    """Gaussians with Adam's state, and one step of the optimisation."""
+
+    def __init__(self, gaussians: Gaussians, task: Task, rest: np.ndarray):
+        self.config, self.poses = task.config, task.poses
+        self.faces, self.face = task.poses.body.faces, gaussians.face
+        opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
+        self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
+                       "rgb": gaussians.rgb, "opacity": np.log(opacity / (1 - opacity))[:, None]}
+        self.values = {name: np.array(value, np.float32) for name, value in self.values.items()}
+        self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
+        self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
+        self.count = np.zeros(len(self.face), np.int64)
+        self.start = self.values["mu"].copy()
+        self.face_scale = face_frames(rest, self.faces).k[self.face].astype(np.float64)
+        self.gains: dict[int, np.ndarray] = {}
+        self.workspace, self.losses = Workspace(), Workspace()
+
+    def gaussians(self) -> Gaussians:
+        v = self.values
+        return Gaussians(self.face, v["mu"].copy(), v["quat"].copy(), v["log_scale"].copy(), v["rgb"].copy(),
+                         1 / (1 + np.exp(-v["opacity"][:, 0])))
+
+    def step(self, t: int, view: View, done: float, background: np.ndarray, number: int) -> float:
+        """One step on frame t. done: share of the steps so far; background: (3,). Returns the loss."""
+        config, v = self.config, self.values
+        vertices = self.poses.vertices(t)
+        shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity"][:, 0]))
+        rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
+        background = background.astype(np.float32)
+        gain = self.gains.get(t, np.ones(3)).astype(np.float32)
+        image, target = np.empty_like(rendering.rgb), np.empty_like(rendering.rgb)
+        on_background(rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
+        loss, grad_image = self._image_loss(image, target)
+        grad_rgb, grad_alpha, grad_gain = np.empty_like(image), np.empty_like(rendering.alpha), np.empty(3)
+        loss += through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain,
+                                   config.mask, grad_rgb, grad_alpha, grad_gain)
+        grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
+        self._guard(number, loss, grads)
+        self._move(grads, shown.opacity, done)
+        if config.pose_rate > 0:
+            self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
+        if config.exposure:
+            self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
+        return float(loss)
+
+    def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:
+        config = self.config
+        loss, gradient = losses.l2(image, target, workspace=self.losses)
+        if config.ssim:
+            similarity = losses.ssim(image, target, factor=-config.ssim, gradient=gradient, workspace=self.losses).value
+            loss += config.ssim * (1 - similarity)
+        if config.sobel:
+            loss += config.sobel * losses.sobel(image, target, factor=config.sobel, gradient=gradient,
+                                                workspace=self.losses).value
+        return loss, gradient
+
+    def _guard(self, number: int, loss: float, grads) -> None:
+        for name, value in (("loss", loss), ("gradient of the vertices", grads.vertices),
+                            ("gradient of mu", grads.mu), ("gradient of quat", grads.quat),
+                            ("gradient of log_scale", grads.log_scale), ("gradient of rgb", grads.rgb),
+                            ("gradient of opacity", grads.opacity)):
+            if not np.isfinite(np.sum(value)):
+                raise StageError(f"train: the {name} is not finite at step {number}; look at the poses in smplx/body.npz, "
+                                 "or lower the rates (train.*_rate)")
+
+    def _move(self, grads, opacity: np.ndarray, done: float) -> None:
+        config, v = self.config, self.values
+        rates = {"mu": config.mu_rate * 0.01**done, "quat": config.quat_rate * 0.1**done,
+                 "log_scale": config.scale_rate * 0.1**done, "rgb": config.rgb_rate * 0.1**done,
+                 "opacity": config.opacity_rate * 0.1**done}
+        by_name = {"mu": grads.mu, "quat": grads.quat, "log_scale": grads.log_scale, "rgb": grads.rgb,
+                   "opacity": (grads.opacity * opacity * (1 - opacity))[:, None]}
+        count_rows(grads.rgb, self.count)
+        for name, rate in rates.items():
+            adam_rows(v[name], by_name[name], self.first[name], self.second[name], self.count, rate)
+        limit(v["mu"], v["quat"], v["log_scale"], v["rgb"], v["opacity"], self.start, self.face_scale, config.needle,
+              LARGEST, config.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
+
+
+def sigmoid(x: np.ndarray) -> np.ndarray:
+    return 1 / (1 + np.exp(-x))

@@ -1,0 +1,45 @@
+"""Which frames are kept for judging, and what pose they are judged with."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+def yaw(global_orient: np.ndarray) -> np.ndarray:
+    """global_orient: (T, 3) axis-angle. Returns (T,) rad in -pi..pi, 0 where the body faces the camera."""
+    forward = Rotation.from_rotvec(np.asarray(global_orient, np.float64)).apply([0.0, 0.0, 1.0])
+    return np.arctan2(forward[:, 0], -forward[:, 2])
+
+
+def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> np.ndarray:
+    """Indices of the frames to hold out: every `every`-th of the usable (T,) bool frames in the order of yaw."""
+    frames = np.flatnonzero(usable)
+    if every < 2 or len(frames) < every:
+        return np.zeros(0, np.int64)
+    return np.sort(frames[np.argsort(yaw(global_orient)[frames], kind="stable")][every // 2::every])
+
+
+def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.ndarray, refined_transl: np.ndarray,
+                      trained: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gives every frame that was not trained on the pose correction of its trained neighbours in the clip.
+
+    pose: (T, J, 3) axis-angle and transl (T, 3) as fitted; refined_*: the same after training; trained: (T,) bool.
+    A correction is the turn from the fitted to the refined joint and the shift between the translations; both are
+    interpolated linearly between the nearest trained frames. Returns pose, transl: refined where trained.
+    """
+    frames = np.flatnonzero(trained)
+    if not len(frames):
+        return pose.copy(), transl.copy()
+    out_pose, out_transl = refined_pose.copy(), refined_transl.copy()
+    fitted = Rotation.from_rotvec(pose.reshape(-1, 3))
+    turns = (fitted.inv() * Rotation.from_rotvec(refined_pose.reshape(-1, 3))).as_rotvec().reshape(pose.shape)
+    shifts = refined_transl - transl
+    for t in np.flatnonzero(~trained):
+        after = np.searchsorted(frames, t)
+        a, b = frames[max(after - 1, 0)], frames[min(after, len(frames) - 1)]
+        u = (t - a) / (b - a) if b > a else 0.0
+        turn = (1 - u) * turns[a] + u * turns[b]
+        out_pose[t] = (Rotation.from_rotvec(pose[t]) * Rotation.from_rotvec(turn)).as_rotvec()
+        out_transl[t] = transl[t] + (1 - u) * shifts[a] + u * shifts[b]
+    return out_pose, out_transl

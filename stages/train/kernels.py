@@ -1,0 +1,117 @@
+"""Small fused numba kernels of the training loop: backgrounds and Adam."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def on_background(rgb, alpha, pixels, background, gain, image, target):
+    """Render and frame over one colour: image = gain * rgb + (1 - alpha) bg, target likewise from the cut-out frame.
+
+    rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8 premultiplied; background, gain: (3,).
+    image, target: (h, w, 3), written.
+    """
+    byte = rgb.dtype.type(1 / 255)
+    one = rgb.dtype.type(1)
+    for y in range(rgb.shape[0]):
+        for x in range(rgb.shape[1]):
+            clear, clear_target = one - alpha[y, x], one - pixels[y, x, 3] * byte
+            for c in range(3):
+                image[y, x, c] = gain[c] * rgb[y, x, c] + clear * background[c]
+                target[y, x, c] = pixels[y, x, c] * byte + clear_target * background[c]
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def through_background(grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, grad_gain):
+    """Gradients of `on_background`, and of mask_weight * mean((alpha - mask)^2), which it returns.
+
+    grad_image: (h, w, 3). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
+    """
+    byte = rgb.dtype.type(1 / 255)
+    share = rgb.dtype.type(mask_weight / alpha.size)
+    loss = 0.0
+    grad_gain[:] = 0
+    for y in range(rgb.shape[0]):
+        for x in range(rgb.shape[1]):
+            difference = alpha[y, x] - pixels[y, x, 3] * byte
+            loss += share * difference * difference
+            g = 2 * share * difference
+            for c in range(3):
+                g -= grad_image[y, x, c] * background[c]
+                grad_rgb[y, x, c] = grad_image[y, x, c] * gain[c]
+                grad_gain[c] += grad_image[y, x, c] * rgb[y, x, c]
+            grad_alpha[y, x] = g
+    return loss
+
+
+@njit(cache=True, error_model="numpy")
+def adam_rows(value, grad, first, second, count, rate):
+    """One Adam step (0.9, 0.99) of the rows of value (N, C) whose gradient is not zero; count: (N,) steps of each row.
+
+    A gaussian that a frame does not see keeps its place and its moments. count is advanced by `count_rows`.
+    """
+    for i in range(value.shape[0]):
+        touched = False
+        for c in range(value.shape[1]):
+            touched |= grad[i, c] != 0
+        if not touched:
+            continue
+        n = count[i] if count[i] > 0 else 1
+        scale = rate / (1 - 0.9**n)
+        unbias = 1 / (1 - 0.99**n)
+        for c in range(value.shape[1]):
+            g = np.float64(grad[i, c])
+            first[i, c] += 0.1 * (g - first[i, c])
+            second[i, c] += 0.01 * (g * g - second[i, c])
+            value[i, c] -= scale * first[i, c] / (math.sqrt(second[i, c] * unbias) + 1e-15)
+
+
+@njit(cache=True, error_model="numpy")
+def count_rows(grad, count):
+    """Adds one to count (N,) where the row of grad (N, C) is not zero."""
+    for i in range(grad.shape[0]):
+        for c in range(grad.shape[1]):
+            if grad[i, c] != 0:
+                count[i] += 1
+                break
+
+
+@njit(cache=True, error_model="numpy")
+def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, largest, reach, pull):
+    """Keeps gaussians sane after a step, in place.
+
+    quat (N, 4) is normalised; the longest axis is at most `needle` times the middle one and 10 times the shortest, and
+    at most `largest` m; mu (N, 3) moves back to start (N, 3) by the share `pull` and stays within `reach` m of it;
+    rgb stays in 0..1 and the opacity's logit in -9..9. face_scale: (N,) m per unit of mu at rest.
+    """
+    log_needle, log_flat = math.log(needle), math.log(10.0)
+    for i in range(mu.shape[0]):
+        norm = 0.0
+        for c in range(4):
+            norm += quat[i, c] * quat[i, c]
+        norm = 1 / math.sqrt(norm) if norm > 1e-20 else 0.0
+        for c in range(4):
+            quat[i, c] *= norm
+        if norm == 0.0:
+            quat[i, 0] = 1
+        a, b, d = log_scale[i, 0], log_scale[i, 1], log_scale[i, 2]
+        high, low = max(a, b, d), min(a, b, d)
+        middle = a + b + d - high - low
+        top = min(high, middle + log_needle, math.log(largest / max(face_scale[i], 1e-6)))
+        for c in range(3):
+            log_scale[i, c] = max(min(log_scale[i, c], top), top - log_flat)
+        away = 0.0
+        for c in range(3):
+            mu[i, c] -= pull * (mu[i, c] - start[i, c])
+            away += (mu[i, c] - start[i, c]) ** 2
+        away = math.sqrt(away) * face_scale[i]
+        if away > reach:
+            for c in range(3):
+                mu[i, c] = start[i, c] + (mu[i, c] - start[i, c]) * reach / away
+        for c in range(3):
+            rgb[i, c] = min(max(rgb[i, c], 0.0), 1.0)
+        logit[i, 0] = min(max(logit[i, 0], -9.0), 9.0)

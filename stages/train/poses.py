@@ -1,0 +1,81 @@
+"""The poses of all frames while they are refined: vertices from poses, and poses from the vertices' gradients."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+from gsac.avatar.skinning import joint_transforms, skin, skin_backward
+
+BODY, JAW_EYES = slice(0, 22), slice(22, 25)
+HAND_SHARE = 0.1
+"""Rate of the fingers, relative to the body's: an image says little about them."""
+TURN, SHIFT = 0.05, 0.02
+"""rad and m in which the distance from the fit is measured."""
+
+
+class Poses:
+    """Poses of T frames with Adam's state; a frame's count of steps is its own."""
+
+    def __init__(self, body, params):
+        """body: avatar.body.Body; params: BodyParams of T frames, left as they are."""
+        self.body, self.params = body, params
+        self.fit_pose = np.array(params.pose, np.float64)
+        self.fit_transl = np.array(params.transl, np.float64)
+        self.pose, self.transl = self.fit_pose.copy(), self.fit_transl.copy()
+        self.share = np.full((self.pose.shape[1], 1), HAND_SHARE)
+        self.share[BODY] = 1
+        self.share[JAW_EYES] = 0
+        frames = len(self.pose)
+        self.moments = np.zeros((2, frames, self.pose.shape[1] + 1, 3))
+        self.count = np.zeros(frames, np.int64)
+        self.rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def copy(self) -> Poses:
+        """The same poses, to be changed apart; Adam starts anew."""
+        other = copy.copy(self)
+        other.pose, other.transl = self.pose.copy(), self.transl.copy()
+        other.moments, other.count = np.zeros_like(self.moments), np.zeros_like(self.count)
+        return other
+
+    def rest(self, t: int) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (V, 3) float32 and joints (55, 3) at rest, with the frame's expression."""
+        if t not in self.rests:
+            p = self.params
+            vertices, joints = self.body.rest(p.betas, self.body.effective_expression(p, t), p.joint_offset)
+            self.rests[t] = np.ascontiguousarray(vertices, np.float32), np.asarray(joints, np.float64)
+        return self.rests[t]
+
+    def vertices(self, t: int) -> np.ndarray:
+        """(V, 3) float32 m, camera frame, posed as the frame stands now."""
+        rest, joints = self.rest(t)
+        transforms = joint_transforms(self.pose[t:t + 1], joints, self.body.parents)[0].astype(np.float32)
+        return skin(rest, transforms, self.body.skin_index, self.body.skin_weight) + self.transl[t].astype(np.float32)
+
+    def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> None:
+        """One Adam step of frame t. grad_vertices: (V, 3)."""
+        rest, joints = self.rest(t)
+        grad_pose, grad_transl, _, _ = skin_backward(
+            np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest, joints, self.body.parents,
+            self.body.skin_index, self.body.skin_weight)
+        grad = np.concatenate([grad_pose, grad_transl[None]]).astype(np.float64)
+        grad[:-1] += 2 * pull * (self.pose[t] - self.fit_pose[t]) / TURN**2
+        grad[-1] += 2 * pull * (self.transl[t] - self.fit_transl[t]) / SHIFT**2
+        self.count[t] += 1
+        first, second = self.moments[:, t]
+        first += 0.1 * (grad - first)
+        second += 0.01 * (grad**2 - second)
+        n = self.count[t]
+        move = rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
+        self.pose[t] -= self.share * move[:-1]
+        self.transl[t] -= move[-1]
+
+    def refined(self):
+        """BodyParams with the poses as they stand; `joints` computed anew."""
+        flat = self.pose.astype(np.float32).reshape(len(self.pose), -1)
+        params = replace(self.params, global_orient=flat[:, :3], body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69],
+                         leye_pose=flat[:, 69:72], reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120],
+                         right_hand_pose=flat[:, 120:165], transl=self.transl.astype(np.float32))
+        params.joints = np.concatenate([self.body.posed(params, [t])[1] for t in range(params.frames)])
+        return params

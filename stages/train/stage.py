@@ -1,0 +1,136 @@
+"""Entry of `train`: reads frames, masks and poses, runs the recipe, judges, writes."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+from gsac.avatar.artifacts import Clip, frame_paths, write_frame
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.metrics import psnr, summary
+from gsac.avatar.workspace import Workspace
+from gsac.stages.contract import Job, StageError
+from gsac.stages.train.evaluate import align_pose, judge, turned
+from gsac.stages.train.holdout import carry_corrections, spaced_in_yaw
+from gsac.stages.train.poses import Poses
+from gsac.stages.train.recipes import RECIPES
+from gsac.stages.train.task import Task
+from gsac.stages.train.views import read_views
+
+TRAIN_SAMPLE = 8
+"""How many trained frames `psnr_fg_train` is taken over."""
+
+
+def run(job: Job) -> None:
+    config = job.config
+    clip = Clip.read(job.inputs["split/clip.json"])
+    params = BodyParams.read(job.inputs["smplx/body.npz"])
+    frames = job.inputs["split/frames"]
+    count = len(frame_paths(frames))
+    if params.frames != count:
+        raise StageError(f"smplx/body.npz has {params.frames} poses, split/frames has {count} frames; run smplx again")
+    body = Body.load()
+    camera = params.camera(clip.width, clip.height)
+    views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height)
+    if len(empty) == count:
+        raise StageError("segment/alpha: every mask is empty, there is no person to train on; look at segment")
+    if empty:
+        job.warn(f"{len(empty)} of {count} frames have an empty mask and are not trained on: "
+                 f"{', '.join(f'{t:06d}' for t in empty[:10])}{' ...' if len(empty) > 10 else ''}.")
+    usable = np.ones(count, bool)
+    usable[empty] = False
+    held = spaced_in_yaw(params.global_orient, usable, config.holdout)
+    if not len(held):
+        job.warn(f"No frame is held out ({int(usable.sum())} usable frames, train.holdout is {config.holdout}): "
+                 "the quality of this avatar is not measured.")
+    trained = np.setdiff1d(np.flatnonzero(usable), held)
+
+    run = Run(job, Poses(body, params), views, trained, held)
+    run.fit()
+    run.write()
+
+
+class Run:
+    """One training: the recipe under a clock, and what is written of it."""
+
+    def __init__(self, job: Job, poses: Poses, views, trained: np.ndarray, held: np.ndarray):
+        self.job, self.poses, self.views, self.trained, self.held = job, poses, views, trained, held
+        self.is_trained = np.zeros(len(views), bool)
+        self.is_trained[trained] = True
+        self.curve: list[dict] = []
+        self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
+        self.workspace = Workspace()
+
+    def fit(self) -> None:
+        self.began = np.array([time.perf_counter(), time.process_time()])
+        task = Task(self.views, self.trained, self.poses, self.job.config, self.job.progress, self.checkpoint)
+        self.result = RECIPES[self.job.config.recipe](task)
+        self.seconds, self.cpu_seconds = self.clock()
+
+    def clock(self) -> np.ndarray:
+        return np.array([time.perf_counter(), time.process_time()]) - self.began - self.aside
+
+    def checkpoint(self, step: int, loss: float, gaussians) -> None:
+        before = self.clock()
+        seconds, cpu_seconds = (round(float(x), 3) for x in before)
+        row = {"step": step, "seconds": seconds, "cpu_seconds": cpu_seconds, "loss": loss}
+        if len(self.held):
+            row["psnr_fg"] = self.psnr_fg(gaussians, self.carried(), self.held)
+        self.curve.append(row)
+        self.aside += self.clock() - before
+
+    def carried(self) -> Poses:
+        """The poses with every frame that was not trained on corrected as its neighbours are."""
+        poses = self.poses.copy()
+        poses.pose, poses.transl = carry_corrections(poses.fit_pose, poses.fit_transl, poses.pose, poses.transl,
+                                                     self.is_trained)
+        return poses
+
+    def psnr_fg(self, gaussians, poses: Poses, frames) -> float | None:
+        return summary(judge(gaussians, poses, frames, self.views, None, self.workspace))["psnr_fg"]
+
+    def write(self) -> None:
+        job, gaussians = self.job, self.result.gaussians
+        folder = job.out / "heldout"
+        folder.mkdir()
+        poses = self.carried()
+        gaussians.write(job.out / "avatar.npz")
+        poses.refined().write(job.out / "body.npz")
+        write_frame(folder / "views.png", turned(gaussians, poses))
+        (job.out / "metrics.json").write_text(json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n")
+
+    def metrics(self, gaussians, poses: Poses, folder) -> dict:
+        config, held = self.job.config, self.held
+        rows = judge(gaussians, poses, held, self.views, folder, self.workspace)
+        fitted = poses.copy()
+        fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
+        aligned = poses.copy()
+        if config.pose_test_steps:
+            for t in held:
+                align_pose(gaussians, aligned, int(t), self.views[t], config.pose_test_steps)
+            ttpo = judge(gaussians, aligned, held, self.views, None, self.workspace)
+        else:
+            ttpo = []
+        sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
+        figures = summary(rows)
+        return figures | {
+            **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips"},
+            "psnr_fg_fit": self.psnr_fg(gaussians, fitted, held),
+            "psnr_fg_train": self.psnr_fg(gaussians, poses, sample),
+            "pose_at_test": {
+                "psnr_fg": "the body fit's pose plus the correction of the neighbouring trained frames, interpolated; "
+                           "the held-out image is not used",
+                "*_ttpo": f"that pose, {config.pose_test_steps} steps optimised on the held-out image, avatar frozen",
+                "psnr_fg_fit": "the body fit's pose as it came",
+            },
+            "n_gaussians": len(gaussians), "steps": config.steps, "recipe": config.recipe, "seed": config.seed,
+            "image_size": [self.views[0].camera.width, self.views[0].camera.height],
+            "seconds": round(float(self.seconds), 3), "cpu_seconds": round(float(self.cpu_seconds), 3),
+            "trained_frames": len(self.trained), "heldout_frames": [int(t) for t in held],
+            "heldout": [row | {"psnr_fg": psnr(row["mse_fg"]), "psnr_full": psnr(row["mse_white"]),
+                               "psnr_fg_ttpo": psnr(other["mse_fg"])}
+                        for row, other in zip(rows, ttpo or [{"mse_fg": None}] * len(rows), strict=True)],
+            "unseen_gaussians": int((~self.result.seen).sum()),
+            "curve": self.curve,
+        }

@@ -1,0 +1,35 @@
+"""What a recipe is handed and what it gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.poses import Poses
+from gsac.stages.train.views import View
+
+
+@dataclass
+class Task:
+    views: list[View]
+    """(T,) whole frames at the height that is trained on."""
+    trained: np.ndarray
+    """Indices of the frames to train on."""
+    poses: Poses
+    """As fitted; the recipe refines those of `trained`."""
+    config: TrainConfig
+    progress: Callable[[int, int, str], None]
+    checkpoint: Callable[[int, float, Gaussians], None] = lambda step, loss, gaussians: None
+    """To be called a few dozen times on the way: step, mean loss since the last call, the gaussians as they stand."""
+
+
+@dataclass
+class Fit:
+    gaussians: Gaussians
+    seen: np.ndarray
+    """(N,) bool, whether training frames show the gaussian; the colour of the others is a guess."""
+    gains: dict[int, np.ndarray] = field(default_factory=dict)
+    """Frame -> (3,) learned gain per channel, where exposure is learned."""
