@@ -1,0 +1,192 @@
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import Clip, read_arrays
+from gsac.avatar.models import ModelMissingError, model_path
+from gsac.avatar.wholebody import FACE, HANDS
+from gsac.benchmarks.perception import run_keypoints, run_stage, score_squats, score_truth, video_frames, write_split
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.keypoints import STAGE
+from gsac.stages.keypoints.config import KeypointsConfig
+from gsac.stages.keypoints.frame import Frame
+from gsac.stages.keypoints.stage import name_frames, run, say, touches_edge
+
+FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
+SQUATS, TRUTH = FOOTAGE / "squats" / "pose_squats.mp4", FOOTAGE / "truth-a" / "clip.mp4"
+
+
+@pytest.fixture(scope="module")
+def store() -> Path:
+    root = Path(os.environ.get("GSAC_CACHE", "~/.cache/gsac")).expanduser()
+    try:
+        for name in KeypointsConfig().models():
+            model_path(name, root)
+    except ModelMissingError as missing:
+        pytest.skip(str(missing))
+    return root
+
+
+def need(path: Path) -> Path:
+    if not path.exists():
+        pytest.skip(f"footage {path.parent.name}/{path.name} is not here")
+    return path
+
+
+def few(path: Path, *index: int) -> list[np.ndarray]:
+    frames = list(video_frames(need(path)))
+    return [frames[i] for i in index]
+
+
+def stage_on(frames: list[np.ndarray], folder: Path, store: Path) -> tuple[dict, list[str]]:
+    arrays, notes, _ = run_keypoints(iter(frames), "clip.mp4", folder, store)
+    return arrays, notes["warnings"]
+
+
+def test_a_wrong_parameter_is_named_with_its_choices():
+    with pytest.raises(BadInput, match="keypoints.detector is 'alphapose'; choices: mediapipe"):
+        KeypointsConfig(detector="alphapose").check()
+    with pytest.raises(BadInput, match="keypoints.hand_threshold is 1.5"):
+        KeypointsConfig(hand_threshold=1.5).check()
+
+
+def test_a_clip_without_a_person_is_refused_by_name(tmp_path, store):
+    ports = write_split(iter([np.full((320, 240, 3), 120, np.uint8)] * 2), tmp_path / "split", "wall.mp4")
+    with pytest.raises(BadInput, match="wall.mp4: no person was found in any of its 2 frames"):
+        run_stage(STAGE, run, ports, tmp_path / "out", store)
+
+
+def seen(**parts) -> Frame:
+    """A frame with a person in the middle of 100 x 200 px."""
+    frame = Frame()
+    frame.score[:17] = 1
+    frame.pose33[:] = (50, 100, 1)
+    for points in parts.values():
+        frame.score[points] = 1
+    return frame
+
+
+def warnings_of(frames: list[Frame], at_edge: list[bool] | None = None) -> list[str]:
+    warnings: list[str] = []
+    clip = Clip(None, None, 100, 200, None, "", "clip.mp4")
+    say(Job({}, Path(), None, warn=warnings.append), clip, frames, at_edge or [False] * len(frames))
+    return warnings
+
+
+def test_warnings_name_the_frames_without_a_person_and_with_two():
+    whole = dict(HANDS, face=FACE)
+    two = seen(**whole)
+    two.person2_score = 0.9
+    warnings = warnings_of([seen(**whole), Frame(), Frame(), two])
+    assert len(warnings) == 2
+    assert "No person was found in 2 of 4 frames (1-2)" in warnings[0]
+    assert "second person was seen in frame 3" in warnings[1]
+
+
+def test_parts_that_were_never_seen_are_warned_of():
+    warnings = warnings_of([seen(right=HANDS["right"])])
+    assert [w.split(";")[0] for w in warnings] == ["The left hand was never seen",
+                                                   "The face was never seen from the front"]
+
+
+def test_touching_the_edge_is_seen_at_feet_and_at_the_crown():
+    frame = seen()
+    assert not touches_edge(frame, 100, 200)
+    frame.pose33[31] = (50, 199.8, 1)
+    assert touches_edge(frame, 100, 200)
+    frame = seen()
+    frame.pose33[[2, 5]], frame.pose33[[9, 10]] = (50, 14, 1), (50, 24, 1)
+    assert touches_edge(frame, 100, 200)
+
+
+def test_long_lists_of_frames_are_cut():
+    assert name_frames(np.arange(5) == 3) == "frame 3"
+    assert name_frames(np.isin(np.arange(50), [1, 2, 3, 7])) == "4 of 50 frames (1-3, 7)"
+    assert name_frames(np.arange(50) % 2 == 0).endswith("12, 14, ...)")
+
+
+@pytest.mark.footage
+def test_one_frame_is_enough_and_the_file_repeats_to_the_byte(tmp_path, store):
+    image = few(SQUATS, 0)
+    arrays, _ = stage_on(image, tmp_path / "a", store)
+    stage_on(image, tmp_path / "b", store)
+    assert arrays["xy"].shape == (1, 133, 2) and arrays["score"].all(axis=1).sum() == 0
+    assert np.isfinite(arrays["world"][0, :17]).all()
+    first, again = ((tmp_path / d / "keypoints" / "keypoints.npz").read_bytes() for d in "ab")
+    assert first == again
+
+
+@pytest.mark.footage
+def test_a_frame_without_the_person_has_no_points_and_a_warning(tmp_path, store):
+    image = few(SQUATS, 0)[0]
+    arrays, warnings = stage_on([image, np.full_like(image, 128), image], tmp_path, store)
+    assert arrays["score"].any(axis=1).tolist() == [True, False, True]
+    assert any("No person was found in frame 1" in w for w in warnings)
+
+
+@pytest.mark.footage
+def test_the_same_person_is_followed_when_a_second_one_comes(tmp_path, store):
+    first, other = few(SQUATS, 0, 1), few(TRUTH, 0)[0]
+    alone, pair = np.hstack([first[0], np.full_like(other, 130)]), np.hstack([first[1], other])
+    arrays, warnings = stage_on([alone, pair], tmp_path, store)
+    assert (arrays["xy"][:, 5:17, 0] < 720).all()
+    assert np.isnan(arrays["person2"][0]).all() and arrays["person2_score"][1] > 0.5
+    assert arrays["person2"][1, 0] > 720
+    assert any("second person was seen in frame 1" in w for w in warnings)
+
+
+@pytest.mark.footage
+def test_a_person_cut_by_the_frame_is_warned_of(tmp_path, store):
+    image = few(SQUATS, 0)[0]
+    _, warnings = stage_on([np.ascontiguousarray(image[:880])], tmp_path, store)
+    assert any("touches the edge of the picture in frame 0" in w for w in warnings)
+
+
+@pytest.mark.footage
+def test_a_photo_read_as_frame_gives_the_same_points_at_twice_the_size(tmp_path, store):
+    import cv2
+
+    image = few(SQUATS, 4)[0]
+    small, _ = stage_on([image], tmp_path / "a", store)
+    large, _ = stage_on([cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)], tmp_path / "b", store)
+    both = (small["score"] > 0.5) & (large["score"] > 0.5)
+    assert both[:, :17].sum() > 12
+    assert np.median(np.linalg.norm(large["xy"] / 2 - small["xy"], axis=-1)[both]) < 4
+
+
+@pytest.mark.footage
+@pytest.mark.slow
+def test_body_points_agree_with_an_independent_implementation(tmp_path, store):
+    reference = np.array(json.loads(need(FOOTAGE / "squats" / "pose_squats.full.json").read_text()))[::3]
+    arrays, _ = stage_on(list(video_frames(SQUATS))[::3], tmp_path, store)
+    figures = score_squats(arrays, reference)
+    assert figures["person"] == 1
+    assert figures["points_median_percent_of_height"] <= 1.5
+
+
+@pytest.mark.footage
+@pytest.mark.slow
+def test_points_lie_where_the_rendered_truth_has_them(tmp_path, store):
+    truth = read_arrays(need(FOOTAGE / "truth-a" / "truth.npz"))
+    arrays, _ = stage_on(list(video_frames(need(TRUTH))), tmp_path, store)
+    figures = score_truth(arrays, truth)
+    assert figures["person"] == 60
+    assert figures["body_median_px"] <= 13
+    assert figures["visible_hands_found"] >= 0.88 and figures["hand_median_px"] <= 4.5
+    assert figures["hands_in_the_wrong_place"] == 0
+    assert figures["face_found"] >= 0.46 and figures["face_found_within_75_deg"] == 1
+    assert figures["face_found_beyond_110_deg"] == 0
+
+
+@pytest.mark.footage
+@pytest.mark.slow
+def test_a_person_is_found_in_every_photo_of_a_turn(tmp_path, store):
+    from gsac.avatar.artifacts import read_frame
+
+    photos = sorted(need(FOOTAGE / "turn-photos" / "000.jpg").parent.glob("[0-9]*.jpg"))
+    arrays, warnings = stage_on([read_frame(path) for path in photos], tmp_path, store)
+    assert arrays["score"].any(axis=1).sum() == len(photos) == 7
+    assert not any("second person" in w for w in warnings)
+    assert arrays["score"][[0, 6]][:, FACE].any(axis=1).all() and not arrays["score"][3, FACE].any()
