@@ -13,21 +13,20 @@ VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".ts"
 PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff", ".heic")
 
 
-def find_clips(source: Path, accepts: Callable[[Path], bool] | None = None) -> list[Path]:
+def find_clips(source: Path) -> list[Path]:
     """Clips of a folder (videos, and folders of photos) or of a list with one path a line, relative to the list.
 
     A path that a list names and that is not there stays in: its run says so. BadInput where there is no clip at all.
     """
-    accepts = accepts or is_clip
     if source.is_dir():
-        clips = sorted(path for path in source.iterdir() if not path.name.startswith(".") and accepts(path))
+        clips = sorted(path for path in source.iterdir() if not path.name.startswith(".") and is_clip(path))
         if not clips:
-            raise BadInput(f"{source}: no clips in this folder; expected videos ({', '.join(VIDEOS)}) or folders of photos")
+            raise BadInput(f"{source}: no clips here; expected videos ({', '.join(VIDEOS)}) or folders of photos")
         return clips
     try:
         lines = source.read_text().splitlines()
     except FileNotFoundError as e:
-        raise BadInput(f"{source}: no such file or folder; give a folder of clips or a list with one path a line") from e
+        raise BadInput(f"{source}: no such file or folder; give a folder of clips or a list of paths") from e
     except (OSError, UnicodeDecodeError) as e:
         raise BadInput(f"{source}: not a list of clips ({e}); one path a line") from e
     clips = [source.parent / line.strip() for line in lines if line.strip() and not line.strip().startswith("#")]

@@ -18,8 +18,10 @@ from gsac.stages.contract import BadInput
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("source", type=Path, metavar="FOLDER|LIST", help="a folder of clips, or a file with one path a line")
-    command.add_argument("--out", type=Path, default=Path("."), metavar="DIR", help="gets a folder a clip (default: here)")
+    command.add_argument("source", type=Path, metavar="FOLDER|LIST",
+                         help="a folder of clips, or a file with one path a line")
+    command.add_argument("--out", type=Path, default=Path("."), metavar="DIR",
+                         help="gets a folder a clip (default: here)")
     command.add_argument("--executor", default="local", metavar="NAME", help=f"one of: {', '.join(EXECUTORS)}")
     command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")

@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import re
-import sys
 
 from gsac.cache import gc, listing, verify
 from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, open_store
+from gsac.pipeline.commands.options import add_json, answers, open_store
 from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput
@@ -38,7 +37,8 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
     rows = listing.ls(store)
     people = answers(arguments)
     for row in rows:
-        people.note(f"{row.stage:<10} {row.key[:16]}  {size(row.bytes):>9}  {row.age_s / 86400:6.1f} d  {row.seconds:8.1f} s")
+        age = f"{row.age_s / 86400:6.1f} d"
+        people.note(f"{row.stage:<10} {row.key[:16]}  {size(row.bytes):>9}  {age}  {row.seconds:8.1f} s")
     people.note(f"{len(rows)} results, {size(sum(row.bytes for row in rows))} in {store.root}")
     if arguments.json:
         emit({"root": str(store.root), "results": [dataclasses.asdict(row) for row in rows]})
@@ -64,16 +64,11 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--keep-days {arguments.keep_days}: expected 0 or more")
     report = gc.collect(open_store(people), arguments.keep_days, limit, arguments.dry_run)
     verb = "would remove" if arguments.dry_run else "removed"
-    people.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {len(report.temps)} left-overs of "
-                f"dead runs: {size(report.freed_bytes)}; {size(report.kept_bytes)} stay")
+    people.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {len(report.temps)} left-overs "
+                f"of dead runs: {size(report.freed_bytes)}; {size(report.kept_bytes)} stay")
     if arguments.json:
         emit(dataclasses.asdict(report))
     return ExitCode.OK
-
-
-def answers(arguments: argparse.Namespace) -> PlainReporter:
-    """What was asked for goes to stdout, unless --json has it."""
-    return PlainReporter(sys.stderr if arguments.json else sys.stdout)
 
 
 def size(count: int) -> str:

@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 
 from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.cache import answers
-from gsac.pipeline.commands.options import add_json, open_store
+from gsac.pipeline.commands.options import add_json, answers, open_store
 from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.models import Models
 from gsac.pipeline.outcomes import ExitCode
@@ -36,7 +35,8 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
              "licence": MODELS[name].licence if name in MODELS else "your own"}
             for name in (*MODELS, *sorted({*models.brought} - {*MODELS}))]
     for row in rows:
-        people.note(f"{row['name']:<32} {'here' if row['here'] else 'missing':<8} {row['sha256'][:16]}  {row['licence']}")
+        here = "here" if row["here"] else "missing"
+        people.note(f"{row['name']:<32} {here:<8} {row['sha256'][:16]}  {row['licence']}")
     if arguments.json:
         emit({"models": rows})
     return ExitCode.OK

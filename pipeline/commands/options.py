@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,11 @@ def add_json(command: argparse.ArgumentParser) -> None:
 
 def add_workspace(command: argparse.ArgumentParser) -> None:
     command.add_argument("folder", nargs="?", type=Path, default=Path("."), help="the folder of a run (default: here)")
+
+
+def answers(arguments: argparse.Namespace) -> PlainReporter:
+    """What was asked for goes to stdout, unless --json has it."""
+    return PlainReporter(sys.stderr if arguments.json else sys.stdout)
 
 
 def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:

@@ -15,7 +15,8 @@ PAGE = "viewer.html"
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("avatar", type=Path, metavar="AVATAR", help="the folder of a run, its export folder, or a file in it")
+    command.add_argument("avatar", type=Path, metavar="AVATAR",
+                         help="the folder of a run, its export folder, or a file in it")
     command.add_argument("--port", type=int, default=0, metavar="N", help="default: any free one")
     command.set_defaults(do=do)
 
