@@ -14,7 +14,6 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
-
 from gsac.avatar.artifacts import ArtifactError
 
 MAGIC = b"GSAC\r\n\x1a\n"

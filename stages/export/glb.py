@@ -11,10 +11,9 @@ import json
 import struct
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
 from gsac.stages.export.ply import SH0
 from gsac.stages.export.rigged import Clip, RiggedAvatar
+from scipy.spatial.transform import Rotation
 
 FLOAT, U16, U32, U8 = 5126, 5123, 5125, 5121
 CODES = {np.dtype("<f4"): FLOAT, np.dtype("<u2"): U16, np.dtype("<u4"): U32, np.dtype("u1"): U8}
@@ -41,6 +40,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
         children = np.flatnonzero(avatar.parents == j).tolist()
         nodes.append(node | ({"children": children} if children else {}))
     root = int(np.flatnonzero(avatar.parents < 0)[0])
+    skin = {"joints": list(range(J)), "skeleton": root, "inverseBindMatrices": file.add(inverse.reshape(J, 16))}
     mesh = {"primitives": [{
         "mode": TRIANGLES, "material": 0, "indices": file.add(avatar.faces.reshape(-1).astype("<u4"), ELEMENT_BUFFER),
         "attributes": {
@@ -69,7 +69,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
         "asset": {"version": "2.0", "generator": "gsac", "copyright": "; ".join(avatar.licence.values())},
         "extensionsUsed": [SPLATS], "scene": 0,
         "scenes": [{"name": "avatar", "nodes": [root, J, J + 1]}], "nodes": nodes, "meshes": [mesh, points],
-        "skins": [{"joints": list(range(J)), "skeleton": root, "inverseBindMatrices": file.add(inverse.reshape(J, 16))}],
+        "skins": [skin],
         "materials": [{"name": "vertex colours",
                        "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.9}}],
     }
@@ -81,7 +81,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
 
 
 def vertex_colours(avatar: RiggedAvatar) -> np.ndarray:
-    """(V, 3) float32 sRGB: mean of the gaussians on a vertex's faces by opacity; others take the nearest coloured one."""
+    """(V, 3) float32 sRGB: mean of the gaussians on a vertex's faces by opacity; others take the nearest one's."""
     from scipy.spatial import cKDTree
 
     g, V = avatar.gaussians, len(avatar.vertices)

@@ -7,13 +7,13 @@ and swings a leg back; the left arm lies along +x, so -z lowers it and +z lowers
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
 from gsac.stages.export.rigged import Clip, RiggedAvatar
+from scipy.spatial.transform import Rotation
 
 FPS = 20.0
 WAVE_S = 3.2
 WALK_S = 1.15
+Angle = float | np.ndarray
 FINGERS = ("index", "middle", "ring", "pinky")
 
 
@@ -110,11 +110,11 @@ def _relaxed(t: np.ndarray) -> dict[str, np.ndarray]:
     return tracks
 
 
-def _turn(t: np.ndarray, x: float | np.ndarray = 0, y: float | np.ndarray = 0, z: float | np.ndarray = 0) -> Rotation:
+def _turn(t: np.ndarray, x: Angle = 0, y: Angle = 0, z: Angle = 0) -> Rotation:
     return Rotation.from_rotvec(_about(t, x, y, z))
 
 
-def _about(t: np.ndarray, x: float | np.ndarray = 0, y: float | np.ndarray = 0, z: float | np.ndarray = 0) -> np.ndarray:
+def _about(t: np.ndarray, x: Angle = 0, y: Angle = 0, z: Angle = 0) -> np.ndarray:
     """(K, 3) axis-angle from its components."""
     return np.stack(np.broadcast_arrays(x, y, z, t)[:3], axis=-1)
 

@@ -6,19 +6,21 @@ import base64
 import zlib
 from pathlib import Path
 
-VIEWER = Path(__file__).parent / "viewer"
-SCRIPTS = ("gsac.js", "math.js", "skin.js", "bind.js", "sort.js", "draw.js", "camera.js", "ui.js")
-"""Plain scripts, in the order in which they lean on each other."""
+HERE = Path(__file__).parent
+PAGE, STYLE = "viewer/page.html", "viewer/style.css"
+SCRIPTS = ("viewer/gsac.js", "viewer/math.js", "viewer/skin.js", "viewer/bind.js", "viewer/sort.js", "viewer/draw.js",
+           "viewer/camera.js", "viewer/ui.js")
+"""Plain scripts, in the order in which they lean on each other. Whole names, so that the cache sees these files."""
 
 
 def page_bytes(container: bytes) -> bytes:
     """container: the bytes of avatar.gsac. The same bytes give the same page."""
     packed = base64.b64encode(zlib.compress(container, 9)).decode()
-    page = (VIEWER / "page.html").read_text()
-    scripts = "\n".join(f"// {name}\n{(VIEWER / name).read_text()}" for name in SCRIPTS)
-    for mark, text in (("STYLE", (VIEWER / "style.css").read_text()), ("SCRIPTS", scripts), ("AVATAR", packed)):
+    page = (HERE / PAGE).read_text()
+    scripts = "\n".join(f"// {name}\n{(HERE / name).read_text()}" for name in SCRIPTS)
+    for mark, text in (("STYLE", (HERE / STYLE).read_text()), ("SCRIPTS", scripts), ("AVATAR", packed)):
         before, found, after = page.partition(f"<!--{mark}-->")
         if not found:
-            raise ValueError(f"viewer/page.html has no <!--{mark}-->")
+            raise ValueError(f"{PAGE} has no <!--{mark}-->")
         page = before + text + after
     return page.encode()

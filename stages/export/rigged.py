@@ -1,4 +1,4 @@
-"""The avatar as every exported format takes it: rest mesh, skeleton, skin, expressions, gaussians; and its `.gsac` file.
+"""The avatar as every exported format takes it: rest mesh, skeleton, skin, expressions, gaussians; its `.gsac` file.
 
 Canonical axes: right-handed, y up, facing +z, left = +x, metres; T-pose at zero rotation.
 """
@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-
 from gsac.avatar.artifacts import AVATAR_SHAPES
 from gsac.stages.export.container import Fault, GsacError, pack, read_bytes, unpack
 
@@ -93,8 +92,6 @@ class RiggedAvatar:
         vertex_type = np.uint16 if len(self.vertices) <= 1 << 16 else np.uint32
         face_type = np.uint16 if len(self.faces) <= 1 << 16 else np.uint32
         g = self.gaussians
-        length = np.linalg.norm(g["quat"], axis=1, keepdims=True)
-        quat = np.where(length < 1e-12, (1, 0, 0, 0), g["quat"] / np.where(abs(length - 1) < 1e-4, 1, np.maximum(length, 1e-12)))
         blocks = {
             "rest.vertices": self.vertices.astype(np.float32),
             "rest.faces": self.faces.astype(vertex_type),
@@ -107,7 +104,7 @@ class RiggedAvatar:
             "expression.jaw": self.jaw_actions.astype(np.float32),
             "gaussian.face": g["face"].astype(face_type),
             "gaussian.mu": g["mu"].astype(np.float16),
-            "gaussian.quat": np.rint(quat / QUAT_SCALE).astype(np.int16),
+            "gaussian.quat": np.rint(_unit(g["quat"]) / QUAT_SCALE).astype(np.int16),
             "gaussian.log_scale": np.rint(np.clip(g["log_scale"], -15.9, 15.9) / LOG_SCALE_SCALE).astype(np.int16),
             "gaussian.rgb": g["rgb"].astype(np.float16),
             "gaussian.opacity": np.rint(np.clip(g["opacity"], 0, 1) * UNIT).astype(np.uint16),
@@ -218,8 +215,8 @@ class _Reading:
         N = len(face)
         if self.entry(levels[0], "count", int) != N:
             raise self.bad(Fault.VALUE, f"level 0 says it has other than {N} gaussians")
-        gaussians = {"face": face} | {
-            name: self.block(f"{prefix}.{name}", (N, *AVATAR_SHAPES[name][1:])) for name in AVATAR_SHAPES if name != "face"}
+        gaussians = {"face": face} | {name: self.block(f"{prefix}.{name}", (N, *shape[1:]))
+                                      for name, shape in AVATAR_SHAPES.items() if name != "face"}
         if N and np.abs((gaussians["quat"] ** 2).sum(1) - 1).max() > 1e-2:
             raise self.bad(Fault.VALUE, f"{prefix}.quat must hold unit quaternions")
         return RiggedAvatar(
@@ -255,6 +252,13 @@ class _Reading:
             clips[name] = Clip(fps, self.entry(entry, "loop", bool), joints, rotation,
                                self.block(f"clip.{name}.transl", (len(rotation), 3)))
         return clips
+
+
+def _unit(quat: np.ndarray) -> np.ndarray:
+    """(N, 4) unit quaternions; those that are unit but for rounding stay as they are, zero becomes no rotation."""
+    length = np.linalg.norm(quat, axis=1, keepdims=True)
+    divisor = np.where(abs(length - 1) < 1e-4, 1, np.maximum(length, 1e-12))
+    return np.where(length < 1e-12, (1, 0, 0, 0), quat / divisor)
 
 
 def _weights_u16(weight: np.ndarray) -> np.ndarray:

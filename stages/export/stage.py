@@ -5,8 +5,6 @@ from __future__ import annotations
 from importlib.metadata import version
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
@@ -17,24 +15,27 @@ from gsac.stages.export.motion import add_motion
 from gsac.stages.export.page import page_bytes
 from gsac.stages.export.ply import ply_bytes
 from gsac.stages.export.rigged import RiggedAvatar
+from scipy.spatial.transform import Rotation
 
 MOVED = 1e-4
 """m: a vertex that an expression moves less than this is left out."""
 
+BODY_LICENCE = "the body model's own terms; the embedded open body is CC0-1.0"
+
 
 def run(job: Job) -> None:
     params = BodyParams.read(job.inputs["train/body.npz"])
-    body = Body.load(job.models.get("body"))
+    body = Body.load()
     if params.model and params.model != body.digest:
         raise BadInput(f"{job.inputs['train/body.npz']}: it was fitted with the body model {params.model[:12]}, "
-                       f"but the one at hand is {body.digest[:12]}; run again from smplx with this body model")
+                       f"but the one at hand is {body.digest[:12]}; run again from the stage smplx")
     gaussians = Gaussians.read(job.inputs["train/avatar.npz"])
     if not len(gaussians) or gaussians.face.min() < 0 or gaussians.face.max() >= len(body.faces):
-        raise BadInput(f"{job.inputs['train/avatar.npz']}: its {len(gaussians)} gaussians must be at least one and lie on "
-                       f"the faces 0..{len(body.faces) - 1} of the body")
+        raise BadInput(f"{job.inputs['train/avatar.npz']}: its {len(gaussians)} gaussians must be at least one and "
+                       f"lie on the faces 0..{len(body.faces) - 1} of the body; run again from the stage train")
     clip = Clip.read(job.inputs["split/clip.json"])
     avatar = rigged(body, params, gaussians)
-    avatar.licence = {"avatar": job.config.licence, "body": "the body model's own terms; the embedded open body is CC0-1.0"}
+    avatar.licence = {"avatar": job.config.licence, "body": BODY_LICENCE}
     avatar.provenance = {"gsac": version("gsac"), "body_model": body.digest, "clip_sha256": clip.source_sha256}
     add_motion(avatar, job.config.clip_names())
 

@@ -138,12 +138,22 @@ function readAvatar(buffer) {
   if (!isTable(level) || typeof level.prefix !== "string") throw new GsacError("head", "levels is empty");
   const face = index(`${level.prefix}.face`, faces.length / 3, null), N = face.length;
   const gaussian = (name, ...shape) => finite(`${level.prefix}.${name}`, N, ...shape);
+  for (const pose of Object.values(head.poses)) {
+    const rows = isTable(pose) ? Object.entries(pose) : [["", null]];
+    for (const [joint, r] of rows) {
+      if (!names.includes(joint) || !Array.isArray(r) || r.length !== 3 || !r.every((x) => Math.abs(x) < 100)) {
+        throw new GsacError("head", "a pose is not a table of joint -> axis-angle");
+      }
+    }
+  }
   const clips = {};
   for (const clip of list(head.clips, "clips")) {
+    if (!isTable(clip)) throw new GsacError("head", "a clip is not a table");
     const joints = list(clip.joints, "clip.joints").map((name) => names.indexOf(name));
-    if (!(clip.fps > 0) || joints.includes(-1)) throw new GsacError("value", "a clip names unknown joints or has no rate");
+    if (!(clip.fps >= 0.1 && clip.fps <= 1000) || joints.includes(-1)) throw new GsacError("value", "a clip names unknown joints or has no rate");
     const rotation = finite(`clip.${clip.name}.rotation`, null, joints.length, 3);
-    const keys = rotation.length / 3 / joints.length;
+    const keys = blocks[`clip.${clip.name}.rotation`].shape[0];
+    if (keys === 0) throw new GsacError("value", "a clip has no keys");
     clips[clip.name] = { fps: clip.fps, loop: clip.loop, joints, keys, rotation, transl: finite(`clip.${clip.name}.transl`, keys, 3) };
   }
   return {

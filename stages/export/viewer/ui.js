@@ -109,8 +109,8 @@ class Viewer {
       this.expression[name] = Number.parseFloat(weight ?? "1");
     }
     const first = Object.keys(this.avatar.clips)[0];
-    const playing = asked.get("clip") in this.avatar.clips ? { clip: asked.get("clip") }
-      : asked.get("pose") in this.avatar.poses ? { pose: asked.get("pose") }
+    const playing = Object.hasOwn(this.avatar.clips, asked.get("clip")) ? { clip: asked.get("clip") }
+      : Object.hasOwn(this.avatar.poses, asked.get("pose")) ? { pose: asked.get("pose") }
         : first ? { clip: first } : { pose: "T" };
     this.play(playing);
     this.fade = 1;

@@ -19,7 +19,7 @@ def find_chromium():
 
 
 class Browser:
-    """One page. `errors` collects what the page threw or logged as an error; `requests` every address that it asked for."""
+    """One page. `errors` collects what the page threw or logged as an error; `requests` every address it asked for."""
 
     def __init__(self, width=640, height=640):
         self.home = tempfile.mkdtemp()
@@ -44,7 +44,8 @@ class Browser:
         self.resize(width, height)
 
     def resize(self, width, height, ratio=1, mobile=False):
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=mobile)
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio,
+                  mobile=mobile)
 
     def open(self, address, timeout=60):
         """Opens the page and waits until it says that it is ready, shows its message, or fails."""
@@ -97,7 +98,8 @@ class Browser:
     def note(self, event):
         method, params = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown":
-            self.errors.append(params["exceptionDetails"].get("exception", {}).get("description", params["exceptionDetails"]["text"]))
+            thrown = params["exceptionDetails"]
+            self.errors.append(thrown.get("exception", {}).get("description", thrown["text"]))
         elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning", "assert"):
             self.errors.append(str([a.get("description", a.get("value")) for a in params["args"]]))
         elif method == "Log.entryAdded" and params["entry"]["level"] == "error":

@@ -45,7 +45,8 @@ def tube(start, end, radius, sides=6, rings=3):
     faces = []
     for r in range(rings - 1):
         for i in range(sides):
-            a, b, c, d = r * sides + i, r * sides + (i + 1) % sides, (r + 1) * sides + i, (r + 1) * sides + (i + 1) % sides
+            a, b = r * sides + i, r * sides + (i + 1) % sides
+            c, d = a + sides, b + sides
             faces += [(a, b, d), (a, d, c)]
     last, first = len(vertices) - 1, len(vertices) - 2
     for i in range(sides):
@@ -97,3 +98,47 @@ def make_figure(per_face=1, seed=0):
 @pytest.fixture(scope="session")
 def figure():
     return make_figure()
+
+
+@pytest.fixture(scope="session")
+def person(tmp_path_factory):
+    """Input files of the stage: the open body with 6,000 noisy gaussians, the left hand red."""
+    from gsac.avatar.artifacts import Clip
+    from gsac.avatar.body import Body, BodyParams
+    from gsac.avatar.gaussians import Gaussians
+
+    folder = tmp_path_factory.mktemp("person")
+    body, rng, N = Body.load(), np.random.default_rng(1), 6000
+    betas = rng.normal(size=body.num_betas).astype(np.float32) * .5
+    expression = np.zeros((2, len(body.expression_names)))
+    params = BodyParams.from_pose(np.zeros((2, 55, 3)), np.zeros((2, 3)), betas, expression, 1000, (300, 300),
+                                  rng.normal(size=(55, 3)) * .002, model=body.digest)
+    vertices, joints = body.rest(betas, None, params.joint_offset)
+    gaussians = Gaussians.area(vertices, body.faces, N)
+    height = np.ptp(vertices[:, 1])
+    centre = vertices[body.faces[gaussians.face]].mean(1)
+    rgb = np.where(centre[:, 1:2] > vertices[:, 1].min() + .5 * height, (.3, .5, .7), (.3, .3, .4))
+    rgb = np.where(centre[:, :1] > joints[20, 0], (.9, .05, .05), rgb) + rng.normal(size=(N, 3)) * .03
+    gaussians.rgb = np.clip(rgb, 0, 1).astype(np.float32)
+    gaussians.opacity = rng.uniform(.5, 1, N).astype(np.float32)
+    gaussians.mu = gaussians.mu + rng.normal(size=(N, 3)).astype(np.float32) * .005
+    gaussians.quat = (gaussians.quat + rng.normal(size=(N, 4)) * .2).astype(np.float32)
+    gaussians.log_scale = gaussians.log_scale + rng.normal(size=(N, 3)).astype(np.float32) * .3
+    paths = {"split/clip.json": folder / "clip.json", "train/avatar.npz": folder / "avatar.npz",
+             "train/body.npz": folder / "body.npz"}
+    Clip(30, [0.0, 0.1], 540, 960, None, "ab" * 32).write(paths["split/clip.json"])
+    gaussians.write(paths["train/avatar.npz"])
+    params.write(paths["train/body.npz"])
+    return paths
+
+
+@pytest.fixture(scope="session")
+def exported(person, tmp_path_factory):
+    """Output folder of the stage for `person`."""
+    from gsac.stages.contract import Job
+    from gsac.stages.export.config import ExportConfig
+    from gsac.stages.export.stage import run
+
+    out = tmp_path_factory.mktemp("exported")
+    run(Job(person, out, ExportConfig()))
+    return out

@@ -96,8 +96,8 @@ def test_a_flipped_bit_is_a_named_error(data):
         assert fault_of(data[:at] + bytes([data[at] ^ 4]) + data[at + 1:]) is Fault.CHECKSUM
 
 
-@pytest.mark.parametrize("text", [b"", b"[]", b"{", b"[" * 100_000, b'{"blocks":{}, "x":NaN}', b"\xff\xfe", b'{"blocks":[]}',
-                                  b'{"n":' + b"9" * 5000 + b"}"])
+@pytest.mark.parametrize("text", [b"", b"[]", b"{", b"[" * 100_000, b'{"blocks":{}, "x":NaN}', b"\xff\xfe",
+                                  b'{"blocks":[]}', b'{"n":' + b"9" * 5000 + b"}"])
 def test_a_head_that_is_not_ours_is_a_named_error(text):
     assert fault_of(rebuilt(text, b"")) is Fault.HEAD
 
