@@ -3,6 +3,7 @@ import threading
 import time
 
 from gsac.cache.lease import in_use, live_keys, single_flight
+from gsac.cache.lock import common
 
 COMPUTE_ONCE = """
 with single_flight(store, parts_of().key()) as found:
@@ -92,3 +93,34 @@ def test_keys_are_live_while_their_run_lives_and_no_longer(store, child):
     holder.wait()
     assert live_keys(store) == set()
     assert list((store.root / "leases").iterdir()) == []
+
+
+def test_no_two_ever_hold_one_key(store):
+    inside, overlaps = [], []
+
+    def take_turns():
+        for _ in range(40):
+            with single_flight(store, "k" * 64):
+                inside.append(1)
+                time.sleep(0.0005)
+                overlaps.append(len(inside) > 1)
+                inside.pop()
+
+    threads = [threading.Thread(target=take_turns) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(overlaps) == 240
+    assert not any(overlaps)
+
+
+def test_a_key_cannot_be_claimed_while_gc_sweeps(store):
+    claimed = threading.Event()
+    with in_use(store) as lease:
+        claim = threading.Thread(target=lambda: (lease.add("k" * 64), claimed.set()))
+        with common(store.root / "lock", alone=True):
+            claim.start()
+            assert not claimed.wait(0.2)
+        assert claimed.wait(5)
+        claim.join()

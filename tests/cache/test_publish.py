@@ -65,9 +65,9 @@ def test_sigkill_at_any_step_never_leaves_a_torn_artifact_that_counts_as_done(
 
 
 PUBLISH_ON = """
-print("ready", flush=True)
 for number in range(10**6):
     make(parts_of(number=number), f"hello {number}", replace=number % 2 == 0)
+    print(number, flush=True)
 """
 
 

@@ -124,6 +124,13 @@ def test_a_corrupt_blob_is_found_quarantined_and_recomputed(store, make, parts_o
     assert verify(store).sound
 
 
+def test_an_object_that_another_run_has_healed_is_not_quarantined(store, make, parts_of):
+    record = make(parts_of())
+    store.quarantine(store.path(record, "frames"), record.outputs["frames"])
+    assert store.lookup(record.key, deep=True) == record
+    assert list((store.root / "quarantine").iterdir()) == []
+
+
 def test_an_object_that_is_gone_is_a_miss_and_can_be_published_again(store, make, parts_of):
     record = make(parts_of())
     store.path(record, "clip.json").unlink()
@@ -167,6 +174,23 @@ def test_a_record_that_is_not_whole_or_of_another_version_is_a_miss(store, make,
     file.write_text(new if old is None else text.replace(old, new))
     assert store.lookup(record.key) is None
     assert make(parts_of(fps=5)) == store.lookup(record.key)
+
+
+def test_a_record_found_bad_is_not_dropped_once_a_sound_one_took_its_place(store, make, parts_of, monkeypatch):
+    bad = make(parts_of())
+    store.path(bad, "clip.json").unlink()
+    other = Store(store.root)
+    true = store.record_change
+
+    def meanwhile(key):
+        if not published:
+            published.append(make(parts_of(), "hello", store=other))
+        return true(key)
+
+    published = []
+    monkeypatch.setattr(store, "record_change", meanwhile)
+    store.lookup(bad.key)
+    assert store.lookup(bad.key, deep=True) == published[0]
 
 
 def test_the_most_similar_earlier_run_is_found_for_explaining(store, make, parts_of):
