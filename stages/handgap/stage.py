@@ -1,0 +1,61 @@
+"""Entry of handgap: find, fill, say how sure each point is."""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, write_arrays
+from gsac.avatar.wholebody import HANDS
+from gsac.stages.contract import Job, StageError
+from gsac.stages.handgap.fill import fill_gaps
+from gsac.stages.handgap.find import SIDES, find_missing, runs
+from gsac.stages.handgap.sigma import detection_sigma, person_height
+
+FILLED_SCORE = 0.5
+"""Score of a filled point that is as sure as a detection; it falls as sigma grows."""
+
+
+def run(job: Job) -> None:
+    keypoints = check_arrays(job.inputs["keypoints/keypoints.npz"], KEYPOINT_SHAPES)
+    clip = Clip.read(job.inputs["split/clip.json"])
+    xy = keypoints["xy"].astype(np.float64)
+    score = keypoints["score"].astype(np.float64)
+    times = None if clip.timestamps_s is None else np.asarray(clip.timestamps_s)
+    if times is not None and len(times) != len(xy):
+        raise StageError(f"keypoints.npz holds {len(xy)} frames and clip.json {len(times)} timestamps; "
+                         "run both stages again")
+
+    score = np.where(np.isfinite(xy).all(axis=2), score, 0)
+    xy = np.nan_to_num(xy)
+    found = find_missing(xy, score, times, job.config)
+    filled, drift = np.zeros(score.shape, bool), np.zeros(score.shape)
+    if times is not None:
+        xy, filled, drift = fill_gaps(xy, found, times, job.config)
+
+    unseen = filled.copy()
+    for i, side in enumerate(SIDES):
+        unseen[:, HANDS[side]] |= found.hand[:, i, None]
+    full = detection_sigma(np.ones_like(score), person_height(xy, score))
+    score = np.where(unseen, 0, score)
+    sigma = np.where(filled, np.hypot(full, drift), detection_sigma(score, person_height(xy, score)))
+    score = np.where(filled, FILLED_SCORE * full / sigma, score)
+    world = np.where(unseen[..., None], np.nan, keypoints["world"])
+    _report(job, found, filled)
+    write_arrays(job.out / "keypoints.npz", xy=xy.astype(np.float32), score=score.astype(np.float32),
+                 world=world.astype(np.float32), detector=keypoints["detector"], missing=found.hand, filled=filled,
+                 sigma=sigma.astype(np.float32))
+
+
+def _report(job: Job, found, filled: np.ndarray) -> None:
+    """Warns of what the user should know: hands never seen, taken for the other one, or left missing."""
+    for i, side in enumerate(SIDES):
+        missing, name = found.hand[:, i], f"the {side} hand"
+        if missing.all():
+            job.warn(f"{name.capitalize()} is never seen in {len(missing)} frames; its pose will be a guess.")
+            continue
+        if found.misplaced[:, i].any():
+            first = int(np.flatnonzero(found.misplaced[:, i])[0])
+            job.warn(f"{name.capitalize()} was detected in a wrong place in {int(found.misplaced[:, i].sum())} frames "
+                     f"(first: frame {first}); those detections are not used.")
+        for start, end in runs(missing & ~filled[:, HANDS[side]].all(axis=1)):
+            if missing[start] and not filled[start, HANDS[side]].all() and end - start > 1:
+                job.warn(f"{name.capitalize()} is missing from frame {start} to {end - 1}, too long to fill.")
