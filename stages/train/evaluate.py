@@ -16,8 +16,8 @@ from gsac.stages.train.kernels import on_background, through_background
 from gsac.stages.train.poses import Poses
 from gsac.stages.train.views import View, person_crop
 
-TEST_RATE = 3e-3
-"""Adam rate of the test-time pose optimisation, falls to a tenth (HAHA: 3e-3, halved after 70 of 100 steps)."""
+TEST_RATE = 1e-3
+"""Adam rate of the test-time pose optimisation, falls to a twentieth."""
 ERROR_FULL = 0.5
 """Error that the error maps draw in their last colour."""
 
@@ -65,7 +65,7 @@ def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: in
         through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, 0.1, grad_rgb,
                            grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
-        poses.step(t, grads.vertices, TEST_RATE * 0.1 ** (step / steps), 0.0)
+        poses.step(t, grads.vertices, TEST_RATE * 0.05 ** (step / steps), 0.0)
 
 
 def turned(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:

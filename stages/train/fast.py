@@ -16,43 +16,53 @@ from gsac.avatar.workspace import Workspace
 from gsac.stages.contract import StageError
 from gsac.stages.train.colours import PosedFrame, fill_unseen, read_colours
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
+from gsac.stages.train.offsets import Offsets, fold
 from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import View, person_crop
 
 COARSE_SHARE = 0.45
 """Part of the steps that run at half the size."""
+OFFSET_SHARE = 0.6
+"""Part of the steps that also move the body's surface out to clothes and hair."""
+OFFSET_RATE = 1e-3
+"""m for each step of the offsets, falls to a tenth."""
 COLOUR_FRAMES = 24
 """How many frames the first colours are read from."""
 LARGEST = 0.05
 """Longest axis of a gaussian, m at rest."""
+LEAST_SHOWN = 0.1
+"""Pixels of a half-size frame, on average over the frames, that a gaussian must fill to have a colour of its own."""
 GAIN_RATE = 2e-3
 CHECKPOINTS = 20
 
 
 def fit(task: Task) -> Fit:
     """Raises StageError naming the step and the quantity that is no longer finite."""
-    config, poses = task.config, task.poses
+    config = task.config
     rng = np.random.default_rng(config.seed)
     fine = {int(t): person_crop(task.views[t]) for t in task.trained}
     coarse = {t: v.halved() for t, v in fine.items()}
-    gaussians, seen = start(task, coarse)
-    trainer = Trainer(gaussians, task, poses.rest(int(task.trained[0]))[0])
+    trainer = Trainer(start(task, coarse), task)
     order, loss_sum, since = [], 0.0, 0
     for step in range(config.steps):
         if not order:
             order = list(rng.permutation(task.trained))
         t, done = int(order.pop()), step / config.steps
+        if trainer.offsets and done >= OFFSET_SHARE:
+            trainer.fold_offsets()
         loss_sum += trainer.step(t, (coarse if done < COARSE_SHARE else fine)[t], done, rng.random(3), step)
         since += 1
         if (step + 1) * CHECKPOINTS // config.steps > step * CHECKPOINTS // config.steps or step + 1 == config.steps:
             task.checkpoint(step + 1, loss_sum / since, trainer.gaussians())
             loss_sum, since = 0.0, 0
         task.progress(step + 1, config.steps, "steps")
-    return Fit(trainer.gaussians(), seen, dict(trainer.gains))
+    if trainer.offsets:
+        trainer.fold_offsets()
+    return Fit(*trainer.recoloured(coarse), dict(trainer.gains))
 
 
-def start(task: Task, coarse: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
-    """Gaussians spread over the body of the first frame, coloured from the frames; and which of them frames show."""
+def start(task: Task, coarse: dict[int, View]) -> Gaussians:
+    """Gaussians spread over the body of the first frame, coloured from the frames."""
     faces = task.poses.body.faces
     rest = task.poses.rest(int(task.trained[0]))[0]
     gaussians = Gaussians.area(rest, faces, task.config.gaussians, task.config.seed)
@@ -61,7 +71,7 @@ def start(task: Task, coarse: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
               for t in task.trained[::every]]
     rgb, seen = read_colours(frames, faces, gaussians)
     gaussians.rgb = fill_unseen(rgb, seen, places(gaussians, rest, faces))
-    return gaussians, seen
+    return gaussians
 
 
 def places(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -72,8 +82,10 @@ def places(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndar
 class Trainer:
     """Gaussians with Adam's state, and one step of the optimisation."""
 
-    def __init__(self, gaussians: Gaussians, task: Task, rest: np.ndarray):
+    def __init__(self, gaussians: Gaussians, task: Task):
         self.config, self.poses = task.config, task.poses
+        self.rest = task.poses.rest(int(task.trained[0]))[0]
+        self.offsets = Offsets(task.poses.body)
         self.faces, self.face = task.poses.body.faces, gaussians.face
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
@@ -83,7 +95,7 @@ class Trainer:
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)
         self.start = self.values["mu"].copy()
-        self.face_scale = face_frames(rest, self.faces).k[self.face].astype(np.float64)
+        self.face_scale = face_frames(self.rest, self.faces).k[self.face].astype(np.float64)
         self.gains: dict[int, np.ndarray] = {}
         self.workspace, self.losses = Workspace(), Workspace()
 
@@ -109,11 +121,35 @@ class Trainer:
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
         self._guard(number, loss, grads)
         self._move(grads, shown.opacity, done)
-        if config.pose_rate > 0:
-            self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
+        grad_rest = self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
+        if self.offsets:
+            self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
+            self.poses.offset = self.offsets.offset
         if config.exposure:
             self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
         return float(loss)
+
+    def fold_offsets(self) -> None:
+        """From here on the gaussians themselves stand where the displaced body carried them."""
+        folded = fold(self.gaussians(), self.rest, self.offsets.offset, self.faces)
+        self.values |= {"mu": folded.mu, "quat": folded.quat, "log_scale": folded.log_scale}
+        self.start = folded.mu.copy()
+        self.poses.offset, self.offsets = np.zeros_like(self.poses.offset), None
+
+    def recoloured(self, views: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
+        """The gaussians, those that (almost) no frame shows in the colour of their neighbours; seen (N,) bool.
+
+        What a gaussian adds to all images, in pixels, is the gradient of their sum with respect to its colour.
+        """
+        gaussians = self.gaussians()
+        shown = np.zeros(len(gaussians))
+        for t, view in views.items():
+            rendering = render_bound(self.poses.vertices(t), self.faces, gaussians, view.camera, self.workspace)
+            ones = np.ones_like(rendering.rgb)
+            shown += render_bound_backward(rendering.state, ones, np.zeros_like(rendering.alpha)).rgb[:, 0]
+        seen = shown > LEAST_SHOWN * len(views)
+        gaussians.rgb = fill_unseen(gaussians.rgb, seen, places(gaussians, self.rest, self.faces))
+        return gaussians, seen
 
     def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:
         config = self.config
@@ -132,7 +168,7 @@ class Trainer:
                             ("gradient of log_scale", grads.log_scale), ("gradient of rgb", grads.rgb),
                             ("gradient of opacity", grads.opacity)):
             if not np.isfinite(np.sum(value)):
-                raise StageError(f"train: the {name} is not finite at step {number}; look at the poses in smplx/body.npz, "
+                raise StageError(f"train: the {name} is not finite at step {number}; look at smplx/body.npz, "
                                  "or lower the rates (train.*_rate)")
 
     def _move(self, grads, opacity: np.ndarray, done: float) -> None:

@@ -1,4 +1,4 @@
-"""Clothes and hair: a smooth displacement of the body's rest vertices, learned first and then folded into the gaussians.
+"""Clothes and hair: a smooth displacement of the rest vertices, learned first, then folded into the gaussians.
 
 Gaussians that each wander off a body that is too thin make a furry surface; moved together they stay a skin. Steps are
 smoothed by (1 + lambda L)^-1, L the mesh's uniform Laplacian, with one Adam scale for all vertices (Nicolet et al.
@@ -31,7 +31,8 @@ class Offsets:
         edges = coo_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (vertices, vertices)).tocsr()
         edges.data[:] = 1
         laplacian = diags(np.asarray(edges.sum(1)).ravel()) - edges
-        self.solve = splu((identity(vertices) + SMOOTHNESS * laplacian).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+        self.solve = splu((identity(vertices) + SMOOTHNESS * laplacian).tocsc(), permc_spec="MMD_AT_PLUS_A",
+                          options={"SymmetricMode": True}).solve
         self.share = 1 - np.where(body.skin_index >= FINGERS, body.skin_weight, 0).sum(1, keepdims=True)
         self.offset = np.zeros((vertices, 3), np.float32)
         self.first, self.second = np.zeros((vertices, 3)), 0.0
@@ -53,8 +54,9 @@ class Offsets:
 
 
 def fold(gaussians: Gaussians, rest: np.ndarray, offset: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians of the displaced body, bound to the plain one: the same world places, rotations and scales at rest."""
-    displaced = bind(face_frames(rest + offset, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    """The gaussians of the displaced body, bound to the plain one; at rest nothing changes."""
+    g = gaussians
+    displaced = bind(face_frames(rest + offset, faces), g.face, g.mu, g.quat, g.log_scale)
     plain = face_frames(rest, faces)
     R, T, k = plain.R[gaussians.face], plain.T[gaussians.face], np.maximum(plain.k[gaussians.face, None], 1e-9)
     mu = np.einsum("nji,nj->ni", R, displaced.means - T) / k

@@ -30,6 +30,8 @@ class Poses:
         frames = len(self.pose)
         self.moments = np.zeros((2, frames, self.pose.shape[1] + 1, 3))
         self.count = np.zeros(frames, np.int64)
+        self.offset = np.zeros((len(body.v_template), 3), np.float32)
+        """(V, 3) m, added to the vertices at rest."""
         self.rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def copy(self) -> Poses:
@@ -51,14 +53,15 @@ class Poses:
         """(V, 3) float32 m, camera frame, posed as the frame stands now."""
         rest, joints = self.rest(t)
         transforms = joint_transforms(self.pose[t:t + 1], joints, self.body.parents)[0].astype(np.float32)
-        return skin(rest, transforms, self.body.skin_index, self.body.skin_weight) + self.transl[t].astype(np.float32)
+        posed = skin(rest + self.offset, transforms, self.body.skin_index, self.body.skin_weight)
+        return posed + self.transl[t].astype(np.float32)
 
-    def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> None:
-        """One Adam step of frame t. grad_vertices: (V, 3)."""
+    def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> np.ndarray:
+        """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradient of the rest vertices (V, 3)."""
         rest, joints = self.rest(t)
-        grad_pose, grad_transl, _, _ = skin_backward(
-            np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest, joints, self.body.parents,
-            self.body.skin_index, self.body.skin_weight)
+        grad_pose, grad_transl, grad_rest, _ = skin_backward(
+            np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest + self.offset, joints,
+            self.body.parents, self.body.skin_index, self.body.skin_weight)
         grad = np.concatenate([grad_pose, grad_transl[None]]).astype(np.float64)
         grad[:-1] += 2 * pull * (self.pose[t] - self.fit_pose[t]) / TURN**2
         grad[-1] += 2 * pull * (self.transl[t] - self.fit_transl[t]) / SHIFT**2
@@ -70,6 +73,7 @@ class Poses:
         move = rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
         self.pose[t] -= self.share * move[:-1]
         self.transl[t] -= move[-1]
+        return grad_rest
 
     def refined(self):
         """BodyParams with the poses as they stand; `joints` computed anew."""
