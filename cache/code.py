@@ -1,9 +1,10 @@
 """The code that a stage's result depends on: every first-party module reachable from it by imports in the source.
 
 Nothing is imported to find out. Imports inside functions count, and so do the `__init__` of every package on the way,
-strings that are the full name of a first-party module (`"gsac.stages.handgap.gp"` in a table of methods), and text
-files beside a module that it names by a string (a CUDA kernel, a page template). Binary data (`.npz`, networks) is not
-code: a stage declares it as a model file. Imports whose names are put together at run time escape: `extra` names them.
+strings that are the full name of a first-party module (`"gsac.stages.handgap.gp"` in a table of methods), and files
+that lie beside a module or below it and that it names by a string or by a path of strings: a CUDA kernel, a page
+template, a table of ours in `.npz`. A stage declares as model files what does not ship with the package. Imports whose
+names are put together at run time escape: `extra` names them.
 """
 
 from __future__ import annotations
@@ -16,15 +17,16 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from gsac.cache.digest import canonical, typed_digest
+from gsac.cache.digest import canonical, file_digest, typed_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.memo import Memo, memo_in
 from gsac.cache.root import default_root
 from gsac.cache.syntax import read_source
 
 FIRST_PARTY = "gsac"
-TEXT_SUFFIXES = (".cu", ".cuh", ".c", ".h", ".cpp", ".cs", ".js", ".css", ".html", ".jinja", ".glsl", ".wgsl", ".json")
-MEMO_KIND = f"module 1 python {sys.version_info.major}.{sys.version_info.minor}"
+FILE_SUFFIXES = tuple(f".{s}" for s in "npz npy json cu cuh c h cpp cs js css html jinja glsl wgsl".split())
+MEMO_KIND = f"module 2 python {sys.version_info.major}.{sys.version_info.minor}"
+"""To be raised when `syntax` reads sources otherwise, so that what was remembered before is not taken for its word."""
 
 
 def code_digest(module: str, extra: tuple[str, ...] = (), memo: Memo | None = None) -> str:
@@ -38,7 +40,7 @@ def code_parts(
     memo: Memo | None = None,
     packages: Mapping[str, Path] | None = None,
 ) -> dict[str, str]:
-    """Module (or `package/file` for a text file) -> digest, over the closure of `module` and the `extra` modules.
+    """Module, or `module/file` for a file that the module names -> digest, over the closure of `module` and `extra`.
 
     packages: folders of top packages (`gsac.stages` -> path), by default those that are installed.
     Raises CacheError where `module` or one of `extra` does not exist.
@@ -64,8 +66,8 @@ def code_parts(
         for reference in named:
             if reference.startswith(FIRST_PARTY + "."):
                 waiting.append(reference)
-            elif reference.endswith(TEXT_SUFFIXES) and (file.parent / reference).is_file():
-                parts[f"{name}/{reference}"] = typed_digest("resource 1", (file.parent / reference).read_bytes())
+            elif (file.parent / reference).is_file():
+                parts[f"{name}/{reference}"] = file_digest(file.parent / reference, memo)
     memo.flush()
     return dict(sorted(parts.items()))
 
@@ -76,7 +78,7 @@ def _module(file: Path, package: str, memo: Memo) -> tuple[str, list[str]]:
     known = memo.get(f"{MEMO_KIND} {package}", stat)
     if known is None:
         digest, references = read_source(file.read_bytes(), package)
-        named = [r for r in sorted(references) if r.startswith(FIRST_PARTY + ".") or r.endswith(TEXT_SUFFIXES)]
+        named = [r for r in sorted(references) if r.startswith(FIRST_PARTY + ".") or r.endswith(FILE_SUFFIXES)]
         known = json.dumps([digest, named])
         memo.put(f"{MEMO_KIND} {package}", stat, known)
     digest, named = json.loads(known)

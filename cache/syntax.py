@@ -57,6 +57,15 @@ def _references(tree: ast.AST, package: str) -> Iterator[str]:
                 base = f"{start}.{base}" if base else start
             yield base
             yield from (f"{base}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and 0 < len(node.value) < 200:
-            if "\n" not in node.value and " " not in node.value:
-                yield node.value
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
+            yield "/".join(_joined(node))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and "\n" not in node.value:
+            yield node.value
+
+
+def _joined(node: ast.AST) -> list[str]:
+    """The strings at the end of a path expression: `HERE / "viewer" / "page.html"` gives both."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
+        right = _joined(node.right)
+        return _joined(node.left) + right if right else []
+    return [node.value] if isinstance(node, ast.Constant) and isinstance(node.value, str) else []

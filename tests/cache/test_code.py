@@ -38,8 +38,9 @@ def tree(tmp_path, store):
         "stages/fill/gp.py": "from ..contract import nothing\n",
         "stages/fill/blend.cu": "__global__ void blend() {}\n",
         "stages/other.py": "VALUE = 1\n",
-        "avatar/body.py": "import numpy\nMODEL = 'body.npz'\n",
-        "avatar/body.npz": "weights",
+        "avatar/body.py": "import numpy\nBODY = HERE / 'open' / 'body.npz'\nMODEL = 'smplx.npz'\n",
+        "avatar/open/body.npz": "weights",
+        "avatar/other.npz": "weights",
         "avatar/binding.py": "K = 0.5\n",
         "avatar/raster/__init__.py": "def fast(x):\n    return x\n",
     }
@@ -63,6 +64,7 @@ def test_the_closure_is_every_module_that_imports_reach_and_nothing_is_imported(
     assert list(parts(tree)) == [
         "gsac.avatar.binding",
         "gsac.avatar.body",
+        "gsac.avatar.body/open/body.npz",
         "gsac.avatar.raster",
         "gsac.stages",
         "gsac.stages.contract",
@@ -116,6 +118,7 @@ def test_the_line_that_documents_a_field_is_not_code(tree):
         ("stages/fill/gp.py", "nothing", "something", "gsac.stages.fill.gp"),
         ("stages/contract.py", "1", "2", "gsac.stages.contract"),
         ("stages/fill/blend.cu", "{}", "{ }", "gsac.stages.fill.stage/blend.cu"),
+        ("avatar/open/body.npz", "weights", "waits", "gsac.avatar.body/open/body.npz"),
         ("avatar/binding.py", "0.5", "0.25", "gsac.avatar.binding"),
         ("avatar/raster/__init__.py", "return x", "return -x", "gsac.avatar.raster"),
     ],
@@ -127,10 +130,10 @@ def test_changed_code_anywhere_in_the_closure_changes_exactly_that_part(tree, fi
     assert {name for name in before if before[name] != after[name]} == {module}
 
 
-def test_an_unreached_module_and_binary_data_are_not_code(tree):
+def test_modules_and_files_that_nothing_reaches_are_not_code(tree):
     before = parts(tree)
     (tree / "stages/other.py").write_text("VALUE = 2\n")
-    (tree / "avatar/body.npz").write_text("other weights")
+    (tree / "avatar/other.npz").write_text("other weights")
     assert parts(tree) == before
 
 
