@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.util
 import os
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from gsac.cache.code import code_parts
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
 from gsac.pipeline.models import Models
+from gsac.pipeline.packages import package_version
 from gsac.pipeline.params import plain
 from gsac.pipeline.project import Project
 
@@ -46,15 +46,6 @@ class Keys:
             packages={package: package_version(package) for package in stage.packages},
             device=self.device if stage.uses_device else "",
         )
-
-
-@cache
-def package_version(package: str) -> str:
-    """Installed version of a distribution, `absent` without one: a stage may do without an optional package."""
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "absent"
 
 
 def device_class() -> str:

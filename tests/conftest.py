@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -210,8 +211,10 @@ class Toy:
         self.write(path, text.replace(old, new))
 
     def set_package_version(self, version: str) -> None:
-        info = self.root / "lib" / "toyware-1.dist-info"
-        info.mkdir(parents=True, exist_ok=True)
+        for old in (self.root / "lib").glob("toyware-*"):
+            shutil.rmtree(old)
+        info = self.root / "lib" / f"toyware-{version}.dist-info"
+        info.mkdir(parents=True)
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: toyware\nVersion: {version}\n")
 
     @property

@@ -128,11 +128,14 @@ def test_verify_finds_rot_that_keeps_size_and_date_and_says_so_with_exit_code_4(
 
 
 def test_gc_never_removes_what_a_run_in_progress_needs(toy):
-    toy.ran("--until", "right")
-    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "join.pause_s=1.5")
-    wait_for(lambda: "join" in toy.runs)
+    toy.ran("--set", "right.word=last")
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "join.pause_s=4")
+    wait_for(lambda: "join" in toy.runs[4:])
+    for record in (toy.cache / "actions").glob("*/*.json"):
+        os.utime(record, (0, 0))
     collected = toy.gsac("cache", "gc", "--max-size", "0", "--json")
     assert collected.code == 0
+    assert {name.split("/")[0] for name in collected.json["records"]} == {"right", "join"}, "the other run's results go"
     _, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     assert toy.result == "ALPHA ALPHA"

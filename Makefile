@@ -1,0 +1,39 @@
+# make setup | demo | test | test-fast: each from an empty machine with Python 3.11 or 3.12, nothing else.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3)
+TORCH ?= torch==2.13.0
+BIN := .venv/bin
+READY := .venv/.gsac-ready
+
+.PHONY: setup demo test test-fast params lint debian
+
+setup: $(READY)
+
+# torch comes first and pinned: left to the resolver it may be any of a wide range.
+$(READY): pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv || { rm -rf .venv; \
+	  echo "make: $(PYTHON) cannot make a virtual environment; on Debian: apt-get install python3-venv" >&2; exit 1; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(TORCH)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/gsac models pull
+	@touch $@
+
+demo: setup
+	$(BIN)/gsac demo
+
+test: setup debian
+	$(BIN)/python -m pytest
+
+test-fast: setup
+	$(BIN)/python -m pytest -m 'not slow'
+
+# Some tests use Debian packages; where they may not be installed, those tests skip and name them.
+debian:
+	@bash .ci/debian-packages
+
+# Writes params.yaml from the stages' defaults.
+params: setup
+	$(BIN)/python -m gsac.pipeline.params
+
+lint: setup
+	$(BIN)/ruff check
