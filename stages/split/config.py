@@ -9,8 +9,8 @@ from gsac.stages.contract import BadInput
 
 @dataclass
 class SplitConfig:
-    fps: float | None = 10.0
-    """Frames kept a second of video, at most; null keeps every frame."""
+    fps: float | None = None
+    """Frames kept a second of video, at most; null sets no rate."""
     count: int | None = 120
     """Frames kept in all, at most, spread evenly over the clip; null sets no limit."""
     max_height: int | None = 1280

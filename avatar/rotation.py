@@ -1,0 +1,51 @@
+"""Rotation vectors and matrices in float64, in batches: what the fit differentiates through."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def exp(rotvec: np.ndarray) -> np.ndarray:
+    """rotvec: (..., 3) rad. Returns (..., 3, 3)."""
+    angle = np.linalg.norm(rotvec, axis=-1)[..., None, None]
+    k = hat(rotvec)
+    small = angle < 1e-6
+    safe = np.where(small, 1.0, angle)
+    a = np.where(small, 1 - angle**2 / 6, np.sin(safe) / safe)
+    b = np.where(small, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
+    return np.eye(3) + a * k + b * (k @ k)
+
+
+def log(matrix: np.ndarray) -> np.ndarray:
+    """matrix: (..., 3, 3). Returns (..., 3) rad, length at most pi."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_rotvec().reshape(*matrix.shape[:-2], 3)
+
+
+def hat(v: np.ndarray) -> np.ndarray:
+    """v: (..., 3). Returns the cross-product matrices (..., 3, 3)."""
+    out = np.zeros((*v.shape[:-1], 3, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return out
+
+
+def log_derivative(rotvec: np.ndarray) -> np.ndarray:
+    """(..., 3, 3): how log(R exp(delta)) moves with delta at R = exp(rotvec) (inverse right Jacobian)."""
+    angle2 = (rotvec**2).sum(-1)[..., None, None]
+    k = hat(rotvec)
+    small = angle2 < 1e-8
+    angle = np.sqrt(np.where(small, 1.0, angle2))
+    b = np.where(small, 1 / 12, 1 / angle**2 - (1 + np.cos(angle)) / (2 * angle * np.sin(angle) + 1e-12))
+    return np.eye(3) + 0.5 * k + b * (k @ k)
+
+
+def align(source: np.ndarray, target: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
+    """Rotation (3, 3) that best turns centred source (P, 3) onto centred target (P, 3) (Kabsch)."""
+    w = np.ones(len(source)) if weight is None else weight
+    a = source - np.average(source, axis=0, weights=w)
+    b = target - np.average(target, axis=0, weights=w)
+    u, _, vt = np.linalg.svd((w[:, None] * a).T @ b)
+    d = np.sign(np.linalg.det(vt.T @ u.T))
+    return vt.T @ np.diag([1, 1, d]) @ u.T

@@ -1,0 +1,41 @@
+"""Parameters of `smplx`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gsac.stages.contract import BadInput
+
+METHODS = ("lm",)
+
+
+@dataclass
+class SmplxConfig:
+    method: str = "lm"
+    """How the body is fitted: `lm` solves all frames at once by Levenberg-Marquardt."""
+    height_m: float | None = None
+    """The person's height; fixes the scale that one camera cannot see. None leaves it to the shape prior."""
+    focal_px: float | None = None
+    """Focal length when the clip does not carry it; None estimates it."""
+    rounds: int = 3
+    """How often the silhouette's correspondences are renewed."""
+    iterations: int = 8
+    """Levenberg-Marquardt steps a round, at most."""
+    silhouette: float = 1.0
+    """Weight of the silhouette against the key points; 0 leaves it out."""
+    smoothness: float = 1.0
+    """Weight of the temporal terms."""
+
+    def check(self) -> None:
+        if self.method not in METHODS:
+            raise BadInput(f"smplx.method is {self.method!r}; choose one of {', '.join(METHODS)}")
+        if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
+            raise BadInput(f"smplx.height_m is {self.height_m}; expected metres between 0.5 and 2.5")
+        if self.focal_px is not None and self.focal_px <= 0:
+            raise BadInput(f"smplx.focal_px is {self.focal_px}; expected pixels above 0")
+        for name in ("rounds", "iterations"):
+            if getattr(self, name) < 1:
+                raise BadInput(f"smplx.{name} is {getattr(self, name)}; expected 1 or more")
+        for name in ("silhouette", "smoothness"):
+            if getattr(self, name) < 0:
+                raise BadInput(f"smplx.{name} is {getattr(self, name)}; expected 0 or more")

@@ -1,0 +1,228 @@
+"""The Levenberg-Marquardt fit of one clip: start, body, outline rounds, fingers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
+from gsac.stages.smplx import start
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.points import Pairs, pairs_of, positions
+from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
+from gsac.stages.smplx.problem import Observations, Problem, State
+from gsac.stages.smplx.silhouette import Outline, outline_points
+from gsac.stages.smplx.solver import levenberg_marquardt
+
+HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
+"""Hand points that no finger joint moves: they turn the wrist."""
+BODY_POINTS = np.array([*range(23), *HAND_ROOTS])
+FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(hand.start, hand.stop)])
+HIPS = (INDEX["left_hip"], INDEX["right_hip"])
+DETECTOR_SPREAD = 0.006
+"""Spread of a good key point as a share of the person's height in pixels."""
+FACE_SPREAD = 1.5
+"""Eyes, ears and nose: the detector means other places than the body's points."""
+DEPTH_SPREAD = 0.08
+OUTLINE_SPREAD = 0.006
+ADULT_HEIGHT = (1.72, 0.05)
+"""The stated scale prior, metres: one camera cannot see scale, and proportions alone mislead."""
+FOCAL_GUESS = 1.0
+"""Focal length when nothing is known, as a share of the picture's longer side: between a phone's main lens and a tele."""
+FOCAL_SPREAD = 0.2
+
+
+@dataclass
+class Sightings:
+    """Detections of one clip, as `handgap` gives them."""
+
+    xy: np.ndarray  # (T, 133, 2) px
+    score: np.ndarray  # (T, 133)
+    sigma: np.ndarray  # (T, 133) px
+    world: np.ndarray  # (T, 133, 3) m
+    seconds: np.ndarray | None
+    width: int
+    height: int
+    focal_px: float | None
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(T, 133) bool."""
+        return (self.score > 0.2) & np.isfinite(self.xy).all(-1)
+
+    @property
+    def person_height(self) -> float:
+        """Median height of the person, px, from the body points."""
+        body = np.where(self.seen[:, :23, None], self.xy[:, :23], np.nan)
+        with np.errstate(all="ignore"):
+            extent = np.nanmax(body[..., 1], 1) - np.nanmin(body[..., 1], 1)
+        return float(np.nanmedian(extent)) * 1.08 if np.isfinite(extent).any() else float(self.height) * 0.8
+
+
+@dataclass
+class Fit:
+    """What the fit found."""
+
+    state: State
+    sigma_joints: np.ndarray  # (T, 55) m
+    iou: np.ndarray  # (T,) body against alpha before the last round; NaN without alpha
+    reprojection: np.ndarray  # (T,) median px of the body points
+    steps: int
+
+
+def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress) -> Fit:
+    """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps."""
+    center = np.array([sightings.width / 2, sightings.height / 2])
+    focal, spread = focal_prior(sightings, config)
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
+    seen = observations(sightings, BODY_POINTS, center, (focal, spread), config, outlines)
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0)
+    state = starting_state(body, sightings, focal, center)
+    seen.depth *= scale_of_world(problem, state, sightings)
+    free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1, bool)
+    trunk_only = free.copy()
+    trunk_only[3:-3] = True
+    state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, 6)
+    state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, 3 * config.iterations)
+    steps, iou = trace.steps + more.steps, np.full(len(sightings.xy), np.nan)
+    problem.outline_weight = config.silhouette
+    for r in range(config.rounds if config.silhouette > 0 else 0):
+        progress(r, config.rounds + 1, "rounds")
+        iou = renew_outlines(problem, state, sightings)
+        state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, config.iterations)
+        steps += more.steps
+    state, more = fit_fingers(body, sightings, problem, state, config)
+    progress(config.rounds + 1, config.rounds + 1, "rounds")
+    return Fit(state, joint_spread(problem, state), iou, reprojection(problem, state), steps + more.steps)
+
+
+def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
+    """Focal length px and how sure it is."""
+    given = config.focal_px or sightings.focal_px
+    if given:
+        return given, 0.002
+    return FOCAL_GUESS * max(sightings.width, sightings.height), FOCAL_SPREAD
+
+
+def observations(sightings: Sightings, points: np.ndarray, center: np.ndarray, focal: tuple[float, float],
+                 config: SmplxConfig, outlines: list[Outline]) -> Observations:
+    """The chosen points with their spreads: the detector's own, never below what a detector can know."""
+    height = sightings.person_height
+    floor = np.full(133, DETECTOR_SPREAD * height)
+    floor[:5] *= FACE_SPREAD
+    spread = np.sqrt(sightings.sigma**2 + floor**2) / np.sqrt(np.clip(sightings.score, 0.2, 1))
+    spread = np.where(sightings.seen, spread, np.inf)[:, points]
+    depth = np.where(sightings.seen, sightings.world[..., 2], np.nan)[:, points]
+    depth = depth - sightings.world[:, HIPS, 2].mean(1)[:, None]
+    depth[:, len([p for p in points if p < 23]):] = np.nan
+    return Observations(sightings.xy[:, points].astype(np.float64), spread.astype(np.float64), depth.astype(np.float64),
+                        DEPTH_SPREAD, center, sightings.seconds, focal,
+                        (config.height_m, 0.003) if config.height_m else ADULT_HEIGHT, outlines, OUTLINE_SPREAD * height)
+
+
+def starting_state(body: Body, sightings: Sightings, focal: float, center: np.ndarray) -> State:
+    frames = len(sightings.xy)
+    rest = body.keypoints(body.v_template)
+    pelvis = body.J_regressor[0] @ body.v_template
+    turns = [start.trunk_turn(rest, sightings.world[t], sightings.xy[t], sightings.seen[t], focal, center) for t in range(frames)]
+    turns = start.fill_gaps(turns)
+    local = start.start_rotations(frames, 55, body.joint_names)
+    local[:, 0] = turns
+    transl = np.full((frames, 3), np.nan)
+    for t in range(frames):
+        use = [i for i in start.TRUNK if sightings.seen[t, i]]
+        if len(use) >= 2:
+            turned = (rest[use] - pelvis) @ turns[t].T + pelvis
+            transl[t] = start.place(turned, sightings.xy[t, use], focal, center)
+    known = np.isfinite(transl).all(1) & (np.nan_to_num(transl[:, 2]) > 0.3)
+    if not known.any():
+        transl[:], known[:] = [0, 0, focal * 1.7 / sightings.person_height], True
+    for c in range(3):
+        transl[:, c] = np.interp(np.arange(frames), np.nonzero(known)[0], transl[known, c])
+    return State(local, transl, np.zeros(body.num_betas), float(np.log(focal)))
+
+
+def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> float:
+    """How much larger the body is than the detector's metric points, by trunk and thigh lengths."""
+    bones = [(5, 11), (6, 12), (11, 13), (12, 14), (5, 7), (6, 8)]
+    chain = problem.skeleton.pose(state.local[:1], state.betas)
+    x = positions(chain, 0, problem.pairs, state.betas)
+    ratios = []
+    for a, b in bones:
+        length = np.linalg.norm(sightings.world[:, a] - sightings.world[:, b], axis=-1)
+        if np.isfinite(length).any():
+            ratios.append(np.linalg.norm(x[a] - x[b]) / np.nanmedian(length))
+    return float(np.median(ratios)) if ratios else 1.0
+
+
+def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
+    """Takes new outline points from the posed body; returns each frame's IoU with the alpha."""
+    params = to_params(problem.body, state, problem.seen.center)
+    camera = params.camera(sightings.width, sightings.height)
+    iou = np.full(len(state.local), np.nan)
+    for t, outline in enumerate(problem.seen.outlines):
+        problem.outline_pairs[t] = None
+        if outline.area > 0:
+            vertices, _ = problem.body.posed(params, [t])
+            points, iou[t] = outline_points(problem.body, vertices[0], camera, outline, t)
+            problem.outline_pairs[t] = points if points.count else None
+    return iou
+
+
+def fit_fingers(body: Body, sightings: Sightings, problem: Problem, state: State, config: SmplxConfig):
+    """Bends the fingers on the fitted wrists; nothing else moves."""
+    pairs: Pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS])
+    seen = observations(sightings, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, problem.seen.outlines)
+    seen.depth[:] = np.nan
+    fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, 0.0)
+    rest, _ = fingers.mean, None
+    state = State(state.local.copy(), state.transl, state.betas, state.log_focal)
+    state.local[:, FINGER_JOINTS] = rotation.exp(rest)
+    frozen = np.zeros(fingers.size, bool)
+    frozen[-3:] = True
+    return levenberg_marquardt(state, fingers.linearise, fingers.cost, fingers.move, frozen,
+                               np.ones(body.num_betas + 1, bool), config.iterations)
+
+
+def joint_spread(problem: Problem, state: State) -> np.ndarray:
+    """(T, 55) m: how far each joint may be off, from the posterior of its own joint rotations (diagonal of the normal equations)."""
+    system = problem.linearise(state)
+    n = problem.size
+    information = system.band[:, np.arange(n), np.arange(n)]
+    angle = 1 / np.sqrt(np.maximum(information[:, :-3].reshape(len(state.local), -1, 3).min(-1), 1e-6))
+    place = np.sqrt(1 / np.maximum(information[:, -3:-1].min(-1), 1e-6))
+    chain = problem.skeleton.pose(state.local, state.betas)
+    out = np.zeros(chain.place.shape[:2])
+    index = {int(j): i for i, j in enumerate(problem.active)}
+    for j, p in enumerate(problem.skeleton.parents):
+        if p < 0:
+            out[:, j] = place
+            continue
+        bone = np.linalg.norm(chain.place[:, j] - chain.place[:, p], axis=-1)
+        turn = angle[:, index[p]] if p in index else 0.2
+        out[:, j] = np.hypot(out[:, p], bone * turn)
+    return out
+
+
+def reprojection(problem: Problem, state: State) -> np.ndarray:
+    """(T,) median distance px between seen and fitted body points; NaN where nothing was seen."""
+    chain = problem.skeleton.pose(state.local, state.betas)
+    out = np.full(len(state.local), np.nan)
+    for t in range(len(out)):
+        x = positions(chain, t, problem.pairs, state.betas) + state.transl[t]
+        off = np.linalg.norm(problem.project(state, x) - problem.seen.xy[t], axis=-1)[np.isfinite(problem.seen.spread[t])]
+        out[t] = np.median(off) if len(off) else np.nan
+    return out
+
+
+def to_params(body: Body, state: State, center: np.ndarray, expression: np.ndarray | None = None) -> BodyParams:
+    """The state in the shape of body.npz."""
+    frames = len(state.local)
+    size = body.exprdirs.shape[2]
+    if expression is None:
+        expression = np.zeros((frames, size))
+    return BodyParams.from_pose(rotation.log(state.local), state.transl, state.betas, expression, np.exp(state.log_focal),
+                                center, model=body.digest)

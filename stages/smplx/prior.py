@@ -1,0 +1,67 @@
+"""What bodies do: mean and spread of each joint's rotation vector, limits of the hinges, and how fast joints turn.
+
+Rotation vectors about the T-pose axes (x left, y up, z front), degrees in the tables. Spreads are wide: they decide only
+what the pictures leave open.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsac.avatar.body import SMPLX_JOINTS
+
+BODY_JOINTS = np.arange(22)
+FINGER_JOINTS = np.arange(25, 55)
+
+SPREAD = {
+    "pelvis": (400, 400, 400), "hip": (35, 20, 15), "spine1": (10, 8, 8), "spine2": (8, 8, 6), "spine3": (8, 8, 6),
+    "knee": (50, 5, 4), "ankle": (20, 10, 8), "foot": (5, 2, 2), "neck": (15, 15, 10), "head": (15, 20, 12),
+    "collar": (5, 8, 8), "shoulder": (30, 35, 40), "elbow": (35, 45, 6), "wrist": (25, 20, 20),
+}
+MEAN = {"left_shoulder": (0, 0, -55), "right_shoulder": (0, 0, 55), "left_elbow": (0, -20, 0), "right_elbow": (0, 20, 0),
+        "left_knee": (8, 0, 0), "right_knee": (8, 0, 0)}
+LIMITS = ((4, 0, 1), (5, 0, 1), (18, 1, -1), (19, 1, 1))
+"""Hinges that do not bend back: joint, axis, sign of the allowed bend."""
+LIMIT_SPREAD = np.radians(3)
+CURL = np.radians(15)
+"""Fingers at rest bend a little, about z: towards the palm."""
+
+
+def pose_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (A, 3) and spread (A, 3) of the joints' rotation vectors, rad."""
+    mean, spread = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
+    for i, j in enumerate(joints):
+        name = SMPLX_JOINTS[j]
+        side, _, part = name.partition("_")
+        part = part or name
+        if j >= 25:
+            mean[i], spread[i] = finger_prior(side, part)
+            continue
+        mean[i] = np.radians(MEAN.get(name, (0, 0, 0)))
+        spread[i] = np.radians(SPREAD[part])
+    return mean, spread
+
+
+def finger_prior(side: str, part: str) -> tuple[np.ndarray, np.ndarray]:
+    """Fingers are hinges about z; roots also spread about y; the thumb is freer."""
+    down = -1 if side == "left" else 1
+    if part.startswith("thumb"):
+        return np.zeros(3), np.radians([12, 15, 15])
+    return np.array([0, 0, down * CURL]), np.radians([3, 8 if part.endswith("1") else 2, 25])
+
+
+def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Spread of angular speed (A,) rad/s (infinite for the pelvis, which turns) and of angular acceleration (A,) rad/s^2."""
+    speed, acceleration = np.full(len(joints), 1.5), np.full(len(joints), 4.0)
+    fast = np.isin(joints, (16, 17, 18, 19, 20, 21, 1, 2, 4, 5))
+    speed[fast], acceleration[fast] = 3.0, 8.0
+    trunk = np.isin(joints, (3, 6, 9, 13, 14, 10, 11))
+    speed[trunk], acceleration[trunk] = 0.6, 2.0
+    fingers = joints >= 25
+    speed[fingers], acceleration[fingers] = 1.0, 4.0
+    speed[joints == 0], acceleration[joints == 0] = np.inf, 3.0
+    return speed, acceleration
+
+
+TRANSL_ACCELERATION = 1.0
+"""Spread of the body's acceleration, m/s^2."""

@@ -1,0 +1,272 @@
+"""The fit as one least-squares problem: state, residuals, cost and normal equations.
+
+Residuals are in units of their own spread, so that weights are probabilities and not taste. Data terms are robust
+(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = B + 1 shared ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.avatar.body import Body
+from gsac.stages.smplx import prior
+from gsac.stages.smplx.points import Pairs, Skeleton, derivatives, positions
+from gsac.stages.smplx.silhouette import Outline
+from gsac.stages.smplx.solver import System
+
+ROBUST = 3.0
+"""Residuals beyond so many spreads count less and less."""
+OUTLINE_ROBUST = 2.0
+
+
+@dataclass
+class State:
+    """The unknowns."""
+
+    local: np.ndarray  # (T, J, 3, 3) joint rotations
+    transl: np.ndarray  # (T, 3) m
+    betas: np.ndarray  # (B,)
+    log_focal: float
+
+
+@dataclass
+class Observations:
+    """What was seen, frame by frame."""
+
+    xy: np.ndarray  # (T, P, 2) px
+    spread: np.ndarray  # (T, P) px; infinite where a point was not seen
+    depth: np.ndarray  # (T, P) m, depth of the point against the hips; NaN where unknown
+    depth_spread: float  # m
+    center: np.ndarray  # (2,) px
+    seconds: np.ndarray | None  # (T,) time; None for photos
+    focal_prior: tuple[float, float]
+    """Focal length px and its relative spread."""
+    height: tuple[float, float]
+    """Metres and spread."""
+    outlines: list[Outline]
+    outline_spread: float  # px
+
+
+def robust(residual: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    """Cost and the square root of the reweighting of residuals in spreads (Geman-McClure)."""
+    square = residual**2
+    shrink = 1 / (1 + square / limit**2)
+    return square * shrink, shrink
+
+
+class Problem:
+    """One clip's fit over chosen joints."""
+
+    def __init__(self, body: Body, pairs: Pairs, hips: tuple[int, int], seen: Observations, active: np.ndarray,
+                 smoothness: float, outline_weight: float):
+        self.body, self.pairs, self.hips, self.seen = body, pairs, hips, seen
+        self.skeleton = Skeleton(body, active)
+        self.active = active
+        self.mean, self.spread = prior.pose_prior(active)
+        speed, acceleration = prior.turning_spread(active)
+        self.speed_spread, self.acceleration_spread = speed, acceleration
+        self.smoothness, self.outline_weight = smoothness, outline_weight
+        self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
+        self.size = 3 * len(active) + 3
+        top, sole = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
+        self.height = float(body.v_template[top, 1] - body.v_template[sole, 1])
+        self.height_dirs = (body.shapedirs[top, 1] - body.shapedirs[sole, 1]).astype(np.float64)
+
+    def move(self, state: State, step: np.ndarray, shared: np.ndarray) -> State:
+        """step: (T, n); shared: (s,)."""
+        local = state.local.copy()
+        local[:, self.active] = local[:, self.active] @ rotation.exp(step[:, :-3].reshape(len(step), -1, 3))
+        return State(local, state.transl + step[:, -3:], state.betas + shared[:-1], state.log_focal + float(shared[-1]))
+
+    def project(self, state: State, x: np.ndarray) -> np.ndarray:
+        return np.exp(state.log_focal) * x[:, :2] / np.maximum(x[:, 2:], 0.05) + self.seen.center
+
+    def cost(self, state: State) -> float:
+        chain = self.skeleton.pose(state.local, state.betas)
+        total = 0.0
+        for t in range(len(state.local)):
+            x = positions(chain, t, self.pairs, state.betas) + state.transl[t]
+            total += robust(self._point_residual(t, self.project(state, x)), ROBUST)[0].sum()
+            depth = self._depth_residual(t, x)
+            total += robust(depth, ROBUST)[0].sum()
+            outline = self.outline_pairs[t]
+            if outline is not None:
+                x = positions(chain, t, outline, state.betas) + state.transl[t]
+                distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
+                scaled = np.where(inside, distance / self.seen.outline_spread, 0)
+                total += self._outline_share(outline) * robust(scaled, OUTLINE_ROBUST)[0].sum()
+        total += (self._prior_residual(state) ** 2).sum() + (self._limit_residual(state)[0] ** 2).sum()
+        total += sum((r**2).sum() for r in self._temporal_residuals(state))
+        return float(total + (self._shared_residual(state)[0] ** 2).sum())
+
+    def linearise(self, state: State) -> System:
+        t_count, a = len(state.local), len(self.active)
+        system = System.zeros(t_count, self.size, len(state.betas) + 1)
+        chain = self.skeleton.pose(state.local, state.betas)
+        for t in range(t_count):
+            x, by_step, by_betas = derivatives(self.skeleton, chain, t, self.pairs, state.betas)
+            x = x + state.transl[t]
+            step3 = np.concatenate([by_step.reshape(len(x), 3, 3 * a), np.broadcast_to(np.eye(3), (len(x), 3, 3))], 2)
+            uv = self.project(state, x)
+            slope = self._projection_slope(state, x)
+            residual = self._point_residual(t, uv)
+            weight = robust(residual, ROBUST)[1] / self.seen.spread[t][:, None]
+            use = np.isfinite(self.seen.spread[t])
+            rows = (slope @ step3 * weight[:, :, None])[use].reshape(-1, self.size)
+            shared = np.concatenate([slope @ by_betas, (uv - self.seen.center)[:, :, None]], 2)
+            shared = (shared * weight[:, :, None])[use].reshape(-1, len(state.betas) + 1)
+            system.add(t, rows, (residual * robust(residual, ROBUST)[1])[use].reshape(-1), shared)
+            self._add_depth(system, t, x, step3, by_betas)
+            self._add_outline(system, state, chain, t)
+        self._add_prior(system, state)
+        self._add_temporal(system, state)
+        residual, jacobian = self._shared_residual(state)
+        system.add_shared(jacobian, residual)
+        return system
+
+    def _projection_slope(self, state: State, x: np.ndarray) -> np.ndarray:
+        """(P, 2, 3) pixels by camera-frame metres."""
+        f, z = np.exp(state.log_focal), np.maximum(x[:, 2], 0.05)
+        out = np.zeros((len(x), 2, 3))
+        out[:, 0, 0] = out[:, 1, 1] = f / z
+        out[:, 0, 2], out[:, 1, 2] = -f * x[:, 0] / z**2, -f * x[:, 1] / z**2
+        return out
+
+    def _point_residual(self, t: int, uv: np.ndarray) -> np.ndarray:
+        """(P, 2) in spreads; 0 where a point was not seen."""
+        known = np.isfinite(self.seen.spread[t])
+        return np.where(known[:, None], (uv - np.nan_to_num(self.seen.xy[t])) / self.seen.spread[t][:, None], 0)
+
+    def _depth_residual(self, t: int, x: np.ndarray) -> np.ndarray:
+        """(P,) depth against the middle of the hips, in spreads; 0 where unknown."""
+        model = x[:, 2] - x[list(self.hips), 2].mean()
+        return np.nan_to_num((model - self.seen.depth[t]) / self.seen.depth_spread)
+
+    def _add_depth(self, system: System, t: int, x: np.ndarray, step3: np.ndarray, by_betas: np.ndarray) -> None:
+        known = np.isfinite(self.seen.depth[t])
+        if not known.any():
+            return
+        residual = self._depth_residual(t, x)[known]
+        weight = (robust(residual, ROBUST)[1] / self.seen.depth_spread)[:, None]
+        hips = list(self.hips)
+        rows = (step3[known, 2] - step3[hips, 2].mean(0)) * weight
+        betas = (by_betas[known, 2] - by_betas[hips, 2].mean(0)) * weight
+        shared = np.concatenate([betas, np.zeros((len(betas), 1))], 1)
+        system.add(t, rows, residual * robust(residual, ROBUST)[1], shared)
+
+    def _outline_share(self, pairs: Pairs) -> float:
+        """Weight of one outline point: neighbours along an edge are not independent sightings."""
+        return self.outline_weight * 40 / max(pairs.count, 1)
+
+    def _add_outline(self, system: System, state: State, chain, t: int) -> None:
+        pairs = self.outline_pairs[t]
+        if pairs is None:
+            return
+        x, by_step, by_betas = derivatives(self.skeleton, chain, t, pairs, state.betas)
+        x = x + state.transl[t]
+        uv = self.project(state, x)
+        distance, direction, inside = self.seen.outlines[t].at(uv)
+        residual = np.where(inside, distance / self.seen.outline_spread, 0)
+        shrink = robust(residual, OUTLINE_ROBUST)[1] * np.sqrt(self._outline_share(pairs))
+        weight = np.where(inside, shrink / self.seen.outline_spread, 0)
+        along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x)) * weight[:, None]  # (P, 3)
+        rows = np.concatenate([np.einsum("pd,pdn->pn", along, by_step.reshape(len(x), 3, -1)), along], 1)
+        focal = ((uv - self.seen.center) * direction).sum(1) * weight
+        shared = np.concatenate([np.einsum("pd,pdb->pb", along, by_betas), focal[:, None]], 1)
+        system.add(t, rows, residual * shrink, shared)
+
+    def _prior_residual(self, state: State) -> np.ndarray:
+        return (rotation.log(state.local[:, self.active]) - self.mean) / self.spread  # (T, A, 3)
+
+    def _limit_residual(self, state: State) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
+        """(T, L) how far hinges bend back, in spreads, and the limits that concern active joints."""
+        where = {int(j): i for i, j in enumerate(self.active)}
+        limits = [(where[j], axis, sign) for j, axis, sign in prior.LIMITS if j in where]
+        if not limits:
+            return np.zeros((len(state.local), 0)), limits
+        vector = rotation.log(state.local[:, self.active])
+        return np.stack([np.minimum(0, sign * vector[:, i, axis]) / prior.LIMIT_SPREAD for i, axis, sign in limits], 1), limits
+
+    def _add_prior(self, system: System, state: State) -> None:
+        vector = rotation.log(state.local[:, self.active])
+        slope = rotation.log_derivative(vector) / self.spread[:, :, None]  # (T, A, 3, 3)
+        residual = self._prior_residual(state)
+        for i in range(len(self.active)):
+            block = slice(3 * i, 3 * i + 3)
+            j = slope[:, i]
+            system.band[:, block, block] += j.transpose(0, 2, 1) @ j
+            system.gradient[:, block] += np.einsum("tab,ta->tb", j, residual[:, i])
+        over, limits = self._limit_residual(state)
+        for k, (i, axis, sign) in enumerate(limits):
+            row = np.where(over[:, k, None] < 0, sign * rotation.log_derivative(vector[:, i])[:, axis] / prior.LIMIT_SPREAD, 0)
+            block = slice(3 * i, 3 * i + 3)
+            system.band[:, block, block] += row[:, :, None] * row[:, None, :]
+            system.gradient[:, block] += row * over[:, k, None]
+
+    def _turns(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation vectors (T - 1, A, 3) and matrices from each frame's joint to the next frame's."""
+        local = state.local[:, self.active]
+        relative = local[:-1].swapaxes(-1, -2) @ local[1:]
+        return rotation.log(relative), relative
+
+    def _temporal_residuals(self, state: State) -> list[np.ndarray]:
+        """Speed of the joints, their acceleration and that of the body, in spreads; empty for photos."""
+        if self.seen.seconds is None or len(state.local) < 3 or self.smoothness == 0:
+            return []
+        gap = np.diff(self.seen.seconds)[:, None, None]
+        turn = self._turns(state)[0] / gap
+        span = 0.5 * (gap[1:] + gap[:-1])
+        moved = np.diff(state.transl, axis=0)[:, None] / gap
+        scale = np.sqrt(self.smoothness)
+        return [scale * turn / self.speed_spread[:, None],
+                scale * np.diff(turn, axis=0) / span / self.acceleration_spread[:, None],
+                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / prior.TRANSL_ACCELERATION]
+
+    def _add_temporal(self, system: System, state: State) -> None:
+        residuals = self._temporal_residuals(state)
+        if not residuals:
+            return
+        speed, acceleration, transl = residuals
+        n, scale = self.size, np.sqrt(self.smoothness)
+        gap = np.diff(self.seen.seconds)
+        span = 0.5 * (gap[1:] + gap[:-1])
+        vector, relative = self._turns(state)
+        slope = rotation.log_derivative(vector)  # by the later frame's step
+        back = -slope @ relative.swapaxes(-1, -2)  # by the earlier frame's
+        for i in range(len(self.active)):
+            block = slice(3 * i, 3 * i + 3)
+            if np.isfinite(self.speed_spread[i]):
+                w = scale / self.speed_spread[i] / gap[:, None, None]
+                self._couple(system, block, n, [back[:, i] * w, slope[:, i] * w], speed[:, i])
+            w = scale / self.acceleration_spread[i] / span[:, None, None]
+            first, second = w / gap[:-1, None, None], w / gap[1:, None, None]
+            self._couple(system, block, n, [-back[:-1, i] * first, back[1:, i] * second - slope[:-1, i] * first,
+                                            slope[1:, i] * second], acceleration[:, i])
+        eye = np.eye(3)[None] * (scale / prior.TRANSL_ACCELERATION / span[:, None, None])
+        first, second = eye / gap[:-1, None, None], eye / gap[1:, None, None]
+        self._couple(system, slice(n - 3, n), n, [first, -first - second, second], transl)
+
+    @staticmethod
+    def _couple(system: System, block: slice, n: int, parts: list[np.ndarray], residual: np.ndarray) -> None:
+        """Adds rows that tie the same unknowns of two or three frames in a row; parts: (R, 3, 3) by frame."""
+        rows = len(residual)
+        for i, left in enumerate(parts):
+            frames = slice(i, i + rows)
+            system.gradient[frames, block] += np.einsum("rab,ra->rb", left, residual)
+            for k, right in enumerate(parts[i:]):
+                columns = slice(block.start + k * n, block.stop + k * n)
+                system.band[frames, block, columns] += left.transpose(0, 2, 1) @ right
+
+    def _shared_residual(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Shape, focal and height priors: residuals (R,) and rows (R, s)."""
+        b = len(state.betas)
+        focal, relative = self.seen.focal_prior
+        residual, rows = [*state.betas, (state.log_focal - np.log(focal)) / relative], [*np.eye(b + 1)]
+        rows[b] = rows[b] / relative
+        metres, spread = self.seen.height
+        residual.append((self.height + self.height_dirs @ state.betas - metres) / spread)
+        rows.append(np.append(self.height_dirs, 0) / spread)
+        return np.array(residual), np.array(rows)

@@ -1,0 +1,76 @@
+"""The outline term: where the body's own outline lies against the alpha's edge.
+
+Each round the posed body is rasterised small, the visible surface under its outline pixels becomes a set of points, and
+each point is drawn along the signed distance field of the alpha until it lies on the edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from gsac.avatar.artifacts import read_alpha
+from gsac.avatar.body import Body
+from gsac.avatar.camera import Camera
+from gsac.avatar.zbuffer import rasterise
+from gsac.stages.smplx.points import Pairs, surface_pairs
+
+FIELD_HEIGHT = 320
+"""Alpha is looked at this high: finer edges than this do not move a joint."""
+POINTS = 160
+"""Outline points a frame, at most."""
+
+
+@dataclass
+class Outline:
+    """One frame's alpha edge as a field, in full-size pixels."""
+
+    field: np.ndarray  # (h, w) signed distance px, negative inside
+    slope: np.ndarray  # (h, w, 2) its gradient
+    scale: float
+    """Full-size pixels a field pixel."""
+    area: float
+    """Share of the frame that the person covers; 0 where there is nobody."""
+    mask: np.ndarray  # (h, w) bool
+
+    def at(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """xy: (P, 2) px. Signed distance (P,) px, its gradient (P, 2), and whether the point lies in the picture (P,)."""
+        h, w = self.field.shape
+        at = (xy / self.scale - 0.5).astype(np.float32)
+        inside = (at[:, 0] > 1) & (at[:, 0] < w - 2) & (at[:, 1] > 1) & (at[:, 1] < h - 2)
+        x, y = at[:, 0].reshape(-1, 1), at[:, 1].reshape(-1, 1)
+        sample = lambda image: cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0]  # noqa: E731
+        return sample(self.field), np.stack([sample(self.slope[..., c]) for c in (0, 1)], 1), inside
+
+
+def read_outline(path: Path) -> Outline:
+    """The outline of one alpha EXR."""
+    alpha = read_alpha(path)
+    scale = max(alpha.shape[0] / FIELD_HEIGHT, 1.0)
+    size = (max(2, round(alpha.shape[1] / scale)), max(2, round(alpha.shape[0] / scale)))
+    small = cv2.resize(alpha, size, interpolation=cv2.INTER_AREA)
+    mask = small > 0.5
+    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
+    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
+    field = (cv2.GaussianBlur(outside - inside, (0, 0), 1.0) * scale).astype(np.float32)
+    slope = np.stack([cv2.Sobel(field, cv2.CV_32F, 1, 0, ksize=3), cv2.Sobel(field, cv2.CV_32F, 0, 1, ksize=3)], -1) / (8 * scale)
+    return Outline(field, slope, scale, float(mask.mean()), mask)
+
+
+def outline_points(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int) -> tuple[Pairs, float]:
+    """Surface points under the posed body's outline (V, 3), and the IoU of body and alpha."""
+    h, w = outline.field.shape
+    face, bary, _ = rasterise(vertices, body.faces, camera.scaled(w, h))
+    covered = face >= 0
+    union = (covered | outline.mask).sum()
+    overlap = (covered & outline.mask).sum() / union if union else 0.0
+    edge = covered & ~cv2.erode(covered.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)
+    edge[[0, -1]] = edge[:, [0, -1]] = False
+    y, x = np.nonzero(edge)
+    if len(y) > POINTS:
+        pick = np.sort(np.random.default_rng(seed).permutation(len(y))[:POINTS])
+        y, x = y[pick], x[pick]
+    return surface_pairs(body, face[y, x], bary[y, x].astype(np.float64)), float(overlap)

@@ -1,0 +1,61 @@
+"""Reads the artifacts, fits the body, says where the fit is not to be trusted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
+from gsac.avatar.body import Body
+from gsac.stages.contract import Job, StageError
+from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
+from gsac.stages.smplx.silhouette import read_outline
+
+POOR_IOU = 0.7
+LOST = 0.5
+"""Joint spread, m, of a frame in which nobody was seen: far more than any fitted frame's."""
+
+
+def run(job: Job) -> None:
+    clip = Clip.read(job.inputs["split/clip.json"])
+    points = read_arrays(job.inputs["handgap/keypoints.npz"])
+    face = read_arrays(job.inputs["face/face.npz"])
+    body = Body.load()
+    sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
+                          None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
+                          clip.focal_px)
+    seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
+    if not seen.any():
+        raise StageError("smplx: no frame shows four body points; the clip needs one whole person in view")
+    outlines = [read_outline(p) for p in frame_paths(job.inputs["segment/alpha"])]
+    if len(outlines) != len(sightings.xy):
+        raise StageError(f"smplx: {len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
+    fit = fit_clip(body, sightings, outlines, job.config, job.progress)
+    expression = face["expression"]
+    if expression.shape[1] != body.exprdirs.shape[2]:
+        raise StageError(f"smplx: face.npz has {expression.shape[1]} expressions, the body model {body.exprdirs.shape[2]}")
+    params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression)
+    params.jaw_pose = face["jaw"].astype(np.float32)
+    params.joints = body.posed(params)[1]
+    params.sigma_joints = fit.sigma_joints.astype(np.float32)
+    params.sigma_joints[~seen] = LOST
+    warn(job, fit, seen, params, clip)
+    params.write(job.out / "body.npz")
+
+
+def warn(job: Job, fit, seen: np.ndarray, params, clip: Clip) -> None:
+    """Says which frames are not to be trusted and what one camera left open."""
+    if not seen.all():
+        job.warn(f"smplx: frames {listed(~seen)} show no person; their pose is interpolated")
+    poor = np.nan_to_num(fit.iou, nan=1.0) < POOR_IOU
+    if (poor & seen).any():
+        job.warn(f"smplx: in frames {listed(poor & seen)} the body covers the silhouette badly (IoU below {POOR_IOU})")
+    if not clip.focal_px and not job.config.focal_px:
+        job.warn(f"smplx: the clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it)")
+    if job.config.height_m is None:
+        job.warn("smplx: one camera cannot see scale; the person's height comes from the shape prior (set smplx.height_m)")
+
+
+def listed(which: np.ndarray) -> str:
+    """Frame numbers of a mask, shortened."""
+    numbers = [str(i) for i in np.nonzero(which)[0]]
+    return ", ".join(numbers[:12]) + (f" and {len(numbers) - 12} more" if len(numbers) > 12 else "")
