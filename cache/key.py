@@ -7,7 +7,7 @@ so no two kinds of thing can collide by having the same bytes:
     text      sha256("gsac text 1\\n" + UTF-8)
     tree      sha256("gsac tree 1\\n" + canonical({relative path: [file digest, size]}))
     module    sha256("gsac module 1\\n" + canonical(normalised syntax tree))        (see `code`)
-    code      sha256("gsac code 1\\n" + canonical({module: module digest}))
+    code      sha256("gsac code 1\\n" + canonical({module: module digest, module/file: file digest}))
     action    sha256("gsac action 1\\n" + canonical(KeyParts as a JSON object))     (the key)
 
 canonical(x) is JSON with sorted keys, no spaces, ASCII escapes and floats as Python's shortest repr; NaN and infinity
