@@ -41,8 +41,8 @@ class Appearance:
     trousers: np.ndarray
     shoes: np.ndarray
     pattern: str
-    bump: dict[str, tuple[float, float]] = field(default_factory=lambda: {
-        "shirt": (26.0, 0.16), "trousers": (22.0, 0.18), "hair": (260.0, 0.25), "skin": (300.0, 0.02),
+    bump: dict[str, tuple] = field(default_factory=lambda: {
+        "shirt": (26.0, 0.16), "trousers": (22.0, 0.18), "hair": ((240.0, 30.0, 240.0), 0.25), "skin": (300.0, 0.02),
         "shoes": (60.0, 0.05), "eye": (1.0, 0.0)})
     """Material -> cells a metre and strength of the normals' roughness."""
 
@@ -145,9 +145,8 @@ class Appearance:
 
     def _shoes(self, p, region):
         x, y, z = p.T
-        sole = _soft((-0.797 - y) * 1200)
-        lace = _soft(np.sin(z * 2 * np.pi / 0.016) * 5) * (np.abs(np.abs(x) - 0.21) < 0.02) * (z > 0.05) * (z < 0.12) * (
-            y > -0.79)
+        sole = _soft((0.019 - y) * 1200)
+        lace = _soft(np.sin(y * 2 * np.pi / 0.012) * 5) * (np.abs(np.abs(x) - 0.21) < 0.02) * (z > 0.03) * (y > 0.06)
         colour = self.shoes * (1 + 0.08 * sample(self.noise, p, 80)[:, :1])
         colour = _mix(colour, linear((225, 222, 214)), np.clip(sole + lace * 0.9, 0, 1))
         return colour, np.full(len(p), 0.2, np.float32)
@@ -156,7 +155,7 @@ class Appearance:
         around = np.arctan2(p[:, 0], p[:, 2] - 0.03)
         strand = np.stack([around * 0.09, p[:, 1] * 0.12 + p[:, 2] * 0.1, p[:, 2] * 0.1], -1)
         n = sample(self.noise, strand, 420)[:, :1] * 0.3 + sample(self.noise, strand, 1300)[:, :1] * 0.3
-        return self.hair * (1 + n + 0.2 * sample(self.noise, p, 40)[:, :1]), np.full(len(p), 0.35, np.float32)
+        return self.hair * (1 + n + 0.2 * sample(self.noise, p, 40)[:, :1]), np.full(len(p), 0.16, np.float32)
 
 
 def make_appearance(person: Person, rng: np.random.Generator) -> Appearance:

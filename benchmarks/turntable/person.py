@@ -9,7 +9,7 @@ import numpy as np
 from gsac.avatar.body import Body
 from gsac.avatar.skinning import skin
 from gsac.benchmarks.turntable.options import TurntableOptions
-from gsac.benchmarks.turntable.shell import Shell, cut, lifted
+from gsac.benchmarks.turntable.shell import Shell, capped, cut, draped, lifted
 
 REGIONS = Path(__file__).with_name("regions.npz")
 """(5, V) shares of lips, ears, eyelids, nails, inner mouth, face: MakeHuman's CC0 texture masks, sampled at the vertices."""
@@ -60,7 +60,7 @@ class Person:
     material: np.ndarray
     """(F,) uint8 into MATERIALS."""
     paint: np.ndarray
-    """(N, 3) m, place on the plain template: what patterns are painted by, equal for all bodies."""
+    """(N, 3) m, what patterns are painted by: place on the plain template, equal for all bodies; shoes: height above the sole."""
     region: np.ndarray
     """(N, 6) shares as in regions.npz."""
 
@@ -83,13 +83,12 @@ class Person:
 
 def make_person(options: TurntableOptions, rng: np.random.Generator) -> Person:
     body = Body.load()
-    template = body.v_template
     betas = (rng.normal(0, 0.8, body.num_betas) * np.linspace(1, 0.4, body.num_betas)).clip(-1.6, 1.6).astype(np.float32)
     shift, joint_offset = outside(body, options.outside, rng)
     rest, joints = body.rest(betas, None, joint_offset)
     rest = rest + shift
-    look = Look(sleeve=float(rng.choice([0.36, 0.42, 0.66])), hem=float(rng.uniform(0.06, 0.11)),
-                cuff=float(rng.choice([-0.70, -0.70, -0.70, -0.24])), hair=str(rng.choice(["short", "bob"])),
+    look = Look(sleeve=float(rng.choice([0.36, 0.42, 0.66])), hem=float(rng.uniform(0.07, 0.12)),
+                cuff=float(rng.choice([-0.755, -0.755, -0.755, -0.24])), hair=str(rng.choice(["short", "bob"])),
                 neckline=float(rng.uniform(0.5, 0.9)))
     region = np.load(REGIONS)["share"].T.astype(np.float32) / 255
     shells, hidden = dress(body, rest, region, look, options.clothing, rng)
@@ -123,7 +122,7 @@ def dress(body: Body, rest: np.ndarray, region: np.ndarray, look: Look, thick: f
     near_neck = np.clip((0.16 - arm) / 0.04, 0, 1)
     fields = {
         "shirt": np.minimum.reduce([y - look.hem, (look.sleeve - arm) * 1.0, np.where(near_neck > 0, neck - y, 0.2)]),
-        "trousers": np.minimum.reduce([0.17 - y, y - look.cuff, 0.4 - arm]),
+        "trousers": np.minimum.reduce([look.hem + 0.07 - y, y - look.cuff, 0.4 - arm]),
         "shoes": np.minimum(-0.715 - y, 0.6 - arm),
         "hair": hair_field(template, region, look),
     }
@@ -131,28 +130,35 @@ def dress(body: Body, rest: np.ndarray, region: np.ndarray, look: Look, thick: f
     sleeve = np.clip((arm - 0.25) / (look.sleeve - 0.2), 0, 1.2) * (y > 0.45)
     leg = np.clip((0.0 - y) / 0.7, 0, 1)
     thickness = {
-        "shirt": 0.007 + 0.012 * waist + 0.014 * sleeve * (look.sleeve < 0.5) + 0.006 * sleeve + fold * 0.007,
-        "trousers": 0.007 + 0.018 * leg + 0.006 * (y < 0.1) + fold * 0.008 * (0.4 + leg),
+        "shirt": 0.008 + 0.010 * waist + 0.014 * sleeve * (look.sleeve < 0.5) + 0.006 * sleeve + fold * 0.006,
+        "trousers": np.where(y > look.hem - 0.03, 0.004, 0.008 + 0.020 * leg + fold * 0.008 * (0.4 + leg)),
         "shoes": np.full(len(template), 0.010),
-        "hair": hair_thickness(template, look, rng),
+        "hair": hair_thickness(template, fields["hair"], look, rng),
     }
     shells = []
     hidden = np.zeros(len(template), bool)
     for name, field in fields.items():
         field = np.where(skin_only, field, -1.0)
         member = field > -0.06
-        lift = lifted(rest, faces, member, np.maximum(thickness[name], 0.003) * thick,
-                      {"shirt": 14, "trousers": 10, "shoes": 12, "hair": 6}[name])
+        base = rest
+        if name == "shoes":
+            for sign in (1, -1):
+                base = capped(base, np.clip((z - 0.07) / 0.06, 0, 1) * member * (sign * x > 0))
+        lift = lifted(base, faces, member, np.maximum(thickness[name], 0.003) * thick,
+                      {"shirt": 16, "trousers": 12, "shoes": 6, "hair": 6}[name])
+        if name == "shirt":
+            lift = draped(lift, np.clip((0.52 - y) / 0.08, 0, 1) * (arm < 0.3) * member)
+        paint = template
         if name == "shoes":
             sole = rest[skin_only, 1].min() - 0.018
             low = np.clip((-0.775 - y) / 0.02, 0, 1)
             lift[:, 1] += low * (sole - lift[:, 1]) * 0.9
+            paint = np.stack([x, lift[:, 1] - sole, z], 1)
         if name == "hair" and look.hair == "bob":
             lift = hang(lift, template, field, thick)
         pair, share, cut_faces = cut(faces, field)
-        shells.append(Shell(name, lift.astype(np.float32), pair, share, cut_faces))
-        if name != "hair":
-            hidden |= field > (0.03 if name == "shirt" else 0.02)
+        shells.append(Shell(name, lift.astype(np.float32), pair, share, cut_faces, paint.astype(np.float32)))
+        hidden |= field > {"shirt": 0.03, "trousers": 0.02, "shoes": 0.02, "hair": 0.03}[name]
     return shells, hidden
 
 
@@ -161,27 +167,28 @@ def hair_field(template: np.ndarray, region: np.ndarray, look: Look) -> np.ndarr
     x, y, z = template.T
     around = np.arctan2(np.abs(x), z - 0.045)  # 0 in front, pi behind
     line = np.interp(around, [0, 0.55, 0.9, 1.25, 1.75, 2.3, np.pi],
-                     [0.967, 0.962, 0.940, 0.885, 0.870, 0.815, 0.800])
+                     [0.967, 0.962, 0.940, 0.885, 0.860, 0.812, 0.800])
     return np.where((y > 0.77) & (np.abs(x) < 0.13), np.minimum(y - line, 0.03 - 0.08 * region[:, 1]), -1.0)
 
 
-def hair_thickness(template: np.ndarray, look: Look, rng) -> np.ndarray:
+def hair_thickness(template: np.ndarray, field: np.ndarray, look: Look, rng) -> np.ndarray:
     x, y, z = template.T
+    rise = 0.15 + 0.85 * np.clip(field / 0.04, 0, 1) if look.hair == "short" else 0.3 + 0.7 * np.clip(field / 0.04, 0, 1)
     up = np.clip((y - 0.86) / 0.12, 0, 1)
     behind = np.clip((0.08 - z) / 0.1, 0, 1)
     tuft = sum(np.sin(template @ rng.normal(0, 60, 3) + rng.uniform(0, 6.28)) for _ in range(4)) / 4
     base = 0.006 + 0.020 * up if look.hair == "short" else 0.014 + 0.014 * up + 0.008 * behind
-    return base + 0.006 * tuft * up
+    return (base + 0.006 * tuft * up) * rise
 
 
 def hang(lift: np.ndarray, template: np.ndarray, field: np.ndarray, thick: float) -> np.ndarray:
-    """Draws the lower rows of long hair down to the jaw, at the sides and behind."""
+    """Draws the lower rows of long hair down to the shoulders, behind the ears."""
     x, y, z = template.T
     around = np.arctan2(np.abs(x), z - 0.045)
-    side = np.clip((around - 0.95) / 0.4, 0, 1)
+    side = np.clip((around - 1.75) / 0.3, 0, 1)
     low = np.clip(1 - field / 0.05, 0, 1) ** 1.5 * side * (field > -0.02) * (y > 0.78)
     out = lift.copy()
-    out[:, 1] -= 0.085 * low * thick
+    out[:, 1] -= 0.095 * low * thick
     radial = np.stack([x, np.zeros_like(x), z - 0.03], -1)
     radial /= np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-9)
     return out + radial * (0.018 * low * thick)[:, None]
@@ -201,12 +208,13 @@ def assemble(body, look, betas, rest, joints, joint_offset, region, shells: list
     control, pairs, shares, faces = [rest], [np.stack([own, own], 1)], [np.zeros(count)], [bare]
     eye = (bare >= EYES.start).all(1)
     materials = [np.where(eye, MATERIALS.index("eye"), MATERIALS.index("skin"))]
-    source = [own]
+    source, paints = [own], [body.v_template]
     at_control, at_drawn = count, count
     for shell in shells:
         used, pair = np.unique(shell.pair, return_inverse=True)
         control.append(shell.rest[used])
         source.append(used)
+        paints.append(shell.paint[used])
         pairs.append(pair.reshape(-1, 2) + at_control)
         shares.append(shell.share)
         faces.append(shell.faces + at_drawn)
@@ -216,9 +224,9 @@ def assemble(body, look, betas, rest, joints, joint_offset, region, shells: list
     source, pair, share = np.concatenate(source), np.concatenate(pairs), np.concatenate(shares).astype(np.float32)
 
     def spread(values):
-        a, b = values[source[pair[:, 0]]], values[source[pair[:, 1]]]
+        a, b = values[pair[:, 0]], values[pair[:, 1]]
         return (a + (b - a) * share[:, None]).astype(np.float32)
 
     return Person(body, look, betas, np.concatenate(control).astype(np.float32), joints, joint_offset,
                   body.skin_index[source], body.skin_weight[source], pair, share, np.concatenate(faces),
-                  np.concatenate(materials).astype(np.uint8), spread(body.v_template), spread(region))
+                  np.concatenate(materials).astype(np.uint8), spread(np.concatenate(paints)), spread(region[source]))

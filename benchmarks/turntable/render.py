@@ -65,19 +65,19 @@ class Studio:
         face_id, bary, depth = rasterise(vertices, person.faces, big)
         world = self.view.to_world(vertices)
         lamp_depth = self.lamp_depth(world)
-        colour = np.zeros((big.height, big.width, 3), np.float32)
+        colour = np.zeros((camera.height, camera.width, 3), np.float32)
         seen = face_id >= 0
         if seen.any():
-            rows, columns = np.flatnonzero(seen.any(1)), np.flatnonzero(seen.any(0))
-            box = np.s_[rows[0]: rows[-1] + 1, columns[0]: columns[-1] + 1]
-            colour[box] = self.shade(world, face_id[box], bary[box], depth[box], lamp_depth)
-        h, w = camera.height, camera.width
-        colour = colour.reshape(h, s, w, s, 3).mean((1, 3))
-        cover = seen.reshape(h, s, w, s).mean((1, 3), dtype=np.float32)
+            rows, columns = np.flatnonzero(seen.any(1)) // s, np.flatnonzero(seen.any(0)) // s
+            y0, y1, x0, x1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
+            box = np.s_[y0 * s: y1 * s, x0 * s: x1 * s]
+            shaded = self.shade(world, face_id[box], bary[box], depth[box], lamp_depth)
+            colour[y0:y1, x0:x1] = cv2.resize(shaded, (int(x1 - x0), int(y1 - y0)), interpolation=cv2.INTER_AREA)
+        cover = cv2.resize(seen.astype(np.float32), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
         ground = self.room.with_shadow(np.isfinite(lamp_depth), feet)
         out = colour + ground * (1 - cover[..., None])
-        out = np.clip(out / (1 + 0.12 * out), 0, 1) ** (1 / 2.2) * 255
-        return Picture(out.astype(np.float32), np.round(cover * 255).astype(np.uint8), depth)
+        out = np.clip(out / (1 + np.float32(0.12) * out), 0, 1) ** np.float32(1 / 2.2) * 255
+        return Picture(out, np.round(cover * 255).astype(np.uint8), depth)
 
     def lamp_depth(self, world: np.ndarray) -> np.ndarray:
         """(S, S) m along the lamp's axis, inf where nothing blocks it."""
@@ -88,74 +88,105 @@ class Studio:
         """(h, w, 3) linear; 0 off the person."""
         person, light = self.appearance.person, self.light
         attributes = np.concatenate([_normals(world, person.faces), world, person.paint, person.region], 1)
-        pixels = interpolate(attributes, person.faces, face_id, bary)
         seen = face_id >= 0
-        at = pixels[seen]
+        at = interpolate(attributes, person.faces, face_id[seen][None], bary[seen][None])[0]
         normal, place, paint, region = at[:, :3], at[:, 3:6], at[:, 6:9], at[:, 9:]
         material = person.material[face_id[seen]]
         albedo, gloss, bump = self.appearance.paint(material, paint, region)
-        to_eye = _unit(self.view.eye.astype(np.float32) - place)
-        normal = _unit(normal)
-        normal = np.where((normal * to_eye).sum(1, keepdims=True) < -0.15, -normal, normal)
-        normal = _unit(normal + bump)
-        away = light.place.astype(np.float32) - place
-        distance = np.linalg.norm(away, axis=1, keepdims=True)
-        to_lamp = away / distance
         turn, lamp = light.camera(SHADOW)
-        in_lamp = ((place + 0.006 * normal - light.place) @ turn.T).astype(np.float32)
-        lit = _unblocked(in_lamp, lamp_depth, lamp.focal[0], SHADOW)[:, None]
-        cosine = (normal * to_lamp).sum(1, keepdims=True)
-        fleshy = np.isin(material, [MATERIALS.index("skin"), MATERIALS.index("eye")])[:, None]
-        wrap = np.where(fleshy, np.array([0.30, 0.18, 0.14], np.float32), np.float32(0.06))
-        diffuse = np.clip((cosine + wrap) / (1 + wrap), 0, 1)
-        lit = np.where(fleshy, lit * 0.92 + 0.08 * np.array([1, 0.6, 0.5], np.float32), lit)
-        power = (3.2 / distance) ** 1.5
-        key = diffuse * lit * power * light.key.astype(np.float32) * 0.95
-        open_sky = _openness(depth)[seen][:, None]
-        ambient = (light.sky * (0.5 + 0.5 * normal[:, 1:2]) + light.ground * (0.5 - 0.5 * normal[:, 1:2])) * open_sky
-        half = _unit(to_lamp + to_eye)
-        sharp = np.where(material == MATERIALS.index("eye"), 300.0, 22.0)[:, None]
-        shine = np.clip((normal * half).sum(1, keepdims=True), 0, 1) ** sharp * gloss[:, None] * lit * power
-        shine = shine * np.where(sharp > 100, 1.2, 0.22)
+        single = [np.ascontiguousarray(a, np.float32) for a in (
+            normal, place, albedo, gloss, bump, _openness(depth)[seen], lamp_depth, turn, light.place, self.view.eye,
+            light.key, light.sky, light.ground)]
         out = np.zeros(face_id.shape + (3,), np.float32)
-        out[seen] = albedo * (key + ambient) + shine
+        out[seen] = _lit(material, *single, np.float32(lamp.focal[0]))
         return out
-
-
-def _unit(v):
-    return v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9).astype(np.float32)
 
 
 def _openness(depth: np.ndarray) -> np.ndarray:
     """(h, w) in 0.4..1: darker where the surface lies behind its surroundings (depth-buffer unsharp mask, Luft 2006)."""
     here = np.isfinite(depth)
-    out = np.ones(depth.shape, np.float32)
+    small = max(1, depth.shape[1] // 4), max(1, depth.shape[0] // 4)
     middle = np.median(depth[here])
     flat = np.where(here, depth - middle, 0).astype(np.float32)
+    less = np.zeros(depth.shape, np.float32)
+    weight0, flat0 = (cv2.resize(a, small, interpolation=cv2.INTER_AREA) for a in (here.astype(np.float32), flat))
     for share, strength in ((0.008, 4.0), (0.025, 1.6)):
-        sigma = max(1.0, share * depth.shape[0])
-        weight = cv2.GaussianBlur(here.astype(np.float32), (0, 0), sigma)
-        mean = cv2.GaussianBlur(flat, (0, 0), sigma) / np.maximum(weight, 1e-3)
-        out -= strength * np.clip(flat - mean, 0, 0.08)
-    return np.clip(out, 0.4, 1)
+        sigma = max(0.5, share * small[1])
+        mean = cv2.GaussianBlur(flat0, (0, 0), sigma) / np.maximum(cv2.GaussianBlur(weight0, (0, 0), sigma), 1e-3)
+        mean = cv2.resize(mean, depth.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        less += np.float32(strength) * np.clip(flat - mean, 0, 0.08)
+    return np.clip(1 - less, 0.4, 1)
 
 
-@njit(cache=True, error_model="numpy")
-def _unblocked(points, lamp_depth, focal, size):
-    """Share of 5 x 5 shadow-map taps about each point (n, 3), lamp's view, that the lamp reaches."""
-    out = np.empty(len(points), np.float32)
-    for i in range(len(points)):
-        z = points[i, 2]
-        u = points[i, 0] / z * focal + size / 2
-        v = points[i, 1] / z * focal + size / 2
-        free = 0
-        for dy in range(-2, 3):
-            for dx in range(-2, 3):
-                x, y = int(u + dx * 1.3), int(v + dy * 1.3)
-                if x < 0 or y < 0 or x >= size or y >= size or z - 0.008 <= lamp_depth[y, x]:
-                    free += 1
-        out[i] = free / 25
+WRAP = np.array([0.30, 0.18, 0.14], np.float32)
+"""How far light creeps round skin's terminator, by colour."""
+GLOW = np.array([0.08, 0.05, 0.04], np.float32)
+"""What shadowed skin still passes on of the lamp's light."""
+_SKIN, _EYE = MATERIALS.index("skin"), MATERIALS.index("eye")
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def _lit(material, normals, places, albedo, gloss, bump, openness, lamp_depth, turn, lamp, eye, key, sky, ground, focal):
+    """(n, 3) linear light that leaves each point for the eye."""
+    out = np.empty((len(places), 3), np.float32)
+    n, to_eye, to_lamp, half = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
+    for i in range(len(places)):
+        for k in range(3):
+            n[k] = normals[i, k]
+            to_eye[k] = eye[k] - places[i, k]
+            to_lamp[k] = lamp[k] - places[i, k]
+        _unit(n)
+        _unit(to_eye)
+        distance = _unit(to_lamp)
+        if n[0] * to_eye[0] + n[1] * to_eye[1] + n[2] * to_eye[2] < -0.15:  # inside of cloth and hair
+            for k in range(3):
+                n[k] = -n[k]
+        free = _unblocked(places[i], n, lamp, turn, lamp_depth, focal)
+        for k in range(3):
+            n[k] += bump[i, k]
+            half[k] = to_lamp[k] + to_eye[k]
+        _unit(n)
+        _unit(half)
+        cosine = n[0] * to_lamp[0] + n[1] * to_lamp[1] + n[2] * to_lamp[2]
+        power = (3.2 / distance) ** 1.5
+        glance = max(n[0] * half[0] + n[1] * half[1] + n[2] * half[2], 0.0)
+        fleshy = material[i] == _SKIN or material[i] == _EYE
+        shine = gloss[i] * free * power * (1.2 * glance ** 300 if material[i] == _EYE else 0.22 * glance ** 22)
+        up = 0.5 + 0.5 * n[1]
+        for k in range(3):
+            wrap = WRAP[k] if fleshy else 0.06
+            lit = free * 0.92 + GLOW[k] if fleshy else free
+            direct = min(max((cosine + wrap) / (1 + wrap), 0.0), 1.0) * lit * power * key[k] * 0.95
+            around = (sky[k] * up + ground[k] * (1 - up)) * openness[i]
+            out[i, k] = albedo[i, k] * (direct + around) + shine
     return out
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def _unit(v):
+    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    if length > 0:
+        v /= length
+    return length
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def _unblocked(place, normal, lamp, turn, lamp_depth, focal):
+    """Share of 5 x 5 shadow-map taps about a point, lifted 1 cm off its surface, that the lamp reaches."""
+    size = lamp_depth.shape[0]
+    x = place[0] + np.float32(0.010) * normal[0] - lamp[0]
+    y = place[1] + np.float32(0.010) * normal[1] - lamp[1]
+    z = place[2] + np.float32(0.010) * normal[2] - lamp[2]
+    depth = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
+    u = (turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z) / depth * focal + size / 2
+    v = (turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z) / depth * focal + size / 2
+    free = 0
+    for dy in range(-2, 3):
+        for dx in range(-2, 3):
+            column, row = int(u + dx * 1.3), int(v + dy * 1.3)
+            if column < 0 or row < 0 or column >= size or row >= size or depth - 0.012 <= lamp_depth[row, column]:
+                free += 1
+    return free / 25
 
 
 @njit(cache=True, error_model="numpy")

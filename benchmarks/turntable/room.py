@@ -51,16 +51,20 @@ class Room:
     """(H, W) part of the light that comes from the key lamp."""
     lamp_map: np.ndarray
     """(H, W, 2) float32 px of each place in the shadow map."""
+    floor_row: int
+    """First row that shows floor from side to side."""
 
     def with_shadow(self, blocked: np.ndarray, feet: np.ndarray) -> np.ndarray:
         """blocked: (S, S) bool shadow map; feet: (K, 3) m, world. Returns (H, W, 3) linear."""
         soft = cv2.GaussianBlur(blocked.astype(np.float32), (0, 0), blocked.shape[0] / 90)
         shadow = cv2.remap(soft, self.lamp_map, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
-        light = 1 - self.key_share * shadow * 0.85
-        for foot in feet:
-            d2 = (self.place[..., 0] - foot[0]) ** 2 + (self.place[..., 2] - foot[2]) ** 2
-            light *= 1 - 0.55 * np.exp(-d2 / 0.02) * np.exp(-np.maximum(foot[1] - 0.1, 0) / 0.1) * (
-                self.place[..., 1] < 0.01)
+        light = 1 - self.key_share * shadow * np.float32(0.85)
+        first = self.floor_row
+        x, z = self.place[first:, :, 0], self.place[first:, :, 2]
+        for foot in feet.astype(np.float32):
+            near = (x - foot[0]) ** 2 + (z - foot[2]) ** 2
+            lifted = np.float32(np.exp(-max(foot[1] - 0.1, 0) / 0.1))
+            light[first:] *= 1 - 0.55 * lifted * np.exp(near * np.float32(-50))
         return self.colour * light[..., None]
 
 
@@ -68,7 +72,7 @@ def make_light(rng) -> Light:
     side = rng.choice([-1, 1])
     warm = rng.uniform(-0.06, 0.06)
     return Light(np.array([side * rng.uniform(1.2, 2.0), rng.uniform(2.6, 3.2), rng.uniform(2.0, 2.8)]),
-                 np.array([1 + warm, 1, 1 - warm]) * 1.0, np.array([0.50, 0.52, 0.55]), np.array([0.30, 0.27, 0.24]))
+                 np.array([1 + warm, 1, 1 - warm]) * 1.15, np.array([0.40, 0.42, 0.45]), np.array([0.22, 0.19, 0.17]))
 
 
 def make_room(camera: Camera, to_world: np.ndarray, eye: np.ndarray, light: Light, shadow_size: int, rng) -> Room:
@@ -96,7 +100,9 @@ def make_room(camera: Camera, to_world: np.ndarray, eye: np.ndarray, light: Ligh
     turn, lamp = light.camera(shadow_size)
     seen = lamp.project((place.reshape(-1, 3) - light.place) @ turn.T)
     lamp_map = (seen - 0.5).reshape(camera.height, camera.width, 2).astype(np.float32)
-    return Room(small(colour, 3), place, small(share, 1), lamp_map)
+    floor = (place[..., 1] < 0.02).mean(1) > 0.5
+    floor_row = int(floor.argmax()) if floor.any() else camera.height
+    return Room(small(colour, 3), place, small(share, 1), lamp_map, floor_row)
 
 
 HALF, BACK, TOP = 1.9, -1.5, 2.7
