@@ -203,6 +203,9 @@ async function main() {
   };
   follow();
   window.addEventListener("hashchange", follow);
+  viewer.canvas.addEventListener("webglcontextlost", () => {
+    tell(new Error("the graphics driver stopped; please reload the page"));
+  });
   viewer.run();
   document.documentElement.dataset.ready = "yes";
 }

@@ -1,6 +1,8 @@
 import json
+import re
 import tracemalloc
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -62,6 +64,17 @@ def test_blocks_are_aligned_and_little_endian(data):
     assert all(entry["offset"] % 16 == 0 for entry in head["blocks"].values())
     entry = head["blocks"]["gaussian.face"]
     assert int.from_bytes(body[entry["offset"] + 2:entry["offset"] + 4], "little") == 1
+
+
+def test_the_specification_lists_the_blocks_and_keys_that_are_written(data):
+    text = (Path(__file__).parents[3] / "docs" / "gsac-format.md").read_text()
+    head, _ = head_and_body(data)
+    rows = {name for line in text.splitlines() if line.startswith("| `") for name in re.findall(r"^\| `([^`]+)`", line)}
+    blocks = {re.sub(r"^clip\.\w+\.", "clip.<name>.", name) for name in head["blocks"]}
+    assert blocks <= rows
+    assert {name for name in rows if "." in name} == blocks
+    assert set(head) - {"blocks"} <= rows
+    assert {fault.name.lower() for fault in Fault} <= rows
 
 
 def test_truncated_anywhere_is_a_named_error(data):
