@@ -13,6 +13,7 @@ import struct
 import numpy as np
 from gsac.stages.export.ply import SH0
 from gsac.stages.export.rigged import Clip, RiggedAvatar
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 FLOAT, U16, U32, U8 = 5126, 5123, 5125, 5121
@@ -21,8 +22,10 @@ KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 ARRAY_BUFFER, ELEMENT_BUFFER = 34962, 34963
 POINTS, TRIANGLES = 0, 4
 SPLATS = "KHR_gaussian_splatting"
-BARE = (0.6, 0.6, 0.6)
-"""sRGB of an avatar without gaussians."""
+NEAREST = 8
+"""How many gaussians give a vertex of the mesh its colour."""
+BLUR_M = 0.004
+"""m: gaussians nearer than this to the vertex count alike."""
 
 
 def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales: np.ndarray) -> bytes:
@@ -39,6 +42,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
         node = {"name": name, "translation": (joints[j] - (joints[parent] if parent >= 0 else 0)).tolist()}
         children = np.flatnonzero(avatar.parents == j).tolist()
         nodes.append(node | ({"children": children} if children else {}))
+    colours = vertex_colours(vertices, means, g["rgb"], g["opacity"])
     root = int(np.flatnonzero(avatar.parents < 0)[0])
     skin = {"joints": list(range(J)), "skeleton": root, "inverseBindMatrices": file.add(inverse.reshape(J, 16))}
     mesh = {"primitives": [{
@@ -46,7 +50,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
         "attributes": {
             "POSITION": file.add(vertices, ARRAY_BUFFER, bounds=True),
             "NORMAL": file.add(vertex_normals(vertices, avatar.faces), ARRAY_BUFFER),
-            "COLOR_0": file.add(_linear(vertex_colours(avatar)), ARRAY_BUFFER),
+            "COLOR_0": file.add(_linear(colours), ARRAY_BUFFER),
             **_skin_attributes(file, avatar.skin_index, avatar.skin_weight),
         }}], "name": "body"}
     corners = avatar.faces[g["face"]]
@@ -80,22 +84,15 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
     return file.glb(document)
 
 
-def vertex_colours(avatar: RiggedAvatar) -> np.ndarray:
-    """(V, 3) float32 sRGB: mean of the gaussians on a vertex's faces by opacity; others take the nearest one's."""
-    from scipy.spatial import cKDTree
+def vertex_colours(vertices: np.ndarray, means: np.ndarray, rgb: np.ndarray, opacity: np.ndarray) -> np.ndarray:
+    """(V, 3) float32 sRGB of vertices (V, 3): mean of the nearest gaussians by opacity and nearness, in one pose.
 
-    g, V = avatar.gaussians, len(avatar.vertices)
-    total, weight = np.zeros((V, 3)), np.zeros(V)
-    for corner in avatar.faces[g["face"]].T:
-        np.add.at(total, corner, np.clip(g["rgb"], 0, 1) * g["opacity"][:, None])
-        np.add.at(weight, corner, g["opacity"])
-    seen = weight > 1e-6
-    if not seen.any():
-        return np.tile(np.float32(BARE), (V, 1))
-    colours = total / np.maximum(weight, 1e-6)[:, None]
-    nearest = cKDTree(avatar.vertices[seen]).query(avatar.vertices[~seen])[1]
-    colours[~seen] = colours[seen][nearest]
-    return colours.astype(np.float32)
+    Nearness and not the binding, because training moves gaussians away from the face that carries them.
+    """
+    distance, near = cKDTree(means).query(vertices, k=min(NEAREST, len(means)))
+    distance, near = distance.reshape(len(vertices), -1), near.reshape(len(vertices), -1)
+    weight = (opacity[near] + 1e-6) / (distance ** 2 + BLUR_M ** 2)
+    return np.einsum("vk,vkc->vc", weight / weight.sum(1, keepdims=True), np.clip(rgb, 0, 1)[near]).astype(np.float32)
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
