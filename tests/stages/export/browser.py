@@ -47,15 +47,19 @@ class Browser:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio,
                   mobile=mobile)
 
-    def open(self, address, timeout=60):
-        """Opens the page and waits until it says that it is ready, shows its message, or fails."""
+    def open(self, address):
+        """Opens the page and waits until it says that it is ready."""
         self.call("Page.navigate", url=address)
+        self.until("document.documentElement?.dataset.ready === 'yes'")
+
+    def until(self, condition, timeout=120):
+        """Waits for a JavaScript condition; AssertionError when the page throws or time is up."""
         end = time.monotonic() + timeout
         while time.monotonic() < end and not self.errors:
-            if self.run("document.documentElement?.dataset.ready === 'yes'"):
+            if self.run(condition):
                 return
             time.sleep(0.1)
-        raise AssertionError(f"the page is not ready: {self.errors}")
+        raise AssertionError(f"not so: {condition}; errors of the page: {self.errors}")
 
     def run(self, script):
         """Value of a JavaScript expression; a promise is awaited."""

@@ -123,21 +123,19 @@ def test_the_page_asks_for_nothing_but_itself(page, exported):
 
 def test_it_plays_and_the_buttons_answer(page):
     page.run("location.hash = 'clip=walk'")
-    page.run("new Promise((done) => setTimeout(done, 1500))")
-    assert page.run("gsac.clock") > 0.2
-    assert "fps" in page.run("document.getElementById('fps').textContent")
+    page.until("gsac.clock > 0.2")
+    page.until("document.getElementById('fps').textContent.includes('fps')")
     for text, playing in (("A-pose", {"pose": "A"}), ("T-pose", {"pose": "T"}), ("Wave", {"clip": "wave"})):
         page.run(f"[...document.querySelectorAll('#poses button')].find((b) => b.textContent === '{text}').click()")
         assert page.run("gsac.playing") == playing
         assert page.run("document.querySelector('#poses button[aria-pressed=true]').textContent") == text
     yaw = page.run("gsac.camera.yaw")
     page.run("document.getElementById('turntable').click()")
-    page.run("new Promise((done) => setTimeout(done, 1000))")
-    assert page.run("gsac.camera.yaw") > yaw
+    page.until(f"gsac.camera.yaw > {yaw}")
     page.run("document.getElementById('reset').click()")
     page.run("document.getElementById('background').value = '#102030'")
     page.run("document.getElementById('background').dispatchEvent(new Event('input'))")
-    page.run("new Promise((done) => setTimeout(done, 600))")
+    page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     assert np.abs(page.picture()[SIZE // 2, 3].astype(int) - (0x10, 0x20, 0x30)).max() <= 1
     assert page.errors == []
 
@@ -145,7 +143,7 @@ def test_it_plays_and_the_buttons_answer(page):
 def test_on_a_phone_the_controls_are_inside_the_screen_and_below_the_feet(page):
     page.resize(390, 844, 2, True)
     page.run("location.hash = 'pose=A&x'")
-    page.run("new Promise((done) => setTimeout(done, 800))")
+    page.until("!gsac.still && gsac.playing.pose === 'A' && gsac.canvas.width === 780")
     boxes = page.run("[...document.querySelectorAll('button, select, input')].map((e) => e.getBoundingClientRect())"
                      ".map((r) => [r.left, r.top, r.right, r.bottom])")
     left, top, right, bottom = np.array(boxes).T
