@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.errors import CacheError
-from gsac.cache.memo import Memo, memo_in
+from gsac.cache.memo import Memo, identity, memo_in
 from gsac.cache.root import default_root
 
 Manifest = dict[str, list]
@@ -83,6 +83,6 @@ def _file_digest(path: Path, memo: Memo) -> str:
     with path.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
         after = os.fstat(stream.fileno())
-    if modes.S_ISREG(after.st_mode) and after == before:
+    if modes.S_ISREG(after.st_mode) and identity(after) == identity(before):
         memo.put("file", before, digest)
     return digest

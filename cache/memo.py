@@ -39,7 +39,7 @@ class Memo:
         try:
             row = self._connection.execute(
                 "select value from memo where kind=? and device=? and inode=? and size=? and mtime_ns=? and ctime_ns=?",
-                (kind, *_identity(stat)),
+                (kind, *identity(stat)),
             ).fetchone()
         except sqlite3.Error:
             return None
@@ -47,7 +47,7 @@ class Memo:
 
     def put(self, kind: str, stat: os.stat_result, value: str) -> None:
         if settled(stat):
-            self._pending.append((kind, *_identity(stat), value))
+            self._pending.append((kind, *identity(stat), value))
 
     def flush(self) -> None:
         rows, self._pending = self._pending, []
@@ -91,6 +91,7 @@ def _memo(root: Path, pid: int, thread: int) -> Memo:
     return Memo(root / "memo.sqlite")
 
 
-def _identity(stat: os.stat_result) -> tuple[int, int, int, int, int]:
+def identity(stat: os.stat_result) -> tuple[int, int, int, int, int]:
+    """What of a stat stands for the content: not the access time, which reading changes."""
     inode = stat.st_ino if stat.st_ino < 2**63 else stat.st_ino - 2**64  # SQLite integers are signed
     return stat.st_dev, inode, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns

@@ -55,6 +55,15 @@ def test_an_unchanged_file_is_read_once(store, tmp_path, settled_at_once, reads)
     assert len(reads) == 1
 
 
+def test_a_file_that_was_never_read_before_is_memoised_on_its_first_reading(store, tmp_path, settled_at_once, reads):
+    (tmp_path / "a").write_bytes(b"abc")
+    mtime = (tmp_path / "a").stat().st_mtime_ns
+    os.utime(tmp_path / "a", ns=(10**18, mtime))
+    file_digest(tmp_path / "a")
+    file_digest(tmp_path / "a")
+    assert len(reads) == 1
+
+
 def test_the_memo_outlives_the_process_that_filled_it(store, tmp_path, settled_at_once, reads):
     (tmp_path / "a").write_bytes(b"abc")
     for _ in range(2):
