@@ -8,6 +8,8 @@ import os
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -192,10 +194,11 @@ class Toy:
         self.write("common.py", COMMON)
         for name, inputs, outputs in (
             ("cut", ("clip",), ("words",)), ("left", ("cut/words",), ("out.txt",)),
-            ("right", ("cut/words",), ("out.txt",)), ("join", ("left/out.txt", "right/out.txt"), ("out.txt", "metrics.json")),
+            ("right", ("cut/words",), ("out.txt",)),
+            ("join", ("left/out.txt", "right/out.txt"), ("out.txt", "metrics.json")),
         ):
-            declaration = DECLARATION.replace("NAME", name).replace("INPUTS", repr(inputs)).replace("OUTPUTS", repr(outputs))
-            self.write(f"{name}/__init__.py", declaration)
+            declaration = DECLARATION.replace("INPUTS", repr(inputs)).replace("OUTPUTS", repr(outputs))
+            self.write(f"{name}/__init__.py", declaration.replace("NAME", name))
             body = BODIES.get(name, BODIES["side"]).replace("NAME", name)
             self.write(f"{name}/stage.py", "from gsac.toy.common import begin, end, spell\n" + body)
         self.set_package_version("1.0")
@@ -247,6 +250,14 @@ class Toy:
         done = self.run(*arguments, **env)
         assert done.code == 0, done.err
         return self.runs
+
+    @staticmethod
+    def wait_for(what: Callable[[], object], seconds: float = 60.0) -> None:
+        """Until `what()` is true."""
+        end = time.monotonic() + seconds
+        while not what():
+            assert time.monotonic() < end, f"waited {seconds} s in vain"
+            time.sleep(0.02)
 
     @property
     def runs(self) -> list[str]:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from gsac.cache.publish import STEPS
@@ -29,13 +30,6 @@ sys.exit(int(cli.execute(sys.argv[2:])))
 """
 
 
-def wait_for(what, seconds: float = 30.0):
-    end = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < end, "waited too long"
-        time.sleep(0.01)
-
-
 @pytest.mark.parametrize("step", STEPS)
 def test_sigkill_at_every_step_of_a_publish_never_leaves_a_torn_artifact_that_counts_as_done(toy, step):
     toy.ran("--until", "right")
@@ -52,13 +46,13 @@ def test_sigkill_at_every_step_of_a_publish_never_leaves_a_torn_artifact_that_co
 
 def test_sigkill_in_the_middle_of_a_stage_never_leaves_a_torn_artifact_that_counts_as_done(toy):
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "join.pause_s=30")
-    wait_for(lambda: "join" in toy.runs)
-    wait_for(lambda: list((toy.cache / "tmp").glob("join-*/out.txt")))
+    toy.wait_for(lambda: "join" in toy.runs)
+    toy.wait_for(lambda: list((toy.cache / "tmp").glob("join-*/out.txt")))
     worker = _children(process.pid)
     assert worker
     process.kill()
     process.communicate()
-    wait_for(lambda: not any(_alive(pid) for pid in worker))
+    toy.wait_for(lambda: not any(_alive(pid) for pid in worker))
     assert not (toy.out / "join").exists()
     assert toy.ran() == ["join"]
     assert toy.result == "ALPHA ALPHA"
@@ -66,7 +60,7 @@ def test_sigkill_in_the_middle_of_a_stage_never_leaves_a_torn_artifact_that_coun
 
 def test_ctrl_c_ends_the_stage_with_exit_code_130_and_keeps_what_is_finished(toy):
     process = toy.start("run", toy.clip, "--out", toy.out, "--json", "--set", "join.pause_s=30")
-    wait_for(lambda: "join" in toy.runs)
+    toy.wait_for(lambda: "join" in toy.runs)
     worker = _children(process.pid)
     began = time.monotonic()
     process.send_signal(signal.SIGINT)
@@ -90,9 +84,9 @@ def test_many_writers_one_result(toy, everything):
 
 def test_a_run_that_dies_hands_its_key_to_the_one_that_waits(toy):
     first = toy.start("run", toy.clip, "--out", toy.root / "out1", "--until", "cut", "--set", "cut.pause_s=2")
-    wait_for(lambda: "cut" in toy.runs)
+    toy.wait_for(lambda: "cut" in toy.runs)
     second = toy.start("run", toy.clip, "--out", toy.root / "out2", "--until", "cut", "--set", "cut.pause_s=2")
-    wait_for(lambda: b"waiting" in os.read(second.stderr.fileno(), 10_000))
+    toy.wait_for(lambda: b"waiting" in os.read(second.stderr.fileno(), 10_000))
     first.kill()
     first.communicate()
     second.communicate(timeout=60)
@@ -130,7 +124,7 @@ def test_verify_finds_rot_that_keeps_size_and_date_and_says_so_with_exit_code_4(
 def test_gc_never_removes_what_a_run_in_progress_needs(toy):
     toy.ran("--set", "right.word=last")
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "join.pause_s=4")
-    wait_for(lambda: "join" in toy.runs[4:])
+    toy.wait_for(lambda: "join" in toy.runs[4:])
     for record in (toy.cache / "actions").glob("*/*.json"):
         os.utime(record, (0, 0))
     collected = toy.gsac("cache", "gc", "--max-size", "0", "--json")
@@ -143,13 +137,12 @@ def test_gc_never_removes_what_a_run_in_progress_needs(toy):
 
 
 def _children(pid: int) -> list[int]:
-    text = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True).stdout
-    return [int(word) for word in text.split()]
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
 def _alive(pid: int) -> bool:
     try:
-        state = open(f"/proc/{pid}/stat").read().rsplit(")", 1)[1].split()[0]
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
     except FileNotFoundError:
         return False
     return state != "Z"

@@ -1,0 +1,201 @@
+"""`gsac run` on the toy project: parts of the chain, what it writes, what it says, how it fails."""
+
+import json
+import os
+import pty
+import re
+import subprocess
+
+import pytest
+import yaml
+from gsac.pipeline import workspace
+
+
+def test_until_stops_after_a_stage_and_runs_only_what_it_needs(toy):
+    assert toy.ran("--until", "left") == ["cut", "left"]
+
+
+def test_from_runs_the_stage_and_what_is_below_when_all_above_is_in_the_cache(toy):
+    toy.ran()
+    words = ["--set", "right.word=last", "--set", "left.word=last"]
+    assert toy.ran("--from", "right", *words) == ["left", "right", "join"], "left is beside right, not above it"
+
+
+def test_from_refuses_with_exit_code_3_when_something_above_is_not_in_the_cache(toy):
+    toy.ran()
+    done = toy.run("--from", "right", "--set", "cut.keep=1")
+    assert done.code == 3 and "stage cut is not up to date" in done.err and "cut.keep" in done.err
+    assert toy.runs == ["cut", "left", "right", "join"]
+
+
+def test_dry_run_says_what_would_run_and_why_and_runs_nothing(toy):
+    toy.ran()
+    toy.runs_file.write_text("")
+    done = toy.run("--dry-run", "--set", "left.word=last")
+    assert done.code == 0 and toy.runs == []
+    assert done.statuses == {"cut": "cached", "left": "planned", "right": "cached", "join": "planned"}
+    assert "left.word changed from 'first' to 'last'" in done.err
+
+
+def test_dry_run_writes_no_folder(toy):
+    assert toy.run("--dry-run").code == 0
+    assert not toy.out.exists()
+
+
+def test_json_is_one_object_on_the_last_line_with_stages_outputs_and_metrics(toy):
+    done = toy.run()
+    assert len(done.out.splitlines()) == 1
+    assert done.statuses == {"cut": "ran", "left": "ran", "right": "ran", "join": "ran"}
+    for stage in done.json["stages"]:
+        assert re.fullmatch("[0-9a-f]{64}", stage["key"]) and stage["seconds"] > 0
+    assert done.json["metrics"] == {"length": 10}
+    assert open(done.json["outputs"]["join/out.txt"]).read() == "ALPHA ALPHA"
+
+
+def test_the_output_folder_shows_every_stage_and_what_was_run(toy):
+    toy.ran("--set", "left.trouble=warning")
+    assert (toy.out / "cut" / "words").is_symlink() and (toy.out / "join" / "out.txt").is_symlink()
+    assert json.loads((toy.out / "metrics.json").read_text()) == {"length": 10}
+    run = json.loads((toy.out / "run.json").read_text())
+    assert run["clip"] == str(toy.clip)
+    left = next(stage for stage in run["stages"] if stage["name"] == "left")
+    assert left["warnings"] == ["left: word 2 is short"] and left["params"]["trouble"] == "warning"
+    assert {"seconds", "cpu_seconds", "peak_rss_mb", "key", "status"} <= left.keys()
+    assert yaml.safe_load((toy.out / "params.yaml").read_text())["left"]["trouble"] == "warning"
+
+
+def test_warnings_of_a_cached_stage_are_still_told(toy):
+    toy.ran("--set", "left.trouble=warning")
+    rows = toy.run("--set", "left.trouble=warning").json["stages"]
+    assert rows[1]["status"] == "cached" and rows[1]["warnings"] == ["left: word 2 is short"]
+
+
+def test_without_out_the_folder_is_named_after_the_clip(toy):
+    assert toy.gsac("run", toy.clip).code == 0
+    assert (toy.root / "clip-avatar" / "join" / "out.txt").read_text() == "ALPHA ALPHA"
+
+
+def test_a_folder_without_links_gets_copies(monkeypatch, tmp_path):
+    def no_links(self, target, target_is_directory=False):
+        raise OSError("no links here")
+
+    monkeypatch.setattr(workspace.Path, "symlink_to", no_links)
+    source = tmp_path / "frames"
+    source.mkdir()
+    (source / "1.txt").write_text("one")
+    workspace.link(source, tmp_path / "shown" / "frames")
+    workspace.link(source / "1.txt", tmp_path / "shown" / "1.txt")
+    assert not (tmp_path / "shown" / "frames").is_symlink()
+    assert (tmp_path / "shown" / "frames" / "1.txt").read_text() == (tmp_path / "shown" / "1.txt").read_text() == "one"
+
+
+@pytest.mark.parametrize(("trouble", "code", "words"), [
+    ("stage", 1, "left: frame 3 has no person; record again"),
+    ("bad input", 2, "left: the clip holds no words"),
+    ("bug", 1, "KeyError: 'surprise'"),
+    ("killed", 1, "killed by SIGKILL"),
+    ("silent", 1, "did not write out.txt"),
+    ("empty", 1, "out.txt is empty"),
+])
+def test_a_stage_that_fails_is_named_nothing_of_it_is_kept_and_what_was_finished_is(toy, trouble, code, words):
+    done = toy.run("--set", f"left.trouble={trouble}")
+    assert done.code == code and "stage left failed: " in done.err and words in done.err
+    assert "Traceback" not in done.err
+    assert done.statuses == {"cut": "ran", "left": "failed"}
+    assert not (toy.out / "left").exists() and list((toy.cache / "tmp").iterdir()) == []
+    assert json.loads((toy.out / "run.json").read_text())["stages"][1]["error"]
+    toy.runs_file.write_text("")
+    assert toy.run().code == 0
+    assert toy.runs == ["left", "right", "join"]
+
+
+def test_the_log_of_a_stage_that_broke_has_its_traceback(toy):
+    done = toy.run("--set", "left.trouble=bug")
+    log = toy.out / "logs" / "left.log"
+    assert str(log) in done.err
+    assert "left at work" in log.read_text() and "KeyError" in log.read_text()
+
+
+@pytest.mark.parametrize(("arguments", "word"), [
+    (["run", "nothing.mp4"], "nothing.mp4"),
+    (["run", "clip.mp4", "--until", "shout"], "unknown stage shout; known: cut, left, right, join"),
+    (["run", "clip.mp4", "--force", "shout"], "unknown stage shout"),
+    (["run", "clip.mp4", "--until", "left", "--from", "join"], "join does not run with --until left"),
+    (["run", "clip.mp4", "--params", "nothing.yaml"], "nothing.yaml"),
+    (["run", "clip.mp4", "--out", "clip.mp4"], "clip.mp4 is a file"),
+    (["run"], "CLIP"),
+    (["fly"], "fly"),
+    (["status", "."], "no dvc.yaml here or above"),
+    (["view", "."], "viewer.html"),
+    (["report", "."], "not the folder of a run"),
+    (["bench", "nothing"], "no benchmark nothing"),
+    (["cache", "gc", "--max-size", "many"], "many"),
+    (["models", "add", "net", "nothing.bin"], "nothing.bin"),
+    (["run", "clip.mp4", "--set", "left.model=nobody"], "unknown model file nobody"),
+    (["batch", "nothing"], "nothing: no such file or folder"),
+    (["batch", "lib"], "no clips here"),
+    (["batch", "clip.mp4", "--executor", "moon"], "moon"),
+])
+def test_a_users_mistake_is_one_clear_line_and_exit_code_2(toy, arguments, word):
+    done = toy.gsac(*arguments)
+    assert done.code == 2 and word in done.err and "Traceback" not in done.err
+
+
+def test_nobodys_dvc_yaml_is_written_over(toy):
+    toy.out.mkdir()
+    (toy.out / "dvc.yaml").write_text("stages: {fit: {cmd: python fit.py}}")
+    done = toy.run()
+    assert done.code == 2 and "python fit.py" in done.err
+    assert (toy.out / "dvc.yaml").read_text() == "stages: {fit: {cmd: python fit.py}}"
+
+
+def test_nobodys_clip_is_written_over(toy):
+    toy.out.mkdir()
+    (toy.out / "clip").write_text("precious")
+    assert toy.run().code == 2
+    assert (toy.out / "clip").read_text() == "precious"
+
+
+def test_a_clip_that_changes_while_it_is_read_is_not_published(toy):
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=1.5")
+    toy.wait_for(lambda: "cut" in toy.runs)
+    toy.clip.write_text("changed meanwhile")
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2 and "changed while it was being read" in err
+    assert not list((toy.cache / "actions").glob("cut/*"))
+
+
+def test_a_missing_parent_of_the_cache_is_made(toy):
+    assert toy.run(GSAC_CACHE=str(toy.root / "deep" / "deeper")).code == 0
+
+
+def test_a_cache_that_cannot_be_written_is_said_and_the_run_keeps_its_results_in_its_own_folder(toy):
+    done = toy.run(GSAC_CACHE="/proc/no-such-cache")
+    assert done.code == 0, done.err
+    assert "/proc/no-such-cache cannot be written" in done.err and str(toy.out / ".store") in done.err
+    assert toy.result == "ALPHA ALPHA"
+    toy.runs_file.write_text("")
+    assert toy.run(GSAC_CACHE="/proc/no-such-cache").code == 0 and toy.runs == []
+
+
+def test_plain_lines_without_a_terminal_and_no_control_codes(toy):
+    done = toy.gsac("run", toy.clip, "--out", toy.out)
+    assert "cut: starts" in done.err and "join: ran in" in done.err and "\x1b" not in done.err and done.out == ""
+
+
+def test_a_bar_in_a_terminal(toy):
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(toy.command("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=0.6"),
+                               cwd=toy.root, env=toy.env | {"TERM": "xterm"}, stderr=follower)
+    os.close(follower)
+    seen = b""
+    while True:
+        try:
+            piece = os.read(leader, 4096)
+        except OSError:
+            break
+        if not piece:
+            break
+        seen += piece
+    assert process.wait(60) == 0
+    assert "1/2 words" in seen.decode() and "left" in seen.decode() and "\x1b[" in seen.decode()
