@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
+from gsac.avatar.kernel import kernel
 from gsac.avatar.workspace import Workspace
-
-kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
 
 class FaceFrames(NamedTuple):

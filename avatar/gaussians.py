@@ -80,7 +80,7 @@ class Gaussians:
         points = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
         from gsac.avatar.binding import face_frames
 
-        frames = face_frames(vertices.astype(np.float64), faces)
+        frames = face_frames(vertices, faces)
         scale = np.where(frames.k[face] > 0, frames.k[face], 1)
         local = np.einsum("nji,nj->ni", frames.R[face], points - frames.T[face]) / scale[:, None]
         return cls._flat(vertices, faces, face, local.astype(np.float32), (areas / np.maximum(whole, 1))[face], rgb, opacity)
@@ -90,7 +90,7 @@ class Gaussians:
         """Discs in the face's plane (the frame's middle axis is the normal), sized by the area each stands for."""
         from gsac.avatar.binding import face_frames
 
-        k = face_frames(np.asarray(vertices, np.float64), faces).k[face]
+        k = face_frames(vertices, faces).k[face]
         width = np.log(SPREAD * np.sqrt(np.maximum(area, 1e-16)) / np.where(k > 0, k, 1))
         log_scale = np.stack([width, width + np.log(FLATNESS), width], 1).astype(np.float32)
         quat = np.zeros((len(face), 4), np.float32)
@@ -105,4 +105,4 @@ def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
     v = np.asarray(vertices, np.float64)[faces]
     area = 0.5 * np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
-    return np.where(face_frames(np.asarray(vertices, np.float64), faces).valid, area, 0)
+    return np.where(face_frames(vertices, faces).valid, area, 0)

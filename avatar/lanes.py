@@ -125,6 +125,53 @@ def total(typingctx, a):
     return a.real(a), code
 
 
+@intrinsic
+def store_totals(typingctx, array, index, a, b, c, d, e, f, g, h):
+    """Writes the eight lanes' sums to `array[index : index + 8]`; three times fewer instructions than eight `total`."""
+    half = WIDTH // 2
+
+    def code(context, builder, signature, arguments):
+        def pick(x, y, mask):
+            return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(ir.IntType(32), half), mask))
+
+        def neighbours(x, y):
+            return builder.fadd(pick(x, y, [0, 2, 8, 10, 4, 6, 12, 14]), pick(x, y, [1, 3, 9, 11, 5, 7, 13, 15]))
+
+        blank = ir.Constant(_vector(a), ir.Undefined)
+        folded = [builder.fadd(pick(v, blank, list(range(half))), pick(v, blank, list(range(half, WIDTH))))
+                  for v in arguments[2:]]
+        pairs = [neighbours(folded[i], folded[i + 1]) for i in (0, 2, 4, 6)]
+        left, right = neighbours(pairs[0], pairs[1]), neighbours(pairs[2], pairs[3])
+        sums = builder.fadd(pick(left, right, [0, 1, 2, 3, 8, 9, 10, 11]), pick(left, right, [4, 5, 6, 7, 12, 13, 14, 15]))
+        data = context.make_array(array)(context, builder, value=arguments[0]).data
+        pointer = builder.bitcast(builder.gep(data, [arguments[1]]), ir.PointerType(sums.type))
+        builder.store(sums, pointer, align=array.dtype.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uintp, a, b, c, d, e, f, g, h), code
+
+
+@intrinsic
+def any_above(typingctx, a, bound):
+    """Whether any lane is above a scalar."""
+
+    def code(context, builder, signature, arguments):
+        bits = builder.fcmp_ordered(">", arguments[0], _spread(builder, arguments[1], a))
+        return builder.icmp_unsigned("!=", builder.bitcast(bits, ir.IntType(WIDTH)), ir.Constant(ir.IntType(WIDTH), 0))
+
+    return types.boolean(a, a.real), code
+
+
+@intrinsic
+def lowest_bit(typingctx, mask):
+    """Position of the lowest set bit of a uint64 that is not zero."""
+
+    def code(context, builder, signature, arguments):
+        return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(types.uint64), code
+
+
 def _exp_coefficients(degree: int, end: float) -> list[float]:
     """exp(-x) on 0..end as a polynomial of x, lowest power first: interpolation at Chebyshev points."""
     points = [end / 2 * (1 + math.cos(math.pi * (i + 0.5) / (degree + 1))) for i in range(degree + 1)]
@@ -200,4 +247,5 @@ def _lanes_divide(a, b):
         return lambda a, b: _divide(a, b)
 
 
-__all__ = ["WIDTH", "Lanes", "below_or_equal", "falloff", "load", "spread", "store", "total"]
+__all__ = ["WIDTH", "Lanes", "any_above", "below_or_equal", "falloff", "load", "lowest_bit", "spread", "store",
+           "store_totals", "total"]

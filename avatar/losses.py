@@ -9,15 +9,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from gsac.avatar import sobel as _sobel
 from gsac.avatar import ssim as _ssim
+from gsac.avatar.kernel import kernel
 from gsac.avatar.lanes import WIDTH, load, spread, store, total
 from gsac.avatar.ssim import MARGIN
 from gsac.avatar.workspace import Workspace
-
-kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
 
 class Loss(NamedTuple):

@@ -6,11 +6,9 @@ smoothing sums to one, so a response has the scale of a central difference.
 
 from __future__ import annotations
 
-import numba
+from gsac.avatar.kernel import kernel
 from gsac.avatar.lanes import WIDTH, load, spread, store, total
 from gsac.avatar.ssim import MARGIN
-
-kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
 
 @kernel

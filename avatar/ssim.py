@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
+from gsac.avatar.kernel import kernel
 from gsac.avatar.lanes import WIDTH, load, spread, store, total
-
-kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
 REACH = 5
 ROWS = 2 * REACH + 1

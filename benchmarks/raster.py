@@ -26,6 +26,9 @@ ELLIPSOIDS = (
     ((0.09, 0.22, 0), (0.06, 0.26, 0.06)), ((-0.09, 0.22, 0), (0.06, 0.26, 0.06)),
 )
 
+BROAD = 1.6
+"""Widens the figure until it covers a quarter of the frame."""
+
 
 def figure() -> tuple[np.ndarray, np.ndarray]:
     """Vertices (V, 3) m, camera frame, and faces (F, 3) of a person made of ellipsoids."""
@@ -34,7 +37,7 @@ def figure() -> tuple[np.ndarray, np.ndarray]:
     parts = []
     for centre, axes in ELLIPSOIDS:
         ball = trimesh.creation.icosphere(subdivisions=4)
-        ball.vertices = ball.vertices * axes + centre
+        ball.vertices = ball.vertices * (np.array(axes) * (BROAD, 1, BROAD)) + np.array(centre) * (BROAD, 1, 1)
         parts.append(ball)
     mesh = trimesh.util.concatenate(parts)
     return in_front(np.asarray(mesh.vertices)), np.asarray(mesh.faces, np.int32)

@@ -35,6 +35,7 @@ class State:
     tile_start: np.ndarray
     pair_gaussian: np.ndarray
     pair_slot: np.ndarray
+    pair_mask: np.ndarray
     columns: int
     rgb: np.ndarray
     alpha: np.ndarray
@@ -86,19 +87,21 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Wo
     workspace = workspace or Workspace()
     share, take, count = workspace.share, workspace.take, len(means)
     lens = np.array([*camera.focal, *camera.center], real)
-    splats, boxes = take("splats", (count, project.SPLAT), real), take("boxes", (count, 4), np.int32)
+    splats, depths = take("splats", (count, project.SPLAT), real), take("depths", (count,), real)
+    boxes = take("boxes", (count, 4), np.int32)
     share(project.project, means, rotations, scales, rgb, opacity, lens, camera.width, camera.height,
-                  splats, boxes)
+          splats, depths, boxes)
 
     columns, rows = -(-camera.width // project.TILE), -(-camera.height // project.TILE)
     slot_start = take("slot_start", (count + 1,), np.int32)
     seen = tiles.slots(boxes, slot_start)
     unsigned = np.uint32 if real == np.float32 else np.uint64
-    order = tiles.depth_order(splats, slot_start, take("keys", (count,), unsigned), take("order", (count,), np.int32),
+    order = tiles.depth_order(depths, slot_start, take("keys", (count,), unsigned), take("order", (count,), np.int32),
                               take("spare_keys", (count,), unsigned), take("spare", (count,), np.int32))
     pairs = int(slot_start[count])
     tile_start = take("tile_start", (columns * rows + 1,), np.int32)
     pair_gaussian, pair_slot = take("pair_gaussian", (pairs,), np.int32), take("pair_slot", (pairs,), np.int32)
+    pair_mask = take("pair_mask", (pairs,), np.uint64)
     tiles.fill(order, seen, boxes, slot_start, columns, tile_start, pair_gaussian, pair_slot)
     # heavy tiles first, so that they spread evenly over the workers
     tile_order = np.argsort(-np.diff(tile_start), kind="stable")
@@ -108,10 +111,10 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Wo
     image = take("rgb", (camera.height, camera.width, 3), real)
     alpha = take("alpha", (camera.height, camera.width), real)
     scratch = take("forward", (workspace.workers, forward.PLANES * project.TILE ** 2), real)
-    share(forward.composite, tile_order, tile_start, pair_gaussian, splats, lattice, columns, scratch,
-                  image, alpha)
+    share(forward.composite, tile_order, tile_start, pair_gaussian, pair_mask, splats, lattice, columns,
+          scratch, image, alpha)
     state = State(camera, workspace, means, rotations, scales, lens, lattice, splats, slot_start, tile_order, tile_start,
-                  pair_gaussian, pair_slot, columns, image, alpha)
+                  pair_gaussian, pair_slot, pair_mask, columns, image, alpha)
     return Rendering(image, alpha, state)
 
 
@@ -122,13 +125,13 @@ def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) 
     moments = take("moments", (len(state.pair_slot), project.MOMENTS), real)
     scratch = take("backward", (state.workspace.workers, backward.PLANES * project.TILE ** 2), real)
     share(backward.composite_backward, state.tile_order, state.tile_start, state.pair_gaussian,
-                  state.pair_slot, state.splats, state.lattice, state.columns, scratch, state.rgb, state.alpha,
-                  binding.plain(grad_rgb, real), binding.plain(grad_alpha, real), moments)
+          state.pair_slot, state.pair_mask, state.splats, state.lattice, state.columns, scratch, state.rgb, state.alpha,
+          binding.plain(grad_rgb, real), binding.plain(grad_alpha, real), moments)
     gradients = Gradients(take("grad_means", (count, 3), real), take("grad_rotations", (count, 3, 3), real),
                           take("grad_scales", (count, 3), real), take("grad_rgb", (count, 3), real),
                           take("grad_opacity", (count,), real))
     share(project.project_backward, state.means, state.rotations, state.scales, state.lens,
-                  state.camera.width, state.camera.height, state.splats, state.slot_start, moments, *gradients)
+          state.camera.width, state.camera.height, state.splats, state.slot_start, moments, *gradients)
     return gradients
 
 

@@ -6,19 +6,18 @@ dL/d(alpha) at a pixel is T (v . c) - V_behind / (1 - alpha): no colour of what 
 
 from __future__ import annotations
 
-import numba
-from gsac.avatar.lanes import below_or_equal, falloff, load, spread, store, total
-from gsac.avatar.raster.forward import BLOCK, BLOCKS, LANES, MAX_ALPHA, STOP, block_columns, block_rows
+import numpy as np
+from gsac.avatar.kernel import kernel
+from gsac.avatar.lanes import below_or_equal, falloff, load, lowest_bit, spread, store, store_totals, total
+from gsac.avatar.raster.forward import BLOCK, BLOCKS, LANES, MAX_ALPHA, STOP
 from gsac.avatar.raster.project import BLUE, GREEN, HA, HC, OPACITY, RED, S_MAX, TILE, B, X, Y
-
-kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 
 PLANES = 6
 """Transmittance, V, and the image gradient of red, green, blue, alpha of a block, 16 numbers each."""
 
 
 @kernel
-def composite_backward(worker, workers, tile_order, tile_start, pair_gaussian, pair_slot, splats, lattice, columns, scratch,
+def composite_backward(worker, workers, tile_order, tile_start, pair_gaussian, pair_slot, pair_mask, splats, lattice, columns, scratch,
                        rgb, alpha, grad_rgb, grad_alpha, moments):
     """Fills moments (pairs, 9), one row for each (tile, gaussian); rgb and alpha are what `composite` gave."""
     height, width = alpha.shape
@@ -50,39 +49,33 @@ def composite_backward(worker, workers, tile_order, tile_start, pair_gaussian, p
             ha, b, hc, s_max, opacity = splat[HA], splat[B], splat[HC], splat[S_MAX], splat[OPACITY]
             red, green, blue = splat[RED], splat[GREEN], splat[BLUE]
             m, mx, my, mxx, mxy, myy, mr, mg, mb = zero, zero, zero, zero, zero, zero, zero, zero, zero
-            first_row, last_row = block_rows(splat, y)
-            for row in range(first_row, last_row + 1):
-                low = real(row * BLOCK) + real(0.5) - y
-                first, last = block_columns(splat, x, low, low + real(BLOCK - 1))
-                dy = lane_y + (real(row * BLOCK) - y)
-                bdy, hcdy2 = dy * b, dy * dy * hc
-                for column in range(first, last + 1):
-                    at = (row * BLOCKS + column) * (PLANES * LANES)
-                    dx = lane_x + (real(column * BLOCK) - x)
-                    s = dx * (dx * ha + bdy) + hcdy2
-                    raw = falloff(s) * opacity
-                    a = below_or_equal(raw, real(MAX_ALPHA), raw, real(MAX_ALPHA))
-                    a = below_or_equal(s, s_max, a, real(0))
-                    before = load(state, at)
-                    weight = before * a
-                    after = before - weight
-                    stopped = after
-                    weight = below_or_equal(stopped, real(STOP), real(0), weight)
-                    after = below_or_equal(stopped, real(STOP), real(0), after)
-                    store(state, at, after)
-                    v0, v1, v2 = load(state, at + 2 * LANES), load(state, at + 3 * LANES), load(state, at + 4 * LANES)
-                    dot = v0 * red + (v1 * green + (v2 * blue + load(state, at + 5 * LANES)))
-                    own = weight * dot
-                    behind = load(state, at + LANES) - own
-                    store(state, at + LANES, behind)
-                    g = own - a * behind / (one - a)
-                    g = below_or_equal(stopped, real(STOP), real(0), g)
-                    g = below_or_equal(raw, real(MAX_ALPHA), g, real(0))
-                    gx, gy = g * dx, g * dy
-                    m, mx, my = m + g, mx + gx, my + gy
-                    mxx, mxy, myy = mxx + gx * dx, mxy + gx * dy, myy + gy * dy
-                    mr, mg, mb = mr + weight * v0, mg + weight * v1, mb + weight * v2
-            slot = pair_slot[pair]
-            moments[slot, 0], moments[slot, 1], moments[slot, 2] = total(m), total(mx), total(my)
-            moments[slot, 3], moments[slot, 4], moments[slot, 5] = total(mxx), total(mxy), total(myy)
-            moments[slot, 6], moments[slot, 7], moments[slot, 8] = total(mr), total(mg), total(mb)
+            mask = pair_mask[pair]
+            while mask != np.uint64(0):
+                block = lowest_bit(mask)
+                mask &= mask - np.uint64(1)
+                at = block * (PLANES * LANES)
+                dx = lane_x + (real(block % BLOCKS * BLOCK) - x)
+                dy = lane_y + (real(block // BLOCKS * BLOCK) - y)
+                s = dx * (dx * ha + dy * b) + dy * dy * hc
+                raw = falloff(s) * opacity
+                a = below_or_equal(raw, real(MAX_ALPHA), raw, real(MAX_ALPHA))
+                a = below_or_equal(s, s_max, a, real(0))
+                before = load(state, at)
+                weight = before * a
+                after = before - weight
+                weight = below_or_equal(after, real(STOP), real(0), weight)
+                store(state, at, below_or_equal(after, real(STOP), real(0), after))
+                v0, v1, v2 = load(state, at + 2 * LANES), load(state, at + 3 * LANES), load(state, at + 4 * LANES)
+                own = weight * (v0 * red + (v1 * green + (v2 * blue + load(state, at + 5 * LANES))))
+                behind = load(state, at + LANES) - own
+                store(state, at + LANES, behind)
+                g = own - a * behind / (one - a)
+                g = below_or_equal(after, real(STOP), real(0), g)
+                g = below_or_equal(raw, real(MAX_ALPHA), g, real(0))
+                gx, gy = g * dx, g * dy
+                m, mx, my = m + g, mx + gx, my + gy
+                mxx, mxy, myy = mxx + gx * dx, mxy + gx * dy, myy + gy * dy
+                mr, mg, mb = mr + weight * v0, mg + weight * v1, mb + weight * v2
+            row = moments[pair_slot[pair]]
+            store_totals(row, 0, m, mx, my, mxx, mxy, myy, mr, mg)
+            row[8] = total(mb)

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
-from gsac.avatar.lanes import below_or_equal, falloff, load, spread, store
+from gsac.avatar.kernel import kernel
+from gsac.avatar.lanes import any_above, below_or_equal, falloff, load, lowest_bit, spread, store
 from gsac.avatar.raster.project import (
     BLUE,
     CHORD,
     GREEN,
     HA,
     HALF_HEIGHT,
+    HALF_WIDTH,
     HC,
     OPACITY,
     RED,
     RIGHTMOST,
+    RIM,
     S_MAX,
     SLOPE,
     TILE,
@@ -23,47 +25,60 @@ from gsac.avatar.raster.project import (
     Y,
 )
 
-kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
-
 BLOCK = 4
 BLOCKS = TILE // BLOCK
 LANES = BLOCK * BLOCK
 MAX_ALPHA = 0.999
 STOP = 1e-4
 """A gaussian that would leave this transmittance or less is not composited, nor any behind it."""
+LOOK = 64
+"""After so many gaussians of a tile, blocks that are opaque everywhere are looked for and left out from there on."""
 PLANES = 5
 """Transmittance, red, green, blue, alpha of a block, 16 numbers each."""
 
 
 @kernel
-def block_rows(splat, y):
-    """First and last row of blocks whose pixels the rim reaches; y: the centre in the tile, px."""
-    real = splat.dtype.type
-    half, reach = real(0.5), splat[HALF_HEIGHT]
-    first = max(np.ceil(y - reach - half), real(0))
-    last = min(np.floor(y + reach - half), real(TILE - 1))
-    return np.int64(first) // BLOCK, np.int64(last) // BLOCK if last >= first else np.int64(-1)
+def _blocks(low, high):
+    """First and last block with a pixel centre in low .. high px of the tile; the last before the first where there is none."""
+    real = type(low)
+    first, last = max(np.ceil(low - real(0.5)), real(0)), min(np.floor(high - real(0.5)), real(TILE - 1))
+    if not first <= last:
+        return np.int64(0), np.int64(-1)
+    return np.int64(first) // BLOCK, np.int64(last) // BLOCK
 
 
 @kernel
-def block_columns(splat, x, low, high):
-    """First and last block that the ellipse reaches in rows of pixels low .. high, measured from its centre."""
+def block_mask(splat, x, y):
+    """The blocks that the splat's ellipse reaches, bit 8 row + column; (x, y): its centre in the tile, px."""
     real = splat.dtype.type
-    half, zero, one = real(0.5), real(0), real(1)
-    at = min(max(splat[RIGHTMOST], low), high)
-    t = at / splat[HALF_HEIGHT]
-    right = splat[SLOPE] * at + splat[CHORD] * np.sqrt(max(zero, one - t * t))
-    at = min(max(-splat[RIGHTMOST], low), high)
-    t = at / splat[HALF_HEIGHT]
-    left = splat[SLOPE] * at - splat[CHORD] * np.sqrt(max(zero, one - t * t))
-    first = max(np.ceil(x + left - half), zero)
-    last = min(np.floor(x + right - half), real(TILE - 1))
-    return np.int64(first) // BLOCK, np.int64(last) // BLOCK if last >= first else np.int64(-1)
+    zero, one, two = real(0), real(1), np.uint64(2)
+    rim, turn = splat[RIM], splat[RIGHTMOST]
+    top, bottom = _blocks(y - splat[HALF_HEIGHT], y + splat[HALF_HEIGHT])
+    first, last = _blocks(x - splat[HALF_WIDTH], x + splat[HALF_WIDTH])
+    mask = np.uint64(0)
+    if last < first:
+        return mask
+    wide = last - first > 1
+    bits = (two << np.uint64(last)) - (np.uint64(1) << np.uint64(first))
+    for row in range(top, bottom + 1):
+        if wide:
+            low = real(row * BLOCK) + real(0.5) - y
+            high = low + real(BLOCK - 1)
+            at = min(max(turn, low), high)
+            right = splat[SLOPE] * at + splat[CHORD] * np.sqrt(max(zero, one - at * at * rim))
+            at = min(max(-turn, low), high)
+            left = splat[SLOPE] * at - splat[CHORD] * np.sqrt(max(zero, one - at * at * rim))
+            first, last = _blocks(x + left, x + right)
+            bits = (two << np.uint64(last)) - (np.uint64(1) << np.uint64(first)) if last >= first else np.uint64(0)
+        mask |= bits << np.uint64(row * BLOCKS)
+    return mask
 
 
 @kernel
-def composite(worker, workers, tile_order, tile_start, pair_gaussian, splats, lattice, columns, scratch, rgb, alpha):
-    """Fills rgb (H, W, 3) and alpha (H, W). lattice: (32,) x then y of a block's pixel centres; scratch: (workers, ...)."""
+def composite(worker, workers, tile_order, tile_start, pair_gaussian, pair_mask, splats, lattice, columns, scratch, rgb, alpha):
+    """Fills rgb (H, W, 3), alpha (H, W) and pair_mask (pairs,) uint64, the blocks that each pair was composited in.
+
+    lattice: (32,) x then y of a block's pixel centres; scratch: (workers, ...)."""
     height, width = alpha.shape
     real = splats.dtype.type
     zero, one = spread(real(0)), spread(real(1))
@@ -84,34 +99,41 @@ def composite(worker, workers, tile_order, tile_start, pair_gaussian, splats, la
             store(state, at, one)
             for plane in range(1, PLANES):
                 store(state, at + plane * LANES, zero)
+        alive = np.uint64(0) - np.uint64(1)
         for pair in range(tile_start[tile], tile_start[tile + 1]):
+            if (pair - tile_start[tile]) % LOOK == LOOK - 1:
+                for block in range(BLOCKS * BLOCKS):
+                    if not any_above(load(state, block * (PLANES * LANES)), real(0)):
+                        alive &= ~(np.uint64(1) << np.uint64(block))
+                if alive == np.uint64(0):
+                    pair_mask[pair:tile_start[tile + 1]] = np.uint64(0)
+                    break
             splat = splats[pair_gaussian[pair]]
             x, y = splat[X] - real(left), splat[Y] - real(top)
             ha, b, hc, s_max, opacity = splat[HA], splat[B], splat[HC], splat[S_MAX], splat[OPACITY]
             red, green, blue = splat[RED], splat[GREEN], splat[BLUE]
-            first_row, last_row = block_rows(splat, y)
-            for row in range(first_row, last_row + 1):
-                low = real(row * BLOCK) + real(0.5) - y
-                first, last = block_columns(splat, x, low, low + real(BLOCK - 1))
-                dy = lane_y + (real(row * BLOCK) - y)
-                bdy, hcdy2 = dy * b, dy * dy * hc
-                for column in range(first, last + 1):
-                    at = (row * BLOCKS + column) * (PLANES * LANES)
-                    dx = lane_x + (real(column * BLOCK) - x)
-                    s = dx * (dx * ha + bdy) + hcdy2
-                    a = falloff(s) * opacity
-                    a = below_or_equal(a, real(MAX_ALPHA), a, real(MAX_ALPHA))
-                    a = below_or_equal(s, s_max, a, real(0))
-                    before = load(state, at)
-                    weight = before * a
-                    after = before - weight
-                    weight = below_or_equal(after, real(STOP), real(0), weight)
-                    after = below_or_equal(after, real(STOP), real(0), after)
-                    store(state, at, after)
-                    store(state, at + LANES, load(state, at + LANES) + weight * red)
-                    store(state, at + 2 * LANES, load(state, at + 2 * LANES) + weight * green)
-                    store(state, at + 3 * LANES, load(state, at + 3 * LANES) + weight * blue)
-                    store(state, at + 4 * LANES, load(state, at + 4 * LANES) + weight)
+            mask = block_mask(splat, x, y) & alive
+            pair_mask[pair] = mask
+            while mask != np.uint64(0):
+                block = lowest_bit(mask)
+                mask &= mask - np.uint64(1)
+                at = block * (PLANES * LANES)
+                dx = lane_x + (real(block % BLOCKS * BLOCK) - x)
+                dy = lane_y + (real(block // BLOCKS * BLOCK) - y)
+                s = dx * (dx * ha + dy * b) + dy * dy * hc
+                a = falloff(s) * opacity
+                a = below_or_equal(a, real(MAX_ALPHA), a, real(MAX_ALPHA))
+                a = below_or_equal(s, s_max, a, real(0))
+                before = load(state, at)
+                weight = before * a
+                after = before - weight
+                weight = below_or_equal(after, real(STOP), real(0), weight)
+                after = below_or_equal(after, real(STOP), real(0), after)
+                store(state, at, after)
+                store(state, at + LANES, load(state, at + LANES) + weight * red)
+                store(state, at + 2 * LANES, load(state, at + 2 * LANES) + weight * green)
+                store(state, at + 3 * LANES, load(state, at + 3 * LANES) + weight * blue)
+                store(state, at + 4 * LANES, load(state, at + 4 * LANES) + weight)
         for r in range(rows):
             for c in range(cols):
                 at = (r // BLOCK * BLOCKS + c // BLOCK) * (PLANES * LANES) + r % BLOCK * BLOCK + c % BLOCK

@@ -6,14 +6,12 @@ alpha is min(0.999, opacity exp(-s)) where s <= `S_MAX` (that is, alpha >= 1/255
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+from gsac.avatar.kernel import kernel
 
-kernel = numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
-
-X, Y, HA, B, HC, S_MAX, OPACITY, RED, GREEN, BLUE, HALF_WIDTH, HALF_HEIGHT, RIGHTMOST, CHORD, SLOPE, DEPTH = range(16)
+X, Y, HA, B, HC, S_MAX, OPACITY, RED, GREEN, BLUE, HALF_WIDTH, HALF_HEIGHT, RIGHTMOST, CHORD, SLOPE, RIM = range(16)
 """Columns of a splat. HALF_*: px from the centre to the rim; RIGHTMOST: dy of the rim's rightmost point;
-CHORD: half the chord through the centre; SLOPE: dx/dy of the chords' middles."""
+CHORD: half the chord through the centre; SLOPE: dx/dy of the chords' middles; RIM: 1 / HALF_HEIGHT^2."""
 
 SPLAT = 16
 MOMENTS = 9
@@ -65,8 +63,8 @@ def _covariance(a0, a1, a2, b0, b1, b2, blur):
 
 
 @kernel
-def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width, height, splats, boxes):
-    """Fills splats (N, 16) and boxes (N, 4): first and end tile column, first and end tile row; empty where not seen."""
+def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width, height, splats, depths, boxes):
+    """Fills splats (N, 16), depths (N,) and boxes (N, 4): first and end tile column, first and end tile row; empty where not seen."""
     count = len(means)
     real = lens.dtype.type
     half, two = real(0.5), real(2)
@@ -89,7 +87,7 @@ def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width
             continue
         boxes[i, 0], boxes[i, 1] = np.int32(first_x) // TILE, np.int32(last_x) // TILE + 1
         boxes[i, 2], boxes[i, 3] = np.int32(first_y) // TILE, np.int32(last_y) // TILE + 1
-        splats[i, X], splats[i, Y], splats[i, DEPTH] = px, py, z
+        splats[i, X], splats[i, Y], depths[i] = px, py, z
         splats[i, HA], splats[i, B], splats[i, HC] = half * yy / determinant, -xy / determinant, half * xx / determinant
         splats[i, S_MAX], splats[i, OPACITY] = s_max, o
         splats[i, RED], splats[i, GREEN], splats[i, BLUE] = rgb[i, 0], rgb[i, 1], rgb[i, 2]
@@ -97,6 +95,7 @@ def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width
         splats[i, RIGHTMOST] = xy / xx * wide
         splats[i, CHORD] = np.sqrt(two * s_max * determinant / yy)
         splats[i, SLOPE] = xy / yy
+        splats[i, RIM] = real(1) / (high * high)
 
 
 @kernel

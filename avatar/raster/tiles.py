@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
-from gsac.avatar.raster.project import DEPTH
-
-kernel = numba.njit(cache=True, nogil=True)
+from gsac.avatar.kernel import kernel
 
 RADIX_BITS = 11
 
@@ -25,16 +22,16 @@ def slots(boxes, slot_start):
 
 
 @kernel
-def depth_order(splats, slot_start, keys, order, spare_keys, spare):
-    """order[:seen]: the gaussians seen, front to back, equal depths by index. keys: unsigned view's type of the splats.
+def depth_order(depths, slot_start, keys, order, spare_keys, spare):
+    """order[:seen]: the gaussians seen, front to back, equal depths by index. keys: unsigned view's type of the depths.
 
     Positive floats sort like their bits; a stable radix sort, so the order does not depend on the machine.
     """
     seen = 0
-    bits = splats.view(keys.dtype)
-    for i in range(len(splats)):
+    bits = depths.view(keys.dtype)
+    for i in range(len(depths)):
         if slot_start[i + 1] > slot_start[i]:
-            keys[seen] = bits[i, DEPTH]
+            keys[seen] = bits[i]
             order[seen] = i
             seen += 1
     counts = np.empty(1 << RADIX_BITS, np.int64)

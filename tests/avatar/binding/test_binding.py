@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-
 from gsac.avatar import binding, raster
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from gsac.avatar import artifacts, binding
 from gsac.avatar.gaussians import Gaussians
 

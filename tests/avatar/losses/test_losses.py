@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from torch.nn import functional
-
 from gsac.avatar import losses
+from torch.nn import functional
 
 
 def mean(map_, weights):

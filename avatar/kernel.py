@@ -1,0 +1,30 @@
+"""The one way our numba kernels are compiled.
+
+numba's disk cache looks at the file of a kernel only, not at the kernels and constants that it takes from other files; a
+digest of all of them in the kernel's name keeps it from running old code after an edit elsewhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numba
+
+SOURCES = ("kernel.py", "lanes.py", "binding.py", "losses.py", "ssim.py", "sobel.py", "raster/project.py", "raster/tiles.py",
+           "raster/forward.py", "raster/backward.py")
+"""Files under this folder that kernels or their constants come from."""
+
+
+def digest(folder: Path) -> str:
+    """Of the content of `SOURCES` under a folder."""
+    return hashlib.sha256(b"\0".join((folder / name).read_bytes() for name in SOURCES)).hexdigest()[:12]
+
+
+DIGEST = digest(Path(__file__).parent)
+
+
+def kernel(function):
+    """Compiled at the first call for each set of types and cached on disk; releases the GIL, fuses a * b + c, x / 0 is inf."""
+    function.__qualname__ += f"_{DIGEST}"
+    return numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")(function)
