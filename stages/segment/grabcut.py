@@ -1,0 +1,85 @@
+"""The outline by GrabCut at half size (Rother et al. 2004), told by the network, the hands' points and a plate."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from gsac.avatar.wholebody import HANDS
+
+HALF = 2
+SURE, NEVER = 0.95, 0.05
+"""Network probabilities that are taken as said."""
+FINGERS = ([0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20])
+PALM_HULL = (0, 1, 5, 9, 13, 17)
+FINGER_WIDTH = 0.16
+"""Of wrist -> root of the middle finger."""
+HAND_SEEN = 0.3
+
+
+def cut_out(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray, iterations: int,
+            empty: np.ndarray | None = None, changed: np.ndarray | None = None) -> np.ndarray:
+    """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).
+
+    empty, changed: (H, W) bool, where a plate says that the scene is bare, or certainly not.
+    Returns (H, W) float32, 0..1, sharp but for the step from half size.
+    """
+    height, width = probability.shape
+    size = (max(1, width // HALF), max(1, height // HALF))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    rough = cv2.resize(probability, size, interpolation=cv2.INTER_AREA)
+    scale = np.array(size) / (width, height)
+    labels = seed(rough, xy * scale, score)
+    if empty is not None:
+        labels[_shrunk(empty, size) & (labels != cv2.GC_FGD)] = cv2.GC_BGD
+    if changed is not None:
+        labels[_shrunk(changed, size) & (labels != cv2.GC_BGD)] = cv2.GC_FGD
+    foreground = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+    if iterations and foreground.any() and not foreground.all():
+        cv2.setRNGSeed(0)  # k-means inside draws numbers: the same frame must give the same bytes
+        cv2.grabCut(small, labels, None, np.zeros((1, 65)), np.zeros((1, 65)), iterations, cv2.GC_INIT_WITH_MASK)
+        foreground = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+    return cv2.resize(foreground.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+
+
+def seed(rough: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.ndarray:
+    """(h, w) uint8 GrabCut labels from the network's probability; around seen hands from their fingers."""
+    sure = cv2.erode((rough > SURE).astype(np.uint8), np.ones((3, 3), np.uint8))
+    never = cv2.dilate((rough > NEVER).astype(np.uint8), np.ones((3, 3), np.uint8)) == 0
+    labels = np.where(rough > 0.5, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[never] = cv2.GC_BGD
+    labels[sure > 0] = cv2.GC_FGD
+    for points in HANDS.values():
+        if np.median(score[points]) >= HAND_SEEN:
+            seed_hand(labels, rough, xy[points])
+    return labels
+
+
+def seed_hand(labels: np.ndarray, rough: np.ndarray, hand: np.ndarray) -> None:
+    """hand: (21, 2) px. The network fills the gaps between fingers and loses thin ones: here the bones tell."""
+    length = float(np.linalg.norm(hand[9] - hand[0]))
+    if not 2 <= length <= max(labels.shape):
+        return
+    whole = cv2.convexHull(hand.round().astype(np.int32))
+    zone = np.zeros_like(labels)
+    cv2.fillConvexPoly(zone, whole, 1)
+    cv2.polylines(zone, [whole], True, 1, max(1, int(0.5 * length)))
+    # Deep inside the body, where the hand lies before it, the network is right.
+    reach = int(0.5 * length) | 1
+    zone[cv2.erode((rough > SURE).astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0] = 0
+
+    width = max(1, round(FINGER_WIDTH * length))
+    bones, cores = np.zeros_like(labels), np.zeros_like(labels)
+    for finger in FINGERS:
+        line = [hand[finger].round().astype(np.int32)]
+        cv2.polylines(bones, line, False, 1, width)
+        cv2.polylines(cores, line, False, 1, max(1, width // 3))
+    cv2.fillConvexPoly(bones, cv2.convexHull(hand[list(PALM_HULL)].round().astype(np.int32)), 1)
+    near = cv2.dilate(bones, np.ones((2 * width + 1, 2 * width + 1), np.uint8))
+    inside = zone > 0
+    labels[inside & (near > 0)] = cv2.GC_PR_BGD
+    labels[inside & (bones > 0)] = cv2.GC_PR_FGD
+    labels[cores > 0] = cv2.GC_FGD
+
+
+def _shrunk(where: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    return cv2.resize(where.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.99

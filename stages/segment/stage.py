@@ -1,0 +1,83 @@
+"""Entry of segment: network, GrabCut, parts, soft edge, frame by frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, check_arrays, frame_paths, read_frame, write_alpha
+from gsac.stages.contract import Job, StageError
+from gsac.stages.segment.edge import soften
+from gsac.stages.segment.grabcut import cut_out
+from gsac.stages.segment.network import PoseMask, SelfieMask, person_region
+from gsac.stages.segment.parts import keep_person
+from gsac.stages.segment.plate import compare
+
+METHODS = {"pose": PoseMask, "selfie": SelfieMask}
+"""Each: (models) -> ((image (H, W, 3), region) -> (H, W) probability)."""
+
+
+def run(job: Job) -> None:
+    frames = job.inputs["split/frames"]
+    paths = frame_paths(frames)
+    keypoints = check_arrays(job.inputs["keypoints/keypoints.npz"], KEYPOINT_SHAPES)
+    if len(paths) != len(keypoints["xy"]):
+        raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
+    plate_path = frames / "plate.png"
+    plate = read_frame(plate_path) if job.config.use_plate and plate_path.exists() else None
+    network = METHODS[job.config.method](job.models)
+    (job.out / "alpha").mkdir()
+    absent, other_scene = [], []
+    for t, path in enumerate(paths):
+        image = read_frame(path)
+        xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
+        region = person_region(xy, score)
+        if region is None:
+            absent.append(t)
+            alpha = np.zeros(image.shape[:2], np.float32)
+        else:
+            alpha, plate_fits = segment_frame(image, network(image, region), xy, score, plate, job.config.iterations)
+            if not plate_fits:
+                other_scene.append(t)
+            if not (alpha > 0.5).any():
+                raise StageError(f"frame {t} ({path.name}): the mask is empty although a person was found there; "
+                                 "look at the frame, and remove it or try segment.method=selfie")
+        write_alpha(job.out / "alpha" / f"{path.stem}.exr", alpha)
+        job.progress(t + 1, len(paths), "frames")
+    if len(absent) == len(paths):
+        raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
+    if absent:
+        job.warn(f"Frames {', '.join(map(str, absent))} show no person; their masks are empty.")
+    if other_scene:
+        job.warn(f"The plate does not show the scene of frames {', '.join(map(str, other_scene))} (did the camera "
+                 "move?); it is not used there.")
+
+
+def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,
+                  plate: np.ndarray | None, iterations: int) -> tuple[np.ndarray, bool]:
+    """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,); plate: (H, W, 3) uint8 or None.
+
+    Returns alpha (H, W) float32, and whether the plate, if any, fits the frame.
+    """
+    difference = None if plate is None else compare(image, plate, probability)
+    box = around(probability)
+    if box is None:
+        return np.zeros(image.shape[:2], np.float32), True
+    part = np.s_[box[1]: box[3], box[0]: box[2]]
+    corner = np.array(box[:2])
+    empty, changed, scene = ((difference.empty[part], difference.changed[part], difference.plate[part])
+                             if difference else (None, None, None))
+    outline = cut_out(image[part], probability[part], xy - corner, score, iterations, empty, changed)
+    outline = keep_person(outline, xy - corner, score)
+    alpha = np.zeros(image.shape[:2], np.float32)
+    alpha[part] = soften(image[part], outline, scene)
+    return alpha, plate is None or difference is not None
+
+
+def around(probability: np.ndarray, least: float = 0.05, margin: float = 0.04) -> tuple[int, int, int, int] | None:
+    """x0, y0, x1, y1 px of what may be person with some scene around it; None where nothing is."""
+    rows, columns = np.flatnonzero((probability > least).any(axis=1)), np.flatnonzero((probability > least).any(axis=0))
+    if len(rows) == 0:
+        return None
+    pad = int(margin * (rows[-1] - rows[0] + 1)) + 4
+    height, width = probability.shape
+    return (max(0, int(columns[0]) - pad), max(0, int(rows[0]) - pad),
+            min(width, int(columns[-1]) + 1 + pad), min(height, int(rows[-1]) + 1 + pad))
