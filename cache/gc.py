@@ -5,6 +5,7 @@ gc holds the store's lock alone while it marks and moves its victims aside, so n
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections import Counter
@@ -63,14 +64,14 @@ def collect(
     """
     report = GcReport(dry_run=dry_run)
     try:
-        with store.private("gc") as aside, common(store.root / "lock", alone=True):
+        with store.private("gc") as aside, common(store.root / "lock", alone=True), contextlib.ExitStack() as held:
             entries, broken = _entries(store, grace_s)
             stored = {path.name: path for path in (store.root / "objects").glob("*/*")}
             _choose(entries, {name: _bytes(path) for name, path in stored.items()}, keep_days, max_bytes)
             doomed = [entry for entry in entries if entry.doomed]
             wanted = {name for entry in entries if not entry.doomed for name in entry.names}
             rubbish = [path for name, path in stored.items() if name not in wanted]
-            temps = _orphans(store)
+            temps = _orphans(store, held)
             damaged = [path for path in (store.root / "quarantine").iterdir() if _age(path) > QUARANTINE_S]
             report.records = sorted(f"{entry.record.parts.stage}/{entry.record.key}" for entry in doomed)
             report.objects = sorted(path.name for path in rubbish)
@@ -121,14 +122,16 @@ def _choose(entries: list[_Entry], sizes: dict[str, int], keep_days: float | Non
             total -= sum(sizes.get(name, 0) for name in entry.names if users[name] == 0)
 
 
-def _orphans(store: Store) -> list[Path]:
-    """Folders and lock files in tmp/ whose owner is dead."""
+def _orphans(store: Store, held: contextlib.ExitStack) -> list[Path]:
+    """Folders and lock files in tmp/ whose owner is dead; their locks are held until they have been moved.
+
+    A run that has just made its lock file and not locked it yet then waits for us, and makes another.
+    """
     orphans = []
     for name in sorted({path.stem for path in (store.root / "tmp").iterdir()}):
         folder = store.root / "tmp" / name
-        with if_free(folder.with_suffix(".lock")) as free:
-            if free:
-                orphans += [path for path in (folder, folder.with_suffix(".lock")) if path.exists()]
+        if held.enter_context(if_free(folder.with_suffix(".lock"))):
+            orphans += [path for path in (folder, folder.with_suffix(".lock")) if path.exists()]
     return orphans
 
 

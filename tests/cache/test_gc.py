@@ -119,6 +119,22 @@ def test_folders_of_dead_runs_go_and_those_of_living_ones_stay(store, child):
         assert (living / "half").read_text() == "half"
 
 
+COME_AND_GO = """
+for number in range(150):
+    with store.private("train") as folder:
+        (folder / "half").write_text("half")
+        time.sleep(0.001)
+        assert (folder / "half").read_text() == "half"
+"""
+
+
+def test_private_folders_that_come_and_go_beside_gc_are_never_taken(store, child):
+    runs = [child(COME_AND_GO) for _ in range(2)]
+    while any(run.poll() is None for run in runs):
+        collect(store)
+    assert [run.returncode for run in runs] == [0, 0]
+
+
 def test_a_dry_run_tells_the_same_and_removes_nothing(store, make, parts_of, unused):
     record = make(parts_of())
     unused(record, 10 * DAY)
