@@ -45,9 +45,7 @@ def tree_digest(path: Path, memo: Memo | None = None) -> tuple[str, Manifest]:
     Links to files are followed; links to folders and special files raise CacheError. Empty folders do not count.
     """
     memo = memo or memo_in(default_root())
-    manifest = {
-        name: [_file_digest(file, memo), file.stat().st_size] for name, file in sorted(tree_files(Path(path)).items())
-    }
+    manifest = {name: [_file_digest(file, memo), file.stat().st_size] for name, file in sorted(tree_files(Path(path)).items())}
     memo.flush()
     return manifest_digest(manifest), manifest
 

@@ -36,9 +36,7 @@ class Store:
     below: a store to read from where this one has nothing, such as a shared one that may not be written.
     """
 
-    def __init__(
-        self, root: Path, say: Callable[[str], None] = lambda message: None, below: Store | None = None
-    ) -> None:
+    def __init__(self, root: Path, say: Callable[[str], None] = lambda message: None, below: Store | None = None) -> None:
         self.root = Path(root).absolute()
         self.say = say
         self.below = below

@@ -178,8 +178,6 @@ def test_the_code_digest_is_the_same_in_every_process(tmp_path):
 
 def test_whatever_python_imports_is_in_the_closure(store):
     command = "import sys, gsac.cache.gc, gsac.cache.verify; print(*[m for m in sys.modules if m.startswith('gsac.')])"
-    imported = subprocess.run(
-        [sys.executable, "-c", command], capture_output=True, check=True, text=True
-    ).stdout.split()
+    imported = subprocess.run([sys.executable, "-c", command], capture_output=True, check=True, text=True).stdout.split()
     assert len(imported) > 10
     assert set(imported) <= set(code_parts("gsac.cache.gc", ("gsac.cache.verify",)))

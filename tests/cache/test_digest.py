@@ -102,9 +102,7 @@ def test_losing_the_memo_only_costs_time(store, tmp_path, settled_at_once, damag
     if damage == "deleted":
         file.unlink()
     else:
-        file.write_bytes(
-            b"not a database, but long enough to look like one" * 100 if damage == "garbage" else b"SQLite"
-        )
+        file.write_bytes(b"not a database, but long enough to look like one" * 100 if damage == "garbage" else b"SQLite")
     assert file_digest(tmp_path / "a", Memo(file)) == before
 
 

@@ -3,6 +3,7 @@ import os
 from gsac.cache import gc
 from gsac.cache.gc import collect
 from gsac.cache.lease import in_use
+from gsac.cache.lock import if_free
 from gsac.cache.verify import verify
 
 DAY = 86400.0
@@ -119,20 +120,20 @@ def test_folders_of_dead_runs_go_and_those_of_living_ones_stay(store, child):
         assert (living / "half").read_text() == "half"
 
 
-COME_AND_GO = """
-for number in range(150):
-    with store.private("train") as folder:
-        (folder / "half").write_text("half")
-        time.sleep(0.001)
-        assert (folder / "half").read_text() == "half"
-"""
+def test_gc_holds_what_it_takes_from_tmp_until_it_is_moved_so_that_nobody_can_claim_it(store, monkeypatch):
+    (store.root / "tmp" / "train-1-abc.lock").touch()
+    claims = []
+    true = os.rename
 
+    def rename(source, target):
+        with if_free(source) as free:
+            claims.append(free)
+        true(source, target)
 
-def test_private_folders_that_come_and_go_beside_gc_are_never_taken(store, child):
-    runs = [child(COME_AND_GO) for _ in range(2)]
-    while any(run.poll() is None for run in runs):
-        collect(store)
-    assert [run.returncode for run in runs] == [0, 0]
+    monkeypatch.setattr(gc.os, "rename", rename)
+    collect(store)
+    assert claims == [False]
+    assert list((store.root / "tmp").iterdir()) == []
 
 
 def test_a_dry_run_tells_the_same_and_removes_nothing(store, make, parts_of, unused):

@@ -74,11 +74,7 @@ def test_every_part_is_in_the_key_and_a_change_says_what_it_is(change, kind, sen
 
 
 def test_the_order_in_which_parts_are_named_does_not_matter():
-    turned = {
-        f.name: dict(reversed(v.items()))
-        for f in dataclasses.fields(PARTS)
-        if isinstance(v := getattr(PARTS, f.name), dict)
-    }
+    turned = {f.name: dict(reversed(v.items())) for f in dataclasses.fields(PARTS) if isinstance(v := getattr(PARTS, f.name), dict)}
     assert dataclasses.replace(PARTS, **turned).key() == PARTS.key()
     assert PARTS.diff(dataclasses.replace(PARTS, **turned)) == []
 
@@ -88,8 +84,7 @@ def test_clip_name_and_paths_are_not_in_the_key_so_equal_content_is_shared(store
     (tmp_path / "deep").mkdir()
     shutil.copy(tmp_path / "anna.mp4", tmp_path / "deep" / "bert.mov")
     keys = {
-        KeyParts("split", {"clip": tree_digest(clip)[0]}).key()
-        for clip in (tmp_path / "anna.mp4", tmp_path / "deep" / "bert.mov")
+        KeyParts("split", {"clip": tree_digest(clip)[0]}).key() for clip in (tmp_path / "anna.mp4", tmp_path / "deep" / "bert.mov")
     }
     assert len(keys) == 1
 
@@ -100,13 +95,7 @@ def test_a_parameter_without_one_plain_value_is_named(value):
         dataclasses.replace(PARTS, params={"method": "gp", "sigma": value}).key()
 
 
-plain = (
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats(allow_nan=False, allow_infinity=False)
-    | st.text("xyz", max_size=3)
-)
+plain = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text("xyz", max_size=3)
 names = st.text("abc", min_size=1, max_size=2)
 several = st.builds(KeyParts, st.sampled_from("xy"), st.dictionaries(names, names), st.dictionaries(names, plain))
 

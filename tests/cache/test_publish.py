@@ -44,9 +44,7 @@ make(parts_of(), "hello", step=step)
 
 
 @pytest.mark.parametrize("step, count", MOMENTS)
-def test_sigkill_at_any_step_never_leaves_a_torn_artifact_that_counts_as_done(
-    store, make, parts_of, contents, child, step, count
-):
+def test_sigkill_at_any_step_never_leaves_a_torn_artifact_that_counts_as_done(store, make, parts_of, contents, child, step, count):
     process = child(DIE_AFTER, step, count)
     process.communicate()
     assert process.returncode == -signal.SIGKILL
@@ -176,14 +174,10 @@ for act in (lambda: make(parts_of(fps=6)), lambda: collect(store)):
 """
 
 
-def test_a_read_only_cache_still_answers_and_says_what_to_do_when_it_should_keep_something(
-    store, make, parts_of, child, tmp_path
-):
+def test_a_read_only_cache_still_answers_and_says_what_to_do_when_it_should_keep_something(store, make, parts_of, child, tmp_path):
     make(parts_of(fps=5), "before")
     folders = [store.root, *(path for path in store.root.rglob("*") if path.is_dir())]
-    parents = [
-        folder for folder in tmp_path.parents if folder.stat().st_uid == os.geteuid() and folder != folder.parent
-    ]
+    parents = [folder for folder in tmp_path.parents if folder.stat().st_uid == os.geteuid() and folder != folder.parent]
     modes = {folder: folder.stat().st_mode for folder in [*folders, tmp_path, *parents]}
     try:
         for folder in folders:
