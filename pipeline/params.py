@@ -19,8 +19,9 @@ Values = dict[str, dict[str, Any]]
 """Section -> parameter -> value."""
 
 
-def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()) -> dict[str, Any]:
-    """Config instance of every stage. BadInput names the parameter and where it came from."""
+def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = (), only: str = "") -> dict[str, Any]:
+    """Config instance of every stage, or of `only` one. BadInput names the parameter and where it came from."""
+    wanted = [only] if only else list(project.graph.steps)
     sources: list[tuple[str, Values]] = []
     if file is not None:
         sources.append((str(file), _sections(read_yaml(file), str(file))))
@@ -32,15 +33,14 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
             if section not in values:
                 known = ", ".join(project.graph.steps)
                 raise BadInput(f"{source}: unknown section {section!r}; known: {known}")
+            if section not in wanted:
+                continue
             values[section] |= parameters
             try:
                 configs[section] = make_config(project.stage(section), values[section])
             except BadInput as e:
                 raise BadInput(f"{source}: {e}") from e
-    for name in project.graph.steps:
-        if name not in configs:
-            configs[name] = make_config(project.stage(name), {})
-    return configs
+    return {name: configs.get(name) or make_config(project.stage(name), {}) for name in wanted}
 
 
 def plain(config: Any) -> dict[str, Any]:

@@ -45,9 +45,11 @@ def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
     return Store(instead, say=reporter.note, below=store)
 
 
-def open_workspace(arguments: argparse.Namespace, start: Path) -> tuple[Workspace, Project, dict[str, Any]]:
-    """The folder of a run, its stages, and its parameters with --params and --set on top."""
+def open_workspace(
+    arguments: argparse.Namespace, start: Path, only: str = ""
+) -> tuple[Workspace, Project, dict[str, Any]]:
+    """The folder of a run, its stages, and its parameters (of `only` one stage) with --params and --set on top."""
     workspace = Workspace.around(start)
     project = workspace.project(Project.at_hand())
     file = getattr(arguments, "params", None) or workspace.params
-    return workspace, project, resolve(project, file, arguments.set)
+    return workspace, project, resolve(project, file, arguments.set, only)

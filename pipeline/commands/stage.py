@@ -26,7 +26,8 @@ from gsac.stages.contract import BadInput, StageError
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("name", metavar="NAME")
     command.add_argument("--inputs", type=Path, metavar="DIR", help="artifacts: DIR/<input stage>/..., DIR/clip")
-    command.add_argument("--out", type=Path, metavar="DIR", help="where the outputs go, with --inputs")
+    command.add_argument("--out", type=Path, metavar="DIR",
+                         help="gets the outputs, with --inputs; `--out DIR/NAME` feeds the next stage")
     command.add_argument("--force", action="store_true", help="run it even if its result is in the cache")
     add_params(command)
     add_json(command)
@@ -38,7 +39,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput("--inputs and --out go together; without both, the folder of a run is used")
     with reporter(plain=arguments.json) as voice:
         if arguments.inputs is None:
-            workspace, project, configs = open_workspace(arguments, Path.cwd())
+            workspace, project, configs = open_workspace(arguments, Path.cwd(), only=arguments.name)
             store = open_store(voice, workspace.root / OWN_STORE)
             step = project.graph.step(arguments.name)
             digests = {port: workspace.digest(port, store) for port in step.deps}
@@ -47,16 +48,21 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         else:
             project = Project.at_hand()
             store = open_store(voice, arguments.out / OWN_STORE)
-            configs = resolve(project, arguments.params, arguments.set)
+            configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
             paths = fixture_paths(project, arguments.name, arguments.inputs)
             digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
             out, logs = arguments.out.absolute(), arguments.out.absolute() / "logs"
-        result = do_one(Keys(project, configs, store), store, voice, arguments.name, digests, paths, out, logs,
-                        arguments.force)
+        keys = Keys(project, configs, store)
+        try:
+            result = do_one(keys, store, voice, arguments.name, digests, paths, out, logs, arguments.force)
+        except StageFailedError as error:
+            if arguments.json:
+                failed = StageResult(arguments.name, Outcome.FAILED, "", error=str(error.cause))
+                emit({"stages": [failed.to_json()], "outputs": {}, "metrics": {}})
+            raise
     if arguments.json:
-        ports = {output.path: str(out / output.path) for output in project.stage(arguments.name).outputs}
-        emit({"stages": [result.to_json()], "outputs": {f"{arguments.name}/{o}": path for o, path in ports.items()},
-              "metrics": result.metrics})
+        ports = {f"{arguments.name}/{o.path}": str(out / o.path) for o in project.stage(arguments.name).outputs}
+        emit({"stages": [result.to_json()], "outputs": ports, "metrics": result.metrics})
     return ExitCode.OK
 
 

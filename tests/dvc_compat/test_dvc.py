@@ -1,0 +1,113 @@
+"""Real DVC and gsac agree about what is up to date, both ways, over the same folder."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+
+class Dvc:
+    """DVC in a workspace."""
+
+    def __init__(self, toy):
+        self.toy = toy
+        self("init", "--no-scm", "-q")
+
+    def __call__(self, *arguments: str) -> str:
+        done = subprocess.run([sys.executable, "-m", "dvc", *arguments], cwd=self.toy.out, env=self.toy.env, text=True,
+                              capture_output=True, timeout=300)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    @property
+    def is_clean(self) -> bool:
+        out = self("status")
+        return "up to date" in out
+
+
+@pytest.fixture
+def dvc(toy):
+    pytest.importorskip("dvc", reason="DVC is not installed (pip install 'gsac[dev]')")
+    toy.out.mkdir()
+    return Dvc(toy)
+
+
+def test_after_gsac_run_dvc_status_is_clean_and_dvc_repro_runs_nothing(toy, dvc):
+    toy.ran()
+    assert dvc.is_clean
+    toy.runs_file.write_text("")
+    assert dvc("repro").count("didn't change") == 4
+    assert toy.runs == []
+
+
+def test_after_dvc_repro_gsac_status_is_clean_and_gsac_run_runs_nothing(toy, dvc, everything):
+    toy.ran("--set", "left.word=last")
+    params = toy.out / "params.yaml"
+    params.write_text(params.read_text().replace("word: first", "word: last"))
+    assert toy.gsac("status", toy.out).code == 3
+    assert "modified" in dvc("status")
+    toy.runs_file.write_text("")
+    dvc("repro")
+    assert toy.runs == ["right", "join"] or toy.runs == ["cut", "right", "join"]
+    status = toy.gsac("status", toy.out)
+    assert status.code == 0, status.out
+    assert toy.result == "GAMMA GAMMA"
+    words = [word for name in everything for word in ("--set", f"{name}.word=last")]
+    assert toy.ran(*words) == []
+    assert dvc.is_clean
+
+
+def test_dvc_repro_alone_makes_everything_in_a_fresh_folder(toy, dvc, everything):
+    toy.ran()
+    for name in everything:
+        for path in (toy.out / name).iterdir():
+            path.unlink()
+    (toy.out / "dvc.lock").unlink()
+    toy.cache.rename(toy.root / "old cache")
+    toy.runs_file.write_text("")
+    dvc("repro")
+    assert toy.runs == everything and toy.result == "ALPHA ALPHA"
+    assert toy.gsac("status", toy.out).code == 0
+
+
+def test_both_see_a_changed_clip_and_a_lost_output(toy, dvc):
+    toy.ran()
+    (toy.out / "left" / "out.txt").unlink()
+    assert "deleted" in dvc("status") and toy.gsac("status", toy.out).code == 3
+    toy.ran()
+    assert dvc.is_clean and toy.gsac("status", toy.out).code == 0
+    toy.clip.write_text("delta beta gamma")
+    assert "modified" in dvc("status") and toy.gsac("status", toy.out).code == 3
+
+
+def test_dvc_repro_never_harms_what_is_in_the_store(toy, dvc):
+    """DVC removes outputs before it runs a step; ours are links, and what they point to must stay."""
+    toy.ran()
+    before = {p: p.read_bytes() for p in (toy.cache / "objects").rglob("*") if p.is_file()}
+    params = toy.out / "params.yaml"
+    params.write_text(params.read_text().replace("keep: 100", "keep: 1"))
+    dvc("repro")
+    assert toy.result == "ALPHA ALPHA"
+    assert before.items() <= {p: p.read_bytes() for p in (toy.cache / "objects").rglob("*") if p.is_file()}.items()
+    assert toy.gsac("cache", "verify").code == 0
+
+
+def test_the_shipped_dvc_yaml_is_one_that_dvc_reads(toy, dvc):
+    from gsac.pipeline.project import shipped_dag
+
+    (toy.out / "dvc.yaml").write_text(shipped_dag().read_text())
+    (toy.out / "params.yaml").write_text(Path(shipped_dag()).with_name("params.yaml").read_text())
+    os.symlink(toy.clip, toy.out / "clip")
+    listed = dvc("stage", "list", "--name-only").split()
+    assert listed == ["split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export"]
+    assert "changed deps" in dvc("status")
+
+
+def test_gsac_never_imports_dvc():
+    script = "import sys; import gsac.pipeline.run, gsac.pipeline.dvc_sync, gsac.pipeline.commands.stage; " \
+             "sys.exit('dvc' in sys.modules)"
+    assert subprocess.run([sys.executable, "-P", "-c", script]).returncode == 0

@@ -1,0 +1,68 @@
+import signal
+
+import pytest
+from gsac.pipeline.batch import find_clips, make_jobs
+
+
+@pytest.fixture
+def clips(toy):
+    folder = toy.root / "clips"
+    folder.mkdir()
+    for name, text in (("one", "alpha beta"), ("two", "gamma delta"), ("bad", "")):
+        (folder / f"{name}.mp4").write_text(text)
+    (folder / "notes.md").write_text("not a clip")
+    return folder
+
+
+def test_a_batch_goes_on_past_a_clip_that_fails_and_says_which_and_why(toy, clips):
+    done = toy.gsac("batch", clips, "--out", toy.root / "avatars", "--executor", "local", "-j", "2", "--json")
+    assert done.code == 1
+    rows = {row["clip"].rsplit("/", 1)[1]: row for row in done.json["clips"]}
+    assert {name: row["status"] for name, row in rows.items()} == {"one.mp4": "done", "two.mp4": "done", "bad.mp4": "failed"}
+    assert "stage left failed" in rows["bad.mp4"]["error"]
+    assert "2 of 3 clips are done" in done.err and "failed: " + str(clips / "bad.mp4") in done.err
+    assert (toy.root / "avatars" / "two-avatar" / "join" / "out.txt").read_text() == "GAMMA GAMMA"
+
+
+def test_a_batch_shares_one_store(toy, clips):
+    (clips / "bad.mp4").unlink()
+    (clips / "again.mp4").write_text("alpha beta")
+    assert toy.gsac("batch", clips, "--out", toy.root / "avatars", "-j", "3").code == 0
+    assert len(toy.runs) == 8, "again.mp4 has the content of one.mp4"
+
+
+def test_a_list_names_clips_relative_to_itself_and_a_missing_one_fails_alone(toy, clips):
+    todo = toy.root / "todo.txt"
+    todo.write_text("# today\nclips/one.mp4\n\nclips/nothing.mp4\nclips/one.mp4\n")
+    done = toy.gsac("batch", todo, "--out", toy.root / "avatars", "--set", "left.word=last")
+    assert done.code == 1 and "1 of 2 clips are done" in done.err and "nothing.mp4: no such file" in done.err
+    assert (toy.root / "avatars" / "one-avatar" / "join" / "out.txt").read_text() == "BETA ALPHA"
+
+
+def test_ctrl_c_ends_a_batch_and_keeps_what_is_finished(toy, clips):
+    process = toy.start("batch", clips, "--out", toy.root / "avatars", "-j", "2", "--set", "join.pause_s=60")
+    toy.wait_for(lambda: toy.runs.count("join") == 2)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130 and "Traceback" not in err
+    assert list((toy.cache / "tmp").iterdir()) == []
+    assert (toy.root / "avatars" / "one-avatar" / "left" / "out.txt").read_text() == "ALPHA"
+
+
+def test_a_wrong_parameter_is_said_once_before_any_clip_runs(toy, clips):
+    done = toy.gsac("batch", clips, "--set", "left.wrd=1")
+    assert done.code == 2 and "left.wrd" in done.err and toy.runs == []
+
+
+def test_folders_of_photos_are_clips_and_other_things_are_not(tmp_path):
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "1.JPG").write_text("x")
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "a.MOV").write_text("x")
+    (tmp_path / "b.txt").write_text("x")
+    assert [clip.name for clip in find_clips(tmp_path)] == ["a.MOV", "photos"]
+
+
+def test_clips_of_equal_name_get_folders_of_their_own(tmp_path):
+    jobs = make_jobs([tmp_path / "a" / "x.mp4", tmp_path / "b" / "x.mp4", tmp_path / "a" / "x.mp4"], tmp_path, ())
+    assert [job.out.name for job in jobs] == ["x-avatar", "x-2-avatar"]

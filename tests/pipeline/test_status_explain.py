@@ -1,0 +1,59 @@
+import shutil
+
+
+def test_status_is_clean_after_a_run_and_exit_code_3_after_a_change(toy):
+    toy.ran()
+    done = toy.gsac("status", toy.out, "--json")
+    assert done.code == 0 and done.json["up_to_date"]
+    toy.edit("right/stage.py", "spell(word)", "spell(word) + '?'")
+    done = toy.gsac("status", toy.out, "--json")
+    assert done.code == 3 and not done.json["up_to_date"]
+    assert [row["reason"] for row in done.json["stages"]] == ["up to date", "up to date", "code changed", "upstream"]
+
+
+def test_status_sees_an_output_that_is_gone_or_altered(toy):
+    toy.ran()
+    (toy.out / "left" / "out.txt").unlink()
+    (toy.out / "right" / "out.txt").unlink()
+    (toy.out / "right" / "out.txt").write_text("by hand")
+    rows = toy.gsac("status", toy.out, "--json").json["stages"]
+    assert [row["reason"] for row in rows] == ["up to date", "output changed", "output changed", "up to date"]
+
+
+def test_status_takes_a_copy_for_the_real_thing(toy):
+    toy.ran()
+    link = toy.out / "cut" / "words"
+    target = link.resolve()
+    link.unlink()
+    shutil.copytree(target, link)
+    assert toy.gsac("status", cwd=toy.out).code == 0
+
+
+def test_status_names_a_clip_that_is_gone(toy):
+    toy.ran()
+    toy.clip.unlink()
+    done = toy.gsac("status", toy.out)
+    assert done.code == 2 and "clip.mp4, which is gone" in done.err
+
+
+def test_explain_names_every_part_of_the_key_that_changed(toy):
+    toy.ran()
+    toy.edit("common.py", "upper()", "lower()")
+    done = toy.gsac("explain", "cut", toy.out, "--set", "cut.keep=2", "--json")
+    assert done.code == 0 and done.json["reason"] == "parameter changed"
+    assert {(c["kind"], c["name"]) for c in done.json["changes"]} == {
+        ("parameter", "cut.keep"), ("code", "gsac.toy.common")}
+    words = toy.gsac("explain", "cut", toy.out, "--set", "cut.keep=2").out
+    assert "parameter cut.keep changed from 100 to 2" in words and "code gsac.toy.common changed" in words
+
+
+def test_explain_of_a_stage_below_a_change_says_what_it_waits_for(toy):
+    toy.ran()
+    done = toy.gsac("explain", "join", toy.out, "--set", "right.keep=2")
+    assert "runs if the result of right changes" in done.out
+
+
+def test_explain_of_an_unknown_stage_names_the_known_ones(toy):
+    toy.ran()
+    done = toy.gsac("explain", "shout", toy.out)
+    assert done.code == 2 and "cut, left, right, join" in done.err
