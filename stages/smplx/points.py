@@ -11,10 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from gsac.avatar.body import Body
 from numba import njit
 from scipy import sparse
-
-from gsac.avatar.body import Body
 
 
 @dataclass

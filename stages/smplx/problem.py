@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.smplx import prior

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
 from gsac.avatar.artifacts import read_alpha
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
 from gsac.avatar.body import Body
 from gsac.stages.contract import Job, StageError

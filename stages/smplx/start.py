@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
 from gsac.avatar import rotation
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx.prior import MEAN

@@ -1,0 +1,126 @@
+"""The body model and its loader."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
+from gsac.avatar.wholebody import INDEX
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.load()
+
+
+def official_file(path, vertices=400, faces=300, directions=20, **changes):
+    """A generated file of the official keys and shapes (not the official data)."""
+    rng = np.random.default_rng(0)
+    weights = rng.random((vertices, 55))
+    arrays = {
+        "v_template": rng.normal(0, 0.5, (vertices, 3)), "f": rng.integers(0, vertices, (faces, 3)).astype(np.uint32),
+        "shapedirs": rng.normal(0, 0.01, (vertices, 3, directions)), "posedirs": np.zeros((vertices, 3, 486)),
+        "J_regressor": np.full((55, vertices), 1 / vertices), "weights": weights / weights.sum(1, keepdims=True),
+        "kintree_table": np.array([[2**32 - 1, *range(54)], range(55)], np.uint32), "hands_meanl": np.zeros(45),
+    } | changes
+    np.savez(path, **{k: v for k, v in arrays.items() if v is not None})
+    return path
+
+
+def test_at_zero_rotation_the_body_stands_in_a_t_pose_facing_plus_z(body):
+    vertices, joints = body.rest(np.zeros(body.num_betas))
+    at = dict(zip(body.joint_names, joints, strict=True))
+    assert at["left_wrist"][0] > 0.5 > -0.5 > at["right_wrist"][0]
+    assert abs(at["left_wrist"][1] - at["left_shoulder"][1]) < 0.02
+    assert np.ptp(vertices[:, 1]) == pytest.approx(1.8, abs=0.15)
+    points = dict(zip(INDEX, body.keypoints(vertices), strict=True))
+    assert points["nose"][2] > points["left_ear"][2] + 0.05 and points["left_eye"][0] > 0 > points["right_eye"][0]
+
+
+def test_joints_come_in_smplx_order_and_parents_before_children(body):
+    assert body.joint_names == tuple(SMPLX_JOINTS) and len(SMPLX_JOINTS) == 55
+    assert body.parents[0] == -1 and all(p < j for j, p in enumerate(body.parents))
+    assert body.joint_names[body.parents[SMPLX_JOINTS.index("left_thumb1")]] == "left_wrist"
+
+
+def test_at_most_four_weights_a_vertex_and_they_sum_to_one(body):
+    assert ((body.weights > 0).sum(1) <= 4).all()
+    assert np.allclose(body.weights.sum(1), 1, atol=1e-5) and np.allclose(body.skin_weight.sum(1), 1, atol=1e-5)
+
+
+def test_posing_turns_about_the_pelvis_and_then_translates(body):
+    pose = np.zeros((1, 55, 3))
+    pose[0, 0] = [0, np.pi / 2, 0]
+    params = BodyParams.from_pose(pose, [[1.0, 2.0, 3.0]], np.zeros(body.num_betas), np.zeros((1, 52)), 1000, (0, 0))
+    vertices, joints = body.posed(params)
+    rest, rest_joints = body.rest(np.zeros(body.num_betas))
+    turn = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    expected = (rest - rest_joints[0]) @ turn.T + rest_joints[0] + [1, 2, 3]
+    assert np.allclose(vertices[0], expected, atol=1e-5)
+    assert np.allclose(joints[0, 0], rest_joints[0] + [1, 2, 3], atol=1e-5)
+
+
+def test_a_bent_elbow_moves_the_hand_and_nothing_of_the_other_side(body):
+    pose = np.zeros((2, 55, 3))
+    pose[1, SMPLX_JOINTS.index("left_elbow")] = [0, -1.2, 0]
+    params = BodyParams.from_pose(pose, np.zeros((2, 3)), np.zeros(body.num_betas), np.zeros((2, 52)), 1000, (0, 0))
+    vertices, joints = body.posed(params)
+    moved = np.linalg.norm(vertices[1] - vertices[0], axis=1)
+    assert moved[vertices[0][:, 0] < 0].max() < 1e-6
+    assert joints[1, SMPLX_JOINTS.index("left_wrist"), 2] > joints[0, SMPLX_JOINTS.index("left_wrist"), 2] + 0.1
+
+
+def test_jaw_rotation_opens_the_mouth_of_a_body_whose_jaw_is_an_action(body):
+    pose = np.zeros((2, 55, 3))
+    pose[1, SMPLX_JOINTS.index("jaw")] = [0.3, 0, 0]
+    params = BodyParams.from_pose(pose, np.zeros((2, 3)), np.zeros(body.num_betas), np.zeros((2, 52)), 1000, (0, 0))
+    vertices, _ = body.posed(params)
+    opened = body.exprdirs[..., body.expression_names.index("jawOpen")]
+    assert (vertices[1] - vertices[0])[np.abs(opened[:, 1]).argmax(), 1] < -0.01
+
+
+def test_hand_points_lie_in_the_hand(body):
+    points = body.keypoints(body.v_template)
+    _, joints = body.rest(np.zeros(body.num_betas))
+    middle = joints[SMPLX_JOINTS.index("left_middle1")]
+    assert np.linalg.norm(points[91:112] - middle, axis=1).max() < 0.16
+    assert np.linalg.norm(points[INDEX["left_hand_middle1"]] - middle) < 0.01
+    assert points[INDEX["left_hand_middle4"], 0] > points[INDEX["left_hand_middle1"], 0] + 0.06
+
+
+def test_params_survive_writing_and_reading(tmp_path, body):
+    rng = np.random.default_rng(0)
+    params = BodyParams.from_pose(rng.normal(size=(3, 55, 3)), rng.normal(size=(3, 3)), rng.normal(size=20),
+                                  rng.normal(size=(3, 52)), (900, 910), (1, 2), model=body.digest)
+    params.write(tmp_path / "body.npz")
+    back = BodyParams.read(tmp_path / "body.npz")
+    assert np.array_equal(back.pose, params.pose) and back.model == body.digest and np.array_equal(back.focal, params.focal)
+
+
+def test_a_file_of_the_official_keys_drops_in(tmp_path):
+    body = Body.load(official_file(tmp_path / "SMPLX_NEUTRAL.npz", directions=400))
+    assert (body.num_betas, body.exprdirs.shape[2]) == (300, 100) and body.parents[0] == -1
+    vertices, joints = body.rest(np.zeros(10))
+    assert vertices.shape == (400, 3) and joints.shape == (55, 3)
+    assert Body.load(official_file(tmp_path / "old.npz")).num_betas == 10
+
+
+@pytest.mark.parametrize("changes,named", [({"weights": None}, "weights"), ({"J_regressor": np.zeros((24, 400))}, "J_regressor"),
+                                           ({"shapedirs": np.zeros((400, 3, 50))}, "shapedirs"),
+                                           ({"weights": np.ones((400, 55))}, "weights"),
+                                           ({"f": np.full((300, 3), 9999)}, "f names vertex")])
+def test_a_wrong_body_file_is_refused_by_the_array_that_is_wrong(tmp_path, changes, named):
+    with pytest.raises(ArtifactError, match=named):
+        Body.load(official_file(tmp_path / "bad.npz", **changes))
+
+
+def test_pickles_and_missing_files_are_refused_with_what_to_do(tmp_path):
+    (tmp_path / "SMPLX_MALE.pkl").write_bytes(b"\x80\x04.")
+    with pytest.raises(ArtifactError, match="npz"):
+        Body.load(tmp_path / "SMPLX_MALE.pkl")
+    with pytest.raises(ArtifactError, match="no body model file"):
+        Body.load(tmp_path / "absent.npz")
+    (tmp_path / "text.npz").write_text("hello")
+    with pytest.raises(ArtifactError, match="not a readable"):
+        Body.load(tmp_path / "text.npz")

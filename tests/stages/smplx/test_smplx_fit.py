@@ -1,0 +1,165 @@
+"""The fit against finite differences and against bodies whose pose is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gsac.avatar import rotation
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.camera import Camera
+from gsac.avatar.zbuffer import silhouette
+from gsac.stages.contract import BadInput, make_config
+from gsac.stages.smplx import STAGE
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.fit import BODY_POINTS, HIPS, Sightings, fit_clip, observations, to_params
+from gsac.stages.smplx.points import pairs_of, positions
+from gsac.stages.smplx.prior import BODY_JOINTS
+from gsac.stages.smplx.problem import Problem, State
+from gsac.stages.smplx.silhouette import Outline, outline_points, read_outline
+from scipy.spatial.transform import Rotation
+
+WIDTH, HEIGHT, FOCAL = 360, 640, 700.0
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.load()
+
+
+def turning_person(body: Body, frames: int, seed: int = 0) -> BodyParams:
+    """A person of some shape who turns, arms hanging and swinging a little."""
+    rng = np.random.default_rng(seed)
+    pose = np.zeros((frames, 55, 3))
+    yaw = np.linspace(0, 1.8 * np.pi, frames)
+    pose[:, 0] = (Rotation.from_euler("x", np.pi) * Rotation.from_euler("y", yaw[:, None])).as_rotvec().reshape(frames, 3)
+    swing = 0.08 * np.sin(np.linspace(0, 5, frames))
+    pose[:, 16, 2], pose[:, 17, 2] = -0.9 + swing, 0.85 + swing
+    pose[:, 18, 1], pose[:, 19, 1] = -0.4, 0.5
+    betas = rng.normal(0, 0.5, body.num_betas)
+    transl = np.tile([0.05, 0.0, 2.4], (frames, 1))
+    return BodyParams.from_pose(pose, transl, betas, np.zeros((frames, 52)), FOCAL, (WIDTH / 2, HEIGHT / 2), model=body.digest)
+
+
+def sightings_of(body: Body, params: BodyParams, noise: float = 0.0, seconds: bool = True) -> Sightings:
+    """Exact or noisy detections of a posed body."""
+    vertices, _ = body.posed(params)
+    points = body.keypoints(vertices)
+    xy = params.camera(WIDTH, HEIGHT).project(points)
+    xy = xy + np.random.default_rng(1).normal(0, noise, xy.shape)
+    score = np.isfinite(xy).all(-1).astype(float)
+    world = points - points[:, list(HIPS)].mean(1, keepdims=True)
+    time = np.arange(params.frames) / 10 if seconds else None
+    return Sightings(np.nan_to_num(xy), score, np.full(score.shape, max(noise, 0.5)), world, time, WIDTH, HEIGHT, FOCAL)
+
+
+def outlines_of(body: Body, params: BodyParams, folder) -> list[Outline]:
+    from gsac.avatar.artifacts import write_alpha
+
+    out = []
+    for t in range(params.frames):
+        vertices, _ = body.posed(params, [t])
+        path = folder / f"{t:06d}.exr"
+        write_alpha(path, silhouette(vertices[0], body.faces, params.camera(WIDTH, HEIGHT)).astype(np.float32))
+        out.append(read_outline(path))
+    return out
+
+
+def joint_error_mm(body: Body, found: BodyParams, truth: BodyParams) -> np.ndarray:
+    """(T, 22) root-aligned."""
+    a, b = body.posed(found)[1][:, :22], body.posed(truth)[1][:, :22]
+    return 1e3 * np.linalg.norm((a - a[:, :1]) - (b - b[:, :1]), axis=-1)
+
+
+def test_a_clean_turn_is_recovered_to_millimetres(body, tmp_path):
+    truth = turning_person(body, 12)
+    seen = sightings_of(body, truth)
+    fit = fit_clip(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)), lambda *a: None)
+    found = to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2]))
+    error = joint_error_mm(body, found, truth)
+    assert np.median(error) < 12 and error.mean() < 18
+    assert np.nanmin(fit.iou) > 0.9
+
+
+def height_of(body: Body, params: BodyParams) -> float:
+    vertices, _ = body.rest(params.betas)
+    return float(np.ptp(vertices[:, 1]))
+
+
+@pytest.mark.parametrize("frames,seconds", [(1, True), (2, True), (4, False)])
+def test_one_frame_two_frames_and_photos_without_times_are_fitted(body, tmp_path, frames, seconds):
+    truth = turning_person(body, frames)
+    seen = sightings_of(body, truth, seconds=seconds)
+    fit = fit_clip(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(rounds=1), lambda *a: None)
+    assert np.isfinite(rotation.log(fit.state.local)).all()
+    assert np.median(fit.reprojection) < 3
+
+
+def test_frames_in_which_nobody_was_seen_lie_between_their_neighbours(body, tmp_path):
+    truth = turning_person(body, 10)
+    seen = sightings_of(body, truth)
+    seen.score[4:6] = 0
+    seen.world[4:6] = np.nan
+    fit = fit_clip(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(silhouette=0.0), lambda *a: None)
+    found = to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2]))
+    assert joint_error_mm(body, found, truth)[4:6].mean() < 120
+    assert fit.sigma_joints[4:6, 7:9].mean() > fit.sigma_joints[:3, 7:9].mean()
+
+
+def test_the_body_never_faces_the_wrong_way(body, tmp_path):
+    truth = turning_person(body, 16, seed=3)
+    seen = sightings_of(body, truth, noise=3.0)
+    fit = fit_clip(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(rounds=1), lambda *a: None)
+    front = fit.state.local[:, 0, :, 2]
+    true_front = rotation.exp(truth.pose[:, 0].astype(float))[..., 2]
+    assert (np.einsum("tc,tc->t", front, true_front) > np.cos(np.radians(25))).all()
+
+
+def test_derivatives_agree_with_finite_differences(body, tmp_path):
+    truth = turning_person(body, 3)
+    outlines = outlines_of(body, truth, tmp_path)
+    seen = observations(sightings_of(body, truth, 2.0), BODY_POINTS, np.array([WIDTH / 2, HEIGHT / 2]), (FOCAL, 0.1),
+                        SmplxConfig(height_m=1.8), outlines)
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
+    rng = np.random.default_rng(0)
+    state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
+                  truth.transl.astype(float) + 0.02, rng.normal(0, 0.3, body.num_betas), float(np.log(FOCAL)))
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0)
+    camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
+    chain = problem.skeleton.pose(state.local, state.betas)
+    x = positions(chain, 0, pairs, state.betas) + state.transl[0]
+    vertices, _ = body.posed(to_params(body, state, problem.seen.center), [0])
+    assert np.allclose(x, body.keypoints(vertices)[0][BODY_POINTS], atol=2e-3)
+    for t, outline in enumerate(outlines):
+        vertices, _ = body.posed(to_params(body, state, problem.seen.center), [t])
+        problem.outline_pairs[t] = outline_points(body, vertices[0], camera, outline, t)[0]
+    check_gradient(problem, state, rng, 1e-5, 2e-3)
+    problem.outline_weight = 1.0
+    # the distance field is sampled to 1/32 pixel, so its slope shows only over longer steps
+    check_gradient(problem, state, rng, 1e-3, 0.08)
+
+
+def check_gradient(problem: Problem, state: State, rng, h: float, tolerance: float) -> None:
+    """Half the cost's slope along random directions is the system's gradient (exact where no point is an outlier)."""
+    import gsac.stages.smplx.problem as module
+
+    robust = module.robust
+    module.robust = lambda residual, limit: (residual**2, np.ones_like(residual))
+    try:
+        system = problem.linearise(state)
+        for _ in range(4):
+            step = rng.normal(0, 1, (len(state.local), problem.size))
+            shared = rng.normal(0, 1, len(state.betas) + 1) * 0.3
+            slope = (problem.cost(problem.move(state, h * step, h * shared))
+                     - problem.cost(problem.move(state, -h * step, -h * shared))) / (2 * h)
+            expected = 2 * ((system.gradient * step).sum() + system.shared_gradient @ shared)
+            assert slope == pytest.approx(expected, rel=tolerance)
+    finally:
+        module.robust = robust
+
+
+@pytest.mark.parametrize("values,name", [({"method": "magic"}, "smplx.method"), ({"height_m": 17.0}, "smplx.height_m"),
+                                         ({"focal_px": -1.0}, "smplx.focal_px"), ({"rounds": 0}, "smplx.rounds"),
+                                         ({"betas": 3}, "smplx.betas")])
+def test_a_wrong_parameter_is_named(values, name):
+    with pytest.raises(BadInput, match=name):
+        make_config(STAGE, values)
