@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from gsac.avatar.wholebody import HANDS
+from gsac.stages.segment.plate import HALF, Difference
 
-HALF = 2
 SURE, NEVER = 0.95, 0.05
 """Network probabilities that are taken as said."""
 FINGERS = ([0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20])
@@ -17,10 +17,10 @@ HAND_SEEN = 0.3
 
 
 def cut_out(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray, iterations: int,
-            empty: np.ndarray | None = None, changed: np.ndarray | None = None) -> np.ndarray:
+            difference: Difference | None = None) -> np.ndarray:
     """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).
 
-    empty, changed: (H, W) bool, where a plate says that the scene is bare, or certainly not.
+    difference: what a plate says of this part of the frame.
     Returns (H, W) float32, 0..1, sharp but for the step from half size.
     """
     height, width = probability.shape
@@ -29,10 +29,9 @@ def cut_out(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: n
     rough = cv2.resize(probability, size, interpolation=cv2.INTER_AREA)
     scale = np.array(size) / (width, height)
     labels = seed(rough, xy * scale, score)
-    if empty is not None:
-        labels[_shrunk(empty, size) & (labels != cv2.GC_FGD)] = cv2.GC_BGD
-    if changed is not None:
-        labels[_shrunk(changed, size) & (labels != cv2.GC_BGD)] = cv2.GC_FGD
+    if difference is not None:
+        labels[difference.empty] = cv2.GC_BGD
+        labels[difference.changed] = cv2.GC_FGD
     foreground = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
     if iterations and foreground.any() and not foreground.all():
         cv2.setRNGSeed(0)  # k-means inside draws numbers: the same frame must give the same bytes
@@ -79,7 +78,3 @@ def seed_hand(labels: np.ndarray, rough: np.ndarray, hand: np.ndarray) -> None:
     labels[inside & (near > 0)] = cv2.GC_PR_BGD
     labels[inside & (bones > 0)] = cv2.GC_PR_FGD
     labels[cores > 0] = cv2.GC_FGD
-
-
-def _shrunk(where: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    return cv2.resize(where.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.99

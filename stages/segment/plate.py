@@ -10,24 +10,49 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-BARE, CHANGED = 2.5, 6.0
-"""Noise widths below which a pixel is bare scene, and above which it is not."""
-CHROMA_NOISE, LIGHT_NOISE = 1.5, 3.0
-"""Least noise of a* b* and of L*, in CIE Lab units."""
+HALF = 2
+"""All is done at half size: a plate decides areas, not outlines."""
+BARE, ALIKE, CHANGED = 2.5, 4.0, 6.0
+"""Noise widths below which a pixel is bare scene, is so where the network doubts, and above which it is not."""
+LEAST_NOISE = 1.0
+"""CIE Lab units, of L* and of a* b*."""
 SHADOW = 45.0
 """L* units by which a shadow may darken a pixel."""
-SMOOTH = 1.5
-"""px; single pixels are too noisy to be believed."""
+SHADE, DIM = 20.0, 8.0
+"""L* units up to which a smooth darkening, and any, without another hue is taken for bare scene in shade."""
+SURE = 0.9
+"""Network probability from which on the plate must show more to overrule it."""
+OPENING = 5, 3
+"""px; bare scene narrower than this is a chance likeness, where the network is sure and where it doubts."""
+CAMOUFLAGE = 0.06
+"""Share of the sure person that may look like the plate; gaps between the limbs are less."""
+STRUCTURE, WINDOW = 4.0, 3.0
+"""A shadow darkens its surroundings alike: a difference that varies more (L*) about its mean (Gaussian, px) is a thing."""
 
 
 @dataclass
 class Difference:
-    plate: np.ndarray
-    """(H, W, 3) uint8: the plate in the frame's exposure."""
+    gain: np.ndarray
+    """(3,) float: the plate times this has the frame's exposure."""
     empty: np.ndarray
-    """(H, W) bool: certainly bare scene."""
+    """(H // 2, W // 2) bool: certainly bare scene."""
     changed: np.ndarray
-    """(H, W) bool: certainly not the bare scene, and no shadow."""
+    """(H // 2, W // 2) bool: certainly not the bare scene, and no shadow."""
+
+    def part(self, x0: int, y0: int, x1: int, y1: int) -> Difference:
+        """The same of a box in full-size pixels, even but at the frame's end."""
+        box = np.s_[y0 // HALF: y1 // HALF, x0 // HALF: x1 // HALF]
+        return Difference(self.gain, self.empty[box], self.changed[box])
+
+    def scene(self, plate: np.ndarray) -> np.ndarray:
+        """plate: (h, w, 3) uint8, any part of it. Returns it in the frame's exposure."""
+        return np.clip(plate * self.gain + 0.5, 0, 255).astype(np.uint8)
+
+
+def halved(image: np.ndarray) -> np.ndarray:
+    """Averaged down by two; an odd last row or column is left out."""
+    height, width = (n // HALF for n in image.shape[:2])
+    return cv2.resize(image[: height * HALF, : width * HALF], (width, height), interpolation=cv2.INTER_AREA)
 
 
 def compare(image: np.ndarray, plate: np.ndarray, person: np.ndarray) -> Difference | None:
@@ -35,37 +60,54 @@ def compare(image: np.ndarray, plate: np.ndarray, person: np.ndarray) -> Differe
 
     None where the plate does not show this frame's scene (most of the background differs).
     """
-    outside = cv2.dilate((person > 0.05).astype(np.uint8), np.ones((31, 31), np.uint8)) == 0
+    image, plate, person = halved(image), halved(plate), halved(person)
+    outside = cv2.dilate((person > 0.05).astype(np.uint8), np.ones((15, 15), np.uint8)) == 0
     if outside.mean() < 0.05:
         return None
-    plate = match_exposure(plate, image, outside)
-    light, chroma = _difference(image, plate)
-    light_noise = max(LIGHT_NOISE, 1.4826 * float(np.median(np.abs(light[outside]))))
-    chroma_noise = max(CHROMA_NOISE, 1.4826 * float(np.median(chroma[outside])))
-    hue = chroma / chroma_noise
-    # Darker than the plate may be shadow; brighter may not.
-    bright = np.abs(light) / light_noise
-    shadow_like = (light < 0) & (light > -SHADOW)
-    away = np.hypot(hue, bright)
+    gain = exposure(plate, image, outside)
+    light, hue = _difference(image, np.clip(plate * gain + 0.5, 0, 255).astype(np.uint8))
+    light_noise = max(LEAST_NOISE, 1.4826 * float(np.median(np.abs(light[outside]))))
+    hue_noise = max(LEAST_NOISE, 1.4826 * float(np.median(hue[outside])))
+    away = np.hypot(hue / hue_noise, light / light_noise)
     if np.median(away[outside]) > BARE or (away[outside] > CHANGED).mean() > 0.3:
         return None
-    empty = (away < BARE) & (person < 0.9)
-    changed = (np.where(shadow_like, hue, away) > CHANGED) & (person > 0.1)
-    return Difference(plate, empty, changed)
+    # Darker than the plate may be shadow, brighter may not.
+    varies = cv2.GaussianBlur(np.abs(light - cv2.GaussianBlur(light, (0, 0), WINDOW)), (0, 0), WINDOW)
+    smooth = varies < STRUCTURE
+    shadow = (light < 0) & (light > -SHADOW) & (smooth | (person < 0.5))
+    shade = (light < 0) & (light > np.where(smooth, -SHADE, -DIM)) & (hue < BARE * hue_noise)
+    doubted = person < SURE
+    empty = bare_scene((away < np.where(doubted, ALIKE, BARE)) | shade, person)
+    changed = (np.where(shadow, hue / hue_noise, away) > CHANGED) & (person > 0.1)
+    return Difference(gain, empty, changed)
 
 
-def match_exposure(plate: np.ndarray, image: np.ndarray, outside: np.ndarray) -> np.ndarray:
-    """The plate times one gain a channel, the median over the pixels outside of the person."""
-    usable = outside & (plate > 12).all(axis=2) & (plate < 245).all(axis=2) & (image < 245).all(axis=2)
+def bare_scene(alike: np.ndarray, person: np.ndarray) -> np.ndarray:
+    """alike: (h, w) bool, looks like the plate; person: (h, w) probability. Returns (h, w) bool, its wide parts.
+
+    The network fills the gaps between arms and trunk, so the plate may overrule it; but where much of the person looks
+    like the plate it is the clothing that does, and only what reaches the person's outside is believed.
+    """
+    alike, inside = alike.astype(np.uint8), person >= SURE
+    wide = np.where(inside, *(cv2.morphologyEx(alike, cv2.MORPH_OPEN, np.ones((n, n), np.uint8)) for n in OPENING))
+    if (wide[inside] > 0).mean() < CAMOUFLAGE:
+        return wide > 0
+    wide[inside] = 0
+    _, labels = cv2.connectedComponents(wide, connectivity=4)
+    return (wide > 0) & np.isin(labels, np.unique(labels[(person < 0.5) & (wide > 0)]))
+
+
+def exposure(plate: np.ndarray, image: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """(3,) gain a channel, plate to image: the median over the pixels outside of the person."""
+    usable = outside & (plate.min(axis=2) > 12) & (plate.max(axis=2) < 245) & (image.max(axis=2) < 245)
     if usable.sum() < 100:
-        return plate
-    gain = np.median(image[usable].astype(np.float32) / plate[usable], axis=0)
-    return np.clip(plate * np.clip(gain, 0.5, 2) + 0.5, 0, 255).astype(np.uint8)
+        return np.ones(3, np.float32)
+    return np.clip(np.median(image[usable].astype(np.float32) / plate[usable], axis=0), 0.5, 2)
 
 
 def _difference(image: np.ndarray, plate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """L* difference, and distance in a* b*, both (H, W), of the lightly smoothed pictures."""
-    lab = [cv2.cvtColor(cv2.GaussianBlur(x, (0, 0), SMOOTH).astype(np.float32) / 255, cv2.COLOR_RGB2Lab)
+    """L* difference, and distance in a* b*, both (h, w), of the lightly smoothed pictures."""
+    lab = [cv2.cvtColor(cv2.GaussianBlur(x, (0, 0), 0.8).astype(np.float32) / 255, cv2.COLOR_RGB2Lab)
            for x in (image, plate)]
     step = lab[0] - lab[1]
     return step[..., 0], np.hypot(step[..., 1], step[..., 2])

@@ -9,7 +9,7 @@ from gsac.stages.segment.edge import soften
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.network import PoseMask, SelfieMask, person_region
 from gsac.stages.segment.parts import keep_person
-from gsac.stages.segment.plate import compare
+from gsac.stages.segment.plate import HALF, compare
 
 METHODS = {"pose": PoseMask, "selfie": SelfieMask}
 """Each: (models) -> ((image (H, W, 3), region) -> (H, W) probability)."""
@@ -63,9 +63,9 @@ def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, sc
         return np.zeros(image.shape[:2], np.float32), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     corner = np.array(box[:2])
-    empty, changed, scene = ((difference.empty[part], difference.changed[part], difference.plate[part])
-                             if difference else (None, None, None))
-    outline = cut_out(image[part], probability[part], xy - corner, score, iterations, empty, changed)
+    here = None if difference is None else difference.part(*box)
+    scene = None if difference is None else difference.scene(plate[part])
+    outline = cut_out(image[part], probability[part], xy - corner, score, iterations, here)
     outline = keep_person(outline, xy - corner, score)
     alpha = np.zeros(image.shape[:2], np.float32)
     alpha[part] = soften(image[part], outline, scene)
@@ -73,11 +73,13 @@ def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, sc
 
 
 def around(probability: np.ndarray, least: float = 0.05, margin: float = 0.04) -> tuple[int, int, int, int] | None:
-    """x0, y0, x1, y1 px of what may be person with some scene around it; None where nothing is."""
+    """x0, y0, x1, y1 px (even but at the frame's end) of what may be person, with some scene around it; None if nothing."""
     rows, columns = np.flatnonzero((probability > least).any(axis=1)), np.flatnonzero((probability > least).any(axis=0))
     if len(rows) == 0:
         return None
     pad = int(margin * (rows[-1] - rows[0] + 1)) + 4
     height, width = probability.shape
-    return (max(0, int(columns[0]) - pad), max(0, int(rows[0]) - pad),
-            min(width, int(columns[-1]) + 1 + pad), min(height, int(rows[-1]) + 1 + pad))
+    low = [max(0, int(first) - pad) // HALF * HALF for first in (columns[0], rows[0])]
+    high = [min(end, -(-(int(last) + 1 + pad) // HALF) * HALF)
+            for last, end in ((columns[-1], width), (rows[-1], height))]
+    return low[0], low[1], high[0], high[1]
