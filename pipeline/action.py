@@ -66,8 +66,9 @@ class Actor:
             if event["event"] == "progress":
                 self.reporter.progress(name, event["done"], event["total"], event["unit"])
             else:
-                info.warnings.append(event["message"])
-                self.reporter.warning(name, event["message"])
+                message = event["message"].removeprefix(f"{name}: ")  # the reporter names the stage
+                info.warnings.append(message)
+                self.reporter.warning(name, message)
 
         self.logs.mkdir(parents=True, exist_ok=True)
         log = self.logs / f"{name}.log"

@@ -15,9 +15,11 @@ from gsac.pipeline.models import Models
 from gsac.pipeline.packages import package_version
 from gsac.pipeline.params import plain
 from gsac.pipeline.project import Project
+from gsac.stages.contract import BadInput
 
 DEVICE = "GSAC_DEVICE"
 """Environment variable: `cpu` or `cuda`, instead of what is found."""
+DEVICES = ("cpu", "cuda")
 
 
 class Keys:
@@ -51,6 +53,8 @@ class Keys:
 def device_class() -> str:
     """`cuda` where both the driver and the [gpu] extra are there, else `cpu`; GSAC_DEVICE overrules."""
     named = os.environ.get(DEVICE)
+    if named and named not in DEVICES:
+        raise BadInput(f"{DEVICE}={named}: unknown device; choices: {', '.join(DEVICES)}")
     if named:
         return named
     return "cuda" if Path("/dev/nvidiactl").exists() and importlib.util.find_spec("cuda") is not None else "cpu"

@@ -120,7 +120,8 @@ def _message(error: Exception) -> str:
 
 
 def _leave_with_parent() -> None:
-    sys.stdin.buffer.read()
+    while os.read(sys.stdin.fileno(), 1):
+        pass
     os.killpg(os.getpgid(0), signal.SIGKILL)
 
 

@@ -59,7 +59,7 @@ def test_the_output_folder_shows_every_stage_and_what_was_run(toy):
     run = json.loads((toy.out / "run.json").read_text())
     assert run["clip"] == str(toy.clip)
     left = next(stage for stage in run["stages"] if stage["name"] == "left")
-    assert left["warnings"] == ["left: word 2 is short"] and left["params"]["trouble"] == "warning"
+    assert left["warnings"] == ["word 2 is short"] and left["params"]["trouble"] == "warning"
     assert {"seconds", "cpu_seconds", "peak_rss_mb", "key", "status"} <= left.keys()
     assert yaml.safe_load((toy.out / "params.yaml").read_text())["left"]["trouble"] == "warning"
 
@@ -67,7 +67,7 @@ def test_the_output_folder_shows_every_stage_and_what_was_run(toy):
 def test_warnings_of_a_cached_stage_are_still_told(toy):
     toy.ran("--set", "left.trouble=warning")
     rows = toy.run("--set", "left.trouble=warning").json["stages"]
-    assert rows[1]["status"] == "cached" and rows[1]["warnings"] == ["left: word 2 is short"]
+    assert rows[1]["status"] == "cached" and rows[1]["warnings"] == ["word 2 is short"]
 
 
 def test_without_out_the_folder_is_named_after_the_clip(toy):
@@ -176,6 +176,17 @@ def test_a_cache_that_cannot_be_written_is_said_and_the_run_keeps_its_results_in
     assert toy.result == "ALPHA ALPHA"
     toy.runs_file.write_text("")
     assert toy.run(GSAC_CACHE="/proc/no-such-cache").code == 0 and toy.runs == []
+
+
+def test_an_unknown_device_is_named_with_the_known_ones(toy):
+    done = toy.run(GSAC_DEVICE="abacus")
+    assert done.code == 2 and "abacus" in done.err and "cpu, cuda" in done.err
+
+
+def test_the_logs_of_stages_hold_only_what_the_stages_said(toy):
+    toy.ran()
+    for name in ("cut", "left", "right", "join"):
+        assert (toy.out / "logs" / f"{name}.log").read_text() == f"{name} at work\n"
 
 
 def test_plain_lines_without_a_terminal_and_no_control_codes(toy):

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from gsac.cache.publish import STEPS
 
-KILLED_AT = """
-import os, signal, sys
+STOPPED_AT = """
+import errno, os, signal, sys
 from gsac.cache.store import Store
 from gsac.pipeline import cli
 
@@ -21,20 +21,36 @@ publish = Store.publish
 
 def watched(self, parts, *rest, **more):
     def step(name):
-        if parts.stage == "join" and name == sys.argv[1]:
-            os.kill(os.getpid(), signal.SIGKILL)
+        if parts.stage == "join" and name == sys.argv[2]:
+            if sys.argv[1] == "killed":
+                os.kill(os.getpid(), signal.SIGKILL)
+            raise OSError(errno.ENOSPC, "No space left on device")
     return publish(self, parts, *rest, step=step, **more)
 
 Store.publish = watched
-sys.exit(int(cli.execute(sys.argv[2:])))
+sys.exit(int(cli.execute(sys.argv[3:])))
 """
+
+
+def run_stopped(toy, how: str, step: str) -> subprocess.CompletedProcess:
+    """A run that is killed, or finds the disk full, right after one step of the publish of `join`."""
+    command = [sys.executable, "-P", "-c", STOPPED_AT, how, step, "run", str(toy.clip), "--out", str(toy.out)]
+    return subprocess.run(command, cwd=toy.root, env=toy.env, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("step", ["started", "sealed", "placed", "record written"])
+def test_a_disk_that_is_full_while_publishing_is_said_and_nothing_is_lost(toy, step):
+    toy.ran("--until", "right")
+    done = run_stopped(toy, "full", step)
+    assert done.returncode == 1 and "no room left in the cache folder" in done.stderr and "Traceback" not in done.stderr
+    assert toy.gsac("cache", "verify").code == 0
+    assert toy.ran() == ["join"] and toy.result == "ALPHA ALPHA"
 
 
 @pytest.mark.parametrize("step", STEPS)
 def test_sigkill_at_every_step_of_a_publish_never_leaves_a_torn_artifact_that_counts_as_done(toy, step):
     toy.ran("--until", "right")
-    done = subprocess.run([sys.executable, "-P", "-c", KILLED_AT, step, "run", str(toy.clip), "--out", str(toy.out)],
-                          cwd=toy.root, env=toy.env, capture_output=True)
+    done = run_stopped(toy, "killed", step)
     assert done.returncode == -signal.SIGKILL
     assert toy.gsac("cache", "verify").code == 0
     left = toy.ran()
@@ -58,12 +74,13 @@ def test_sigkill_in_the_middle_of_a_stage_never_leaves_a_torn_artifact_that_coun
     assert toy.result == "ALPHA ALPHA"
 
 
-def test_ctrl_c_ends_the_stage_with_exit_code_130_and_keeps_what_is_finished(toy):
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_the_stage_with_exit_code_130_and_keeps_what_is_finished(toy, how):
     process = toy.start("run", toy.clip, "--out", toy.out, "--json", "--set", "join.pause_s=30")
     toy.wait_for(lambda: "join" in toy.runs)
     worker = _children(process.pid)
     began = time.monotonic()
-    process.send_signal(signal.SIGINT)
+    process.send_signal(how)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 130 and "interrupted" in err and "Traceback" not in err
     assert time.monotonic() - began < 10
