@@ -1,0 +1,146 @@
+"""Pictures for a page: frames by time, one crop round the person, size-bounded WebP data URIs."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import cv2
+import numpy as np
+from gsac.avatar.artifacts import FILLED_SHAPES, KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_alpha, read_frame
+from gsac.avatar.wholebody import BODY, FEET
+from gsac.pipeline.report.results import AbsentError, Results
+
+QUALITIES = (82, 68, 52, 36, 20)
+MOST_BYTES = 42_000
+"""Of one picture; about 60 of them make a page."""
+SEEN = 0.2
+"""Least score of a point that is drawn or counted."""
+MARGIN = 0.08
+"""Room round the person's box, in units of its longer side."""
+
+
+@dataclass
+class Picture:
+    """One <img> and the words under it."""
+
+    uri: str
+    width: int
+    height: int
+    caption: str
+    alt: str
+
+
+def picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTES) -> Picture:
+    """rgb: (H, W, 3) uint8. Quality falls, then size, until the file is at most `most_bytes`."""
+    shown = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
+    while True:
+        for quality in QUALITIES:
+            ok, data = cv2.imencode(".webp", shown, [cv2.IMWRITE_WEBP_QUALITY, quality])
+            if ok and len(data) <= most_bytes:
+                uri = "data:image/webp;base64," + base64.b64encode(data.tobytes()).decode()
+                return Picture(uri, shown.shape[1], shown.shape[0], caption, alt)
+        shown = cv2.resize(shown, None, fx=0.6, fy=0.6, interpolation=cv2.INTER_AREA)
+
+
+def fitted(image: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The image made smaller, never larger, to fit into width x height; its aspect stays."""
+    scale = min(width / image.shape[1], height / image.shape[0], 1.0)
+    if scale == 1.0:
+        return image
+    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+
+
+def spread(count: int, most: int) -> list[int]:
+    """At most `most` of 0..count-1, evenly, first and last among them."""
+    return sorted({round(x) for x in np.linspace(0, count - 1, min(most, count))}) if count else []
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A box of the frame and the scale at which it is shown."""
+
+    x0: int
+    y0: int
+    x1: int
+    y1: int
+    scale: float
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return max(1, round((self.x1 - self.x0) * self.scale)), max(1, round((self.y1 - self.y0) * self.scale))
+
+    def cut(self, image: np.ndarray) -> np.ndarray:
+        """image: (H, W, ...) of the whole frame."""
+        return cv2.resize(image[self.y0:self.y1, self.x0:self.x1], self.size, interpolation=cv2.INTER_AREA)
+
+    def points(self, xy: np.ndarray) -> np.ndarray:
+        """xy: (..., 2) px of the frame. Returns px of the crop."""
+        return (xy - (self.x0, self.y0)) * (np.array(self.size) / (self.x1 - self.x0, self.y1 - self.y0))
+
+
+class Footage:
+    """Frames, masks and keypoints of one run, read once."""
+
+    def __init__(self, results: Results):
+        self.results = results
+        self._frames: dict[int, np.ndarray] = {}
+
+    @cached_property
+    def clip(self) -> Clip:
+        return Clip.read(self.results.path("split/clip.json"))
+
+    @cached_property
+    def frames(self) -> list[Path]:
+        paths = frame_paths(self.results.path("split/frames"))
+        if not paths:
+            raise AbsentError("split/frames holds no frame.")
+        return paths
+
+    @cached_property
+    def keypoints(self) -> dict[str, np.ndarray]:
+        """Of handgap, with `missing` and `filled`; else those of keypoints without them."""
+        try:
+            return check_arrays(self.results.path("handgap/keypoints.npz"), FILLED_SHAPES)
+        except AbsentError:
+            return check_arrays(self.results.path("keypoints/keypoints.npz"), KEYPOINT_SHAPES)
+
+    def frame(self, t: int) -> np.ndarray:
+        """(H, W, 3) uint8."""
+        if t not in self._frames:
+            self._frames[t] = read_frame(self.frames[t])
+        return self._frames[t]
+
+    def alpha(self, t: int) -> np.ndarray:
+        """(H, W) float32 of frame t."""
+        path = self.results.path("segment/alpha") / f"{self.frames[t].stem}.exr"
+        if not path.is_file():
+            raise AbsentError(f"segment/alpha has no mask for frame {self.frames[t].stem}.")
+        return np.clip(np.nan_to_num(read_alpha(path)), 0, 1)
+
+    def moment(self, t: int) -> str:
+        """`frame 12 · 0.40 s`"""
+        times = self.clip.timestamps_s
+        return f"frame {t}" + (f" · {times[t]:.2f} s" if times and t < len(times) else "")
+
+    def crop(self, width: int, height: int) -> Crop:
+        """Round the person over the whole clip, so that all pictures of a sheet line up."""
+        h, w = self.frame(0).shape[:2]
+        box = (0, 0, w, h)
+        try:
+            k = self.keypoints
+            stem = slice(BODY.start, FEET.stop)
+            xy = k["xy"][:, stem][(k["score"][:, stem] >= SEEN) & np.isfinite(k["xy"][:, stem]).all(2)]
+        except Exception:  # without usable keypoints the whole frame is shown
+            xy = np.empty((0, 2))
+        if len(xy) >= 4:
+            low, high = np.quantile(xy, (0.002, 0.998), axis=0)
+            room = MARGIN * (high - low).max()
+            low, high = np.clip(low - room, 0, (w - 1, h - 1)), np.clip(high + room, 1, (w, h))
+            if (high - low).min() >= 16:
+                box = (*np.floor(low).astype(int).tolist(), *np.ceil(high).astype(int).tolist())
+        scale = min(width / (box[2] - box[0]), height / (box[3] - box[1]), 1.0)
+        return Crop(*box, scale)

@@ -1,0 +1,122 @@
+"""What a run left in its folder, and why something is not there."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from gsac.pipeline.graph import CLIP, Graph
+from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.project import Project
+from gsac.pipeline.workspace import DAG, RUN
+from gsac.stages.contract import StageError
+
+DONE = (Outcome.RAN.value, Outcome.CACHED.value)
+
+
+class AbsentError(Exception):
+    """Something that a section shows is not there. The message is the sentence that the section shows instead."""
+
+
+class Results:
+    """The folder of one run. Nothing in it is taken for granted: each part may be missing, torn or of an earlier run."""
+
+    def __init__(self, root: Path):
+        self.root = Path(root).absolute()
+        run = read_json(self.root / RUN)
+        self.has_run = isinstance(run, dict)
+        self.run: dict[str, Any] = run if isinstance(run, dict) else {}
+        rows = self.run.get("stages")
+        self.rows = {str(row["name"]): row for row in (rows if isinstance(rows, list) else [])
+                     if isinstance(row, dict) and "name" in row}
+
+    @cached_property
+    def project(self) -> Project:
+        """The stages at hand, joined as the folder's own dvc.yaml says where it has one."""
+        at_hand = Project.at_hand()
+        try:
+            return Project(at_hand.package, self.root / DAG) if (self.root / DAG).is_file() else at_hand
+        except StageError:
+            return at_hand
+
+    @cached_property
+    def order(self) -> list[str]:
+        """Names of all stages, first to last."""
+        try:
+            graph: Graph = self.project.graph
+            return [*graph.steps, *(name for name in self.rows if name not in graph.steps)]
+        except StageError:
+            return list(self.rows)
+
+    @cached_property
+    def failed(self) -> tuple[str, str] | None:
+        """Stage and its error, where the run failed."""
+        for name, row in self.rows.items():
+            if row.get("status") == Outcome.FAILED.value:
+                return name, str(row.get("error") or "no reason is recorded")
+        return None
+
+    @cached_property
+    def clip_name(self) -> str:
+        """File or folder name of the source; its place on the disk is nobody's business."""
+        named = str(self.run.get("clip") or "")
+        link = self.root / CLIP
+        return Path(named).name or (link.resolve().name if link.exists() else "") or self.root.name
+
+    @cached_property
+    def metrics(self) -> dict[str, Any]:
+        """metrics.json of train. AbsentError where there is none."""
+        path = self.path("train/metrics.json")
+        content = read_json(path)
+        if not isinstance(content, dict):
+            raise AbsentError(f"{path.name} of train cannot be read.")
+        return content
+
+    def done(self, stage: str) -> bool:
+        return not self.has_run or self.rows.get(stage, {}).get("status") in DONE
+
+    def path(self, port: str) -> Path:
+        """File or folder of a port, as this run made it; without run.json whatever lies there. AbsentError says why not."""
+        stage = port.partition("/")[0]
+        path = self.root / port
+        if self.failed and self.failed[0] == stage:
+            raise AbsentError(f"Stage {stage} failed: {self.failed[1]}")
+        if not self.done(stage):
+            why = f"not reached: stage {self.failed[0]} failed" if self.failed else "not part of this run"
+            earlier = " What lies in its folder is of an earlier run and is not shown." if path.exists() else ""
+            raise AbsentError(f"Stage {stage} was {why}.{earlier}")
+        if not path.exists():
+            raise AbsentError(f"{port} is absent from the run's folder.")
+        return path
+
+    def size(self, stage: str) -> int | None:
+        """Bytes of a stage's outputs on disk; None where there are none of this run."""
+        folder = self.root / stage
+        if not (self.done(stage) and folder.is_dir()):
+            return None
+        return sum(tree_size(entry) for entry in folder.iterdir())
+
+
+def tree_size(path: Path) -> int:
+    """Bytes of a file or folder, the first link followed; 0 for a dead link."""
+    path = path.resolve()
+    if path.is_dir():
+        return sum(p.lstat().st_size for p in path.rglob("*") if p.is_file())
+    return path.stat().st_size if path.exists() else 0
+
+
+def read_json(path: Path) -> Any:
+    """None where it cannot be read."""
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError):
+        return None
+
+
+def number(value: Any) -> float | None:
+    """A finite number, or None."""
+    usable = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return float(value) if usable else None

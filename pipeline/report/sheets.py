@@ -1,0 +1,245 @@
+"""The page's picture sections: each function looks at one result and returns pictures with the figures under them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from gsac.avatar.artifacts import frame_paths, read_frame
+from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
+from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
+from gsac.pipeline.report.pictures import SEEN, Footage, Picture, fitted, picture, spread
+from gsac.pipeline.report.results import AbsentError, Results, number
+
+CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT = 12, 8, 6, 6, 8
+"""How many frames each sheet shows at most."""
+WIDE, HIGH = 520, 640
+"""Largest picture of a sheet, px."""
+VIEWS_BYTES = 160_000
+LEAST_MASK = 1e-4
+"""A mask that covers less of the frame is empty."""
+PERSON_WHITE = 250
+"""Darker than this is person on a held-out picture's white ground."""
+
+
+@dataclass
+class Sheet:
+    """Pictures of one section and what was measured on the way."""
+
+    pictures: list[Picture]
+    figures: dict[str, str] = field(default_factory=dict)
+    """Name -> value, as read by people."""
+    facts: dict[str, float] = field(default_factory=dict)
+    """The same for `verdict`."""
+    columns: str = "tall"
+    """How the page lays the pictures out: tall, wide, or one."""
+
+
+def contact_sheet(footage: Footage) -> Sheet:
+    pictures = []
+    for t in spread(len(footage.frames), CONTACT):
+        image = footage.frame(t)
+        shown = fitted(image, 480 if image.shape[1] > image.shape[0] else 300, 400)
+        pictures.append(picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000))
+    return Sheet(pictures)
+
+
+def keypoint_sheet(footage: Footage) -> Sheet:
+    k = footage.keypoints
+    count = min(len(footage.frames), len(k["xy"]))
+    crop = footage.crop(WIDE, HIGH)
+    pictures = []
+    for t in telling(k, count):
+        image = crop.cut(footage.frame(t)).copy()
+        draw_keypoints(image, crop.points(k["xy"][t]), k["score"][t], SEEN, k.get("filled", [None] * count)[t],
+                       k.get("missing", [None] * count)[t])
+        hands = ", ".join(f"{side} hand {hand_word(k, t, i, side)}" for i, side in enumerate(HANDS))
+        pictures.append(picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}"))
+    figures = {"Detector": str(k["detector"]), "Frames": str(len(k["xy"]))}
+    facts = {"person_share": float((k["score"][:, BODY] >= SEEN).any(1).mean())}
+    figures["Person found"] = share(facts["person_share"])
+    for side, part in HANDS.items():
+        facts[f"{side}_hand_share"] = found = float(seen_part(k, part).mean())
+        figures[f"{side.capitalize()} hand found"] = share(found)
+        if "filled" in k:
+            facts[f"{side}_hand_filled"] = float(k["filled"][:, part].any(1).mean())
+            figures[f"{side.capitalize()} hand filled"] = share(facts[f"{side}_hand_filled"])
+    facts["face_share"] = float(seen_part(k, FACE).mean())
+    figures["Face found"] = share(facts["face_share"])
+    return Sheet(pictures, figures, facts)
+
+
+def seen_part(k: dict[str, np.ndarray], part: slice) -> np.ndarray:
+    """(T,) bool: the part was found in the image, not filled."""
+    found = (k["score"][:, part] >= SEEN).mean(1) >= 0.5
+    return found & ~k["filled"][:, part].any(1) if "filled" in k else found
+
+
+def hand_word(k: dict[str, np.ndarray], t: int, i: int, side: str) -> str:
+    if "filled" in k and k["filled"][t, HANDS[side]].any():
+        return "filled"
+    if "missing" in k and k["missing"][t, i]:
+        return "missing"
+    return "found" if seen_part(k, HANDS[side])[t] else "not found"
+
+
+def telling(k: dict[str, np.ndarray], count: int) -> list[int]:
+    """Frames to show: even ones, and the middle of where each hand is filled and where it is missing."""
+    frames = set(spread(count, KEYPOINTS - 3))
+    if "filled" in k:
+        for i, part in enumerate(HANDS.values()):
+            filled = k["filled"][:count, part].any(1)
+            for which in (filled, k["missing"][:count, i] & ~filled):
+                hits = np.flatnonzero(which)
+                if len(hits) and len(frames) < KEYPOINTS:
+                    frames.add(int(hits[len(hits) // 2]))
+    return sorted(frames)
+
+
+def alpha_sheet(footage: Footage) -> Sheet:
+    crop = footage.crop(WIDE, HIGH)
+    masks = {p.stem for p in frame_paths(footage.results.path("segment/alpha"))}
+    pictures, covers, soft = [], [], []
+    for t in spread(len(footage.frames), ALPHA):
+        alpha = footage.alpha(t)
+        covers.append(float(alpha.mean()))
+        soft.append(float(((alpha > 0.02) & (alpha < 0.98)).sum() / max((alpha >= 0.5).sum(), 1)))
+        pictures.append(picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
+                                f"{footage.moment(t)}: covers {share(covers[-1])}", f"Frame {t} cut out, on magenta"))
+    missing = sum(path.stem not in masks for path in footage.frames)
+    facts = {"empty_masks": float(sum(c < LEAST_MASK for c in covers))}
+    figures = {"Frame covered, median": share(float(np.median(covers))),
+               "Soft edge, of the person's area": share(float(np.median(soft)))}
+    if missing:
+        figures["Frames without a mask"] = str(missing)
+    if facts["empty_masks"]:
+        figures["Empty masks among those shown"] = f"{int(facts['empty_masks'])} of {len(covers)}"
+    return Sheet(pictures, figures, facts)
+
+
+def body_sheet(footage: Footage) -> Sheet:
+    from gsac.avatar.body import Body, BodyParams
+    from gsac.avatar.zbuffer import rasterise
+
+    params = BodyParams.read(footage.results.path("smplx/body.npz"))
+    body = Body.load()
+    if params.model and params.model != body.digest:
+        raise AbsentError(f"The body was fitted with another body model ({params.model[:12]}) than the one at hand "
+                          f"({body.digest[:12]}), so it cannot be drawn.")
+    crop = footage.crop(WIDE, HIGH)
+    k = footage.keypoints
+    height, width = footage.frame(0).shape[:2]
+    full = params.camera(width, height)
+    camera = full.scaled(round(width * crop.scale), round(height * crop.scale))
+    frames = spread(min(len(footage.frames), params.frames, len(k["xy"])), BODIES)
+    pictures, overlaps, misses = [], [], []
+    for t in frames:
+        vertices = body.posed(params, [t])[0][0]
+        face_id = rasterise(vertices, body.faces, camera)[0]
+        small = cv2.resize(footage.frame(t), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+        projected = full.project(body.keypoints(vertices))
+        shown = (k["score"][t] >= SEEN) & np.isfinite(projected).all(1) & np.isfinite(k["xy"][t]).all(1)
+        image = draw_body(small, vertices, body.faces, face_id)
+        scale = np.array((camera.width / width, camera.height / height))
+        draw_reprojection(image, k["xy"][t] * scale, projected * scale, shown)
+        misses.append(np.linalg.norm(k["xy"][t] - projected, axis=1)[: FEET.stop][shown[: FEET.stop]])
+        caption, overlap = footage.moment(t), silhouette_iou(footage, t, face_id)
+        if overlap is not None:
+            overlaps.append(overlap)
+            caption += f": outline IoU {overlap:.2f}"
+        x0, y0, x1, y1 = (round(v * crop.scale) for v in (crop.x0, crop.y0, crop.x1, crop.y1))
+        pictures.append(picture(image[y0:y1, x0:x1], caption, f"Fitted body over frame {t}"))
+    return body_figures(Sheet(pictures), body, params, full.focal[0], np.concatenate(misses), overlaps)
+
+
+def silhouette_iou(footage: Footage, t: int, face_id: np.ndarray) -> float | None:
+    """Of the drawn body and the mask at 0.5; None without a mask."""
+    try:
+        alpha = footage.alpha(t)
+    except AbsentError:
+        return None
+    mask = cv2.resize(alpha, face_id.shape[::-1], interpolation=cv2.INTER_AREA) >= 0.5
+    either = (mask | (face_id >= 0)).sum()
+    return float((mask & (face_id >= 0)).sum() / either) if either else None
+
+
+def body_figures(sheet: Sheet, body, params, focal: float, misses: np.ndarray, overlaps: list[float]) -> Sheet:
+    rest = body.rest(params.betas)[0]
+    sheet.facts = {"turn_degrees": turn_covered(params.global_orient), "height_m": float(np.ptp(rest[:, 1]))}
+    sheet.figures = {"Height": f"{sheet.facts['height_m']:.2f} m", "Focal length": f"{focal:.0f} px",
+                     "Turn seen": f"{sheet.facts['turn_degrees']:.0f} of 360 degrees"}
+    if len(misses):
+        sheet.facts["reprojection_px"] = float(np.median(misses))
+        sheet.figures["Joint reprojection, median of the frames shown"] = f"{sheet.facts['reprojection_px']:.1f} px"
+    if overlaps:
+        sheet.facts["outline_iou"] = float(np.mean(overlaps))
+        sheet.figures["Outline IoU, mean of the frames shown"] = f"{sheet.facts['outline_iou']:.3f}"
+    return sheet
+
+
+def turn_covered(global_orient: np.ndarray, step: int = 15) -> float:
+    """Degrees of the turn about the upright axis that some frame looks at. global_orient: (T, 3) axis-angle."""
+    turns = np.stack([cv2.Rodrigues(r.astype(np.float64))[0] for r in global_orient])
+    yaw = np.degrees(np.arctan2(turns[:, 0, 2], turns[:, 2, 2])) % 360
+    return float(len({int(y // step) for y in yaw}) * step)
+
+
+def heldout_sheet(results: Results) -> Sheet:
+    """Truth, render and error of held-out frames side by side, the worst one among them."""
+    folder = results.path("train/heldout")
+    frames = sorted(p.stem.removesuffix("_render") for p in folder.glob("*_render.png"))
+    if not frames:
+        raise AbsentError("No frame was held out, so nothing is compared.")
+    rows = rows_of(results)
+    chosen = {frames[i] for i in spread(len(frames), HELDOUT - 1)}
+    judged = [(rows[f]["psnr_fg"], f) for f in frames if number(rows.get(f, {}).get("psnr_fg")) is not None]
+    worst = min(judged)[1] if judged else None
+    pictures = []
+    for stem in sorted(chosen | ({worst} - {None})):
+        parts = [read_frame(folder / f"{stem}_{kind}.png") for kind in ("truth", "render", "error")]
+        y, x = person_box(parts[0], parts[1])
+        shown = np.hstack([fitted(part[y, x], 420, 540) for part in parts])
+        pictures.append(picture(shown, caption_of(stem, rows.get(stem, {}), stem == worst),
+                                f"Held-out frame {int(stem)}: truth, render, error", 70_000))
+    return Sheet(pictures, columns="wide")
+
+
+def rows_of(results: Results) -> dict[str, dict]:
+    """`000012` -> its row of metrics.json."""
+    try:
+        rows = results.metrics.get("heldout") or []
+    except AbsentError:
+        return {}
+    return {f"{int(row['frame']):06d}": row for row in rows if isinstance(row, dict) and number(row.get("frame")) is not None}
+
+
+def caption_of(stem: str, row: dict, worst: bool) -> str:
+    words = [f"frame {int(stem)}"]
+    plain, aligned = number(row.get("psnr_fg")), number(row.get("psnr_fg_ttpo"))
+    if plain is not None:
+        words.append(f"{plain:.2f} dB on the person")
+    if aligned is not None:
+        words.append(f"{aligned:.2f} dB with the pose aligned at test time")
+    return ", ".join(words) + (" (the worst frame)" if worst else "")
+
+
+def person_box(truth: np.ndarray, render: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
+    """Rows and columns round everything that is not white in either; all where nothing is."""
+    marked = (np.minimum(truth, render) < PERSON_WHITE).any(2)
+    box = []
+    for axis, size in ((1, marked.shape[0]), (0, marked.shape[1])):
+        hits = np.flatnonzero(marked.any(axis))
+        box.append(slice(max(hits[0] - margin, 0), min(hits[-1] + margin + 1, size)) if len(hits) else slice(0, size))
+    return box[0], box[1]
+
+
+def views_sheet(results: Results) -> Sheet:
+    image = read_frame(results.path("train/heldout/views.png"))
+    words = "front, right side, back; left side, from below, from above"
+    return Sheet([picture(fitted(image, 1440, 960), words, f"The avatar from {words}", VIEWS_BYTES)], columns="one")
+
+
+def share(x: float) -> str:
+    """0.123 -> `12 %`"""
+    return f"{100 * x:.0f} %" if x >= 0.095 or x == 0 else f"{100 * x:.1f} %"

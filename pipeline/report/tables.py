@@ -1,0 +1,142 @@
+"""Rows of the page's tables: stages, parameters, and what made the results (models, versions, licences)."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from typing import Any
+
+from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.params import meanings, plain
+from gsac.pipeline.report.results import Results, number
+
+MB = 1e6
+BLANK = {"seconds": None, "cpu": None, "memory": None, "bytes": None, "cached": False, "bar": 0.0, "error": ""}
+
+
+def stage_rows(results: Results) -> list[dict[str, Any]]:
+    """One row a stage, also of those that this run did not reach; `bar` is the share of the longest stage's time."""
+    longest = max((number(row.get("seconds")) or 0 for row in results.rows.values()), default=0) or 1
+    rows = []
+    for name in results.order:
+        row = results.rows.get(name)
+        if row is None:
+            rows.append(BLANK | {"name": name, "status": "not run" if results.has_run else "unknown",
+                                 "bytes": results.size(name)})
+            continue
+        done = results.done(name)
+        rows.append(BLANK | {
+            "name": name, "status": str(row.get("status")),
+            "seconds": number(row.get("seconds")) if done else None,
+            "cpu": number(row.get("cpu_seconds")) if done else None,
+            "memory": (number(row.get("peak_rss_mb")) or 0) * MB if done else None, "bytes": results.size(name),
+            "cached": row.get("status") == Outcome.CACHED.value, "bar": 100 * (number(row.get("seconds")) or 0) / longest,
+            "error": str(row.get("error") or ""),
+        })
+    return rows
+
+
+def totals(results: Results) -> dict[str, float]:
+    """Seconds of all stages however old, of those that ran in this run, and of those that came from the cache."""
+    def total(field: str, *statuses: Outcome) -> float:
+        words = {status.value for status in statuses}
+        return sum(number(row.get(field)) or 0 for row in results.rows.values() if row.get("status") in words)
+
+    ran, cached = total("seconds", Outcome.RAN), total("seconds", Outcome.CACHED)
+    return {"seconds": ran + cached, "ran": ran, "cached": cached,
+            "cpu": total("cpu_seconds", Outcome.RAN, Outcome.CACHED),
+            "bytes": sum(results.size(name) or 0 for name in results.order)}
+
+
+def parameters(results: Results) -> list[dict[str, Any]]:
+    """Of each stage of the run: name, value, meaning, and the default where the value is another."""
+    found = []
+    for name, row in results.rows.items():
+        values = row.get("params")
+        if not isinstance(values, dict) or not values:
+            continue
+        defaults, meaning = declared(results, name)
+        rows = [{"name": key, "value": word(value), "meaning": meaning.get(key, ""),
+                 "default": word(defaults[key]) if key in defaults and defaults[key] != value else None}
+                for key, value in values.items()]
+        found.append({"stage": name, "rows": rows, "changed": sum(row["default"] is not None for row in rows)})
+    return found
+
+
+def declared(results: Results, stage: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """Defaults and meanings of a stage's parameters; empty where the stage is not at hand."""
+    try:
+        config = results.project.stage(stage).config
+        return plain(config()), meanings(config)
+    except Exception:  # a stage of another version: the values alone are shown
+        return {}, {}
+
+
+def word(value: Any) -> str:
+    return "none" if value is None else str(value).lower() if isinstance(value, bool) else str(value) or "(empty)"
+
+
+def foot(results: Results) -> dict[str, list]:
+    """What is at hand now: network files, body model, versions. Results from the cache were made with the same ones."""
+    return {"models": networks(results), "body": body_model(results), "versions": versions(results)}
+
+
+def networks(results: Results) -> list[dict[str, str]]:
+    from gsac.avatar.models import MODELS
+    from gsac.stages.contract import make_config
+
+    found: dict[str, dict[str, str]] = {}
+    for name, row in results.rows.items():
+        try:
+            stage = results.project.stage(name)
+            needed = stage.models(make_config(stage, row.get("params") or {}))
+        except Exception:  # a stage of another version: what it needs is not known here
+            continue
+        for model in needed:
+            known = MODELS.get(model)
+            found[model] = {"name": model, "sha256": known.sha256 if known else "brought by the user",
+                            "licence": known.licence if known else "the user's to know"}
+    return list(found.values())
+
+
+def body_model(results: Results) -> list[dict[str, str]]:
+    for port in ("train/body.npz", "smplx/body.npz"):
+        try:
+            digest = body_digest(results.path(port))
+        except Exception:  # absent or unreadable: the body's section says so
+            continue
+        own = own_body_digest()
+        return [{"name": "open body" if digest == own else "body model", "sha256": digest or "not recorded",
+                 "licence": "CC0-1.0" if digest == own else "that of the file the user brought"}]
+    return []
+
+
+def body_digest(path) -> str:
+    from gsac.avatar.artifacts import read_arrays
+
+    return str(read_arrays(path)["model"])
+
+
+def own_body_digest() -> str:
+    import hashlib
+
+    from gsac.avatar.body import OPEN_BODY
+
+    return hashlib.sha256(OPEN_BODY.read_bytes()).hexdigest()
+
+
+def versions(results: Results) -> list[str]:
+    """`name version` of gsac, Python, and every distribution that a stage of the run declares."""
+    names = {"gsac"}
+    for name in results.rows:
+        try:
+            names |= set(results.project.stage(name).packages)
+        except Exception:  # a stage of another version
+            continue
+    found = [f"Python {platform.python_version()}"]
+    for name in sorted(names):
+        try:
+            found.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            found.append(f"{name} (not installed)")
+    return found
