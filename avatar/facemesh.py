@@ -96,11 +96,15 @@ class FaceMesh:
         right, left = points[0], points[1]
         return around_points(points, upright_angle(right, left, 0.0)).scaled(2.0).moved(0.0, -0.1)
 
-    def read(self, image: np.ndarray, region: Region) -> Face:
-        """One look of the mesh network."""
+    def read(self, image: np.ndarray, region: Region, mirror: np.ndarray | None = None) -> Face:
+        """One look of the mesh network; mirror: (468,) each point's mirror image, to look at the mirrored crop."""
         size = self._mesh.width
-        raw, presence = self._mesh(crop(image, region, size))
+        seen = crop(image, region, size)
+        raw, presence = self._mesh(seen if mirror is None else seen[:, ::-1])
         points = raw.reshape(POINTS, 3).astype(np.float64) / size
+        if mirror is not None:
+            points = points[mirror]
+            points[:, 0] = 1 - points[:, 0]
         xy = region.to_frame(points[:, :2])
         return Face(np.hstack([xy, points[:, 2:] * region.side]), float(sigmoid(presence.reshape(-1)[0])))
 

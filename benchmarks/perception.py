@@ -24,6 +24,10 @@ VISIBLE = 0.25
 BONES = [0] + [4 * finger + joint for finger in range(5) for joint in (1, 2, 3)]
 """Hand points that have a bone's head in the rendered truth: the wrist and three joints a finger."""
 
+ACTIONS = {"jaw": ("jawOpen",), "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
+           "smile": ("mouthSmileLeft", "mouthSmileRight"), "brow": ("browInnerUp",)}
+"""What the rendered clip moves."""
+
 
 def video_frames(path: Path) -> Iterator[np.ndarray]:
     """(H, W, 3) uint8 RGB frames."""
@@ -74,6 +78,15 @@ def run_keypoints(frames: Iterator[np.ndarray], name: str, folder: Path, store: 
     return read_arrays(ports["keypoints/keypoints.npz"]), notes, ports
 
 
+def run_face(ports: dict[str, Path], folder: Path, store: Path, **parameters) -> tuple[dict, dict]:
+    """Returns the arrays of face.npz and the notes of `run_stage`."""
+    from gsac.stages.face import STAGE
+    from gsac.stages.face.stage import run
+
+    notes = run_stage(STAGE, run, ports, folder / "face", store, **parameters)
+    return read_arrays(folder / "face" / "face.npz"), notes
+
+
 def score_squats(arrays: dict, reference: np.ndarray) -> dict:
     """reference: (T, 33, 3) px of an independent implementation of the same body network."""
     apart = np.linalg.norm(arrays["pose33"][..., :2] - reference[..., :2], axis=-1)
@@ -109,6 +122,23 @@ def score_truth(arrays: dict, truth: dict) -> dict:
             "hands_in_the_wrong_place": false, "face_found": round(float(face.mean()), 3),
             "face_found_within_75_deg": round(float(face[np.abs(yaw) < 75].mean()), 3),
             "face_found_beyond_110_deg": round(float(face[np.abs(yaw) > 110].mean()), 3)}
+
+
+def score_expression(face: dict, truth: dict) -> dict:
+    """Correlation with the rendered actions over the frames in which the stage calls the face seen, and the slope of
+    what it says against what is true; None where nothing moves."""
+    names = [str(name) for name in truth["expr_names"]]
+    out = {"face_valid": int(face["valid"].sum())}
+    for what, members in ACTIONS.items():
+        columns = [names.index(name) for name in members]
+        said = face["expression"][face["valid"]][:, columns].mean(axis=1)
+        true = truth["exprs"][face["valid"]][:, columns].mean(axis=1)
+        still = true.std() == 0 or said.std() == 0
+        out[what] = None if still else round(float(np.corrcoef(said, true)[0, 1]), 3)
+        out[f"{what}_slope"] = None if still else round(float(np.polyfit(true, said, 1)[0]), 2)
+    moved = [names.index(name) for members in ACTIONS.values() for name in members]
+    out["actions_at_rest_mean"] = round(float(np.delete(face["expression"][face["valid"]], moved, axis=1).mean()), 4)
+    return out
 
 
 def draw(arrays: dict, frames: list[Path], path: Path, columns: int = 6, rows: int = 3, height: int = 640) -> None:
@@ -156,6 +186,9 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             arrays, notes, ports = run_keypoints(frames, name, Path(folder), arguments.store)
             print(json.dumps({"clip": name, **score(arrays), **notes}))
+            face, notes = run_face(ports, Path(folder), arguments.store)
+            fit = score_expression(face, truth) if name == "truth-a" else {"face_valid": int(face["valid"].sum())}
+            print(json.dumps({"clip": name, **fit, **notes}))
             if arguments.draw:
                 draw(arrays, frame_paths(ports["split/frames"]), arguments.draw / f"{name}.png")
 

@@ -15,6 +15,6 @@ STAGE = Stage(
     inputs=("split/frames", "split/clip.json"),
     outputs=(Output("keypoints.npz", check_keypoints),),
     config=KeypointsConfig,
-    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert"),
+    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "onnxruntime"),
     models=lambda config: config.models(),
 )

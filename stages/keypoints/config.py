@@ -9,6 +9,8 @@ from gsac.stages.contract import BadInput
 MODELS = {
     "mediapipe": ("pose_detection", "pose_landmark_full", "hand_recrop", "palm_detection_full", "hand_landmark_full",
                   "face_detection_short_range", "face_landmark"),
+    "onnx-wholebody": ("pose_detection", "pose_landmark_full", "onnx-wholebody", "face_detection_short_range",
+                       "face_landmark"),
 }
 """Detector -> the network files it needs."""
 
@@ -16,7 +18,8 @@ MODELS = {
 @dataclass
 class KeypointsConfig:
     detector: str = "mediapipe"
-    """Which networks look: `mediapipe`."""
+    """Which networks look: `mediapipe`, or `onnx-wholebody`: a SimCC whole-body network (RTMW, DWPose) that you bring by
+    `gsac models add onnx-wholebody FILE`."""
     person_threshold: float = 0.5
     """Least confidence, 0..1, for a person to count as seen."""
     hand_threshold: float = 0.5

@@ -8,8 +8,9 @@ from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.keypoints.frame import ARRAYS, Frame
 from gsac.stages.keypoints.mediapipe import Mediapipe
+from gsac.stages.keypoints.simcc import Wholebody
 
-DETECTORS = {"mediapipe": Mediapipe}
+DETECTORS = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody}
 EDGE = 0.004
 """Width of the rim of the frame, as a part of its longer side, that counts as touching it."""
 

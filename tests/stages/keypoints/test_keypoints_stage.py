@@ -46,7 +46,7 @@ def stage_on(frames: list[np.ndarray], folder: Path, store: Path) -> tuple[dict,
 
 
 def test_a_wrong_parameter_is_named_with_its_choices():
-    with pytest.raises(BadInput, match="keypoints.detector is 'alphapose'; choices: mediapipe"):
+    with pytest.raises(BadInput, match="keypoints.detector is 'alphapose'; choices: mediapipe, onnx-wholebody"):
         KeypointsConfig(detector="alphapose").check()
     with pytest.raises(BadInput, match="keypoints.hand_threshold is 1.5"):
         KeypointsConfig(hand_threshold=1.5).check()

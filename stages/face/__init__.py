@@ -1,0 +1,20 @@
+"""face: what the face does in each frame in which it is seen, as the open body's 52 facial actions.
+
+takes  split/frames, split/clip.json, keypoints/keypoints.npz
+gives  face.npz: valid (T,) bool, expression (T,52) in 0..1 in the order of the body's expression_names, jaw (T,3) zeros
+       (the open body opens its mouth by jawOpen), shape (1404,) m the person's resting points less the body's,
+       landmarks (T,468,3) px or NaN
+"""
+
+from gsac.avatar.artifacts import check_face
+from gsac.stages.contract import Output, Stage
+from gsac.stages.face.config import FaceConfig
+
+STAGE = Stage(
+    name="face",
+    inputs=("split/frames", "split/clip.json", "keypoints/keypoints.npz"),
+    outputs=(Output("face.npz", check_face),),
+    config=FaceConfig,
+    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert"),
+    models=lambda config: ("face_detection_short_range", "face_landmark"),
+)

@@ -1,0 +1,42 @@
+"""Parameters of face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gsac.stages.contract import BadInput
+
+
+@dataclass
+class FaceConfig:
+    angle: float = 125.0
+    """A face counts as seen where it looks at least this far, degrees, away from the camera's own direction of view:
+    180 looks straight into the camera, 90 is a profile."""
+    threshold: float = 0.5
+    """Least confidence of the face network, 0..1."""
+    ridge: float = 0.002
+    """Pull of every action to 0, mm^2: larger is calmer."""
+    sparsity: float = 0.002
+    """Price of each action, mm^2: larger uses fewer actions."""
+    symmetry: float = 0.05
+    """Pull of left and right actions together, mm^2."""
+    noise: float = 0.0002
+    """Price of the network's own wavering, mm^2: larger reads more of it as action."""
+    identity: float = 3.0
+    """How far, mm, the person's resting points may differ from the open body's."""
+    smooth: float = 0.04
+    """Standard deviation, s, of the smoothing over time; 0 is none. Photos have no time and are not smoothed."""
+    rest_time: float = 0.2
+    """Time, s, in which an unseen face falls back to rest by a factor e."""
+
+    def check(self) -> None:
+        if not 90 <= self.angle < 180:
+            raise BadInput(f"face.angle is {self.angle}; expected degrees from 90 to below 180")
+        if not 0 < self.threshold < 1:
+            raise BadInput(f"face.threshold is {self.threshold}; expected a number between 0 and 1")
+        for name in ("ridge", "noise", "identity", "rest_time"):
+            if not getattr(self, name) > 0:
+                raise BadInput(f"face.{name} is {getattr(self, name)}; expected a number above 0")
+        for name in ("sparsity", "symmetry", "smooth"):
+            if getattr(self, name) < 0:
+                raise BadInput(f"face.{name} is {getattr(self, name)}; expected 0 or more")

@@ -1,0 +1,67 @@
+"""Looks again at every face that keypoints found, closely, and fits the facial actions; writes face.npz."""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_arrays
+from gsac.avatar.facemesh import POINTS, FaceMesh
+from gsac.avatar.wholebody import INDEX
+from gsac.stages.contract import Job, StageError
+from gsac.stages.face.actions import Actions, fill, smooth, solve
+from gsac.stages.face.landmarks import align, look
+
+NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
+DOUBT = 0.1
+
+
+def run(job: Job) -> None:
+    clip = Clip.read(job.inputs["split/clip.json"])
+    paths = frame_paths(job.inputs["split/frames"])
+    keypoints = read_arrays(job.inputs["keypoints/keypoints.npz"])
+    if len(keypoints["score"]) != len(paths):
+        raise StageError(f"keypoints.npz has {len(keypoints['score'])} frames but split has {len(paths)}; "
+                         "run keypoints again")
+    actions = Actions.load()
+    landmarks, points, weight, direction = read_clip(job, paths, keypoints, actions)
+    valid = np.isfinite(landmarks[:, 0, 0])
+    times = None if clip.timestamps_s is None else np.array(clip.timestamps_s)
+    config = job.config
+    if valid.any():
+        c, offset = solve(points[valid], weight[valid], direction[valid], actions, config.ridge, config.sparsity,
+                          config.symmetry, config.noise, config.identity)
+        if times is not None and config.smooth > 0:
+            c = smooth(c, times[valid], config.smooth)
+    else:
+        c, offset = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
+        job.warn("The face was never seen from the front; the avatar's face stays at rest.")
+    expression = fill(c, valid, times, config.rest_time)
+    write_arrays(job.out / "face.npz", valid=valid, expression=expression.astype(np.float32),
+                 jaw=np.zeros((len(paths), 3), np.float32), shape=offset.ravel().astype(np.float32),
+                 landmarks=landmarks.astype(np.float32))
+
+
+def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple[np.ndarray, ...]:
+    """Returns landmarks (T, 468, 3) px, NaN where the face is turned away or not believed, and of those frames, aligned
+    points (T, 468, 3) m, weights (T, 468) and where the face looks (T, 3); zeros elsewhere."""
+    mesh = FaceMesh(job.models)
+    T = len(paths)
+    landmarks = np.full((T, POINTS, 3), np.nan)
+    points, weight, direction = np.zeros((T, POINTS, 3)), np.zeros((T, POINTS)), np.zeros((T, 3))
+    least = -np.cos(np.radians(job.config.angle))
+    for t, path in enumerate(paths):
+        seen = keypoints["face_mesh"][t]
+        if np.isfinite(seen[0, 0]) and not turned_away(keypoints["world"][t], least):
+            face = look(mesh, read_frame(path), seen, actions.mirror)
+            aligned, looks = align(face.points, actions.neutral, face.facing())
+            if face.presence >= job.config.threshold and looks[2] >= least:
+                landmarks[t], points[t], weight[t], direction[t] = face.points, aligned, face.facing(), looks
+        job.progress(t + 1, T, "frames")
+    return landmarks, points, weight, direction
+
+
+def turned_away(world: np.ndarray, least: float) -> bool:
+    """world: (133, 3) m or NaN. Whether the body's own head points say that the face looks away from the camera: the face
+    network alone sees frontal faces in profiles. `DOUBT` allows for what those points are worth."""
+    forward = world[NOSE] - world[EARS].mean(axis=0)
+    toward = -forward[2] / max(np.hypot(forward[0], forward[2]), 1e-9)
+    return bool(np.isfinite(toward) and toward < least - DOUBT)

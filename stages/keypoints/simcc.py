@@ -1,0 +1,97 @@
+"""A whole-body network with SimCC outputs (RTMPose, RTMW, DWPose; 133 points), brought by the user as an ONNX file.
+
+Its input is 3 x H x W, RGB less ImageNet's mean; its outputs are a score for each half pixel along x and along y.
+BlazePose finds the person and gives the metres, the face mesh network what `face` needs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from gsac.avatar.facemesh import FaceMesh, head_yaw, region_of_head
+from gsac.avatar.wholebody import HANDS
+from gsac.stages.contract import BadInput
+from gsac.stages.keypoints.config import KeypointsConfig
+from gsac.stages.keypoints.follow import Follower
+from gsac.stages.keypoints.frame import Frame
+from gsac.stages.keypoints.mediapipe import write_body
+
+MEAN = np.array([123.675, 116.28, 103.53], np.float32)
+DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)
+PADDING = 1.25
+POINTS = 133
+
+
+class Wholebody:
+    """models: name -> file, those of `config.models()`."""
+
+    def __init__(self, models: dict[str, Path], config: KeypointsConfig):
+        import onnxruntime
+
+        self._config = config
+        self._follower = Follower(models, config)
+        self._face = FaceMesh(models)
+        self._session = onnxruntime.InferenceSession(str(models["onnx-wholebody"]), providers=["CPUExecutionProvider"])
+        self._input = self._session.get_inputs()[0]
+        shape, outputs = self._input.shape, self._session.get_outputs()
+        if len(shape) != 4 or not all(isinstance(n, int) for n in shape[2:]) or len(outputs) != 2:
+            raise BadInput(f"model file onnx-wholebody has input {shape} and {len(outputs)} outputs; expected a SimCC "
+                           "network of 133 points: input [N, 3, height, width] and the two outputs simcc_x, simcc_y")
+        self._height, self._width = shape[2:]
+
+    def look(self, image: np.ndarray) -> Frame:
+        """image: (H, W, 3) uint8 RGB, the next frame of the clip."""
+        frame = Frame()
+        pose = self._follower.look(image, frame)
+        if pose is None:
+            return frame
+        write_body(frame, pose)
+        head = region_of_head(pose.points[:11])
+        face = self._face.find(image, head, head_yaw(pose.world), self._config.face_threshold)
+        if face is not None:
+            frame.face_mesh[:] = face.points
+        to_frame = crop_matrix(pose.points, self._width, self._height)
+        frame.xy[:], frame.score[:] = self._points(image, to_frame)
+        drop_doubled_hand(frame)
+        return frame
+
+    def _points(self, image: np.ndarray, to_frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """xy (133, 2) px of the frame and score (133,)."""
+        import cv2
+
+        # OpenCV counts from pixel centres at 0, we from their corners.
+        centre = to_frame + [[0, 0, -0.5], [0, 0, -0.5]]
+        centre[:, 2] += to_frame[:, :2] @ [0.5, 0.5]
+        crop = cv2.warpAffine(image, centre, (self._width, self._height), flags=cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR)
+        ready = ((crop - MEAN) / DEVIATION).transpose(2, 0, 1)[None].astype(np.float32)
+        x, y = self._session.run(None, {self._input.name: ready})
+        if x.shape[1] != POINTS:
+            raise BadInput(f"model file onnx-wholebody gives {x.shape[1]} points; expected COCO-WholeBody's {POINTS}")
+        xy, score = decode(x[0], y[0], self._width, self._height)
+        return xy @ to_frame[:, :2].T + to_frame[:, 2], np.clip(score, 0, 1)
+
+
+def crop_matrix(points: np.ndarray, width: int, height: int) -> np.ndarray:
+    """points: (n, 2) px that span the person. Returns (2, 3): crop pixels to frame pixels, the padded box of the
+    points at the crop's aspect, upright."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    scale = float(((high - low) * PADDING / [width, height]).max())
+    middle = (low + high) / 2
+    return np.array([[scale, 0, middle[0] - scale * width / 2], [0, scale, middle[1] - scale * height / 2]])
+
+
+def decode(x: np.ndarray, y: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """x: (n, bins), y: (n, bins) scores along the axes of a width x height crop. Returns the places (n, 2) px of the
+    crop and their scores (n,), the lesser of the two axes' peaks (Li et al. 2022)."""
+    at = np.stack([x.argmax(axis=1) * width / x.shape[1], y.argmax(axis=1) * height / y.shape[1]], axis=1)
+    return at + 0.5, np.minimum(x.max(axis=1), y.max(axis=1))
+
+
+def drop_doubled_hand(frame: Frame) -> None:
+    """Takes the score of the less sure hand where both hands' points lie on one hand of the picture."""
+    left, right = HANDS["left"], HANDS["right"]
+    size = min(np.ptp(frame.xy[left], axis=0).max(), np.ptp(frame.xy[right], axis=0).max())
+    if np.median(np.linalg.norm(frame.xy[left] - frame.xy[right], axis=1)) < size / 4:
+        loser = left if frame.score[left].mean() < frame.score[right].mean() else right
+        frame.score[loser] = 0

@@ -1,0 +1,80 @@
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import Clip, read_arrays, write_arrays
+from gsac.avatar.body import Body
+from gsac.avatar.models import ModelMissingError, model_path
+from gsac.benchmarks.perception import run_face, run_keypoints, score_expression, video_frames, write_split
+from gsac.stages.contract import StageError
+from gsac.stages.face import STAGE
+from gsac.stages.face.config import FaceConfig
+
+FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
+
+
+@pytest.fixture(scope="module")
+def store() -> Path:
+    root = Path(os.environ.get("GSAC_CACHE", "~/.cache/gsac")).expanduser()
+    try:
+        for name in STAGE.models(FaceConfig()):
+            model_path(name, root)
+    except ModelMissingError as missing:
+        pytest.skip(str(missing))
+    return root
+
+
+def need(path: Path) -> Path:
+    if not path.exists():
+        pytest.skip(f"footage {path.parent.name}/{path.name} is not here")
+    return path
+
+
+def unseen(folder: Path, frames: int, said: int) -> dict[str, Path]:
+    """Ports of a clip of grey frames whose keypoints, of `said` frames, saw no face."""
+    ports = write_split(iter([np.full((64, 48, 3), 120, np.uint8)] * frames), folder / "split", "back.mp4")
+    ports["keypoints/keypoints.npz"] = folder / "keypoints.npz"
+    write_arrays(folder / "keypoints.npz", score=np.zeros((said, 133)), world=np.full((said, 133, 3), np.nan),
+                 face_mesh=np.full((said, 468, 3), np.nan))
+    return ports
+
+
+def test_a_face_that_is_never_seen_rests_with_a_warning(tmp_path, store):
+    face, notes = run_face(unseen(tmp_path, 3, 3), tmp_path, store)
+    assert not face["valid"].any() and face["expression"].shape == (3, 52) and not face["expression"].any()
+    assert np.isnan(face["landmarks"]).all() and not face["shape"].any()
+    assert notes["warnings"] == ["The face was never seen from the front; the avatar's face stays at rest."]
+
+
+def test_keypoints_of_another_clip_are_refused(tmp_path, store):
+    with pytest.raises(StageError, match="keypoints.npz has 2 frames but split has 3"):
+        run_face(unseen(tmp_path, 3, 2), tmp_path, store)
+
+
+@pytest.mark.footage
+@pytest.mark.slow
+def test_actions_of_the_rendered_clip_are_read_from_its_small_face(tmp_path, store):
+    truth = read_arrays(need(FOOTAGE / "truth-a" / "truth.npz"))
+    assert tuple(str(n) for n in truth["expr_names"]) == Body.load().expression_names
+    frames = list(video_frames(need(FOOTAGE / "truth-a" / "clip.mp4")))
+    near = [t for t in range(60) if min(t, 60 - t) <= 13]
+    _, _, ports = run_keypoints(iter([frames[t] for t in near]), "truth-a", tmp_path, store)
+    face, _ = run_face(ports, tmp_path, store)
+    figures = score_expression(face, {**truth, "exprs": truth["exprs"][near]})
+    assert figures["face_valid"] >= 13
+    assert figures["jaw"] >= 0.9 and figures["blink"] >= 0.8 and figures["smile"] >= 0.8 and figures["brow"] >= 0.6
+    assert figures["actions_at_rest_mean"] < 0.06
+
+
+@pytest.mark.footage
+def test_photos_have_no_time_so_an_unseen_face_rests_at_once(tmp_path, store):
+    frames = list(video_frames(need(FOOTAGE / "truth-a" / "clip.mp4")))
+    _, _, ports = run_keypoints(iter([frames[3], frames[30]]), "photos", tmp_path, store)
+    clip = Clip.read(ports["split/clip.json"])
+    clip.timestamps_s = clip.fps = None
+    clip.write(ports["split/clip.json"])
+    face, notes = run_face(ports, tmp_path, store)
+    assert face["valid"].tolist() == [True, False]
+    assert not face["expression"][1].any() and np.isfinite(face["landmarks"][0]).all()
+    assert notes["warnings"] == []
