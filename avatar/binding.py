@@ -75,8 +75,8 @@ def bind_backward(vertices: np.ndarray, faces: np.ndarray, face: np.ndarray, mu:
     real = vertices.dtype
     mu = plain(mu, real)
     out = BindingGradients(np.empty_like(mu), np.empty((len(mu), 4), real), np.empty_like(mu), np.empty_like(vertices))
-    backward(Workspace(1).share, vertices, plain(faces, np.int32), plain(face, np.int32), mu, plain(quat, real), plain(log_scale, real),
-             plain(grad_means, real), plain(grad_rotations, real), plain(grad_scales, real),
+    backward(Workspace(1).share, vertices, plain(faces, np.int32), plain(face, np.int32), mu, plain(quat, real),
+             plain(log_scale, real), plain(grad_means, real), plain(grad_rotations, real), plain(grad_scales, real),
              np.empty((len(mu), 9), real), out)
     return out
 
@@ -89,7 +89,10 @@ def plain(array: np.ndarray, dtype=None) -> np.ndarray:
 
 
 def forward(share, vertices, faces, used, frames: FaceFrames, face, mu, quat, log_scale, out: Bound) -> None:
-    """Frames of the faces that carry gaussians, then the binding, into given buffers; share: a workspace's; used: (F,) bool scratch."""
+    """Frames of the faces that carry gaussians, then the binding, into given buffers.
+
+    share: a workspace's; used: (F,) bool scratch.
+    """
     _used_frames(vertices, faces, face, used, *frames)
     share(_bind, frames.R, frames.T, frames.k, face, mu, quat, log_scale, *out)
 

@@ -38,11 +38,9 @@ def ssim(image, target, box=None, weights=None, factor: float = 1.0, gradient=No
     """Mean structural similarity (1 for equal images): 11x11 gaussian window, sigma 1.5, zero padding, data range 1."""
     job = _Crop(image, target, box, weights, gradient, workspace)
     scratch = job.take("ssim_scratch", (job.workspace.workers, _ssim.SCRATCH))
-    slopes = job.take("ssim_slopes", (3, job.height, job.stride))
     sums = np.empty((job.height, -(-job.count // _ssim.STRIP)), job.real)
-    job.workspace.share(_ssim.similarity, *job.place, job.height, job.count, job.shares, scratch, slopes, sums)
-    job.workspace.share(_ssim.similarity_backward, *job.place, job.height, job.count, job.real.type(factor), scratch, slopes,
-                        job.flat_gradient)
+    job.workspace.share(_ssim.similarity, *job.place, job.height, job.count, job.shares, job.real.type(factor), scratch,
+                        job.flat_gradient, sums)
     return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
 
 

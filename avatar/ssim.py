@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from gsac.avatar.kernel import kernel
 from gsac.avatar.lanes import WIDTH, load, spread, store, total
 
@@ -17,8 +16,8 @@ REACH = 5
 ROWS = 2 * REACH + 1
 MARGIN = 16
 """Zeros before and after a row: at least 3 * REACH."""
-STRIP = 128
-"""Numbers of a row that are worked on at a time, so that eleven rows of four planes stay in the first cache."""
+STRIP = 256
+"""Numbers of a row that are worked on at a time."""
 C1, C2 = 0.01**2, 0.03**2
 
 _weights = [math.exp(-(i**2) / (2 * 1.5**2)) for i in range(REACH + 1)]
@@ -26,7 +25,9 @@ _sum = _weights[0] + 2 * sum(_weights[1:])
 W0, W1, W2, W3, W4, W5 = (w / _sum for w in _weights)
 
 
-SCRATCH = 4 * (STRIP + 2 * MARGIN) + 4 * ROWS * STRIP
+WIDE, LONG = STRIP + 2 * MARGIN, STRIP + 4 * MARGIN
+"""A strip with what its gradient needs of its neighbours, and with what that needs."""
+SCRATCH = 4 * LONG + (8 * ROWS + 3) * WIDE + 6 * ROWS * STRIP
 """Numbers of scratch that a worker needs."""
 
 
@@ -43,27 +44,33 @@ def _across(row, at):
 
 
 @kernel
-def _down(ring, at, step, row):
-    """The window down the ring of eleven rows, around `row`; at: index inside a ring row, step: its length."""
-    real = ring.dtype.type
-    r = np.uint64(row + ROWS)
-    value = load(ring, at + (r % ROWS) * step) * real(W0)
-    value = value + (load(ring, at + (r - 1) % ROWS * step) + load(ring, at + (r + 1) % ROWS * step)) * real(W1)
-    value = value + (load(ring, at + (r - 2) % ROWS * step) + load(ring, at + (r + 2) % ROWS * step)) * real(W2)
-    value = value + (load(ring, at + (r - 3) % ROWS * step) + load(ring, at + (r + 3) % ROWS * step)) * real(W3)
-    value = value + (load(ring, at + (r - 4) % ROWS * step) + load(ring, at + (r + 4) % ROWS * step)) * real(W4)
-    return value + (load(ring, at + (r - 5) % ROWS * step) + load(ring, at + (r + 5) % ROWS * step)) * real(W5)
+def _down(rows, at, step):
+    """The window down eleven rows; at: index in the first of them, step: their length."""
+    real = rows.dtype.type
+    value = load(rows, at + 5 * step) * real(W0)
+    value = value + (load(rows, at + 4 * step) + load(rows, at + 6 * step)) * real(W1)
+    value = value + (load(rows, at + 3 * step) + load(rows, at + 7 * step)) * real(W2)
+    value = value + (load(rows, at + 2 * step) + load(rows, at + 8 * step)) * real(W3)
+    value = value + (load(rows, at + step) + load(rows, at + 9 * step)) * real(W4)
+    return value + (load(rows, at) + load(rows, at + 10 * step)) * real(W5)
 
 
 @kernel
-def padded_row(flat, start, count, first, row, at):
-    """Copies numbers first - MARGIN .. first + STRIP + MARGIN of a crop's row to `row[at:]`, zeros outside 0 .. count.
+def _keep(rows, at, step, value):
+    """Writes to a row and to its double eleven rows below, so that any eleven successive rows lie in one piece."""
+    store(rows, at, value)
+    store(rows, at + ROWS * step, value)
+
+
+@kernel
+def _padded_row(flat, start, count, first, row, at):
+    """Copies `LONG` numbers from first - 2 MARGIN on of a crop's row to `row[at:]`, zeros outside 0 .. count.
 
     start: index of the crop row's first number in the flat image.
     """
     real = row.dtype.type
-    for i in range(0, STRIP + 2 * MARGIN, WIDTH):
-        begin = first - MARGIN + i
+    for i in range(0, LONG, WIDTH):
+        begin = first - 2 * MARGIN + i
         if begin >= 0 and begin + WIDTH <= count:
             store(row, at + i, load(flat, start + begin))
         else:
@@ -72,102 +79,90 @@ def padded_row(flat, start, count, first, row, at):
 
 
 @kernel
-def similarity(worker, workers, image, target, pitch, start, height, count, shares, scratch, slopes, sums):
-    """Slopes (3, height, stride) of the mean with respect to mx, q, p, times each number's share; sums (height, strips).
+def similarity(worker, workers, image, target, pitch, start, height, count, shares, factor, scratch, gradient, sums):
+    """Adds factor times the mean's gradient with respect to the image to `gradient`; sums (height, strips) add up to the mean.
 
-    image, target: flat; pitch: numbers of a full row; start: index of the crop's first number; count: numbers of a crop row;
-    shares (1 or height, stride): share of each number in the mean, zero past the row's end; scratch: (workers, SCRATCH).
+    image, target, gradient: flat; pitch: numbers of a full row; start: index of the crop's first number; count: numbers of a crop
+    row; shares (1 or height, padded row): share of each number in the mean, zero in the margins; scratch: (workers, SCRATCH).
+    All that is between the images and the gradient rolls through a few rows of a strip and never leaves the cache.
     """
     real = image.dtype.type
-    two, c1, c2 = real(2), spread(real(C1)), spread(real(C2))
+    two, zero, c1, c2 = real(2), spread(real(0)), spread(real(C1)), spread(real(C2))
     state = scratch[worker]
-    long = STRIP + 2 * MARGIN
-    rings = 4 * long
-    plane = ROWS * STRIP
+    x_row, y_row, q_row, p_row = 0, LONG, 2 * LONG, 3 * LONG
+    means = 4 * LONG
+    plane, slope_plane = 2 * ROWS * WIDE, 2 * ROWS * STRIP
+    of_mx = means + 4 * plane
+    of_q, of_p, slopes = of_mx + WIDE, of_mx + 2 * WIDE, of_mx + 3 * WIDE
     begin, end = height * worker // workers, height * (worker + 1) // workers
     for first in range(0, count, STRIP):
-        wide = min(STRIP, -(-(count - first) // WIDTH) * WIDTH)
-        for row in range(begin - REACH, end + REACH):
-            ring = rings + (row + ROWS) % ROWS * STRIP
+        narrow = min(STRIP, -(-(count - first) // WIDTH) * WIDTH)
+        wide = narrow + 2 * MARGIN
+        for row in range(begin - 2 * REACH, end + 2 * REACH):
+            ring = means + (row + 2 * ROWS) % ROWS * WIDE
             if 0 <= row < height:
-                padded_row(image, start + row * pitch, count, first, state, 0)
-                padded_row(target, start + row * pitch, count, first, state, long)
-                for i in range(0, long, WIDTH):
-                    x, y = load(state, i), load(state, long + i)
-                    store(state, 2 * long + i, x * x + y * y)
-                    store(state, 3 * long + i, x * y)
+                _padded_row(image, start + row * pitch, count, first, state, x_row)
+                _padded_row(target, start + row * pitch, count, first, state, y_row)
+                for i in range(0, LONG, WIDTH):
+                    x, y = load(state, x_row + i), load(state, y_row + i)
+                    store(state, q_row + i, x * x + y * y)
+                    store(state, p_row + i, x * y)
                 for i in range(0, wide, WIDTH):
-                    store(state, ring + i, _across(state, MARGIN + i))
-                    store(state, ring + plane + i, _across(state, long + MARGIN + i))
-                    store(state, ring + 2 * plane + i, _across(state, 2 * long + MARGIN + i))
-                    store(state, ring + 3 * plane + i, _across(state, 3 * long + MARGIN + i))
+                    _keep(state, ring + i, WIDE, _across(state, x_row + MARGIN + i))
+                    _keep(state, ring + plane + i, WIDE, _across(state, y_row + MARGIN + i))
+                    _keep(state, ring + 2 * plane + i, WIDE, _across(state, q_row + MARGIN + i))
+                    _keep(state, ring + 3 * plane + i, WIDE, _across(state, p_row + MARGIN + i))
             else:
-                for i in range(4):
-                    state[ring + i * plane:ring + i * plane + STRIP] = real(0)
-            middle = row - REACH
-            if middle < begin:
-                continue
-            share_row = shares[min(middle, len(shares) - 1)]
-            to_mx, to_q, to_p = slopes[0, middle], slopes[1, middle], slopes[2, middle]
-            value = spread(real(0))
-            for i in range(0, wide, WIDTH):
-                mx, my = _down(state, rings + i, STRIP, middle), _down(state, rings + plane + i, STRIP, middle)
-                q, p = _down(state, rings + 2 * plane + i, STRIP, middle), _down(state, rings + 3 * plane + i, STRIP, middle)
-                squares, product = mx * mx + my * my, mx * my
-                a1, a2 = product * two + c1, (p - product) * two + c2
-                b1, b2 = squares + c1, q - squares + c2
-                part = load(share_row, MARGIN + first + i)
-                scale = part / (b1 * b2)
-                s = a1 * a2 * scale
-                value = value + s
-                over_b2 = s / b2
-                store(to_mx, MARGIN + first + i, ((a2 - a1) * my * scale + (over_b2 - s / b1) * mx) * two)
-                store(to_q, MARGIN + first + i, spread(real(0)) - over_b2)
-                store(to_p, MARGIN + first + i, a1 * scale * two)
-            sums[middle, first // STRIP] = total(value)
-    for row in range(begin, end):
-        for i in range(3):
-            slopes[i, row, :MARGIN] = real(0)
-            slopes[i, row, -MARGIN:] = real(0)
-
-
-@kernel
-def similarity_backward(worker, workers, image, target, pitch, start, height, count, factor, scratch, slopes, gradient):
-    """Adds factor times the mean's gradient with respect to the image to `gradient` (flat)."""
-    real = image.dtype.type
-    two = real(2)
-    state = scratch[worker]
-    rings = 3 * WIDTH
-    plane = ROWS * STRIP
-    begin, end = height * worker // workers, height * (worker + 1) // workers
-    for first in range(0, count, STRIP):
-        wide = min(STRIP, -(-(count - first) // WIDTH) * WIDTH)
-        for row in range(begin - REACH, end + REACH):
-            ring = rings + (row + ROWS) % ROWS * STRIP
-            if 0 <= row < height:
-                of_mx, of_q, of_p = slopes[0, row], slopes[1, row], slopes[2, row]
                 for i in range(0, wide, WIDTH):
-                    at = MARGIN + first + i
-                    store(state, ring + i, _across(of_mx, at))
-                    store(state, ring + plane + i, _across(of_q, at))
-                    store(state, ring + 2 * plane + i, _across(of_p, at))
-            else:
-                for i in range(3):
-                    state[ring + i * plane:ring + i * plane + STRIP] = real(0)
+                    for j in range(4):
+                        _keep(state, ring + j * plane + i, WIDE, zero)
             middle = row - REACH
-            if middle < begin:
+            if middle < begin - REACH:
                 continue
-            for i in range(0, wide, WIDTH):
-                mx, q = _down(state, rings + i, STRIP, middle), _down(state, rings + plane + i, STRIP, middle)
-                p = _down(state, rings + 2 * plane + i, STRIP, middle)
-                at = start + middle * pitch + first + i
+            ring = slopes + (middle + 2 * ROWS) % ROWS * STRIP
+            if 0 <= middle < height:
+                share_row = shares[min(middle, len(shares) - 1)]
+                value = zero
+                window = means + (middle - REACH + 2 * ROWS) % ROWS * WIDE
+                for i in range(0, wide, WIDTH):
+                    mx, my = _down(state, window + i, WIDE), _down(state, window + plane + i, WIDE)
+                    q, p = _down(state, window + 2 * plane + i, WIDE), _down(state, window + 3 * plane + i, WIDE)
+                    squares, product = mx * mx + my * my, mx * my
+                    a1, a2 = product * two + c1, (p - product) * two + c2
+                    b1, b2 = squares + c1, q - squares + c2
+                    scale = load(share_row, first + i) / (b1 * b2)
+                    s = a1 * a2 * scale
+                    over_b2 = s / b2
+                    store(state, of_mx + i, ((a2 - a1) * my * scale + (over_b2 - s / b1) * mx) * two)
+                    store(state, of_q + i, zero - over_b2)
+                    store(state, of_p + i, a1 * scale * two)
+                    if i >= MARGIN and i < MARGIN + narrow:
+                        value = value + s
+                if begin <= middle < end:
+                    sums[middle, first // STRIP] = total(value)
+                for i in range(0, narrow, WIDTH):
+                    _keep(state, ring + i, STRIP, _across(state, of_mx + MARGIN + i))
+                    _keep(state, ring + slope_plane + i, STRIP, _across(state, of_q + MARGIN + i))
+                    _keep(state, ring + 2 * slope_plane + i, STRIP, _across(state, of_p + MARGIN + i))
+            else:
+                for i in range(0, narrow, WIDTH):
+                    for j in range(3):
+                        _keep(state, ring + j * slope_plane + i, STRIP, zero)
+            out = middle - REACH
+            if out < begin:
+                continue
+            window = slopes + (out - REACH + 2 * ROWS) % ROWS * STRIP
+            for i in range(0, narrow, WIDTH):
+                mx, q = _down(state, window + i, STRIP), _down(state, window + slope_plane + i, STRIP)
+                p = _down(state, window + 2 * slope_plane + i, STRIP)
+                at = start + out * pitch + first + i
                 if first + i + WIDTH <= count:
                     own = mx + q * load(image, at) * two + p * load(target, at)
                     store(gradient, at, load(gradient, at) + own * factor)
                 else:
-                    store(state, 0, mx)
-                    store(state, WIDTH, q)
-                    store(state, 2 * WIDTH, p)
+                    store(state, x_row, mx)
+                    store(state, x_row + WIDTH, q)
+                    store(state, x_row + 2 * WIDTH, p)
                     for j in range(count - first - i):
                         own = state[j] + two * state[WIDTH + j] * image[at + j] + state[2 * WIDTH + j] * target[at + j]
                         gradient[at + j] += own * factor

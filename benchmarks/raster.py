@@ -1,18 +1,19 @@
 """Time of the CPU rasteriser against a vectorised torch implementation of the same tiles, in the same run.
 
-`python -m gsac.benchmarks.raster [--sizes 270 540 1080] [--repeats 20] [--threads 1] [--json FILE]`
+`python -m gsac.benchmarks.raster [--scene figure|body] [--sizes 270 540 1080] [--repeats 20] [--threads 1] [--json FILE]`
 Figures are process CPU time, the best of many: a busy host disturbs them least.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import time
 from pathlib import Path
 
 import numpy as np
-from gsac.avatar import binding, raster
+from gsac.avatar import losses, raster
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 
@@ -56,13 +57,18 @@ def camera_for(vertices: np.ndarray, size: int) -> Camera:
     return Camera((focal, focal), (size / 2, size / 2), size, size)
 
 
-def scene() -> tuple[np.ndarray, np.ndarray, Gaussians, str]:
-    """The open body with lowered arms where the package has it, else the ellipsoid figure; 25,000 gaussians on it."""
-    vertices, faces = figure()
+def scene(name: str) -> tuple[np.ndarray, np.ndarray, Gaussians]:
+    """`figure` (ellipsoids) or `body` (the open body, T-pose): vertices, faces, 25,000 gaussians of random colour."""
+    if name == "body":
+        from gsac.avatar.body import Body
+
+        body = Body.load()
+        vertices, faces = in_front(body.v_template), body.faces
+    else:
+        vertices, faces = figure()
     gaussians = Gaussians.area(vertices, faces, COUNT, seed=0)
-    random = np.random.default_rng(0)
-    gaussians.rgb[:] = random.random(gaussians.rgb.shape)
-    return vertices, faces, gaussians, "ellipsoids"
+    gaussians.rgb[:] = np.random.default_rng(0).random(gaussians.rgb.shape)
+    return vertices, faces, gaussians
 
 
 def best(repeats: int, work) -> float:
@@ -75,88 +81,111 @@ def best(repeats: int, work) -> float:
     return 1e3 * least
 
 
-def torch_tiles(state: raster.State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) -> float:
-    """CPU ms of one forward and backward pass of the same tiles by torch autograd, one thread; checks the image too.
+def composited(state: raster.State) -> tuple[np.ndarray, np.ndarray]:
+    """Gaussian and pixel of every (gaussian, pixel) that the tiles composite, pixel by pixel, front to back."""
+    size, column = raster.project.TILE, raster.project
+    height, width = state.alpha.shape
+    y, x = (g.reshape(-1) for g in np.mgrid[:size, :size])
+    gaussians, pixels = [], []
+    for tile in range(len(state.tile_start) - 1):
+        top, left = tile // state.columns * size, tile % state.columns * size
+        own = state.pair_gaussian[state.tile_start[tile]:state.tile_start[tile + 1]]
+        splats = state.splats[own][:, :, None]
+        dx, dy = x + np.float32(left + 0.5) - splats[:, column.X], y + np.float32(top + 0.5) - splats[:, column.Y]
+        s = (splats[:, column.HA] * dx + splats[:, column.B] * dy) * dx + splats[:, column.HC] * dy * dy
+        seen = (s <= splats[:, column.S_MAX]) & (x + left < width) & (y + top < height)
+        alpha = np.where(seen, np.minimum(splats[:, column.OPACITY] * np.exp(-s), 0.999), 0)
+        seen &= np.cumprod(1 - alpha, axis=0) > 1e-4
+        pixel, turn = np.nonzero(seen.T)
+        gaussians.append(own[turn])
+        pixels.append((y[pixel] + top) * width + x[pixel] + left)
+    return np.concatenate(gaussians).astype(np.int64), np.concatenate(pixels).astype(np.int64)
 
-    Vectorised over (gaussian, pixel) of a tile: exponent, alpha, transmittance by cumulative product, weights.
+
+def torch_step(state: raster.State, grad_rgb: np.ndarray, grad_alpha: np.ndarray, repeats: int) -> tuple[float, int]:
+    """CPU ms, best of a few, of compositing forward and backward in torch on one thread, and the number of (gaussian, pixel)s.
+
+    Vectorised over what the same tiles composite (list made before the clock starts: no work on pairs that do not show), as
+    gsplat's torch formula does it: exponent, alpha, transmittance by a segmented sum of logarithms, weighted sums by index.
+    The image must agree with the kernels'.
     """
     import torch
 
     torch.set_num_threads(1)
-    size = raster.project.TILE
-    projection = raster.project
-    splats = torch.tensor(state.splats, requires_grad=True)
+    column = raster.project
     height, width = state.alpha.shape
-    padded = [-(-side // size) * size for side in (height, width)]
-    wanted = torch.zeros(*padded, 4)
-    wanted[:height, :width, :3], wanted[:height, :width, 3] = torch.tensor(grad_rgb), torch.tensor(grad_alpha)
-    y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
-    start = time.process_time()
-    worst = 0.0
-    for tile in range(len(state.tile_start) - 1):
-        first, end = state.tile_start[tile], state.tile_start[tile + 1]
-        if first == end:
-            continue
-        row, column = divmod(tile, state.columns)
-        top, left = row * size, column * size
-        part = splats[torch.from_numpy(state.pair_gaussian[first:end].astype(np.int64))]
-        dx = (x + left).reshape(1, -1) - part[:, projection.X, None]
-        dy = (y + top).reshape(1, -1) - part[:, projection.Y, None]
-        s = (part[:, projection.HA, None] * dx + part[:, projection.B, None] * dy) * dx + part[:, projection.HC, None] * dy * dy
-        alpha = (part[:, projection.OPACITY, None] * torch.exp(-s)).clamp(max=0.999)
-        alpha = torch.where(alpha >= 1 / 255, alpha, 0.0)
-        after = torch.cumprod(1 - alpha, 0)
-        before = torch.cat([torch.ones_like(after[:1]), after[:-1]])
-        weight = torch.where(after > 1e-4, before * alpha, 0.0)
-        colour = torch.cat([part[:, projection.RED:projection.BLUE + 1], torch.ones(len(part), 1)], 1)
-        image = (weight.T @ colour).reshape(size, size, 4)
-        image.backward(wanted[top:top + size, left:left + size])
-        got = image.detach()[:height - top, :width - left].numpy()
-        worst = max(worst, np.abs(got[..., 3] - state.alpha[top:top + size, left:left + size]).max())
-    seconds = time.process_time() - start
+    gaussian, pixel = (torch.from_numpy(a) for a in composited(state))
+    first = torch.cat([torch.ones(1, dtype=torch.bool), pixel[1:] != pixel[:-1]])
+    begin = torch.cummax(torch.where(first, torch.arange(len(pixel)), 0), 0).values
+    wanted = torch.from_numpy(np.concatenate([grad_rgb, grad_alpha[..., None]], 2).reshape(-1, 4))
+    least = np.inf
+    for _ in range(repeats):
+        splats = torch.tensor(state.splats, requires_grad=True)
+        start = time.process_time()
+        part = splats[gaussian]
+        dx, dy = pixel % width + 0.5 - part[:, column.X], pixel // width + 0.5 - part[:, column.Y]
+        s = (part[:, column.HA] * dx + part[:, column.B] * dy) * dx + part[:, column.HC] * dy * dy
+        alpha = (part[:, column.OPACITY] * torch.exp(-s)).clamp(max=0.999)
+        logarithm = torch.log1p(-alpha).double()
+        before = torch.cumsum(logarithm, 0) - logarithm
+        weight = alpha * torch.exp(before - before[begin]).float()
+        colour = torch.cat([part[:, column.RED:column.BLUE + 1], torch.ones(len(part), 1)], 1)
+        image = torch.zeros(height * width, 4).index_add(0, pixel, weight[:, None] * colour)
+        image.backward(wanted)
+        least = min(least, time.process_time() - start)
+    worst = np.abs(image.detach()[:, 3].numpy().reshape(height, width) - state.alpha).max()
     if worst > 0.01:
-        raise RuntimeError(f"the torch tiles disagree with the kernels by {worst:.3g}")
-    return 1e3 * seconds
+        raise RuntimeError(f"the torch implementation disagrees with the kernels by {worst:.3g}")
+    return 1e3 * least, len(pixel)
 
 
-def measure(size: int, repeats: int, workers: int, against_torch: int) -> dict:
-    """Times (CPU ms) of one image size, with binding and projection apart."""
-    vertices, faces, gaussians, name = scene()
+def measure(name: str, size: int, repeats: int, workers: int, torch_repeats: int) -> dict:
+    """CPU ms of one image size. `raster_ms`: projection, depth sort, tiles, forward, backward to means, rotations and scales."""
+    vertices, faces, gaussians = scene(name)
     camera = camera_for(vertices, size)
     workspace = raster.Workspace(workers)
     random = np.random.default_rng(1)
     grad_rgb = random.normal(size=(size, size, 3)).astype(np.float32)
     grad_alpha = random.normal(size=(size, size)).astype(np.float32)
-    rendering = raster.render_bound(vertices, faces, gaussians, camera, workspace)
-    state = rendering.state
-    raster.render_bound_backward(state, grad_rgb, grad_alpha)
-    covered = float((rendering.alpha > 0.5).mean())
 
-    step = best(repeats, lambda: raster.render_bound_backward(
-        raster.render_bound(vertices, faces, gaussians, camera, workspace).state, grad_rgb, grad_alpha))
-    forward = best(repeats, lambda: raster.render(state.means, state.rotations, state.scales, gaussians.rgb,
-                                                  gaussians.opacity, camera, workspace))
+    def bound_step():
+        return raster.render_bound_backward(raster.render_bound(vertices, faces, gaussians, camera, workspace).state, grad_rgb,
+                                            grad_alpha)
+
+    bound_step()
+    state = raster.render_bound(vertices, faces, gaussians, camera, workspace).state
+    result = {"scene": name, "size": size, "gaussians": len(gaussians), "threads": workers,
+              "covered": float((state.alpha > 0.5).mean()), "tile_pairs": len(state.pair_slot),
+              "step_ms": best(repeats, bound_step)}
+    forward = best(repeats, lambda: raster.render(state.means, state.rotations, state.scales, gaussians.rgb, gaussians.opacity,
+                                                  camera, workspace))
     backward = best(repeats, lambda: raster.render_backward(state, grad_rgb, grad_alpha))
-    bind = best(repeats, lambda: binding.bind(binding.face_frames(vertices, faces), gaussians.face, gaussians.mu,
-                                              gaussians.quat, gaussians.log_scale))
-    result = {"scene": name, "size": size, "gaussians": len(gaussians), "threads": workers, "covered": covered,
-              "pairs": len(state.pair_slot), "bind_ms": bind, "forward_ms": forward, "backward_ms": backward,
-              "bound_step_ms": step}
-    if against_torch:
-        slow = min(torch_tiles(state, grad_rgb, grad_alpha) for _ in range(against_torch))
-        result |= {"torch_ms": slow, "times_faster": slow / (forward + backward)}
+    result |= {"forward_ms": forward, "backward_ms": backward, "raster_ms": forward + backward}
+    target = random.random((size, size, 3), np.float32)
+    image, gradient = state.rgb.copy(), np.zeros_like(target)
+    for loss in (losses.l2, losses.ssim, losses.sobel):
+        loss(image, target, gradient=gradient, workspace=workspace)
+        result[f"{loss.__name__}_ms"] = best(repeats, functools.partial(loss, image, target, gradient=gradient,
+                                                                        workspace=workspace))
+    if torch_repeats:
+        slow, pixels = torch_step(state, grad_rgb, grad_alpha, torch_repeats)
+        result |= {"composited": pixels, "torch_ms": slow, "times_faster": slow / (forward + backward)}
     return result
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scene", choices=("figure", "body"), default="figure")
     parser.add_argument("--sizes", type=int, nargs="+", default=[270, 540, 1080])
     parser.add_argument("--repeats", type=int, default=20)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--torch", type=int, default=1, metavar="RUNS", help="runs of the torch implementation; 0 for none")
+    parser.add_argument("--torch-sizes", type=int, nargs="*", default=[270, 540],
+                        help="sizes that torch runs too (1080 takes several GB)")
+    parser.add_argument("--torch-repeats", type=int, default=3)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    results = [measure(size, options.repeats, options.threads, options.torch) for size in options.sizes]
+    results = [measure(options.scene, size, options.repeats, options.threads, options.torch_repeats * (size in options.torch_sizes))
+               for size in options.sizes]
     for result in results:
         print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in result.items()))
     if options.json:

@@ -1,8 +1,8 @@
 """Differentiable CPU rasteriser of 3-D gaussians.
 
-`render` and `render_bound` give the image and a state; `render_backward` and `render_bound_backward` take the image's gradient back.
-EWA splatting in 32x32 tiles, one global depth sort, gradients in one slot for each (tile, gaussian): results are bitwise the
-same for any number of threads. float32; float64 in, float64 out (tests).
+`render` and `render_bound` give the image and a state; `render_backward` and `render_bound_backward` take the image's
+gradient back. EWA splatting in 32x32 tiles, one global depth sort, gradients in one slot for each (tile, gaussian): results
+are bitwise the same for any number of threads. float32; float64 in, float64 out (tests).
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ PLANES = 6
 
 
 @kernel
-def composite_backward(worker, workers, tile_order, tile_start, pair_gaussian, pair_slot, pair_mask, splats, lattice, columns, scratch,
-                       rgb, alpha, grad_rgb, grad_alpha, moments):
+def composite_backward(worker, workers, tile_order, tile_start, pair_gaussian, pair_slot, pair_mask, splats, lattice, columns,
+                       scratch, rgb, alpha, grad_rgb, grad_alpha, moments):
     """Fills moments (pairs, 9), one row for each (tile, gaussian); rgb and alpha are what `composite` gave."""
     height, width = alpha.shape
     real = splats.dtype.type

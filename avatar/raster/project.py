@@ -64,7 +64,10 @@ def _covariance(a0, a1, a2, b0, b1, b2, blur):
 
 @kernel
 def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width, height, splats, depths, boxes):
-    """Fills splats (N, 16), depths (N,) and boxes (N, 4): first and end tile column, first and end tile row; empty where not seen."""
+    """Fills splats (N, 16), depths (N,) and boxes (N, 4): first and end tile column, first and end tile row.
+
+    A box is empty where the gaussian is not seen; its splat is then left as it was.
+    """
     count = len(means)
     real = lens.dtype.type
     half, two = real(0.5), real(2)

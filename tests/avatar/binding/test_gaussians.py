@@ -47,11 +47,15 @@ def test_area_placement_draws_faces_by_area_to_the_power(mesh):
 
 
 def test_area_placement_covers_the_surface_evenly(mesh):
-    """The area that a face's gaussians stand for is the face's."""
+    """The area that the gaussians stand for is the face's, and no gap is left between them."""
     gaussians = Gaussians.area(*mesh, 1000, seed=3)
     width = placed(mesh, gaussians).scales[:, 0]
     on_first = gaussians.face == 0
-    assert np.isclose((width[on_first] ** 2).sum() / 0.55**2, 0.5, rtol=1e-4)
+    assert np.isclose((width[on_first] ** 2).sum() / 0.55**2, 0.5, rtol=0.01)
+    points = placed(mesh, gaussians).means[on_first, :2]
+    inside = np.random.default_rng(0).dirichlet((1, 1, 1), 500) @ mesh[0][mesh[1][0], :2]
+    gap = np.linalg.norm(inside[:, None] - points, axis=2).min(1)
+    assert gap.max() < 3.0 * np.sqrt(0.5 / on_first.sum())
 
 
 def test_the_same_seed_gives_the_same_gaussians(mesh):
