@@ -159,7 +159,8 @@ class Body:
         vertices = np.empty((len(frames), len(shaped), 3), np.float32)
         posed_joints = np.empty((len(frames), J, 3), np.float32)
         for i, t in enumerate(frames):
-            rest = shaped + self.exprdirs @ self.effective_expression(params, t)
+            expression = self.effective_expression(params, t)
+            rest = shaped + self.exprdirs @ expression if expression.any() else shaped
             vertices[i] = skin(rest, transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
             posed_joints[i] = np.einsum("jab,jb->ja", transforms[i, :, :, :3], joints) + transforms[i, :, :, 3]
         return vertices, posed_joints + params.transl[frames][:, None]

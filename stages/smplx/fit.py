@@ -35,6 +35,8 @@ ADULT_HEIGHT = (1.72, 0.05)
 FOCAL_GUESS = 1.0
 """Focal length when nothing is known, as a share of the picture's longer side: between a phone's main lens and a tele."""
 FOCAL_SPREAD = 0.2
+POSED_AT_ONCE = 64
+"""Frames whose vertices are held in memory together."""
 
 
 @dataclass
@@ -149,7 +151,7 @@ def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> floa
     """How much larger the body is than the detector's metric points, by trunk and thigh lengths."""
     bones = [(5, 11), (6, 12), (11, 13), (12, 14), (5, 7), (6, 8)]
     chain = problem.skeleton.pose(state.local[:1], state.betas)
-    x = positions(chain, 0, problem.pairs, state.betas)
+    x = positions(chain, [problem.pairs], state.betas)[0]
     ratios = []
     for a, b in bones:
         length = np.linalg.norm(sightings.world[:, a] - sightings.world[:, b], axis=-1)
@@ -163,12 +165,13 @@ def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.n
     params = to_params(problem.body, state, problem.seen.center)
     camera = params.camera(sightings.width, sightings.height)
     iou = np.full(len(state.local), np.nan)
-    for t, outline in enumerate(problem.seen.outlines):
-        problem.outline_pairs[t] = None
-        if outline.area > 0:
-            vertices, _ = problem.body.posed(params, [t])
-            points, iou[t] = outline_points(problem.body, vertices[0], camera, outline, t)
-            problem.outline_pairs[t] = points if points.count else None
+    for first in range(0, len(iou), POSED_AT_ONCE):
+        frames = range(first, min(first + POSED_AT_ONCE, len(iou)))
+        for t, vertices in zip(frames, problem.body.posed(params, list(frames))[0], strict=True):
+            outline, problem.outline_pairs[t] = problem.seen.outlines[t], None
+            if outline.area > 0:
+                points, iou[t] = outline_points(problem.body, vertices, camera, outline, t)
+                problem.outline_pairs[t] = points if points.count else None
     return iou
 
 
@@ -209,10 +212,8 @@ def joint_spread(problem: Problem, state: State) -> np.ndarray:
 
 def reprojection(problem: Problem, state: State) -> np.ndarray:
     """(T,) median distance px between seen and fitted body points; NaN where nothing was seen."""
-    chain = problem.skeleton.pose(state.local, state.betas)
     out = np.full(len(state.local), np.nan)
-    for t in range(len(out)):
-        x = positions(chain, t, problem.pairs, state.betas) + state.transl[t]
+    for t, x in enumerate(problem.points(problem.skeleton.pose(state.local, state.betas), state)):
         off = np.linalg.norm(problem.project(state, x) - problem.seen.xy[t], axis=-1)[np.isfinite(problem.seen.spread[t])]
         out[t] = np.median(off) if len(off) else np.nan
     return out

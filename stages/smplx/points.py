@@ -97,30 +97,48 @@ class Chain:
     shift: np.ndarray  # (T, J, 3): skinned = world @ rest + shift
     shift_dirs: np.ndarray  # (T, J, 3, B)
 
+    def frame(self, t: int) -> Chain:
+        """The chain of one frame alone."""
+        return Chain(self.world[t: t + 1], self.place[t: t + 1], self.shift[t: t + 1], self.shift_dirs[t: t + 1])
 
-def positions(chain: Chain, t: int, pairs: Pairs, betas: np.ndarray) -> np.ndarray:
-    """(P, 3) points of frame t, without transl."""
+
+def positions(chain: Chain, pairs: list[Pairs], betas: np.ndarray) -> list[np.ndarray]:
+    """Points (P_t, 3) of every frame, without transl; pairs: one set for each frame."""
+    return [_positions(q.start, q.joint, q.mass, q.moment + q.moment_dirs @ betas, chain.world[t], chain.shift[t])
+            for t, q in enumerate(pairs)]
+
+
+def pulled_back(skeleton: Skeleton, chain: Chain, t: int, pairs: Pairs, betas: np.ndarray, covectors: np.ndarray) -> np.ndarray:
+    """Rows of the Jacobian of frame t: how g . x moves with the unknowns, for R covectors g of every point.
+
+    covectors: (P, R, 3). Returns (P R, 3 A + 3 + B): joint steps, transl, betas.
+    """
     moment = pairs.moment + pairs.moment_dirs @ betas
-    part = np.einsum("mab,mb->ma", chain.world[t][pairs.joint], moment) + pairs.mass[:, None] * chain.shift[t][pairs.joint]
-    return np.add.reduceat(part, pairs.start[:-1], axis=0)
-
-
-def derivatives(skeleton: Skeleton, chain: Chain, t: int, pairs: Pairs, betas: np.ndarray,
-                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (P, 3) of frame t without transl, by joint steps (P, 3, A, 3) and by betas (P, 3, B)."""
-    moment = pairs.moment + pairs.moment_dirs @ betas
-    return _derivatives(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
-                        chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries)
+    rows = _pulled_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
+                        chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries, covectors)
+    return rows.reshape(-1, rows.shape[2])
 
 
 @njit(cache=True)
-def _derivatives(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries):
+def _positions(start, joint, mass, moment, world, shift):
+    x = np.zeros((len(start) - 1, 3))
+    for p in range(len(x)):
+        for m in range(start[p], start[p + 1]):
+            g, k = world[joint[m]], joint[m]
+            for c in range(3):
+                x[p, c] += g[c, 0] * moment[m, 0] + g[c, 1] * moment[m, 1] + g[c, 2] * moment[m, 2] + mass[m] * shift[k, c]
+    return x
+
+
+@njit(cache=True)
+def _pulled_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors):
     points, joints, size = len(start) - 1, len(active), moment_dirs.shape[2]
-    x = np.zeros((points, 3))
-    by_step = np.zeros((points, 3, joints, 3))
-    by_betas = np.zeros((points, 3, size))
+    rows = np.zeros((points, covectors.shape[1], 3 * joints + 3 + size))
+    arm = np.zeros((joints, 3))
+    by_betas = np.zeros((3, size))
     for p in range(points):
-        arm = np.zeros((joints, 3))
+        arm[:] = 0
+        by_betas[:] = 0
         for m in range(start[p], start[p + 1]):
             w = mass[m]
             if w == 0.0:
@@ -129,17 +147,23 @@ def _derivatives(start, joint, mass, moment, moment_dirs, world, place, shift, s
             g = world[k]
             for c in range(3):
                 part = g[c, 0] * moment[m, 0] + g[c, 1] * moment[m, 1] + g[c, 2] * moment[m, 2] + w * shift[k, c]
-                x[p, c] += part
                 for a in range(joints):
                     if carries[k, a]:
                         arm[a, c] += part - w * place[active[a], c]
                 for b in range(size):
-                    by_betas[p, c, b] += (g[c, 0] * moment_dirs[m, 0, b] + g[c, 1] * moment_dirs[m, 1, b]
-                                          + g[c, 2] * moment_dirs[m, 2, b] + w * shift_dirs[k, c, b])
-        for a in range(joints):
-            g = world[active[a]]
-            for d in range(3):
-                by_step[p, 0, a, d] = g[1, d] * arm[a, 2] - g[2, d] * arm[a, 1]
-                by_step[p, 1, a, d] = g[2, d] * arm[a, 0] - g[0, d] * arm[a, 2]
-                by_step[p, 2, a, d] = g[0, d] * arm[a, 1] - g[1, d] * arm[a, 0]
-    return x, by_step, by_betas
+                    by_betas[c, b] += (g[c, 0] * moment_dirs[m, 0, b] + g[c, 1] * moment_dirs[m, 1, b]
+                                       + g[c, 2] * moment_dirs[m, 2, b] + w * shift_dirs[k, c, b])
+        for r in range(covectors.shape[1]):
+            v = covectors[p, r]
+            for a in range(joints):
+                x = arm[a, 1] * v[2] - arm[a, 2] * v[1]
+                y = arm[a, 2] * v[0] - arm[a, 0] * v[2]
+                z = arm[a, 0] * v[1] - arm[a, 1] * v[0]
+                g = world[active[a]]
+                for d in range(3):
+                    rows[p, r, 3 * a + d] = g[0, d] * x + g[1, d] * y + g[2, d] * z
+            for c in range(3):
+                rows[p, r, 3 * joints + c] = v[c]
+            for b in range(size):
+                rows[p, r, 3 * joints + 3 + b] = v[0] * by_betas[0, b] + v[1] * by_betas[1, b] + v[2] * by_betas[2, b]
+    return rows

@@ -6,19 +6,22 @@ Residuals are in units of their own spread, so that weights are probabilities an
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.smplx import prior
-from gsac.stages.smplx.points import Pairs, Skeleton, derivatives, positions
+from gsac.stages.smplx.points import Chain, Pairs, Skeleton, positions, pulled_back
 from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.solver import System
 
 ROBUST = 3.0
 """Residuals beyond so many spreads count less and less."""
 OUTLINE_ROBUST = 2.0
+OUTLINE_SIGHTINGS = 40
+"""How many independent sightings one frame's outline is worth."""
 
 
 @dataclass
@@ -86,45 +89,59 @@ class Problem:
     def cost(self, state: State) -> float:
         chain = self.skeleton.pose(state.local, state.betas)
         total = 0.0
-        for t in range(len(state.local)):
-            x = positions(chain, t, self.pairs, state.betas) + state.transl[t]
+        for t, x in enumerate(self.points(chain, state)):
             total += robust(self._point_residual(t, self.project(state, x)), ROBUST)[0].sum()
-            depth = self._depth_residual(t, x)
-            total += robust(depth, ROBUST)[0].sum()
-            outline = self.outline_pairs[t]
-            if outline is not None:
-                x = positions(chain, t, outline, state.betas) + state.transl[t]
-                distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
-                scaled = np.where(inside, distance / self.seen.outline_spread, 0)
-                total += self._outline_share(outline) * robust(scaled, OUTLINE_ROBUST)[0].sum()
+            total += robust(self._depth_residual(t, x), ROBUST)[0].sum()
+        for t, x in self.outline_points(chain, state):
+            distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
+            scaled = np.where(inside, distance / self.seen.outline_spread, 0)
+            total += self._outline_share(len(x)) * robust(scaled, OUTLINE_ROBUST)[0].sum()
         total += (self._prior_residual(state) ** 2).sum() + (self._limit_residual(state)[0] ** 2).sum()
         total += sum((r**2).sum() for r in self._temporal_residuals(state))
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
     def linearise(self, state: State) -> System:
-        t_count, a = len(state.local), len(self.active)
-        system = System.zeros(t_count, self.size, len(state.betas) + 1)
+        system = System.zeros(len(state.local), self.size, len(state.betas) + 1)
         chain = self.skeleton.pose(state.local, state.betas)
-        for t in range(t_count):
-            x, by_step, by_betas = derivatives(self.skeleton, chain, t, self.pairs, state.betas)
-            x = x + state.transl[t]
-            step3 = np.concatenate([by_step.reshape(len(x), 3, 3 * a), np.broadcast_to(np.eye(3), (len(x), 3, 3))], 2)
-            uv = self.project(state, x)
-            slope = self._projection_slope(state, x)
-            residual = self._point_residual(t, uv)
-            weight = robust(residual, ROBUST)[1] / self.seen.spread[t][:, None]
-            use = np.isfinite(self.seen.spread[t])
-            rows = (slope @ step3 * weight[:, :, None])[use].reshape(-1, self.size)
-            shared = np.concatenate([slope @ by_betas, (uv - self.seen.center)[:, :, None]], 2)
-            shared = (shared * weight[:, :, None])[use].reshape(-1, len(state.betas) + 1)
-            system.add(t, rows, (residual * robust(residual, ROBUST)[1])[use].reshape(-1), shared)
-            self._add_depth(system, t, x, step3, by_betas)
-            self._add_outline(system, state, chain, t)
+        for t, x in enumerate(self.points(chain, state)):
+            self._add_points(system, state, chain, t, x)
+        for t, x in self.outline_points(chain, state):
+            self._add_outline(system, state, chain, t, x)
         self._add_prior(system, state)
         self._add_temporal(system, state)
         residual, jacobian = self._shared_residual(state)
         system.add_shared(jacobian, residual)
         return system
+
+    def points(self, chain: Chain, state: State) -> list[np.ndarray]:
+        """(P, 3) key points of every frame, camera frame."""
+        frames = positions(chain, [self.pairs] * len(state.local), state.betas)
+        return [x + move for x, move in zip(frames, state.transl, strict=True)]
+
+    def outline_points(self, chain: Chain, state: State) -> Iterator[tuple[int, np.ndarray]]:
+        """Frame and its outline points (P, 3), of the frames that have any."""
+        if self.outline_weight > 0:
+            for t, pairs in enumerate(self.outline_pairs):
+                if pairs is not None:
+                    yield t, positions(chain.frame(t), [pairs], state.betas)[0] + state.transl[t]
+
+    def _add_points(self, system: System, state: State, chain: Chain, t: int, x: np.ndarray) -> None:
+        """Key points and their depths: two rows and one row a point."""
+        uv = self.project(state, x)
+        residual = self._point_residual(t, uv)
+        shrink = robust(residual, ROBUST)[1]
+        weight = shrink / self.seen.spread[t][:, None]  # zero where a point was not seen
+        depth = self._depth_residual(t, x)
+        depth_shrink = np.where(np.isfinite(self.seen.depth[t]), robust(depth, ROBUST)[1], 0)
+        covectors = np.concatenate([self._projection_slope(state, x), np.broadcast_to([0, 0, 1.0], (len(x), 1, 3))], 1)
+        rows = pulled_back(self.skeleton, chain, t, self.pairs, state.betas, covectors).reshape(len(x), 3, -1)
+        rows[:, 2] -= rows[list(self.hips), 2].mean(0)
+        scale = np.concatenate([weight, depth_shrink[:, None] / self.seen.depth_spread], 1)
+        focal = np.concatenate([uv - self.seen.center, np.zeros((len(x), 1))], 1)
+        jacobian = np.concatenate([rows, focal[:, :, None]], 2) * scale[:, :, None]
+        values = np.concatenate([residual * shrink, (depth * depth_shrink)[:, None]], 1)
+        use = scale.ravel() > 0
+        system.add(t, jacobian.reshape(len(use), -1)[use], values.ravel()[use])
 
     def _projection_slope(self, state: State, x: np.ndarray) -> np.ndarray:
         """(P, 2, 3) pixels by camera-frame metres."""
@@ -144,38 +161,20 @@ class Problem:
         model = x[:, 2] - x[list(self.hips), 2].mean()
         return np.nan_to_num((model - self.seen.depth[t]) / self.seen.depth_spread)
 
-    def _add_depth(self, system: System, t: int, x: np.ndarray, step3: np.ndarray, by_betas: np.ndarray) -> None:
-        known = np.isfinite(self.seen.depth[t])
-        if not known.any():
-            return
-        residual = self._depth_residual(t, x)[known]
-        weight = (robust(residual, ROBUST)[1] / self.seen.depth_spread)[:, None]
-        hips = list(self.hips)
-        rows = (step3[known, 2] - step3[hips, 2].mean(0)) * weight
-        betas = (by_betas[known, 2] - by_betas[hips, 2].mean(0)) * weight
-        shared = np.concatenate([betas, np.zeros((len(betas), 1))], 1)
-        system.add(t, rows, residual * robust(residual, ROBUST)[1], shared)
-
-    def _outline_share(self, pairs: Pairs) -> float:
+    def _outline_share(self, count: int) -> float:
         """Weight of one outline point: neighbours along an edge are not independent sightings."""
-        return self.outline_weight * 40 / max(pairs.count, 1)
+        return self.outline_weight * OUTLINE_SIGHTINGS / max(count, 1)
 
-    def _add_outline(self, system: System, state: State, chain, t: int) -> None:
-        pairs = self.outline_pairs[t]
-        if pairs is None:
-            return
-        x, by_step, by_betas = derivatives(self.skeleton, chain, t, pairs, state.betas)
-        x = x + state.transl[t]
+    def _add_outline(self, system: System, state: State, chain: Chain, t: int, x: np.ndarray) -> None:
         uv = self.project(state, x)
         distance, direction, inside = self.seen.outlines[t].at(uv)
         residual = np.where(inside, distance / self.seen.outline_spread, 0)
-        shrink = robust(residual, OUTLINE_ROBUST)[1] * np.sqrt(self._outline_share(pairs))
+        shrink = robust(residual, OUTLINE_ROBUST)[1] * np.sqrt(self._outline_share(len(x)))
         weight = np.where(inside, shrink / self.seen.outline_spread, 0)
         along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x)) * weight[:, None]  # (P, 3)
-        rows = np.concatenate([np.einsum("pd,pdn->pn", along, by_step.reshape(len(x), 3, -1)), along], 1)
+        rows = pulled_back(self.skeleton, chain, t, self.outline_pairs[t], state.betas, along[:, None])
         focal = ((uv - self.seen.center) * direction).sum(1) * weight
-        shared = np.concatenate([np.einsum("pd,pdb->pb", along, by_betas), focal[:, None]], 1)
-        system.add(t, rows, residual * shrink, shared)
+        system.add(t, np.concatenate([rows, focal[:, None]], 1), residual * shrink)
 
     def _prior_residual(self, state: State) -> np.ndarray:
         return (rotation.log(state.local[:, self.active]) - self.mean) / self.spread  # (T, A, 3)

@@ -9,34 +9,33 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 
 @dataclass
 class System:
-    """Normal equations J'J x = -J'r and their cost."""
+    """Normal equations J'J x = -J'r."""
 
     band: np.ndarray  # (T, n, 3 n): block row t against frames t, t + 1, t + 2
     arrow: np.ndarray  # (T, n, s)
     shared: np.ndarray  # (s, s)
     gradient: np.ndarray  # (T, n)
     shared_gradient: np.ndarray  # (s,)
-    cost: float = 0.0
 
     @classmethod
     def zeros(cls, frames: int, size: int, shared: int) -> System:
         return cls(np.zeros((frames, size, 3 * size)), np.zeros((frames, size, shared)), np.zeros((shared, shared)),
                    np.zeros((frames, size)), np.zeros(shared))
 
-    def add(self, t: int, jacobian: np.ndarray, residual: np.ndarray, shared: np.ndarray | None = None) -> None:
-        """Rows (R, n), residuals (R,) and shared columns (R, s) of one frame."""
+    def add(self, t: int, jacobian: np.ndarray, residual: np.ndarray) -> None:
+        """Rows (R, n + s) and residuals (R,) of one frame."""
         n = self.gradient.shape[1]
-        self.band[t, :, :n] += jacobian.T @ jacobian
-        self.gradient[t] += jacobian.T @ residual
-        if shared is not None:
-            self.arrow[t] += jacobian.T @ shared
-            self.shared += shared.T @ shared
-            self.shared_gradient += shared.T @ residual
+        square, slope = jacobian.T @ jacobian, jacobian.T @ residual
+        self.band[t, :, :n] += square[:n, :n]
+        self.arrow[t] += square[:n, n:]
+        self.shared += square[n:, n:]
+        self.gradient[t] += slope[:n]
+        self.shared_gradient += slope[n:]
 
     def add_shared(self, jacobian: np.ndarray, residual: np.ndarray) -> None:
         """Rows (R, s) on the shared unknowns alone."""
@@ -44,25 +43,60 @@ class System:
         self.shared_gradient += jacobian.T @ residual
 
     def solve(self, damping: float, frozen: np.ndarray, frozen_shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Step (T, n) and shared step (s,); frozen (n,) and frozen_shared (s,) mark unknowns that stay."""
+        """Step (T, n) and shared step (s,); frozen (n,) and frozen_shared (s,) mark unknowns that stay.
+
+        Raises LinAlgError where the damped system is not positive definite.
+        """
         t, n = self.gradient.shape
         band = self.band.copy()
         diagonal = np.arange(n)
         band[:, diagonal, diagonal] += damping * band[:, diagonal, diagonal] + 1e-9
-        band[:, diagonal[frozen], diagonal[frozen]] += 1e12
-        lower = np.zeros((3 * n, t, n))
-        for i in range(n):
-            lower[: 3 * n - i, :, i] = band[:, i, i:].T
-        lower = lower.reshape(3 * n, t * n)
-        factor = cholesky_banded(lower, lower=True, overwrite_ab=True, check_finite=False)
-        right = np.concatenate([-self.gradient.reshape(-1, 1), self.arrow.reshape(t * n, -1)], 1)
-        solved = cho_solve_banded((factor, True), right, check_finite=False)
+        band[:, diagonal[frozen], diagonal[frozen]] += FROZEN
+        right = np.concatenate([-self.gradient[:, :, None], self.arrow], 2)
+        solved = solve_band(band, right).reshape(t * n, -1)
         arrow = self.arrow.reshape(t * n, -1)
         schur = self.shared - arrow.T @ solved[:, 1:]
-        schur[np.diag_indices_from(schur)] += damping * np.diag(self.shared) + 1e-9
-        schur[np.diag_indices_from(schur)] += 1e12 * frozen_shared
+        schur[np.diag_indices_from(schur)] += damping * np.diag(self.shared) + 1e-9 + FROZEN * frozen_shared
         shared = np.linalg.solve(schur, -self.shared_gradient - arrow.T @ solved[:, 0])
         return (solved[:, 0] - solved[:, 1:] @ shared).reshape(t, n), shared
+
+
+FROZEN = 1e12
+
+
+def solve_band(band: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solves the symmetric band system by block Cholesky over pairs of frames, which makes it block tridiagonal.
+
+    band: (T, n, 3 n) upper block rows; right: (T, n, k). Returns (T, n, k).
+    """
+    t, n = band.shape[:2]
+    if t % 2:
+        band = np.concatenate([band, np.zeros((1, n, 3 * n))])
+        band[-1, :, :n] = np.eye(n)
+        right = np.concatenate([right, np.zeros((1, *right.shape[1:]))])
+    first, second = band[0::2], band[1::2]
+    pairs, m = len(first), 2 * n
+    diagonal = np.zeros((pairs, m, m))
+    diagonal[:, :n, :n], diagonal[:, :n, n:], diagonal[:, n:, n:] = first[..., :n], first[..., n:m], second[..., :n]
+    diagonal[:, n:, :n] = first[..., n:m].swapaxes(1, 2)
+    ahead = np.zeros((pairs, m, m))
+    ahead[:, :n, :n], ahead[:, n:, :n], ahead[:, n:, n:] = first[..., m:], second[..., n:m], second[..., m:]
+    solved = right.reshape(pairs, m, -1).copy()
+    factors, couplings = [], []
+    for i in range(pairs):
+        if i:
+            diagonal[i] -= couplings[-1].T @ couplings[-1]
+            solved[i] -= couplings[-1].T @ solved[i - 1]
+        factor = cholesky(diagonal[i], lower=True, check_finite=False)
+        factors.append(factor)
+        both = solve_triangular(factor, np.concatenate([ahead[i], solved[i]], 1), lower=True, check_finite=False)
+        couplings.append(both[:, :m])
+        solved[i] = both[:, m:]
+    for i in reversed(range(pairs)):
+        if i + 1 < pairs:
+            solved[i] -= couplings[i] @ solved[i + 1]
+        solved[i] = solve_triangular(factors[i], solved[i], lower=True, trans=1, check_finite=False)
+    return solved.reshape(-1, n, right.shape[2])[:t]
 
 
 @dataclass
@@ -84,7 +118,7 @@ def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callab
     for _ in range(iterations):
         try:
             step, shared = system.solve(damping, frozen, frozen_shared)
-        except (LinAlgError, np.linalg.LinAlgError):
+        except LinAlgError:
             damping = max(damping, 1e-6) * 10
             continue
         trial = move(state, step, shared)
