@@ -16,7 +16,7 @@ REACH = 5
 ROWS = 2 * REACH + 1
 MARGIN = 16
 """Zeros before and after a row: at least 3 * REACH."""
-STRIP = 256
+STRIP = 128
 """Numbers of a row that are worked on at a time."""
 C1, C2 = 0.01**2, 0.03**2
 
