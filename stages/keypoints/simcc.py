@@ -23,22 +23,49 @@ PADDING = 1.25
 POINTS = 133
 
 
-class Wholebody:
-    """models: name -> file, those of `config.models()`."""
+class SimccNetwork:
+    """path: the ONNX file. One that is no such network raises `BadInput`."""
 
-    def __init__(self, models: dict[str, Path], config: KeypointsConfig):
+    def __init__(self, path: Path):
         import onnxruntime
 
-        self._config = config
-        self._follower = Follower(models, config)
-        self._face = FaceMesh(models)
-        self._session = onnxruntime.InferenceSession(str(models["onnx-wholebody"]), providers=["CPUExecutionProvider"])
+        try:
+            self._session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+        except Exception as e:  # onnxruntime's own classes share no narrower base
+            raise BadInput(f"model file onnx-wholebody cannot be read as ONNX ({e}); bring it again with "
+                           "`gsac models add onnx-wholebody FILE`") from e
         self._input = self._session.get_inputs()[0]
         shape, outputs = self._input.shape, self._session.get_outputs()
         if len(shape) != 4 or not all(isinstance(n, int) for n in shape[2:]) or len(outputs) != 2:
             raise BadInput(f"model file onnx-wholebody has input {shape} and {len(outputs)} outputs; expected a SimCC "
                            "network of 133 points: input [N, 3, height, width] and the two outputs simcc_x, simcc_y")
-        self._height, self._width = shape[2:]
+        self.height, self.width = shape[2:]
+
+    def read(self, image: np.ndarray, to_frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """image: (H, W, 3) uint8 RGB; to_frame: (2, 3), crop pixels to frame pixels. Returns xy (133, 2) px of the frame
+        and score (133,) in 0..1."""
+        import cv2
+
+        # OpenCV counts from pixel centres at 0, we from their corners.
+        centres = to_frame.copy()
+        centres[:, 2] += to_frame[:, :2] @ [0.5, 0.5] - 0.5
+        crop = cv2.warpAffine(image, centres, (self.width, self.height), flags=cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR)
+        ready = ((crop - MEAN) / DEVIATION).transpose(2, 0, 1)[None].astype(np.float32)
+        x, y = self._session.run(None, {self._input.name: ready})
+        if x.shape[1] != POINTS:
+            raise BadInput(f"model file onnx-wholebody gives {x.shape[1]} points; expected COCO-WholeBody's {POINTS}")
+        xy, score = decode(x[0], y[0], self.width, self.height)
+        return xy @ to_frame[:, :2].T + to_frame[:, 2], np.clip(score, 0, 1)
+
+
+class Wholebody:
+    """models: name -> file, those of `config.models()`."""
+
+    def __init__(self, models: dict[str, Path], config: KeypointsConfig):
+        self._config = config
+        self._network = SimccNetwork(models["onnx-wholebody"])
+        self._follower = Follower(models, config)
+        self._face = FaceMesh(models)
 
     def look(self, image: np.ndarray) -> Frame:
         """image: (H, W, 3) uint8 RGB, the next frame of the clip."""
@@ -51,25 +78,10 @@ class Wholebody:
         face = self._face.find(image, head, head_yaw(pose.world), self._config.face_threshold)
         if face is not None:
             frame.face_mesh[:] = face.points
-        to_frame = crop_matrix(pose.points, self._width, self._height)
-        frame.xy[:], frame.score[:] = self._points(image, to_frame)
+        network = self._network
+        frame.xy[:], frame.score[:] = network.read(image, crop_matrix(pose.points, network.width, network.height))
         drop_doubled_hand(frame)
         return frame
-
-    def _points(self, image: np.ndarray, to_frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """xy (133, 2) px of the frame and score (133,)."""
-        import cv2
-
-        # OpenCV counts from pixel centres at 0, we from their corners.
-        centre = to_frame + [[0, 0, -0.5], [0, 0, -0.5]]
-        centre[:, 2] += to_frame[:, :2] @ [0.5, 0.5]
-        crop = cv2.warpAffine(image, centre, (self._width, self._height), flags=cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR)
-        ready = ((crop - MEAN) / DEVIATION).transpose(2, 0, 1)[None].astype(np.float32)
-        x, y = self._session.run(None, {self._input.name: ready})
-        if x.shape[1] != POINTS:
-            raise BadInput(f"model file onnx-wholebody gives {x.shape[1]} points; expected COCO-WholeBody's {POINTS}")
-        xy, score = decode(x[0], y[0], self._width, self._height)
-        return xy @ to_frame[:, :2].T + to_frame[:, 2], np.clip(score, 0, 1)
 
 
 def crop_matrix(points: np.ndarray, width: int, height: int) -> np.ndarray:
