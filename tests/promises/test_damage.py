@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from gsac.cache.publish import STEPS
 
+pytestmark = pytest.mark.slow
+
 STOPPED_AT = """
 import errno, os, signal, sys
 from gsac.cache.store import Store
