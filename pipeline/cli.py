@@ -41,7 +41,8 @@ def main(argv: list[str] | None = None) -> None:
 def execute(argv: list[str]) -> ExitCode:
     """Runs one command line; a user's mistake is one line on stderr, never a traceback."""
     with contextlib.suppress(ValueError):  # not in the main thread
-        signal.signal(signal.SIGTERM, _interrupt)
+        for how in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(how, _interrupt)
     arguments = _parser(argv).parse_args(argv)
     try:
         return arguments.do(arguments)
@@ -107,7 +108,7 @@ def _complain(message: str) -> None:
 
 
 def _interrupt(signum: int, frame: Any) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signum, signal.SIG_DFL)
     raise KeyboardInterrupt
 
 
