@@ -14,7 +14,7 @@ MODELS = {"pose": ("pose_landmark_full",), "selfie": ("selfie_segmentation",)}
 class SegmentConfig:
     method: str = "pose"
     """Which network says where the person is: pose (the body network's own mask) or selfie."""
-    iterations: int = 2
+    iterations: int = 1
     """Rounds of GrabCut; 0 keeps the network's outline."""
     use_plate: bool = True
     """Whether the empty scene, where photos came with one, joins in."""

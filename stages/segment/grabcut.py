@@ -7,7 +7,7 @@ import numpy as np
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.segment.plate import HALF, Difference
 
-SURE, NEVER = 0.95, 0.05
+SURE, NEVER = 0.95, 0.15
 """Network probabilities that are taken as said."""
 FINGERS = ([0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20])
 PALM_HULL = (0, 1, 5, 9, 13, 17)

@@ -14,8 +14,8 @@ HALF = 2
 """All is done at half size: a plate decides areas, not outlines."""
 BARE, ALIKE, CHANGED = 2.5, 4.0, 6.0
 """Noise widths below which a pixel is bare scene, is so where the network doubts, and above which it is not."""
-LEAST_NOISE = 1.0
-"""CIE Lab units, of L* and of a* b*."""
+LEAST_NOISE, MOST_NOISE = 1.0, 6.0
+"""CIE Lab units, of L* and of a* b*; with more the plate shows another scene."""
 SHADOW = 45.0
 """L* units by which a shadow may darken a pixel."""
 SHADE, DIM = 20.0, 8.0
@@ -69,7 +69,7 @@ def compare(image: np.ndarray, plate: np.ndarray, person: np.ndarray) -> Differe
     light_noise = max(LEAST_NOISE, 1.4826 * float(np.median(np.abs(light[outside]))))
     hue_noise = max(LEAST_NOISE, 1.4826 * float(np.median(hue[outside])))
     away = np.hypot(hue / hue_noise, light / light_noise)
-    if np.median(away[outside]) > BARE or (away[outside] > CHANGED).mean() > 0.3:
+    if max(light_noise, hue_noise) > MOST_NOISE or (away[outside] > CHANGED).mean() > 0.3:
         return None
     # Darker than the plate may be shadow, brighter may not.
     varies = cv2.GaussianBlur(np.abs(light - cv2.GaussianBlur(light, (0, 0), WINDOW)), (0, 0), WINDOW)
