@@ -78,7 +78,8 @@ def block_mask(splat, x, y):
 def composite(worker, workers, tile_order, tile_start, pair_gaussian, pair_mask, splats, lattice, columns, scratch, rgb, alpha):
     """Fills rgb (H, W, 3), alpha (H, W) and pair_mask (pairs,) uint64, the blocks that each pair was composited in.
 
-    lattice: (32,) x then y of a block's pixel centres; scratch: (workers, ...)."""
+    lattice: (32,) x then y of a block's pixel centres; scratch: (workers, PLANES * TILE^2).
+    """
     height, width = alpha.shape
     real = splats.dtype.type
     zero, one = spread(real(0)), spread(real(1))
