@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 
 W, H = 480, 260
 LEFT, RIGHT, TOP, BOTTOM = 54, 14, 26, 40
-ROW, STRIP_LEFT, STRIP_W = 22, 92, 720
+ROW, STRIP_LEFT, STRIP_W = 20, 84, 880
 
 
 @dataclass
@@ -42,10 +42,10 @@ class Axis:
 
 
 def nice(length: float) -> float:
-    """A round step that cuts the length into about five."""
+    """A round step that cuts the length into about six."""
     rough = length / 5
     decade = 10 ** math.floor(math.log10(rough))
-    return next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough * 0.999)
+    return next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough * 0.7)
 
 
 def curve_chart(curve: list, key: str, title: str, unit: str, log: bool = False) -> Markup | None:
@@ -87,9 +87,9 @@ def strip_chart(k: dict[str, np.ndarray], face_valid: np.ndarray | None) -> Mark
     count = len(body)
     x = Axis(0, max(count, 1), STRIP_LEFT, STRIP_W)
     high = ROW * len(rows) + 26
-    out = [f'<svg class="strip" viewBox="0 0 {STRIP_W} {high}" role="img" aria-label="What was found in which frame">']
+    out = [f'<svg class="strip" viewBox="0 0 {STRIP_W + 12} {high}" role="img" aria-label="What was found in which frame">']
     for i, (name, words) in enumerate(rows):
-        out.append(f'<text class="end" x="{STRIP_LEFT - 8}" y="{i * ROW + 15}">{name}</text>')
+        out.append(f'<text class="end" x="{STRIP_LEFT - 8}" y="{i * ROW + 14}">{name}</text>')
         starts = [0, *(np.flatnonzero(words[1:] != words[:-1]) + 1).tolist(), count]
         for a, b in zip(starts, starts[1:], strict=False):
             if b > a:

@@ -49,12 +49,12 @@ def draw_keypoints(image: np.ndarray, xy: np.ndarray, score: np.ndarray, least: 
                    missing: np.ndarray | None = None) -> None:
     """Draws into (H, W, 3) uint8. xy: (133, 2) px; score: (133,); filled: (133,) bool; missing: (2,) bool left, right.
 
-    Left points in one colour, right in another; a filled point is a ring; a cross marks the wrist of a hand that is
+    Left points in one colour, right in another; a filled point is a ring, however unsure; a cross marks the wrist of a hand that is
     missing and was not filled.
     """
     far = 4 * max(image.shape)
-    shown = (score >= least) & np.isfinite(xy).all(1) & (np.abs(np.nan_to_num(xy)) < far).all(1)
     filled = np.zeros(len(xy), bool) if filled is None else filled
+    shown = ((score >= least) | filled) & np.isfinite(xy).all(1) & (np.abs(np.nan_to_num(xy)) < far).all(1)
     unit = max(image.shape[0] / 640, 0.6)
     edges = [(*e, 2) for e in TORSO_EDGES + LIMB_EDGES] + [(*e, 1) for side in HANDS for e in hand_edges(side)]
     for a, b, width in edges:

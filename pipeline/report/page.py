@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from gsac.pipeline.report.results import AbsentError, Results, number, read_json
+from gsac.pipeline.report.results import AbsentError, Results, number, read_json, tree_size
 from gsac.pipeline.report.tables import foot, parameters, stage_rows, totals
 from gsac.pipeline.workspace import RUN
 
@@ -100,14 +100,9 @@ def section(ident: str, title: str, lead: str, sheet: Callable | None, charts: C
 
 
 def strips(footage) -> list:
-    from gsac.avatar.artifacts import read_arrays
     from gsac.pipeline.report.charts import strip_chart
 
-    try:
-        valid = read_arrays(footage.results.path("face/face.npz")).get("valid")
-    except Exception:  # the face's row is left out; the stage table says why
-        valid = None
-    return [strip_chart(footage.keypoints, valid)]
+    return [strip_chart(footage.keypoints, footage.face_valid)]
 
 
 def curves(results: Results) -> list:
@@ -134,9 +129,9 @@ def headline(results: Results, facts: dict[str, float]) -> dict[str, Any]:
     if psnr is not None:
         figures.append(("Held-out PSNR, person only", f"{psnr:.2f} dB", "poses carried from neighbouring frames"))
     if aligned is not None:
-        figures.append(("with test-time pose", f"{aligned:.2f} dB", "pose aligned to the held-out frame, avatar frozen"))
+        figures.append(("… pose aligned at test time", f"{aligned:.2f} dB", "on the held-out frame, avatar frozen"))
     if fit is not None:
-        figures.append(("with the fit's pose", f"{fit:.2f} dB", "as stage smplx left it"))
+        figures.append(("… with the fit's pose", f"{fit:.2f} dB", "as stage smplx left it"))
     if (ssim := number(metrics.get("ssim"))) is not None:
         figures.append(("SSIM", f"{ssim:.3f}", "whole frame, on white"))
     if (count := number(metrics.get("n_gaussians"))) is not None:
@@ -169,7 +164,7 @@ def person(results: Results, facts: dict[str, float]) -> str:
 
 def warnings(results: Results) -> list[tuple[str, str]]:
     """Stage and sentence, all of them."""
-    return [(name, str(text)) for name, row in results.rows.items() for text in row.get("warnings") or []]
+    return [(name, str(text).removeprefix(f"{name}: ")) for name, row in results.rows.items() for text in row.get("warnings") or []]
 
 
 def reached(results: Results) -> str:
@@ -188,7 +183,8 @@ def exported_viewer(results: Results) -> bool:
 
 def exported(results: Results) -> dict[str, Any]:
     """Files of export: name, bytes, relative address; or why there are none."""
-    words = {"avatar.gsac": "the avatar: body, gaussians, skinning, motions", "viewer.html": "opens from disk, turns and moves",
+    words = {"viewer.html": "the avatar in a page: opens from disk, turns and moves",
+             "avatar.gsac": "the avatar: body, gaussians, skinning, motions",
              "avatar.ply": "gaussians in one pose, for 3DGS viewers", "avatar.glb": "skinned mesh",
              "avatar.spz": "gaussians in one pose, packed", "unity": "Unity package"}
     files = []
@@ -197,8 +193,6 @@ def exported(results: Results) -> dict[str, Any]:
             path = results.path(f"export/{name}")
         except AbsentError:
             continue
-        from gsac.pipeline.report.results import tree_size
-
         files.append({"name": name, "what": what, "bytes": tree_size(path), "href": quote(f"export/{name}")})
     absent = ""
     if not files:

@@ -9,7 +9,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from gsac.avatar.artifacts import FILLED_SHAPES, KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_alpha, read_frame
+from gsac.avatar.artifacts import (
+    FILLED_SHAPES,
+    KEYPOINT_SHAPES,
+    ArtifactError,
+    Clip,
+    check_arrays,
+    frame_paths,
+    read_alpha,
+    read_frame,
+)
 from gsac.avatar.wholebody import BODY, FEET
 from gsac.pipeline.report.results import AbsentError, Results
 
@@ -107,6 +116,14 @@ class Footage:
             return check_arrays(self.results.path("handgap/keypoints.npz"), FILLED_SHAPES)
         except AbsentError:
             return check_arrays(self.results.path("keypoints/keypoints.npz"), KEYPOINT_SHAPES)
+
+    @cached_property
+    def face_valid(self) -> np.ndarray | None:
+        """(T,) bool, frames whose face was used; None where stage face left nothing readable."""
+        try:
+            return check_arrays(self.results.path("face/face.npz"), {"valid": ("T",)})["valid"].astype(bool)
+        except (AbsentError, ArtifactError):
+            return None
 
     def frame(self, t: int) -> np.ndarray:
         """(H, W, 3) uint8."""

@@ -12,7 +12,7 @@ from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reproje
 from gsac.pipeline.report.pictures import SEEN, Footage, Picture, fitted, picture, spread
 from gsac.pipeline.report.results import AbsentError, Results, number
 
-CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT = 12, 8, 6, 6, 8
+CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT = 12, 8, 8, 8, 8
 """How many frames each sheet shows at most."""
 WIDE, HIGH = 520, 640
 """Largest picture of a sheet, px."""
@@ -32,8 +32,8 @@ class Sheet:
     """Name -> value, as read by people."""
     facts: dict[str, float] = field(default_factory=dict)
     """The same for `verdict`."""
-    columns: str = "tall"
-    """How the page lays the pictures out: tall, wide, or one."""
+    columns: str = "large"
+    """How the page lays the pictures out: small, large, wide, or one."""
 
 
 def contact_sheet(footage: Footage) -> Sheet:
@@ -42,7 +42,7 @@ def contact_sheet(footage: Footage) -> Sheet:
         image = footage.frame(t)
         shown = fitted(image, 480 if image.shape[1] > image.shape[0] else 300, 400)
         pictures.append(picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000))
-    return Sheet(pictures)
+    return Sheet(pictures, columns="small")
 
 
 def keypoint_sheet(footage: Footage) -> Sheet:
@@ -67,6 +67,9 @@ def keypoint_sheet(footage: Footage) -> Sheet:
             figures[f"{side.capitalize()} hand filled"] = share(facts[f"{side}_hand_filled"])
     facts["face_share"] = float(seen_part(k, FACE).mean())
     figures["Face found"] = share(facts["face_share"])
+    if footage.face_valid is not None:
+        facts["face_used"] = float(footage.face_valid.mean())
+        figures["Face used for shape and expression"] = share(facts["face_used"])
     return Sheet(pictures, figures, facts)
 
 
@@ -85,15 +88,17 @@ def hand_word(k: dict[str, np.ndarray], t: int, i: int, side: str) -> str:
 
 
 def telling(k: dict[str, np.ndarray], count: int) -> list[int]:
-    """Frames to show: even ones, and the middle of where each hand is filled and where it is missing."""
-    frames = set(spread(count, KEYPOINTS - 3))
+    """Frames to show: the middle of where each hand is filled and where it is missing, and even ones."""
+    frames: set[int] = set()
     if "filled" in k:
         for i, part in enumerate(HANDS.values()):
             filled = k["filled"][:count, part].any(1)
             for which in (filled, k["missing"][:count, i] & ~filled):
                 hits = np.flatnonzero(which)
-                if len(hits) and len(frames) < KEYPOINTS:
-                    frames.add(int(hits[len(hits) // 2]))
+                frames |= {int(hits[len(hits) // 2])} if len(hits) else set()
+    for t in sorted(spread(count, KEYPOINTS), key=lambda t: -min((abs(t - f) for f in frames), default=0)):
+        if len(frames) < KEYPOINTS:
+            frames.add(t)
     return sorted(frames)
 
 
@@ -195,11 +200,12 @@ def heldout_sheet(results: Results) -> Sheet:
     chosen = {frames[i] for i in spread(len(frames), HELDOUT - 1)}
     judged = [(rows[f]["psnr_fg"], f) for f in frames if number(rows.get(f, {}).get("psnr_fg")) is not None]
     worst = min(judged)[1] if judged else None
+    triples = {stem: [read_frame(folder / f"{stem}_{kind}.png") for kind in ("truth", "render", "error")]
+               for stem in sorted(chosen | ({worst} - {None}))}
+    y, x = person_box([image for triple in triples.values() for image in triple[:2]])
     pictures = []
-    for stem in sorted(chosen | ({worst} - {None})):
-        parts = [read_frame(folder / f"{stem}_{kind}.png") for kind in ("truth", "render", "error")]
-        y, x = person_box(parts[0], parts[1])
-        shown = np.hstack([fitted(part[y, x], 420, 540) for part in parts])
+    for stem, triple in triples.items():
+        shown = np.hstack([fitted(image[y, x], 420, 540) for image in triple])
         pictures.append(picture(shown, caption_of(stem, rows.get(stem, {}), stem == worst),
                                 f"Held-out frame {int(stem)}: truth, render, error", 70_000))
     return Sheet(pictures, columns="wide")
@@ -224,9 +230,9 @@ def caption_of(stem: str, row: dict, worst: bool) -> str:
     return ", ".join(words) + (" (the worst frame)" if worst else "")
 
 
-def person_box(truth: np.ndarray, render: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
-    """Rows and columns round everything that is not white in either; all where nothing is."""
-    marked = (np.minimum(truth, render) < PERSON_WHITE).any(2)
+def person_box(images: list[np.ndarray], margin: int = 8) -> tuple[slice, slice]:
+    """Rows and columns round everything that is not white in any image; all where nothing is."""
+    marked = np.any([(image < PERSON_WHITE).any(2) for image in images], 0)
     box = []
     for axis, size in ((1, marked.shape[0]), (0, marked.shape[1])):
         hits = np.flatnonzero(marked.any(axis))

@@ -107,7 +107,7 @@ def body_model(results: Results) -> list[dict[str, str]]:
             continue
         own = own_body_digest()
         return [{"name": "open body" if digest == own else "body model", "sha256": digest or "not recorded",
-                 "licence": "CC0-1.0" if digest == own else "that of the file the user brought"}]
+                 "licence": "CC0-1.0" if digest == own else "of another body than the one at hand"}]
     return []
 
 

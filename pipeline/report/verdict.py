@@ -6,7 +6,8 @@ from typing import Any
 
 from gsac.pipeline.report.results import number
 
-GRADES = ((30.0, "Very close to the frames"), (27.0, "Good"), (24.0, "Fair: fine detail is lost"), (20.0, "Poor: blurred or misplaced parts show"))
+GRADES = ((30.0, "Very close to the frames"), (27.0, "Good"), (24.0, "Fair: fine detail is lost"),
+          (20.0, "Poor: blurred or misplaced parts show"))
 """Least held-out PSNR on the person, dB, and the word for it."""
 BAD = "Bad: it does not look like the person"
 OVERFIT_DB, POSE_DB, WORST_DB = 2.0, 1.0, 3.0
@@ -39,6 +40,8 @@ def of_input(facts: dict[str, float]) -> list[str]:
                          "their neighbours).")
     if facts.get("face_share") == 0:
         found.append("The face was never seen; its shape and expression are the average's.")
+    elif facts.get("face_used") == 0:
+        found.append("No frame's face was usable; its shape and expression are the average's.")
     if facts.get("empty_masks"):
         found.append("Some masks are empty.")
     return found
