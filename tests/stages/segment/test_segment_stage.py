@@ -1,0 +1,121 @@
+"""segment as a stage: figures on footage with truth, and what it does with frames that show nobody."""
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import Clip, frame_paths, read_alpha, write_arrays, write_frame
+from gsac.avatar.models import ModelMissingError, model_path
+from gsac.stages.contract import Job, StageError
+from gsac.stages.segment import stage
+from gsac.stages.segment.config import SegmentConfig
+
+FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
+SIZE = (120, 80)
+
+
+def disc():
+    """(H, W) float32: what the stand-in network says of every frame."""
+    mask = np.zeros(SIZE, np.float32)
+    cv2.circle(mask, (40, 60), 25, 1, -1)
+    return mask
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Three frames with a blue disc and points on it; the network is stood in for."""
+    (tmp_path / "frames").mkdir()
+    rng = np.random.default_rng(0)
+    image = np.where(disc()[..., None] > 0, (40, 60, 140), (170, 165, 150)) + rng.normal(0, 2, (*SIZE, 3))
+    for i in range(3):
+        write_frame(tmp_path / f"frames/{i:06d}.png", image.astype(np.uint8))
+    monkeypatch.setitem(stage.METHODS, "pose", lambda models: lambda image, region: disc())
+    xy, score = np.zeros((3, 133, 2), np.float32), np.zeros((3, 133), np.float32)
+    xy[:, :4], score[:, :4] = [(40, 60), (50, 60), (40, 70), (30, 50)], 0.9
+    return tmp_path, xy, score
+
+
+def segment(folder, xy, score):
+    write_arrays(folder / "keypoints.npz", xy=xy, score=score, detector=np.array("none"),
+                 world=np.zeros((*score.shape, 3), np.float32))
+    Clip(None, None, SIZE[1], SIZE[0], None, "0").write(folder / "clip.json")
+    warnings, seen = [], []
+    (folder / "out").mkdir()
+    stage.run(Job({"split/frames": folder / "frames", "split/clip.json": folder / "clip.json",
+                   "keypoints/keypoints.npz": folder / "keypoints.npz"}, folder / "out", SegmentConfig(),
+                  warn=warnings.append, progress=lambda *step: seen.append(step)))
+    assert seen == [(1, 3, "frames"), (2, 3, "frames"), (3, 3, "frames")]
+    return [read_alpha(p) for p in frame_paths(folder / "out/alpha")], warnings
+
+
+def test_each_frame_gets_its_alpha(folder):
+    alphas, warnings = segment(*folder)
+    assert len(alphas) == 3 and not warnings
+    for alpha in alphas:
+        assert ((alpha > 0.5) & (disc() > 0)).sum() / ((alpha > 0.5) | (disc() > 0)).sum() > 0.95
+        assert 0 <= alpha.min() and alpha.max() <= 1
+
+
+def test_a_frame_without_a_person_gets_an_empty_alpha_and_a_warning(folder):
+    path, xy, score = folder
+    score[1] = 0
+    alphas, warnings = segment(path, xy, score)
+    assert not alphas[1].any() and alphas[0].any() and alphas[2].any()
+    assert "1" in warnings[0] and "no person" in warnings[0]
+
+
+def test_no_person_anywhere_is_an_error_that_names_a_frame(folder):
+    path, xy, score = folder
+    with pytest.raises(StageError, match="frame 0 .*no person"):
+        segment(path, xy, 0 * score)
+
+
+def test_an_empty_mask_is_an_error_that_names_the_frame(folder, monkeypatch):
+    path, xy, score = folder
+    monkeypatch.setitem(stage.METHODS, "pose", lambda models: lambda image, region: 0 * disc())
+    with pytest.raises(StageError, match=r"frame 0 \(000000.png\): the mask is empty"):
+        segment(path, xy, score)
+
+
+def test_keypoints_of_another_clip_are_refused(folder):
+    path, xy, score = folder
+    with pytest.raises(StageError, match="3 frames and keypoints of 2"):
+        segment(path, xy[:2], score[:2])
+
+
+def test_a_plate_that_does_not_fit_is_named_and_left_out(folder):
+    path, xy, score = folder
+    write_frame(path / "frames/plate.png", np.random.default_rng(1).integers(0, 255, (*SIZE, 3), np.uint8))
+    alphas, warnings = segment(path, xy, score)
+    assert "0, 1, 2" in warnings[0] and "plate" in warnings[0] and alphas[0].any()
+
+
+@pytest.mark.footage
+@pytest.mark.slow
+def test_truth_a_is_cut_out_with_an_iou_of_at_least_0_97(tmp_path):
+    source = FOOTAGE / "truth-a"
+    if not source.exists():
+        pytest.skip("footage truth-a is not here")
+    root = Path(os.environ.get("GSAC_CACHE", "~/.cache/gsac")).expanduser()
+    try:
+        network = stage.METHODS["pose"]({"pose_landmark_full": model_path("pose_landmark_full", root)})
+    except ModelMissingError as missing:
+        pytest.skip(str(missing))
+    joints = np.load(source / "truth.npz", allow_pickle=True)["coco2d"]
+    overlaps, softness = [], []
+    reader = cv2.VideoCapture(str(source / "clip.mp4"))
+    for i in range(60):
+        image = cv2.cvtColor(reader.read()[1], cv2.COLOR_BGR2RGB)
+        if i % 4:
+            continue
+        xy, score = np.zeros((133, 2)), np.zeros(133)
+        xy[:23], score[:23] = joints[i], 0.9
+        said = network(image, stage.person_region(xy, score))
+        alpha, _ = stage.segment_frame(image, said, xy, score, None, SegmentConfig().iterations)
+        truth = cv2.imread(str(source / f"mask/{i:04d}.png"), cv2.IMREAD_GRAYSCALE) > 127
+        overlaps.append(((alpha > 0.5) & truth).sum() / ((alpha > 0.5) | truth).sum())
+        softness.append(np.abs(alpha - truth).sum() / truth.sum())
+    assert np.mean(overlaps) >= 0.97 and np.min(overlaps) >= 0.94
+    assert np.mean(softness) < 0.035
