@@ -66,7 +66,7 @@ def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, actions
     w = (weight[..., None] * AXES).reshape(T, -1)
     w = w / np.maximum(w.sum(axis=1, keepdims=True), 1e-9)
     both = np.concatenate([response, modes])
-    hessian = np.einsum("tn,en,fn->tef", w, both, both, optimize=True)
+    hessian = (w @ (both[:, None] * both).reshape(-1, w.shape[1]).T).reshape(T, len(both), len(both))
     cc, cn, nn = hessian[:, :E, :E], hessian[:, :E, E:], hessian[:, E:, E:] + noise * np.eye(len(modes))
     cc = cc + ridge * np.eye(E)
     for left, right in actions.pairs():
@@ -91,9 +91,13 @@ def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, actions
 
 
 def smooth(c: np.ndarray, times: np.ndarray, sigma: float) -> np.ndarray:
-    """c: (T, E) at times (T,) s. The Gaussian mean over time with this standard deviation in seconds."""
-    near = np.exp(-0.5 * ((times[:, None] - times[None]) / sigma) ** 2)
-    return near @ c / near.sum(axis=1, keepdims=True)
+    """c: (T, E) at rising times (T,) s. The Gaussian mean over time with this standard deviation in seconds."""
+    out = np.empty_like(c)
+    first, last = np.searchsorted(times, times - 4 * sigma), np.searchsorted(times, times + 4 * sigma, side="right")
+    for t, (a, b) in enumerate(zip(first, last, strict=True)):
+        near = np.exp(-0.5 * ((times[a:b] - times[t]) / sigma) ** 2)
+        out[t] = near @ c[a:b] / near.sum()
+    return out
 
 
 def fill(c: np.ndarray, valid: np.ndarray, times: np.ndarray | None, rest_time: float) -> np.ndarray:

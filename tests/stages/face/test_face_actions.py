@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 from gsac.avatar.body import Body
+from gsac.avatar.facemesh import IBUG68
+from gsac.avatar.wholebody import face_flip
 from gsac.stages.contract import BadInput
 from gsac.stages.face.actions import Actions, fill, smooth, solve, view_terms
 from gsac.stages.face.config import FaceConfig
@@ -38,6 +40,10 @@ def test_the_table_speaks_of_the_open_bodys_actions_and_is_symmetric(actions):
     assert (actions.mirror[actions.mirror] == np.arange(468)).all()
     left, right = (actions.names.index(f"mouthSmile{side}") for side in ("Left", "Right"))
     np.testing.assert_allclose(actions.response[left][actions.mirror] * [-1, 1, 1], actions.response[right], atol=0.02)
+
+
+def test_the_68_points_mirror_as_ibugs_do(actions):
+    np.testing.assert_array_equal(actions.mirror[IBUG68], IBUG68[face_flip()])
 
 
 def test_known_actions_are_found_again_and_no_other(actions):
