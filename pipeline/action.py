@@ -45,7 +45,7 @@ class Actor:
             if there is not None and not forced:
                 return Outcome.CACHED, there
             models = self.keys.models.need(parts.models, self.reporter.note)
-            self.reporter.starts(name, verdict.sentence)
+            self.reporter.starts(name, verdict.reason.value)
             stage = self.keys.project.stage(name)
             with self.store.private(name) as folder:
                 info = self._compute(parts, inputs, models, folder)
