@@ -56,7 +56,8 @@ def keypoint_sheet(footage: Footage) -> Sheet:
                        k.get("missing", [None] * count)[t])
         hands = ", ".join(f"{side} hand {hand_word(k, t, i, side)}" for i, side in enumerate(HANDS))
         pictures.append(picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}"))
-    figures = {"Detector": str(k["detector"]), "Frames": str(len(k["xy"]))}
+    figures = {"Detector": str(k["detector"]), "Of stage": "handgap" if "filled" in k else "keypoints",
+               "Frames": str(len(k["xy"]))}
     facts = {"person_share": float((k["score"][:, BODY] >= SEEN).any(1).mean())}
     figures["Person found"] = share(facts["person_share"])
     for side, part in HANDS.items():

@@ -1,0 +1,379 @@
+"""report.html: whole, partial and failed runs; nothing outside the page; nothing of the user's text taken for HTML."""
+
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import cv2
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.wholebody import HANDS, INDEX
+from gsac.avatar.zbuffer import silhouette
+from gsac.pipeline.report import write_report
+from gsac.pipeline.report.charts import curve_chart
+from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
+from gsac.pipeline.report.page import seconds, size
+from gsac.pipeline.report.pictures import MOST_BYTES, picture
+from gsac.pipeline.report.sheets import turn_covered
+from gsac.pipeline.report.verdict import BAD, grade, weaknesses
+
+spec = importlib.util.spec_from_file_location(
+    "report_browser", Path(__file__).parents[1] / "stages" / "export" / "browser.py")
+chromium = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(chromium)
+
+T, WIDTH, HEIGHT = 6, 90, 160
+STAGES = ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")
+FILLED_FRAME, MISSING_FRAME = 2, 4
+PICTURES = ("clip", "keypoints", "alpha", "body", "heldout", "views")
+
+
+def stage_row(name, **changes):
+    return {"name": name, "status": "ran", "seconds": 10.0, "cpu_seconds": 8.0, "peak_rss_mb": 250.0, "key": "ab" * 32,
+            "reason": "", "warnings": [], "params": {}} | changes
+
+
+def write_run(out, rows, clip="/somewhere/private/turn.mp4"):
+    (out / "run.json").write_text(json.dumps({"clip": clip, "stages": rows, "outputs": {}, "metrics": {}}))
+
+
+def write_artifacts(out):
+    """A body that turns once, its exact keypoints and mask, one hand filled in one frame and missing in another."""
+    for port in ("split/frames", "keypoints", "handgap", "segment/alpha", "face", "smplx", "train/heldout", "export"):
+        (out / port).mkdir(parents=True)
+    body = Body.load()
+    pose = np.zeros((T, 55, 3), np.float32)
+    for t, angle in enumerate(np.linspace(0, 2 * np.pi, T, endpoint=False)):
+        turned = cv2.Rodrigues(np.array([np.pi, 0, 0]))[0] @ cv2.Rodrigues(np.array([0, angle, 0]))[0]
+        pose[t, 0] = cv2.Rodrigues(turned)[0][:, 0]
+    zeros = np.zeros((T, body.exprdirs.shape[2]))
+    params = BodyParams.from_pose(pose, np.tile((0, 0, 4.0), (T, 1)), np.zeros(body.num_betas), zeros, 200,
+                                  (WIDTH / 2, HEIGHT / 2), model=body.digest)
+    vertices, params.joints = body.posed(params)
+    camera = params.camera(WIDTH, HEIGHT)
+    params.write(out / "smplx/body.npz")
+    params.write(out / "train/body.npz")
+    noise = np.random.default_rng(0)
+    for t in range(T):
+        mask = silhouette(vertices[t], body.faces, camera)
+        write_frame(out / f"split/frames/{t:06d}.png", np.uint8(noise.integers(60, 90, (HEIGHT, WIDTH, 3)) + 80 * mask[..., None]))
+        write_alpha(out / f"segment/alpha/{t:06d}.exr", mask.astype(np.float32))
+    Clip(30.0, [t / 30 for t in range(T)], WIDTH, HEIGHT, None, "0" * 64).write(out / "split/clip.json")
+    xy = camera.project(body.keypoints(vertices)).astype(np.float32)
+    score = np.isfinite(xy).all(2).astype(np.float32)
+    keypoints = {"xy": np.nan_to_num(xy), "world": np.full((T, 133, 3), np.nan, np.float32), "detector": np.array("toy")}
+    write_arrays(out / "keypoints/keypoints.npz", score=score, **keypoints)
+    filled, missing = np.zeros((T, 133), bool), np.zeros((T, 2), bool)
+    filled[FILLED_FRAME, HANDS["left"]] = True
+    missing[[FILLED_FRAME, MISSING_FRAME], 0] = True
+    score = score.copy()
+    score[MISSING_FRAME, HANDS["left"]] = 0
+    write_arrays(out / "handgap/keypoints.npz", score=score, filled=filled, missing=missing,
+                 sigma=np.ones((T, 133), np.float32), **keypoints)
+    write_arrays(out / "face/face.npz", valid=np.array([True, True, False, False, False, True]))
+    for kind, value in (("truth", 200), ("render", 190), ("error", 10)):
+        image = np.full((80, 45, 3), 255, np.uint8)
+        image[20:60, 10:30] = value
+        for frame in (1, 4):
+            write_frame(out / f"train/heldout/{frame:06d}_{kind}.png", image)
+    write_frame(out / "train/heldout/views.png", np.full((96, 144, 3), 220, np.uint8))
+    (out / "train/metrics.json").write_text(json.dumps({
+        "psnr_fg": 26.54, "psnr_fg_ttpo": 28.91, "psnr_fg_fit": 24.0, "psnr_fg_train": 27.0, "ssim": 0.98, "lpips": None,
+        "n_gaussians": 12345, "unseen_gaussians": 10, "alpha_iou": 0.97,
+        "heldout": [{"frame": 1, "psnr_fg": 27.5, "psnr_fg_ttpo": 29.0}, {"frame": 4, "psnr_fg": 21.25, "psnr_fg_ttpo": None}],
+        "curve": [{"step": i, "seconds": 3.0 * i, "loss": 0.1 / i, "psnr_fg": 20.0 + i} for i in range(1, 8)],
+    }))
+    for name, length in (("avatar.gsac", 3000), ("viewer.html", 5000), ("avatar.ply", 700), ("avatar.glb", 90)):
+        (out / "export" / name).write_bytes(b"x" * length)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a run with everything in it."""
+    out = tmp_path_factory.mktemp("whole")
+    write_artifacts(out)
+    rows = [stage_row(name) for name in STAGES]
+    rows[0] |= {"status": "cached", "seconds": 75.0}
+    rows[4] |= {"warnings": ["The face is seen in 3 frames only."]}
+    rows[6] |= {"params": {"steps": 77, "seed": 0}}
+    write_run(out, rows)
+    write_report(out)
+    return out
+
+
+@pytest.fixture
+def copied(whole, tmp_path):
+    """The same, to be spoilt."""
+    return shutil.copytree(whole, tmp_path / "run", ignore=shutil.ignore_patterns("report.html"))
+
+
+class Page(HTMLParser):
+    """Tags, addresses and texts as a browser would see them."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.html = path.read_text()
+        self.tags, self.texts, self.section, self.where = [], [], "head", {}
+        self.feed(self.html)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag in ("section", "footer"):
+            self.section = dict(attrs).get("id", tag)
+        if tag == "img":
+            self.where.setdefault(self.section, []).append(dict(attrs))
+
+    def handle_data(self, data):
+        self.texts.append((self.section, data))
+
+    def text(self, section=None):
+        return " ".join(" ".join(t for s, t in self.texts if section in (None, s)).split())
+
+    def images(self, section):
+        return self.where.get(section, [])
+
+
+def page_of(out):
+    return Page(write_report(out))
+
+
+def test_a_whole_run_shows_every_section(whole):
+    page = Page(whole / "report.html")
+    assert all(page.images(section) for section in PICTURES)
+    assert "absent" not in {attrs.get("class") for _, attrs in page.tags}
+    head = page.text("head")
+    for words in ("turn.mp4", "26.54 dB", "28.91 dB", "12,345", "2 min 25 s"):
+        assert words in head
+    assert "The face is seen in 3 frames only." in page.text("warnings")
+    assert "75.0 s" not in page.text("stages") and "1 min 15 s then" in page.text("stages")
+    assert len([t for t, a in page.tags if t == "polyline"]) == 2
+
+
+def test_the_page_asks_for_nothing_outside_itself(whole):
+    page = Page(whole / "report.html")
+    addresses = [a[name] for _, a in page.tags for name in ("src", "href", "srcset", "poster", "data") if a.get(name)]
+    pictures = [a["src"] for t, a in page.tags if t == "img"]
+    assert len(pictures) > 20 and all(p.startswith("data:image/webp;base64,") for p in pictures)
+    for address in set(addresses) - set(pictures):
+        assert address.startswith("#") or (whole / unquote(address)).exists()
+    assert not re.search(r"url\(|@import|https?://|//[a-z]+\.", re.sub(r"base64,[^\"]*", "", page.html))
+    assert "/somewhere/private" not in page.html
+
+
+def test_an_exact_body_lies_on_the_person(whole):
+    text = Page(whole / "report.html").text("body")
+    assert float(re.search(r"Joint reprojection, median of the frames shown ([\d.]+) px", text)[1]) < 0.2
+    assert float(re.search(r"Outline IoU, mean of the frames shown ([\d.]+)", text)[1]) > 0.9
+
+
+def test_hands_are_said_to_be_found_filled_or_missing_frame_by_frame(whole):
+    text = Page(whole / "report.html").text("keypoints")
+    assert f"frame {FILLED_FRAME} · 0.07 s: left hand filled, right hand found" in text
+    assert f"frame {MISSING_FRAME} · 0.13 s: left hand missing, right hand found" in text
+    assert "Left hand found 67 %" in text and "Right hand found 100 %" in text and "Left hand filled 17 %" in text
+
+
+def test_the_worst_held_out_frame_is_named(whole):
+    page = Page(whole / "report.html")
+    assert "frame 4, 21.25 dB on the person (the worst frame)" in page.text("heldout")
+    assert "Held-out frame 4 is much worse than the others (21.2 dB)." in page.text("head")
+    assert "Aligning the pose to a held-out frame gains 2.4 dB" in page.text("head")
+
+
+def test_files_are_linked_with_their_sizes(whole):
+    page = Page(whole / "report.html")
+    links = {a["href"] for t, a in page.tags if t == "a" and not a["href"].startswith("#")}
+    assert links == {f"export/{name}" for name in ("avatar.gsac", "viewer.html", "avatar.ply", "avatar.glb")}
+    assert "3.0 kB" in page.text("files") and "90 B" in page.text("files")
+
+
+def test_a_parameter_that_is_not_at_its_default_shows_both(whole):
+    text = Page(whole / "report.html").text("parameters")
+    assert re.search(r"train\.steps 77 \(default \d+\)", text)
+    assert "train.seed 0 (default" not in text
+
+
+def test_models_are_named_with_digest_and_licence(copied):
+    text = page_of(copied).text("footer")
+    assert Body.load().digest in text and "CC0-1.0" in text and "gsac 0" in text
+    assert re.search(r"pose_landmark\w* Apache-2.0 [0-9a-f]{64}", text)
+
+
+def test_a_partial_run_says_what_was_not_part_of_it(copied):
+    write_run(copied, [stage_row("split"), stage_row("keypoints")])
+    page = page_of(copied)
+    assert page.images("clip") and page.images("keypoints")
+    for section in ("alpha", "body", "heldout", "views"):
+        assert not page.images(section)
+        assert "was not part of this run. What lies in its folder is of an earlier run and is not shown." in page.text(section)
+    assert "This run ended before handgap, segment, face, smplx, train, export" in page.text("head")
+    assert "No avatar in this run" in page.text("head")
+
+
+def test_a_failed_run_says_which_stage_and_why(copied):
+    why = "smplx: no frame shows four body points; the clip needs one whole person in view"
+    write_run(copied, [stage_row(name) for name in STAGES[:5]] + [stage_row("smplx", status="failed", error=why)])
+    page = page_of(copied)
+    assert "The run failed in stage smplx." in page.text("head") and why in page.text("head")
+    assert why in page.text("body") and why in page.text("stages")
+    assert "Stage train was not reached: stage smplx failed." in page.text("heldout")
+    assert page.images("alpha") and not page.images("body")
+
+
+def test_an_empty_folder_gives_a_page(tmp_path):
+    page = page_of(tmp_path)
+    assert "There is no readable run.json here" in page.text("head")
+    assert "split/frames is absent" in page.text("clip")
+
+
+@pytest.mark.parametrize("run", ["", "[]", '{"stages": 3}', '{"stages": [7, {"status": "ran"}, {"name": "split"}]}'])
+def test_a_torn_run_json_gives_a_page(tmp_path, run):
+    (tmp_path / "run.json").write_text(run)
+    assert "Warnings" in page_of(tmp_path).text()
+
+
+@pytest.mark.parametrize(("port", "section"), [
+    ("split/clip.json", "clip"), ("split/frames/000000.png", "clip"), ("handgap/keypoints.npz", "keypoints"),
+    ("segment/alpha/000000.exr", "alpha"), ("smplx/body.npz", "body"), ("train/heldout/000001_truth.png", "heldout"),
+    ("train/heldout/views.png", "views"), ("train/metrics.json", "training"),
+])
+@pytest.mark.parametrize("damage", ["gone", "torn"])
+def test_a_missing_or_torn_artifact_costs_its_own_section_only(copied, port, section, damage):
+    path = copied / port
+    if damage == "gone":
+        path.unlink()
+    else:
+        path.write_bytes(path.read_bytes()[:11])
+    page = page_of(copied)
+    if (port, damage) not in (("split/frames/000000.png", "gone"), ("handgap/keypoints.npz", "gone")):
+        assert "absent" in page.text(section) or "cannot be read" in page.text(section) or \
+            "could not be drawn" in page.text(section) or "no mask" in page.text(section)
+    if section != "views":
+        assert page.images("views")
+    if section not in ("heldout", "training"):
+        assert page.images("heldout")
+
+
+def test_text_of_the_user_is_never_taken_for_html(copied):
+    hostile = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'{{ 7*7 }}"
+    rows = [stage_row(name, warnings=[hostile], params={hostile: hostile}) for name in STAGES[:7]]
+    write_run(copied, [*rows, stage_row("export", status="failed", error=hostile)], clip=f"/clips/{hostile.replace('/', '_')}.mp4")
+    page = page_of(copied)
+    assert sum(tag == "script" for tag, _ in page.tags) == 1
+    assert not any(name.startswith("on") for _, attrs in page.tags for name in attrs)
+    assert page.text("warnings").count(hostile) == 7
+    assert hostile in page.text("head") and hostile.replace("/", "_") in page.text("head")
+
+
+def test_a_picture_never_passes_its_bound():
+    noise = np.random.default_rng(0).integers(0, 256, (640, 520, 3), dtype=np.uint8)
+    shown = picture(noise, "", "")
+    assert len(shown.uri) * 3 / 4 <= MOST_BYTES + 100
+    assert shown.width > 150
+
+
+def test_the_page_is_small(whole):
+    assert (whole / "report.html").stat().st_size < 4e6
+    assert (12 + 3 * 8) * MOST_BYTES * 4 / 3 + 8 * 70_000 * 4 / 3 + 160_000 * 4 / 3 < 4e6
+
+
+def test_left_and_right_hands_differ_and_filled_and_missing_are_marked():
+    xy = np.zeros((133, 2)) + (20, 20)
+    score = np.zeros(133)
+    left, right, wrist = HANDS["left"].start + 4, HANDS["right"].start + 4, INDEX["right_wrist"]
+    xy[left], xy[right], xy[wrist], xy[left + 4] = (100.5, 100.5), (200.5, 100.5), (200.5, 200.5), (100.5, 200.5)
+    score[[left, right, wrist]] = 1
+    filled = np.zeros(133, bool)
+    filled[left + 4] = True
+
+    def drawn(missing):
+        image = np.zeros((640, 300, 3), np.uint8)
+        draw_keypoints(image, xy, score, 0.2, filled, np.array(missing))
+        return image
+
+    image = drawn([False, False])
+    assert tuple(image[100, 100]) == SIDE_COLOURS["left"] and tuple(image[100, 200]) == SIDE_COLOURS["right"]
+    ring = image[194:208, 94:108].reshape(-1, 3).astype(float)
+    assert tuple(image[200, 100]) == (0, 0, 0)
+    brightest = ring[ring.sum(1).argmax()]
+    assert np.allclose(brightest / brightest.max(), np.array(FILLED_COLOUR) / 255, atol=0.1) and brightest.max() > 100
+    assert (drawn([False, True]) == MISSING_COLOUR).all(2)[190:211, 190:211].any()
+    assert not (drawn([True, False]) == MISSING_COLOUR).all(2).any()
+
+
+def test_alpha_mixes_frame_and_magenta():
+    mixed = over_magenta(np.full((1, 3, 3), 100, np.uint8), np.array([[0.0, 0.5, 1.0]]))
+    assert mixed[0].tolist() == [[255, 0, 255], [178, 50, 178], [100, 100, 100]]
+
+
+def test_a_turn_is_counted_by_the_directions_seen():
+    def turned(angles):
+        return np.stack([cv2.Rodrigues(cv2.Rodrigues(np.array([np.pi, 0, 0.]))[0] @ cv2.Rodrigues(np.array([0, a, 0.]))[0])[0][:, 0]
+                         for a in angles])
+
+    assert turn_covered(turned(np.linspace(0, 2 * np.pi, 60))) == 360
+    assert 150 <= turn_covered(turned(np.linspace(0, np.pi, 60))) <= 195
+    assert turn_covered(turned([0.1] * 5)) == 15
+
+
+@pytest.mark.parametrize(("metrics", "facts", "words"), [
+    ({"psnr_fg": 25.0, "psnr_fg_train": 28.0}, {}, "better by 3.0 dB"),
+    ({"psnr_fg": 25.0, "alpha_iou": 0.9}, {}, "alpha IoU 0.90"),
+    ({"n_gaussians": 100, "unseen_gaussians": 20}, {}, "20% of the gaussians"),
+    ({}, {"left_hand_share": 0.0}, "left hand was never seen"),
+    ({}, {"right_hand_share": 0.25, "right_hand_filled": 0.5}, "right hand was seen in 25%"),
+    ({}, {"turn_degrees": 90.0}, "Only 90 of 360"),
+    ({}, {"outline_iou": 0.5}, "badly"),
+    ({}, {"face_share": 0.0}, "face was never seen"),
+])
+def test_each_weakness_has_its_sentence(metrics, facts, words):
+    assert sum(words in sentence for sentence in weaknesses(metrics, facts)) == 1
+
+
+def test_good_figures_have_no_weakness_and_grades_follow_psnr():
+    good = {"psnr_fg": 31.0, "psnr_fg_train": 31.5, "psnr_fg_ttpo": 31.2, "alpha_iou": 0.99}
+    assert weaknesses(good, {"turn_degrees": 360}) == []
+    assert grade({"psnr_fg": 12.0}) == BAD != grade({"psnr_fg": 28.0})
+    assert "Not measured" in grade({"psnr_fg": None})
+
+
+def test_a_curve_leaves_out_what_is_not_a_number():
+    rows = [{"seconds": s, "loss": v} for s, v in ((1, 0.5), (2, float("nan")), (3, None), (4, 0.1), (5, 0.0))]
+    assert curve_chart(rows, "loss", "Loss", "", log=True).count("<circle") == 2
+    assert curve_chart(rows[:2], "loss", "Loss", "") is None
+
+
+def test_times_and_sizes_read_well():
+    assert [seconds(x) for x in (0.04, 59.96, 185.2, 3725, None)] == ["0.0 s", "1 min 00 s", "3 min 05 s", "1 h 02 min", "–"]
+    assert [size(x) for x in (90, 1234, 123_456, 48_200_000, None)] == ["90 B", "1.2 kB", "123 kB", "48.2 MB", "–"]
+
+
+def test_importing_the_report_loads_no_heavy_package():
+    script = "import sys, gsac.pipeline.report; print([m for m in ('cv2', 'numba', 'torch', 'jinja2') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")
+def test_nothing_overflows_on_a_phone_and_a_browser_finds_no_fault(whole):
+    browser = chromium.Browser(360, 800)
+    try:
+        browser.resize(360, 800, mobile=True)
+        browser.open((whole / "report.html").as_uri())
+        browser.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+        assert browser.run("document.documentElement.scrollWidth") == 360
+        assert browser.run("Promise.all([...document.images].map(i => (i.loading = 'eager', i.decode().then(() => 1))))"
+                           ".then(all => all.length)") > 20
+        assert browser.run("document.querySelector('figure img').click(), document.querySelector('dialog').open")
+        assert not browser.errors
+        assert {address.partition(":")[0] for address in browser.requests} <= {"file", "data"}
+    finally:
+        browser.close()
