@@ -13,7 +13,7 @@ from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 from gsac.pipeline.report_hook import refresh_report
-from gsac.pipeline.run import Chain, Options
+from gsac.pipeline.run import Chain, Options, StageFailedError
 from gsac.pipeline.workspace import OWN_STORE, Workspace
 from gsac.stages.contract import BadInput
 
@@ -52,13 +52,20 @@ def carry_out(chain: Chain, clip: Path, options: Options, voice: PlainReporter, 
     """The run itself; the JSON object comes out whether it ends well or not."""
     try:
         chain.run(clip, options)
-        if (warning := refresh_report(chain.workspace, chain.results)) is not None:
-            voice.note(f"gsac: warning: {warning}")
+        report(chain, voice)
+    except StageFailedError:
+        report(chain, voice)
+        raise
     finally:
         if json:
             emit(chain.summary())
     voice.note(f"results: {chain.workspace.root}")
     return ExitCode.OK
+
+
+def report(chain: Chain, voice: PlainReporter) -> None:
+    if (warning := refresh_report(chain.workspace, chain.results)) is not None:
+        voice.note(f"gsac: warning: {warning}")
 
 
 def foretell(chain: Chain, clip: Path, options: Options, voice: PlainReporter, json: bool) -> ExitCode:

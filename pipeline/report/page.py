@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -64,34 +65,50 @@ def render(results: Results) -> str:
 
 
 def sections_of(results: Results) -> list[Section]:
-    from gsac.pipeline.report import sheets
-    from gsac.pipeline.report.pictures import Footage
+    drawing = functools.cache(lambda: Draw(results))
 
-    footage = Footage(results)
+    def section(*parts) -> Section:
+        return make_section(results, drawing, *parts)
+
     return [
-        section("clip", "The clip", "Frames that the stages read, evenly through the clip.",
-                lambda: sheets.contact_sheet(footage)),
-        section("keypoints", "Keypoints", "What the detector saw. A ring is a point filled by its neighbours in time; a cross "
-                "marks the wrist of a hand that is missing.", lambda: sheets.keypoint_sheet(footage), lambda: strips(footage)),
-        section("alpha", "Cut-out", "The person over magenta: what is pink inside the person, or not pink outside, is wrong.",
-                lambda: sheets.alpha_sheet(footage)),
-        section("body", "Fitted body", "The body model over the frames, half transparent. Dots are detected points, white rings "
-                "the body's own, lines their distance.", lambda: sheets.body_sheet(footage)),
-        section("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of frames "
-                "that training never saw.", lambda: sheets.heldout_sheet(results)),
-        section("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have had.",
-                lambda: sheets.views_sheet(results)),
-        section("training", "Training", "Loss and held-out quality over the seconds of training, without the time for judging.",
-                None, lambda: curves(results)),
+        section("clip", "The clip", "Frames that the stages read, evenly through the clip.", "split/frames",
+                lambda draw: draw.sheets.contact_sheet(draw.footage)),
+        section("keypoints", "Keypoints", "What the detector saw. A ring is a point filled by its neighbours in time; "
+                "a cross marks the wrist of a hand that is missing.", "keypoints/keypoints.npz",
+                lambda draw: draw.sheets.keypoint_sheet(draw.footage),
+                lambda draw: [draw.charts.strip_chart(draw.footage.keypoints, draw.footage.face_valid)]),
+        section("alpha", "Cut-out", "The person over magenta: what is pink inside the person, or not pink outside, is "
+                "wrong.", "segment/alpha", lambda draw: draw.sheets.alpha_sheet(draw.footage)),
+        section("body", "Fitted body", "The body model over the frames, half transparent. Dots are detected points, "
+                "white rings the body's own, lines their distance.", "smplx/body.npz",
+                lambda draw: draw.sheets.body_sheet(draw.footage)),
+        section("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of "
+                "frames that training never saw.", "train/heldout", lambda draw: draw.sheets.heldout_sheet(results)),
+        section("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
+                "had.", "train/heldout/views.png", lambda draw: draw.sheets.views_sheet(results)),
+        section("training", "Training", "Loss and held-out quality over the seconds of training, without the time for "
+                "judging.", "train/metrics.json", None, lambda draw: curves(results, draw.charts)),
     ]
 
 
-def section(ident: str, title: str, lead: str, sheet: Callable | None, charts: Callable | None = None) -> Section:
-    """Makes both parts; whatever keeps one from being made becomes the sentence in its place."""
+class Draw:
+    """What draws, imported when there is something to draw."""
+
+    def __init__(self, results: Results):
+        from gsac.pipeline.report import charts, sheets
+        from gsac.pipeline.report.pictures import Footage
+
+        self.charts, self.sheets, self.footage = charts, sheets, Footage(results)
+
+
+def make_section(results: Results, drawing: Callable[[], Draw], ident: str, title: str, lead: str, port: str,
+                 sheet: Callable | None, charts: Callable | None = None) -> Section:
+    """Draws what lies at a port; whatever keeps it from being drawn becomes the sentence in its place."""
     made = Section(ident, title, lead)
     try:
-        made.sheet = sheet() if sheet else None
-        made.charts = charts() if charts else []
+        results.path(port)
+        made.sheet = sheet(drawing()) if sheet else None
+        made.charts = charts(drawing()) if charts else []
     except AbsentError as reason:
         made.absent = str(reason)
     except Exception as error:  # a torn or foreign artifact must not cost the other sections
@@ -99,18 +116,10 @@ def section(ident: str, title: str, lead: str, sheet: Callable | None, charts: C
     return made
 
 
-def strips(footage) -> list:
-    from gsac.pipeline.report.charts import strip_chart
-
-    return [strip_chart(footage.keypoints, footage.face_valid)]
-
-
-def curves(results: Results) -> list:
-    from gsac.pipeline.report.charts import curve_chart
-
+def curves(results: Results, draw) -> list:
     curve = results.metrics.get("curve") or []
-    charts = [curve_chart(curve, "psnr_fg", "Held-out PSNR on the person", "dB"),
-              curve_chart(curve, "loss", "Loss", "log scale", log=True)]
+    charts = [draw.curve_chart(curve, "psnr_fg", "Held-out PSNR on the person", "dB"),
+              draw.curve_chart(curve, "loss", "Loss", "log scale", log=True)]
     if not any(charts):
         raise AbsentError("train/metrics.json holds no training curve.")
     return [chart for chart in charts if chart]
