@@ -21,7 +21,7 @@ class Output:
     path: str
     """Relative path, e.g. `keypoints.npz` or `frames`."""
     check: Callable[[Path], None]
-    """Raises `avatar.artifacts.ArtifactError` when the file or folder is not what the port promises (name, shape, dtype, count)."""
+    """Raises `avatar.artifacts.ArtifactError` when the file or folder is not what the port promises."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class Stage:
     """Ports it reads, `<stage>/<output path>`; the source clip is the port `clip`."""
     outputs: tuple[Output, ...]
     config: type
-    """Frozen-by-convention dataclass; its fields are the parameters `<stage>.<field>`, its defaults are params.yaml's."""
+    """Dataclass; its fields are the parameters `<stage>.<field>`, its defaults are params.yaml's."""
     packages: tuple[str, ...] = ()
     """Distributions whose version is part of the key."""
     models: Callable[[Any], tuple[str, ...]] = lambda config: ()
-    """Names of the model files that this configuration needs (see `avatar.models`); their digests are part of the key."""
+    """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
     uses_device: bool = False
     """Whether the device class (cpu, cuda) is part of the key."""
     code: tuple[str, ...] = ()
@@ -67,7 +67,7 @@ class StageError(Exception):
     """A stage cannot give a right result. The message names what, where and what to do (exit code 1)."""
 
 
-class BadInput(StageError):
+class BadInput(StageError):  # noqa: N818, reads as what the user did
     """The user's file or parameter is at fault (exit code 2)."""
 
 
