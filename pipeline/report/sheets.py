@@ -42,7 +42,7 @@ def contact_sheet(footage: Footage) -> Sheet:
         image = footage.frame(t)
         shown = fitted(image, 480 if image.shape[1] > image.shape[0] else 300, 400)
         pictures.append(picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000))
-    return Sheet(pictures, columns="small")
+    return Sheet(pictures, columns="large" if shown.shape[1] > shown.shape[0] else "small")
 
 
 def keypoint_sheet(footage: Footage) -> Sheet:

@@ -132,7 +132,8 @@ class Page(HTMLParser):
             self.where.setdefault(self.section, []).append(dict(attrs))
 
     def handle_data(self, data):
-        self.texts.append((self.section, data))
+        if self.tags and self.tags[-1][0] not in ("style", "script"):
+            self.texts.append((self.section, data))
 
     def text(self, section=None):
         return " ".join(" ".join(t for s, t in self.texts if section in (None, s)).split())
@@ -226,6 +227,15 @@ def test_a_failed_run_says_which_stage_and_why(copied):
     assert why in page.text("body") and why in page.text("stages")
     assert "Stage train was not reached: stage smplx failed." in page.text("heldout")
     assert page.images("alpha") and not page.images("body")
+
+
+def test_a_run_that_fails_leaves_its_report(toy):
+    assert toy.run().code == 0
+    assert "failed" not in Page(toy.out / "report.html").text("head")
+    assert toy.run("--set", "join.trouble=stage", "--set", "left.trouble=warning").code == 1
+    page = Page(toy.out / "report.html")
+    assert "The run failed in stage join. join: frame 3 has no person; record again" in page.text("head")
+    assert "word 2 is short" in page.text("warnings")
 
 
 def test_an_empty_folder_gives_a_page(tmp_path):
