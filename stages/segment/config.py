@@ -17,7 +17,8 @@ class SegmentConfig:
     iterations: int = 1
     """Rounds of GrabCut; 0 keeps the network's outline."""
     use_plate: bool = True
-    """Whether the empty scene, where photos came with one, joins in."""
+    """Whether the empty scene joins in: the one that photos came with, or the one that a still camera's video shows
+    where the person is not."""
 
     def check(self) -> None:
         if self.method not in MODELS:

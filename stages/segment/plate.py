@@ -14,7 +14,7 @@ HALF = 2
 """All is done at half size: a plate decides areas, not outlines."""
 BARE, ALIKE, CHANGED = 2.5, 4.0, 6.0
 """Noise widths below which a pixel is bare scene, is so where the network doubts, and above which it is not."""
-LEAST_NOISE, MOST_NOISE = 1.0, 6.0
+LEAST_NOISE, MOST_NOISE = 1.0, 4.0
 """CIE Lab units, of L* and of a* b*; with more the plate shows another scene."""
 SHADOW = 45.0
 """L* units by which a shadow may darken a pixel."""
@@ -31,6 +31,22 @@ STRUCTURE, WINDOW = 4.0, 3.0
 
 
 @dataclass
+class Plate:
+    """The empty scene."""
+
+    image: np.ndarray
+    """(H, W, 3) uint8."""
+    known: np.ndarray
+    """(H, W) bool: where it was seen."""
+    most_changed: float = 0.3
+    """Share of the background that may differ before the plate counts as one of another scene."""
+
+    def part(self, box: tuple[int, int, int, int]) -> Plate:
+        x0, y0, x1, y1 = box
+        return Plate(self.image[y0:y1, x0:x1], self.known[y0:y1, x0:x1], self.most_changed)
+
+
+@dataclass
 class Difference:
     gain: np.ndarray
     """(3,) float: the plate times this has the frame's exposure."""
@@ -39,14 +55,15 @@ class Difference:
     changed: np.ndarray
     """(H // 2, W // 2) bool: certainly not the bare scene, and no shadow."""
 
-    def part(self, x0: int, y0: int, x1: int, y1: int) -> Difference:
-        """The same of a box in full-size pixels, even but at the frame's end."""
-        box = np.s_[y0 // HALF: y1 // HALF, x0 // HALF: x1 // HALF]
-        return Difference(self.gain, self.empty[box], self.changed[box])
+    def part(self, box: tuple[int, int, int, int]) -> Difference:
+        """The same of a box (x0, y0, x1, y1) in full-size pixels, even but at the frame's end."""
+        x0, y0, x1, y1 = box
+        half = np.s_[y0 // HALF: y1 // HALF, x0 // HALF: x1 // HALF]
+        return Difference(self.gain, self.empty[half], self.changed[half])
 
-    def scene(self, plate: np.ndarray) -> np.ndarray:
-        """plate: (h, w, 3) uint8, any part of it. Returns it in the frame's exposure."""
-        return np.clip(plate * self.gain + 0.5, 0, 255).astype(np.uint8)
+    def scene(self, plate: Plate) -> Plate:
+        """The plate, or a part of it, in the frame's exposure."""
+        return Plate(exposed(plate.image, self.gain), plate.known)
 
 
 def halved(image: np.ndarray) -> np.ndarray:
@@ -55,21 +72,23 @@ def halved(image: np.ndarray) -> np.ndarray:
     return cv2.resize(image[: height * HALF, : width * HALF], (width, height), interpolation=cv2.INTER_AREA)
 
 
-def compare(image: np.ndarray, plate: np.ndarray, person: np.ndarray) -> Difference | None:
-    """image, plate: (H, W, 3) uint8; person: (H, W) network probability.
+def compare(image: np.ndarray, plate: Plate, person: np.ndarray) -> Difference | None:
+    """image: (H, W, 3) uint8, like the plate; person: (H, W) network probability.
 
     None where the plate does not show this frame's scene (most of the background differs).
     """
-    image, plate, person = halved(image), halved(plate), halved(person)
-    outside = cv2.dilate((person > 0.05).astype(np.uint8), np.ones((15, 15), np.uint8)) == 0
+    known = halved(plate.known.astype(np.float32)) > 0.99
+    most_changed = plate.most_changed
+    image, plate, person = halved(image), halved(plate.image), halved(person)
+    outside = known & (cv2.dilate((person > 0.05).astype(np.uint8), np.ones((15, 15), np.uint8)) == 0)
     if outside.mean() < 0.05:
         return None
     gain = exposure(plate, image, outside)
-    light, hue = _difference(image, np.clip(plate * gain + 0.5, 0, 255).astype(np.uint8))
+    light, hue = _difference(image, exposed(plate, gain))
     light_noise = max(LEAST_NOISE, 1.4826 * float(np.median(np.abs(light[outside]))))
     hue_noise = max(LEAST_NOISE, 1.4826 * float(np.median(hue[outside])))
     away = np.hypot(hue / hue_noise, light / light_noise)
-    if max(light_noise, hue_noise) > MOST_NOISE or (away[outside] > CHANGED).mean() > 0.3:
+    if max(light_noise, hue_noise) > MOST_NOISE or (away[outside] > CHANGED).mean() > most_changed:
         return None
     # Darker than the plate may be shadow, brighter may not.
     varies = cv2.GaussianBlur(np.abs(light - cv2.GaussianBlur(light, (0, 0), WINDOW)), (0, 0), WINDOW)
@@ -79,7 +98,7 @@ def compare(image: np.ndarray, plate: np.ndarray, person: np.ndarray) -> Differe
     doubted = person < SURE
     empty = bare_scene((away < np.where(doubted, ALIKE, BARE)) | shade, person)
     changed = (np.where(shadow, hue / hue_noise, away) > CHANGED) & (person > 0.1)
-    return Difference(gain, empty, changed)
+    return Difference(gain, empty & known, changed & known)
 
 
 def bare_scene(alike: np.ndarray, person: np.ndarray) -> np.ndarray:
@@ -97,9 +116,17 @@ def bare_scene(alike: np.ndarray, person: np.ndarray) -> np.ndarray:
     return (wide > 0) & np.isin(labels, np.unique(labels[(person < 0.5) & (wide > 0)]))
 
 
+def exposed(plate: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """plate: (h, w, 3) uint8; gain: (3,). Returns their product, (h, w, 3) uint8."""
+    table = np.clip(np.arange(256)[:, None] * gain + 0.5, 0, 255).astype(np.uint8)
+    return cv2.LUT(plate, table[None])
+
+
 def exposure(plate: np.ndarray, image: np.ndarray, outside: np.ndarray) -> np.ndarray:
     """(3,) gain a channel, plate to image: the median over the pixels outside of the person."""
-    usable = outside & (plate.min(axis=2) > 12) & (plate.max(axis=2) < 245) & (image.max(axis=2) < 245)
+    # Every second pixel tells the median as well.
+    plate, image = plate[::2, ::2][outside[::2, ::2]], image[::2, ::2][outside[::2, ::2]]
+    usable = (plate > 12).all(axis=1) & (plate < 245).all(axis=1) & (image < 245).all(axis=1)
     if usable.sum() < 100:
         return np.ones(3, np.float32)
     return np.clip(np.median(image[usable].astype(np.float32) / plate[usable], axis=0), 0.5, 2)

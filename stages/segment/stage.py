@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, check_arrays, frame_paths, read_frame, write_alpha
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
 from gsac.stages.contract import Job, StageError
 from gsac.stages.segment.edge import soften
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.network import PoseMask, SelfieMask, person_region
 from gsac.stages.segment.parts import keep_person
-from gsac.stages.segment.plate import HALF, compare
+from gsac.stages.segment.plate import HALF, Plate, compare
+from gsac.stages.segment.still import learn_plate
 
 METHODS = {"pose": PoseMask, "selfie": SelfieMask}
 """Each: (models) -> ((image (H, W, 3), region) -> (H, W) probability)."""
+
+
+WIDE = 0.25
+"""Of the person's height: how far around it the scene is compared with the plate."""
 
 
 def run(job: Job) -> None:
@@ -21,9 +26,14 @@ def run(job: Job) -> None:
     keypoints = check_arrays(job.inputs["keypoints/keypoints.npz"], KEYPOINT_SHAPES)
     if len(paths) != len(keypoints["xy"]):
         raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
-    plate_path = frames / "plate.png"
-    plate = read_frame(plate_path) if job.config.use_plate and plate_path.exists() else None
     network = METHODS[job.config.method](job.models)
+    plate = None
+    if job.config.use_plate and (frames / "plate.png").exists():
+        image = read_frame(frames / "plate.png")
+        plate = Plate(image, np.ones(image.shape[:2], bool))
+    elif job.config.use_plate and Clip.read(job.inputs["split/clip.json"]).timestamps_s is not None:
+        plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
+    given = (frames / "plate.png").exists()
     (job.out / "alpha").mkdir()
     absent, other_scene = [], []
     for t, path in enumerate(paths):
@@ -35,7 +45,7 @@ def run(job: Job) -> None:
             alpha = np.zeros(image.shape[:2], np.float32)
         else:
             alpha, plate_fits = segment_frame(image, network(image, region), xy, score, plate, job.config.iterations)
-            if not plate_fits:
+            if given and not plate_fits:
                 other_scene.append(t)
             if not (alpha > 0.5).any():
                 raise StageError(f"frame {t} ({path.name}): the mask is empty although a person was found there; "
@@ -52,24 +62,28 @@ def run(job: Job) -> None:
 
 
 def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,
-                  plate: np.ndarray | None, iterations: int) -> tuple[np.ndarray, bool]:
-    """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,); plate: (H, W, 3) uint8 or None.
+                  plate: Plate | None, iterations: int) -> tuple[np.ndarray, bool]:
+    """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).
 
     Returns alpha (H, W) float32, and whether the plate, if any, fits the frame.
     """
-    difference = None if plate is None else compare(image, plate, probability)
     box = around(probability)
     if box is None:
         return np.zeros(image.shape[:2], np.float32), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     corner = np.array(box[:2])
-    here = None if difference is None else difference.part(*box)
-    scene = None if difference is None else difference.scene(plate[part])
+    here = scene = None
+    if plate is not None:
+        x0, y0, x1, y1 = around(probability, margin=WIDE)
+        here = compare(image[y0:y1, x0:x1], plate.part((x0, y0, x1, y1)), probability[y0:y1, x0:x1])
+    if here is not None:
+        here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
+        scene = here.scene(plate.part(box))
     outline = cut_out(image[part], probability[part], xy - corner, score, iterations, here)
     outline = keep_person(outline, xy - corner, score)
     alpha = np.zeros(image.shape[:2], np.float32)
     alpha[part] = soften(image[part], outline, scene)
-    return alpha, plate is None or difference is not None
+    return alpha, plate is None or here is not None
 
 
 def around(probability: np.ndarray, least: float = 0.05, margin: float = 0.04) -> tuple[int, int, int, int] | None:

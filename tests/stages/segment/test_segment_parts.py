@@ -11,8 +11,9 @@ from gsac.stages.segment.edge import soften
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.network import onto_frame, person_region
 from gsac.stages.segment.parts import keep_person
-from gsac.stages.segment.plate import compare
+from gsac.stages.segment.plate import Plate, compare
 from gsac.stages.segment.stage import METHODS, around, segment_frame
+from gsac.stages.segment.still import masked_median
 
 HEIGHT, WIDTH = 480, 320
 NO_POINTS = np.zeros((133, 2)), np.zeros(133)
@@ -43,6 +44,11 @@ def painted(alpha, background, person=(40, 60, 130), noise=2.0, seed=1):
     rng = np.random.default_rng(seed)
     mix = alpha[..., None] * np.array(person) + (1 - alpha[..., None]) * background
     return np.clip(mix + rng.normal(0, noise, mix.shape), 0, 255).astype(np.uint8)
+
+
+def empty_scene(background, seed=5):
+    """The plate of a background, with its own noise."""
+    return Plate(painted(np.zeros((HEIGHT, WIDTH)), background, seed=seed), np.ones((HEIGHT, WIDTH), bool))
 
 
 def rough(alpha, sigma=8.0):
@@ -131,7 +137,7 @@ def test_a_plate_brings_back_what_the_network_missed_and_clears_what_it_filled(p
     hole[260:320, 140:156] = 1  # bare scene that the network calls person
     truth = truth * (1 - hole)
     background = scene()
-    image, plate = painted(truth, background), painted(np.zeros_like(truth), background, seed=5)
+    image, plate = painted(truth, background), empty_scene(background)
     said = rough(figure())
     said[:, 230:] *= 0.4  # half of the arm is doubted
     with_plate, fits = segment_frame(image, said, *points, plate, 1)
@@ -145,7 +151,7 @@ def test_a_soft_shadow_on_the_scene_is_not_person(points):
     shadow = np.zeros((HEIGHT, WIDTH), np.float32)
     cv2.ellipse(shadow, (160, 424), (120, 28), 0, 0, 360, 0.3, -1)
     shaded = background * (1 - cv2.GaussianBlur(shadow, (0, 0), 10))[..., None]
-    image, plate = painted(truth, shaded), painted(np.zeros_like(truth), background, seed=5)
+    image, plate = painted(truth, shaded), empty_scene(background)
     alpha, fits = segment_frame(image, rough(truth), *points, plate, 1)
     assert fits and (alpha > 0.5)[(truth == 0)].mean() < 0.004
     assert iou(alpha > 0.5, truth > 0.5) > 0.97
@@ -153,7 +159,7 @@ def test_a_soft_shadow_on_the_scene_is_not_person(points):
 
 def test_another_exposure_of_the_plate_is_brought_into_line():
     truth, background = figure(), scene()
-    plate = painted(np.zeros_like(truth), background * [1.2, 1.1, 0.9], seed=5)
+    plate = empty_scene(background * [1.2, 1.1, 0.9])
     difference = compare(painted(truth, background), plate, rough(truth))
     assert difference.gain == pytest.approx([1 / 1.2, 1 / 1.1, 1 / 0.9], abs=0.02)
     assert difference.empty[10:60, 10:40].mean() > 0.9 and difference.changed[120:160, 70:90].all()
@@ -161,28 +167,59 @@ def test_another_exposure_of_the_plate_is_brought_into_line():
 
 def test_clothes_that_look_like_the_scene_are_not_cut_open(points):
     truth, background = figure(), scene(spread=0)
-    plate = painted(np.zeros_like(truth), background, seed=5)
+    plate = empty_scene(background)
     image = painted(truth, background)
     patch = np.zeros((HEIGHT, WIDTH), bool)
     patch[200:360, 124:196] = True
-    image[patch] = plate[patch]
+    image[patch] = plate.image[patch]
     alpha, _ = segment_frame(image, rough(truth), *points, plate, 1)
     assert (alpha > 0.5)[patch].mean() > 0.95
 
 
 def test_a_plate_of_another_place_is_not_used(points):
     truth = figure()
-    plate = painted(np.zeros_like(truth), scene(seed=9, base=(60, 160, 60), spread=40))
+    plate = empty_scene(scene(seed=9, base=(60, 160, 60), spread=40))
     image = painted(truth, scene())
     alpha, fits = segment_frame(image, rough(truth), *points, plate, 1)
     assert not fits and np.array_equal(alpha, segment_frame(image, rough(truth), *points, None, 1)[0])
+
+
+def test_where_the_plate_was_never_seen_it_says_nothing(points):
+    truth, background = figure(), scene()
+    plate = empty_scene(background)
+    plate.known[:, 100:260] = False
+    plate.image[:, 100:260] = 0
+    difference = compare(painted(truth, background), plate, rough(truth))
+    assert not difference.empty[:, 50:130].any() and not difference.changed[:, 50:130].any()
+    alpha, fits = segment_frame(painted(truth, background), rough(truth), *points, plate, 1)
+    assert fits and iou(alpha > 0.5, truth > 0.5) > 0.97
+
+
+def test_a_still_video_teaches_its_own_plate():
+    background = scene()
+    moves = [np.roll(figure(), shift, axis=1) for shift in (-80, -40, 0, 40, 80, 0, 40)]
+    images = np.stack([painted(m, background, seed=i) for i, m in enumerate(moves)])
+    plate = masked_median(images, np.stack([m == 0 for m in moves]))
+    empty = painted(0 * figure(), background, noise=0).astype(int)
+    assert np.abs(plate.image[plate.known].astype(int) - empty[plate.known]).mean() < 2
+    assert plate.known.mean() > 0.9 and not plate.known.all()
+    assert not plate.known[sum(m == 0 for m in moves) < 3].any()
+
+
+def test_a_moving_camera_teaches_no_plate_that_is_used(points):
+    tiles = np.random.default_rng(4).integers(40, 220, (12, 16, 3)).astype(np.float64)
+    wide = cv2.resize(tiles, (2 * WIDTH, HEIGHT), interpolation=cv2.INTER_NEAREST)
+    images = np.stack([painted(figure(), wide[:, s: s + WIDTH], seed=s) for s in range(0, 80, 10)])
+    plate = masked_median(images, np.repeat(figure()[None] == 0, 8, axis=0))
+    for image in images[::3]:
+        assert not segment_frame(image, rough(figure()), *points, plate, 1)[1]
 
 
 @pytest.mark.parametrize("size", [(HEIGHT, WIDTH), (HEIGHT - 1, WIDTH - 1)])
 def test_odd_sizes_pass(points, size):
     truth = figure()
     cut = np.s_[: size[0], : size[1]]
-    image, plate = painted(truth, scene())[cut], painted(0 * truth, scene(), seed=5)[cut]
+    image, plate = painted(truth, scene())[cut], empty_scene(scene()).part((0, 0, size[1], size[0]))
     alpha, _ = segment_frame(image, rough(truth)[cut], *points, plate, 1)
     assert alpha.shape == size and iou(alpha > 0.5, truth[cut] > 0.5) > 0.97
 
