@@ -4,7 +4,8 @@ takes  split/frames (frames/plate.png where photos came with the empty scene), s
 gives  alpha/%06d.exr (H, W) half, 0..1
 
 A person network says roughly where (`network.py`), GrabCut at half size finds the outline (`grabcut.py`), the colours
-on both sides of the outline give the soft edge (`edge.py`). A plate joins in at each step (`plate.py`).
+on both sides of the outline give the soft edge (`edge.py`). A plate joins in at each step (`plate.py`);
+a still camera's video teaches its own (`still.py`).
 """
 
 from gsac.avatar.artifacts import check_image_folder
