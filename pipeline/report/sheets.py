@@ -209,7 +209,20 @@ def heldout_sheet(results: Results) -> Sheet:
         shown = np.hstack([fitted(image[y, x], 420, 540) for image in triple])
         pictures.append(picture(shown, caption_of(stem, rows.get(stem, {}), stem == worst),
                                 f"Held-out frame {int(stem)}: truth, render, error", 70_000))
-    return Sheet(pictures, columns="wide")
+    return Sheet(pictures, judged_on(results), columns="wide")
+
+
+def judged_on(results: Results) -> dict[str, str]:
+    """How the held-out figures were taken, as far as metrics.json says."""
+    try:
+        metrics = results.metrics
+    except AbsentError:
+        return {}
+    width, height = metrics.get("image_size") or (None, None)
+    figures = {"Size judged": f"{width} x {height} px" if width else None, "Trained on": metrics.get("trained_frames"),
+               "Held out": len(metrics.get("heldout_frames") or []) or None,
+               "LPIPS": "not measured (no weights)" if metrics.get("lpips") is None else f"{metrics['lpips']:.3f}"}
+    return {name: f"{value} frames" if isinstance(value, int) else value for name, value in figures.items() if value}
 
 
 def rows_of(results: Results) -> dict[str, dict]:

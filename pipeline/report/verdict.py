@@ -64,7 +64,7 @@ def of_avatar(metrics: dict[str, Any]) -> list[str]:
         found.append(f"Frames that were trained on look better by {train - psnr:.1f} dB than held-out ones: it has learnt "
                      "frames rather than the person.")
     if psnr is not None and aligned is not None and aligned - psnr > POSE_DB:
-        found.append(f"Aligning the pose to a held-out frame gains {aligned - psnr:.1f} dB: poses are less exact than looks.")
+        found.append(f"Aligning the pose to a held-out frame gains {aligned - psnr:.1f} dB: the poses are not exact yet.")
     rows = [row for row in metrics.get("heldout") or [] if isinstance(row, dict) and number(row.get("psnr_fg")) is not None]
     if rows and psnr is not None:
         worst = min(rows, key=lambda row: row["psnr_fg"])

@@ -87,6 +87,7 @@ def write_artifacts(out):
     write_frame(out / "train/heldout/views.png", np.full((96, 144, 3), 220, np.uint8))
     (out / "train/metrics.json").write_text(json.dumps({
         "psnr_fg": 26.54, "psnr_fg_ttpo": 28.91, "psnr_fg_fit": 24.0, "psnr_fg_train": 27.0, "ssim": 0.98, "lpips": None,
+        "image_size": [45, 80], "trained_frames": 4, "heldout_frames": [1, 4],
         "n_gaussians": 12345, "unseen_gaussians": 10, "alpha_iou": 0.97,
         "heldout": [{"frame": 1, "psnr_fg": 27.5, "psnr_fg_ttpo": 29.0}, {"frame": 4, "psnr_fg": 21.25, "psnr_fg_ttpo": None}],
         "curve": [{"step": i, "seconds": 3.0 * i, "loss": 0.1 / i, "psnr_fg": 20.0 + i} for i in range(1, 8)],
@@ -185,6 +186,7 @@ def test_hands_are_said_to_be_found_filled_or_missing_frame_by_frame(whole):
 def test_the_worst_held_out_frame_is_named(whole):
     page = Page(whole / "report.html")
     assert "frame 4, 21.25 dB on the person (the worst frame)" in page.text("heldout")
+    assert "Size judged 45 x 80 px Trained on 4 frames Held out 2 frames LPIPS not measured" in page.text("heldout")
     assert "Held-out frame 4 is much worse than the others (21.2 dB)." in page.text("head")
     assert "Aligning the pose to a held-out frame gains 2.4 dB" in page.text("head")
 
