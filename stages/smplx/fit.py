@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from gsac.avatar import rotation
+from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
 from gsac.stages.smplx import start
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.points import Pairs, pairs_of, positions
+from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.problem import Observations, Problem, State
 from gsac.stages.smplx.silhouette import Outline, outline_points
@@ -19,6 +21,8 @@ from gsac.stages.smplx.solver import levenberg_marquardt
 HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
 """Hand points that no finger joint moves: they turn the wrist."""
 BODY_POINTS = np.array([*range(23), *HAND_ROOTS])
+OFFSETS = {"mediapipe": "offsets/mediapipe.npz"}
+"""Detector -> what was measured of it."""
 FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(hand.start, hand.stop)])
 HIPS = (INDEX["left_hip"], INDEX["right_hip"])
 DETECTOR_SPREAD = 0.006
@@ -30,8 +34,8 @@ DEPTH_SPREAD = 0.08
 DEPTH_TRUST = 0.4
 """Metres, once it has decided: its depth leans with the camera, the pictures do not."""
 OUTLINE_SPREAD = 0.006
-ADULT_HEIGHT = (1.72, 0.05)
-"""The stated scale prior, metres: one camera cannot see scale, and proportions alone mislead."""
+ADULT_HEIGHT = (1.72, 0.02)
+"""The stated scale prior, metres and spread: one camera cannot see scale, and clothes make a free scale read people as small."""
 FOCAL_GUESS = 1.0
 """Focal length when nothing is known, as a share of the picture's longer side: between a phone's main lens and a tele."""
 FOCAL_SPREAD = 0.2
@@ -51,6 +55,7 @@ class Sightings:
     width: int
     height: int
     focal_px: float | None
+    detector: str = ""
 
     @property
     def seen(self) -> np.ndarray:
@@ -79,7 +84,8 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps."""
     center = np.array([sightings.width / 2, sightings.height / 2])
     focal, spread = focal_prior(sightings, config)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
+    offsets = detector_offsets(body, sightings.detector)
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], offsets[BODY_POINTS])
     seen = observations(sightings, BODY_POINTS, center, (focal, spread), config, outlines)
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0)
     state = starting_state(body, sightings, focal, center)
@@ -99,6 +105,17 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     state, more = fit_fingers(body, sightings, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     return Fit(state, joint_spread(problem, state), iou, reprojection(problem, state), steps + more.steps)
+
+
+def detector_offsets(body: Body, detector: str) -> np.ndarray:
+    """(133, 3) m: where the detector's points lie against the body's own; zeros for a detector or body not measured.
+
+    `benchmarks/detector_offsets.py` measures them on truth clips.
+    """
+    measured = read_arrays(Path(__file__).parent / OFFSETS[detector]) if detector in OFFSETS else None
+    if measured is None or str(measured["model"]) != body.digest:
+        return np.zeros((133, 3))
+    return measured["offsets"].astype(np.float64)
 
 
 def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
@@ -177,13 +194,13 @@ def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.n
 
 def fit_fingers(body: Body, sightings: Sightings, problem: Problem, state: State, config: SmplxConfig):
     """Bends the fingers on the fitted wrists; nothing else moves."""
-    pairs: Pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS])
+    offsets = detector_offsets(body, sightings.detector)
+    pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS], offsets[FINGER_POINTS])
     seen = observations(sightings, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, problem.seen.outlines)
     seen.depth[:] = np.nan
     fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, 0.0)
-    rest, _ = fingers.mean, None
     state = State(state.local.copy(), state.transl, state.betas, state.log_focal)
-    state.local[:, FINGER_JOINTS] = rotation.exp(rest)
+    state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)
     frozen = np.zeros(fingers.size, bool)
     frozen[-3:] = True
     return levenberg_marquardt(state, fingers.linearise, fingers.cost, fingers.move, frozen,

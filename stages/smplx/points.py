@@ -31,19 +31,20 @@ class Pairs:
         return len(self.start) - 1
 
 
-def pairs_of(body: Body, matrix: sparse.csr_matrix) -> Pairs:
-    """matrix: (P, V) weights of the points over the vertices."""
+def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None) -> Pairs:
+    """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m added in the axes of the heaviest joint."""
     matrix = matrix.tocsr()
     start, joint, mass, moment, dirs = [0], [], [], [], []
     for p in range(matrix.shape[0]):
         span = slice(matrix.indptr[p], matrix.indptr[p + 1])
         vertices, a = matrix.indices[span], matrix.data[span].astype(np.float64)
         carried = a[:, None] * body.weights[vertices]  # (n, 55)
+        heaviest = np.abs(carried).sum(0).argmax()
         for k in np.nonzero(np.abs(carried).sum(0) > 1e-4)[0]:
             w = carried[:, k]
             joint.append(k)
             mass.append(w.sum())
-            moment.append(w @ body.v_template[vertices])
+            moment.append(w @ body.v_template[vertices] + (offsets[p] if offsets is not None and k == heaviest else 0))
             dirs.append(np.tensordot(w, body.shapedirs[vertices], 1))
         start.append(len(joint))
     return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3),

@@ -8,6 +8,7 @@ from gsac.avatar.body import Body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
 from gsac.stages.smplx.silhouette import read_outline
+from threadpoolctl import threadpool_limits
 
 POOR_IOU = 0.7
 LOST = 0.5
@@ -21,17 +22,18 @@ def run(job: Job) -> None:
     body = Body.load()
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px)
+                          clip.focal_px, str(points["detector"]))
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
-        raise StageError("smplx: no frame shows four body points; the clip needs one whole person in view")
+        raise StageError("no frame shows four body points; the clip needs one whole person in view")
     outlines = [read_outline(p) for p in frame_paths(job.inputs["segment/alpha"])]
     if len(outlines) != len(sightings.xy):
-        raise StageError(f"smplx: {len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
-    fit = fit_clip(body, sightings, outlines, job.config, job.progress)
+        raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
+    with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
+        fit = fit_clip(body, sightings, outlines, job.config, job.progress)
     expression = face["expression"]
     if expression.shape[1] != body.exprdirs.shape[2]:
-        raise StageError(f"smplx: face.npz has {expression.shape[1]} expressions, the body model {body.exprdirs.shape[2]}")
+        raise StageError(f"face.npz has {expression.shape[1]} expressions, the body model {body.exprdirs.shape[2]}")
     params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression)
     params.jaw_pose = face["jaw"].astype(np.float32)
     params.joints = body.posed(params)[1]
@@ -44,14 +46,14 @@ def run(job: Job) -> None:
 def warn(job: Job, fit, seen: np.ndarray, params, clip: Clip) -> None:
     """Says which frames are not to be trusted and what one camera left open."""
     if not seen.all():
-        job.warn(f"smplx: frames {listed(~seen)} show no person; their pose is interpolated")
+        job.warn(f"Frames {listed(~seen)} show no person; their pose is interpolated")
     poor = np.nan_to_num(fit.iou, nan=1.0) < POOR_IOU
     if (poor & seen).any():
-        job.warn(f"smplx: in frames {listed(poor & seen)} the body covers the silhouette badly (IoU below {POOR_IOU})")
+        job.warn(f"In frames {listed(poor & seen)} the body covers the silhouette badly (IoU below {POOR_IOU})")
     if not clip.focal_px and not job.config.focal_px:
-        job.warn(f"smplx: the clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it)")
+        job.warn(f"The clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it)")
     if job.config.height_m is None:
-        job.warn("smplx: one camera cannot see scale; the person's height comes from the shape prior (set smplx.height_m)")
+        job.warn("One camera cannot see scale; the person's height comes from the shape prior (set smplx.height_m)")
 
 
 def listed(which: np.ndarray) -> str:
