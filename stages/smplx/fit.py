@@ -39,6 +39,8 @@ ADULT_HEIGHT = (1.72, 0.02)
 FOCAL_GUESS = 1.0
 """Focal length when nothing is known, as a share of the picture's longer side: between a phone's main lens and a tele."""
 FOCAL_SPREAD = 0.2
+VIEW = np.radians(30)
+"""Yaw that makes another view of the person."""
 POSED_AT_ONCE = 64
 """Frames whose vertices are held in memory together."""
 
@@ -90,6 +92,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0)
     state = starting_state(body, sightings, focal, center)
     seen.depth *= scale_of_world(problem, state, sightings)
+    seen.repeats = repeats(state.local[:, 0])
     free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1, bool)
     trunk_only = free.copy()
     trunk_only[3:-3] = True
@@ -139,7 +142,7 @@ def observations(sightings: Sightings, points: np.ndarray, center: np.ndarray, f
     depth[:, len([p for p in points if p < 23]):] = np.nan
     return Observations(sightings.xy[:, points].astype(np.float64), spread.astype(np.float64), depth.astype(np.float64),
                         DEPTH_SPREAD, center, sightings.seconds, focal,
-                        (config.height_m, 0.003) if config.height_m else ADULT_HEIGHT, outlines, OUTLINE_SPREAD * height)
+                        (config.height_m, 0.003) if config.height_m else ADULT_HEIGHT, 1.0, outlines, OUTLINE_SPREAD * height)
 
 
 def starting_state(body: Body, sightings: Sightings, focal: float, center: np.ndarray) -> State:
@@ -162,6 +165,12 @@ def starting_state(body: Body, sightings: Sightings, focal: float, center: np.nd
     for c in range(3):
         transl[:, c] = np.interp(np.arange(frames), np.nonzero(known)[0], transl[known, c])
     return State(local, transl, np.zeros(body.num_betas), float(np.log(focal)))
+
+
+def repeats(turns: np.ndarray) -> float:
+    """turns: (T, 3, 3) of the body. Frames for each different view, in yaw."""
+    yaw = np.arctan2(turns[:, 0, 2], -turns[:, 2, 2])
+    return len(turns) / len(np.unique(np.floor(yaw / VIEW)))
 
 
 def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> float:

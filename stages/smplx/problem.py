@@ -48,6 +48,8 @@ class Observations:
     """Focal length px and its relative spread."""
     height: tuple[float, float]
     """Metres and spread."""
+    repeats: float
+    """Frames for each different view of the person; what they get wrong they get wrong together."""
     outlines: list[Outline]
     outline_spread: float  # px
 
@@ -259,12 +261,14 @@ class Problem:
                 system.band[frames, block, columns] += left.transpose(0, 2, 1) @ right
 
     def _shared_residual(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Shape, focal and height priors: residuals (R,) and rows (R, s)."""
-        b = len(state.betas)
-        focal, relative = self.seen.focal_prior
-        residual, rows = [*state.betas, (state.log_focal - np.log(focal)) / relative], [*np.eye(b + 1)]
-        rows[b] = rows[b] / relative
-        metres, spread = self.seen.height
-        residual.append((self.height + self.height_dirs @ state.betas - metres) / spread)
-        rows.append(np.append(self.height_dirs, 0) / spread)
-        return np.array(residual), np.array(rows)
+        """Shape, focal and height priors: residuals (R,) and rows (R, s).
+
+        Frames of one view share their errors (clothes, the detector's habits), so that the priors count once for each repeat.
+        """
+        b, (focal, focal_spread), (metres, spread) = len(state.betas), self.seen.focal_prior, self.seen.height
+        rows = np.concatenate([np.eye(b + 1), np.append(self.height_dirs, 0)[None]])
+        rows[b:] /= np.array([[focal_spread], [spread]])
+        tall = self.height + self.height_dirs @ state.betas
+        residual = np.array([*state.betas, (state.log_focal - np.log(focal)) / focal_spread, (tall - metres) / spread])
+        count = np.sqrt(self.seen.repeats)
+        return residual * count, rows * count
