@@ -37,7 +37,10 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     from gsac.benchmarks.turntable.clip import make_clip
 
-    made = make_clip(folder, options, lambda done, total, what: print(f"\r{done}/{total} {what}", end="", file=sys.stderr))
+    def say(done: int, total: int, what: str) -> None:
+        print(f"\r{done}/{total} {what}", end="", file=sys.stderr)
+
+    made = make_clip(folder, options, say)
     print(file=sys.stderr)
     print(made)
     return 0

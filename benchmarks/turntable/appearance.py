@@ -112,7 +112,7 @@ class Appearance:
             share = _soft((np.sin(along * 2 * np.pi / 0.062) - 0.25) * 4)
         elif self.pattern == "checks":
             across = np.where(sleeve, z + y, np.arctan2(x, z) * 0.14)
-            share = 0.5 * _soft(np.sin(along * 2 * np.pi / 0.07) * 5) + 0.5 * _soft(np.sin(across * 2 * np.pi / 0.07) * 5)
+            share = 0.5 * sum(_soft(np.sin(u * 2 * np.pi / 0.07) * 5) for u in (along, across))
         elif self.pattern == "print":
             r = np.hypot(x, y - 0.47)
             ring = _soft((0.012 - np.abs(r - 0.075)) * 900) + _soft((0.034 - r) * 900)
@@ -120,7 +120,7 @@ class Appearance:
             back = _soft((0.025 - np.abs(y - 0.50)) * 900) * (np.abs(x) < 0.11)
             share = np.where(z > 0, np.clip(ring + bars, 0, 1), back)
         else:
-            share = _soft((np.abs(x) - 0.17) * 900)
+            share = _soft((np.abs(x) - 0.17) * 900) * (y > 0.4)
         collar = 0.775 - self.person.look.neckline * np.clip(z - 0.01, -0.05, 0.2) - y
         trim = _soft((0.014 - collar) * 1500) * (np.abs(x) < 0.16)
         trim = np.maximum(trim, _soft((np.abs(x) - self.person.look.sleeve + 0.014) * 1500) * sleeve)

@@ -37,12 +37,12 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
               progress: Callable[[int, int, str], None] = lambda done, total, what: None, **changes) -> Path:
     """Writes a clip into out_dir (made if needed) and returns `clip.mp4`, or `frames` for novel poses.
 
-    Options come as a TurntableOptions or by keyword: `make_clip(out, seed=3, frames=40)`. Raises ValueError for a bad one.
+    Options come as a TurntableOptions or by keyword: `make_clip(out, seed=3, frames=40)`. A bad one raises ValueError.
 
-    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m camera frame; vertices (T, V, 3) m bare body (if asked for);
-    keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad; hidden (T, 2) bool,
-    left and right hand; height_m; rotation (3, 3) and eye (3,) world -> camera; shift (V, 3) m by which the bare T-pose leaves the
-    shape basis; and `BodyParams`' arrays, whose posed body is the truth up to that shift.
+    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m, camera frame; vertices (T, V, 3) m bare body (if asked
+    for); keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad; hidden (T, 2)
+    bool, left and right hand; height_m; rotation (3, 3) and eye (3,) world -> camera; shift (V, 3) m by which the bare
+    T-pose leaves the shape basis; and `BodyParams`' arrays, whose posed body is the truth up to that shift.
     mask: share of each pixel that is person; above 127 is the silhouette.
     """
     options = options or TurntableOptions(**changes)
@@ -79,11 +79,12 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
 
 
 def make_studio(person: Person, options: TurntableOptions) -> Studio:
-    """A person of the body's height fills about 0.78 of the picture's height."""
+    """The camera stands so far off that arms stay in the picture."""
     rng = np.random.default_rng([options.seed, 3])
     width, height = options.size
+    fill = 0.73 if options.poses == "turn" else 0.53
     camera = Camera((options.focal_px,) * 2, (width / 2, height / 2), width, height)
-    distance = options.focal_px * person.height_m / (0.78 * min(height, width * 16 / 9))
+    distance = options.focal_px * person.height_m / (fill * min(height, width * 16 / 9))
     eye = np.array([rng.uniform(-0.05, 0.05), rng.uniform(1.1, 1.4), distance])
     aim = np.array([0, 0.5 * person.height_m, 0]) - eye
     forward = aim / np.linalg.norm(aim)
@@ -176,7 +177,8 @@ class Video:
              "-s", f"{width}x{height}", "-r", str(options.fps), "-i", "-",
              "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-c:v", "libx264", "-preset", "fast", "-threads", "1",
              "-crf", str(options.crf), "-pix_fmt", "yuv420p", "-colorspace", "bt709", "-color_primaries", "bt709",
-             "-color_trc", "bt709", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart", str(path)],
+             "-color_trc", "bt709", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart",
+             str(path)],
             stdin=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def add(self, frame: np.ndarray) -> None:

@@ -63,7 +63,7 @@ def _novel(body, joints, options: TurntableOptions, rng) -> Motion:
     stir(pose, index, options.arm_swing, rng)
     yaw = 0.9 * np.sin(2 * np.pi * np.arange(T) / T * 2 + rng.random())
     lean = pose[:, 0].copy()
-    pose[:, 0] = (Rotation.from_euler("Y", yaw) * Rotation.from_rotvec(lean)).as_rotvec()
+    pose[:, 0] = (Rotation.from_euler("Y", yaw[:, None]) * Rotation.from_rotvec(lean)).as_rotvec()
     return Motion(pose, np.zeros((T, 2)), yaw, expressions(body, options, rng))
 
 
@@ -88,8 +88,8 @@ def a_pose(body, rng) -> np.ndarray:
     return pose
 
 
-STIR = {"spine1": 1.0, "spine2": 1.0, "spine3": 1.2, "neck": 1.6, "head": 2.4, "collar": 0.8, "shoulder": 3.5, "elbow": 3.5,
-        "wrist": 4.0, "index1": 4.0, "middle1": 3.0, "ring1": 3.0, "pinky1": 4.0, "thumb1": 3.0}
+STIR = {"spine1": 1.0, "spine2": 1.0, "spine3": 1.2, "neck": 1.6, "head": 2.4, "collar": 0.8, "shoulder": 3.5,
+        "elbow": 3.5, "wrist": 4.0, "index1": 4.0, "middle1": 3.0, "ring1": 3.0, "pinky1": 4.0, "thumb1": 3.0}
 """Degrees (standard deviation) that a joint wanders about each axis."""
 
 
@@ -111,13 +111,14 @@ def steps(pose: np.ndarray, index: dict, yaw: np.ndarray, amount: float) -> None
         pose[:, index[f"{side}_ankle"], 0] -= 0.10 * lift
 
 
-def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.ndarray, options: TurntableOptions) -> None:
-    """Moves one hand behind the back or before the belly between hidden_from and hidden_to; pose (T, 55, 3) in place."""
+def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.ndarray,
+              options: TurntableOptions) -> None:
+    """Moves one hand behind the back or before the belly for a while; pose (T, 55, 3) in place."""
     side, where = options.hidden_hand.split("_")
     sign = SIDES[side]
     back = where == "back"
-    depth = -0.13 if back else 0.2
-    target = joints[index["spine1"]] + [-sign * 0.05, 0.02, depth]
+    depth = -0.12 if back else 0.19
+    target = joints[index["spine1"]] + [sign * 0.10, 0.0, depth]
     chain = [index[f"{side}_{name}"] for name in ("shoulder", "elbow", "wrist")]
     hand, knuckle, elbow = chain[2], index[f"{side}_middle1"], chain[1]
     start = pose[0].copy()
@@ -134,15 +135,15 @@ def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.nda
         a = joint_transforms(trial[None], joints, parents)[0]
         at = {j: a[j, :, :3] @ joints[j] + a[j, :, 3] for j in (hand, knuckle, elbow)}
         along = at[knuckle] - at[hand]
-        across = along / np.linalg.norm(along) + [sign, 0, 0]
-        return np.concatenate([(at[hand] - target) * 30, across * 1.5, (at[elbow] - elbow_goal) * 4,
+        across = along / np.linalg.norm(along) - np.array([-0.7 * sign, -0.7, 0])
+        return np.concatenate([(at[hand] - target) * 30, across * 1.0, (at[elbow] - elbow_goal) * 4,
                                (x - aim.ravel()) * 0.15, x[6:] * 0.8])
 
     goal = least_squares(miss, aim.ravel()).x.reshape(3, 3)
     s = np.arange(len(pose)) / len(pose)
-    ramp = 0.12
-    gone = _smooth(np.clip((s - options.hidden_from + ramp) / ramp, 0, 1)) * _smooth(
-        np.clip((options.hidden_to + ramp - s) / ramp, 0, 1))
+    ramp = 0.10
+    arrive, leave = options.hidden
+    gone = _smooth(np.clip((s - arrive + ramp) / ramp, 0, 1)) * _smooth(np.clip((leave + ramp - s) / ramp, 0, 1))
     pose[:, chain] += gone[:, None, None] * (goal - start[chain])
 
 
@@ -158,7 +159,7 @@ def expressions(body, options: TurntableOptions, rng) -> np.ndarray:
         for a in actions:
             out[:, names[a]] = np.clip(curve, 0, 1)
 
-    set_to(0.18 + wander(rng, T, 0.28, 4), "jawOpen")
+    set_to(0.08 + wander(rng, T, 0.22, 4), "jawOpen")
     smile = 0.25 + wander(rng, T, 0.35, 2)
     set_to(smile + wander(rng, T, 0.05), "mouthSmileLeft")
     set_to(smile + wander(rng, T, 0.05), "mouthSmileRight")

@@ -26,10 +26,10 @@ class TurntableOptions:
     """`turn`: A-pose, once around. `novel`: squat, raised arms, reach, twist; PNG frames, no video, no noise."""
     hidden_hand: Literal["none", "left_back", "right_back", "left_front", "right_front"] = "none"
     """A hand that goes behind the back, or before the belly, for a while."""
-    hidden_from: float = 0.35
-    """Where the hand is fully gone, as a share of the clip."""
-    hidden_to: float = 0.60
-    """Where the hand starts to come back."""
+    hidden_from: float | None = None
+    """Where the hand has arrived, as a share of the clip; None: when the body comes to cover it."""
+    hidden_to: float | None = None
+    """Where the hand leaves again, as a share of the clip."""
     expression: bool = True
     """Mouth, smile, brows and blinks change; else a neutral face."""
     arm_swing: float = 1.0
@@ -66,8 +66,16 @@ class TurntableOptions:
         for name, choices in (("poses", ("turn", "novel")), ("hidden_hand", HIDDEN_HANDS)):
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} is {getattr(self, name)!r}, expected one of {', '.join(choices)}")
-        if not 0 <= self.hidden_from <= self.hidden_to <= 1:
-            raise ValueError(f"hidden_from {self.hidden_from}, hidden_to {self.hidden_to}: expected 0 <= from <= to <= 1")
+        start, stop = self.hidden
+        if not 0 <= start <= stop <= 1:
+            raise ValueError(f"hidden_from is {start}, hidden_to {stop}; expected 0 <= from <= to <= 1")
+
+    @property
+    def hidden(self) -> tuple[float, float]:
+        """Shares of the clip between which the hand is away: towards the end, facing the camera, or half-way, facing off."""
+        start, stop = (0.42, 0.58) if self.hidden_hand.endswith("front") else (0.85, 0.97)
+        return (start if self.hidden_from is None else self.hidden_from,
+                stop if self.hidden_to is None else self.hidden_to)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -12,9 +12,9 @@ from gsac.benchmarks.turntable.options import TurntableOptions
 from gsac.benchmarks.turntable.shell import Shell, capped, cut, draped, lifted
 
 REGIONS = Path(__file__).with_name("regions.npz")
-"""(5, V) shares of lips, ears, eyelids, nails, inner mouth, face: MakeHuman's CC0 texture masks, sampled at the vertices."""
+"""(6, V) shares of lips, ears, eyelids, nails, inner mouth, face: MakeHuman's CC0 texture masks, at the vertices."""
 OUTSIDE = Path(__file__).with_name("outside.npz")
-"""What single local shape sliders do: `vertices` (S, V, 3) and `joints` (S, 55, 3), m; written by the open body's bake."""
+"""What single local shape sliders do: `vertices` (S, V, 3) and `joints` (S, 55, 3), m; from the open body's bake."""
 EYES = slice(13574, 13718)
 """Both eyeballs in the open body's vertices."""
 MATERIALS = ("skin", "eye", "shirt", "trousers", "shoes", "hair")
@@ -83,7 +83,8 @@ class Person:
 
 def make_person(options: TurntableOptions, rng: np.random.Generator) -> Person:
     body = Body.load()
-    betas = (rng.normal(0, 0.8, body.num_betas) * np.linspace(1, 0.4, body.num_betas)).clip(-1.6, 1.6).astype(np.float32)
+    spread = np.linspace(0.8, 0.32, body.num_betas)
+    betas = (rng.normal(0, 1, body.num_betas) * spread).clip(-1.6, 1.6).astype(np.float32)
     shift, joint_offset = outside(body, options.outside, rng)
     rest, joints = body.rest(betas, None, joint_offset)
     rest = rest + shift
@@ -140,18 +141,16 @@ def dress(body: Body, rest: np.ndarray, region: np.ndarray, look: Look, thick: f
     for name, field in fields.items():
         field = np.where(skin_only, field, -1.0)
         member = field > -0.06
-        base = rest
-        if name == "shoes":
-            for sign in (1, -1):
-                base = capped(base, np.clip((z - 0.07) / 0.06, 0, 1) * member * (sign * x > 0))
-        lift = lifted(base, faces, member, np.maximum(thickness[name], 0.003) * thick,
+        lift = lifted(rest, faces, member, np.maximum(thickness[name], 0.003) * thick,
                       {"shirt": 16, "trousers": 12, "shoes": 6, "hair": 6}[name])
         if name == "shirt":
             lift = draped(lift, np.clip((0.52 - y) / 0.08, 0, 1) * (arm < 0.3) * member)
         paint = template
         if name == "shoes":
+            for sign in (1, -1):
+                lift = capped(lift, np.clip((z - 0.07) / 0.06, 0, 1) * (field > 0) * (sign * x > 0))
             sole = rest[skin_only, 1].min() - 0.018
-            low = np.clip((-0.775 - y) / 0.02, 0, 1)
+            low = np.clip((-0.806 - y) / 0.014, 0, 1)
             lift[:, 1] += low * (sole - lift[:, 1]) * 0.9
             paint = np.stack([x, lift[:, 1] - sole, z], 1)
         if name == "hair" and look.hair == "bob":

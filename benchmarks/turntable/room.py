@@ -36,7 +36,8 @@ class Light:
         right = np.cross(forward, [0, 1, 0])
         right /= np.linalg.norm(right)
         focal = 0.5 * size * distance / 1.35
-        return np.stack([right, np.cross(forward, right), forward]), Camera((focal, focal), (size / 2, size / 2), size, size)
+        pinhole = Camera((focal, focal), (size / 2, size / 2), size, size)
+        return np.stack([right, np.cross(forward, right), forward]), pinhole
 
 
 @dataclass
@@ -76,7 +77,7 @@ def make_light(rng) -> Light:
 
 
 def make_room(camera: Camera, to_world: np.ndarray, eye: np.ndarray, light: Light, shadow_size: int, rng) -> Room:
-    """camera: at the wanted size; to_world: (3, 3) camera -> world; eye: (3,) m. Drawn at twice the size and averaged."""
+    """camera: at the wanted size; to_world: (3, 3) camera -> world; eye: (3,) m. Drawn twice as large and averaged."""
     big = camera.scaled(camera.width * 2, camera.height * 2)
     ys, xs = np.mgrid[: big.height, : big.width].astype(np.float32) + 0.5
     ray = np.stack([(xs - big.center[0]) / big.focal[0], (ys - big.center[1]) / big.focal[1], np.ones_like(xs)], -1)
@@ -110,14 +111,14 @@ HALF, BACK, TOP = 1.9, -1.5, 2.7
 
 
 def _trace(ray, eye, rng):
-    """Place (n, 3), normal (n, 3), surface (n,): 0 floor, 1 back, 2 left, 3 right, 4 ceiling, 5 cabinet front, 6 top, 7 side."""
+    """Place (n, 3), normal (n, 3), surface (n,): 0 floor, 1-3 back, left, right, 4 ceiling, 5-7 cabinet front, top, side."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ts = np.stack([-eye[1] / ray[:, 1], (BACK - eye[2]) / ray[:, 2], (-HALF - eye[0]) / ray[:, 0],
                        (HALF - eye[0]) / ray[:, 0], (TOP - eye[1]) / ray[:, 1]], 1)
     ts[~(ts > 1e-4)] = np.inf
     surface = ts.argmin(1)
     t = ts.min(1)
-    normals = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 1, 0], [1, 0, 0]], np.float32)
+    normals = np.float32([[0, 1, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 1, 0], [1, 0, 0]])
     side = rng.choice([-1, 1])
     width, height = rng.uniform(0.5, 0.8), rng.uniform(0.6, 1.0)
     low = np.array([side * 1.15 - width / 2, 0, BACK], np.float32)
@@ -172,8 +173,8 @@ def _albedo(place, surface, rng):
     row = (y[shelf] % 0.28) / 0.28
     wood = floor * (0.9 + 0.2 * sample(noise, place[shelf], (6, 90, 90))[:, :1])
     books = (row > 0.12) & (row < 0.72 + 0.12 * tint[:, 0]) & (surface[shelf] == 5)
-    out[shelf] = np.where(books[:, None], 0.05 + 0.35 * tint, np.where((row > 0.12)[:, None] & (surface[shelf] == 5)[:, None],
-                                                                     0.03, wood))
+    hollow = (row > 0.12) & (surface[shelf] == 5)
+    out[shelf] = np.where(books[:, None], 0.05 + 0.35 * tint, np.where(hollow[:, None], 0.03, wood))
     return out
 
 

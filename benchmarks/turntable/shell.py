@@ -27,7 +27,7 @@ class Shell:
 
 
 def cut(faces: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Keeps the part of a mesh where field (V,) > 0, clipped at the zero line. Returns pair (N, 2), share (N,), faces."""
+    """Keeps the part of a mesh where field (V,) > 0, cut at the zero line. Returns pair (N, 2), share (N,), faces."""
     inside = field[faces] > 0
     count = inside.sum(1)
     whole = faces[count == 3]
