@@ -1,0 +1,117 @@
+// The kernels' formulas over arrays, float64, for test_formulas.py.
+#include "formulas.cuh"
+
+typedef Vec<double> V;
+static V vec(const double *p) { return {p[0], p[1], p[2]}; }
+static void put(double *p, V v) { p[0] = v.x; p[1] = v.y; p[2] = v.z; }
+static Lens<double> lens_of(const double *l) { return {l[0], l[1], l[2], l[3], l[4], l[5]}; }
+static Bound<double> bound_of(const double *mean, const double *rotation, const double *scale) {
+    Bound<double> g;
+    g.mean = vec(mean);
+    for (int j = 0; j < 3; ++j) {
+        g.column[j] = {rotation[j], rotation[3 + j], rotation[6 + j]};
+        g.scale[j] = scale[j];
+    }
+    return g;
+}
+static void put_bound(const Bound<double> &g, double *mean, double *rotation, double *scale) {
+    put(mean, g.mean);
+    for (int j = 0; j < 3; ++j) {
+        rotation[j] = g.column[j].x;
+        rotation[3 + j] = g.column[j].y;
+        rotation[6 + j] = g.column[j].z;
+        scale[j] = g.scale[j];
+    }
+}
+
+extern "C" {
+void bind_all(int n, const double *corners, const double *mu, const double *quat, const double *log_scale, double *means,
+              double *rotations, double *scales, const double *gm, const double *gr, const double *gs, double *gmu, double *gquat,
+              double *glog, double *gcorners) {
+    for (int i = 0; i < n; ++i) {
+        Face<double> f = face_frame(vec(corners + 9 * i), vec(corners + 9 * i + 3), vec(corners + 9 * i + 6));
+        Turn<double> t = turn_of(quat[4 * i], quat[4 * i + 1], quat[4 * i + 2], quat[4 * i + 3]);
+        put_bound(bind(f, t, vec(mu + 3 * i), log_scale + 3 * i), means + 3 * i, rotations + 9 * i, scales + 3 * i);
+        BindGradient<double> g = bind_backward(f, t, vec(mu + 3 * i), log_scale + 3 * i, bound_of(gm + 3 * i, gr + 9 * i, gs + 3 * i));
+        put(gmu + 3 * i, g.mu);
+        for (int c = 0; c < 4; ++c) gquat[4 * i + c] = g.quat[c];
+        for (int c = 0; c < 3; ++c) {
+            glog[3 * i + c] = g.log_scale[c];
+            put(gcorners + 9 * i + 3 * c, g.corner[c]);
+        }
+    }
+}
+
+void project_all(int n, const double *lens, const double *means, const double *rotations, const double *scales,
+                 const double *opacity, double *splats, int *seen) {
+    for (int i = 0; i < n; ++i) {
+        Splat<double> s = project(lens_of(lens), bound_of(means + 3 * i, rotations + 9 * i, scales + 3 * i), opacity[i]);
+        seen[i] = s.seen;
+        const double row[8] = {s.x, s.y, s.ha, s.b, s.hc, s.s_max, s.wide, s.high};
+        for (int c = 0; s.seen && c < 8; ++c) splats[8 * i + c] = row[c];
+    }
+}
+
+// Composites gaussians given front to back over every pixel, and takes the image's gradient back to all that was given.
+void render_all(int n, const double *lens, const double *means, const double *rotations, const double *scales, const double *rgb,
+                const double *opacity, const double *grad_image, double *image, double *gm, double *gr, double *gs, double *grgb,
+                double *go) {
+    int width = int(lens[4]), height = int(lens[5]);
+    double *moments = new double[9 * n]();
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            double *out = image + 4 * (y * width + x);
+            const double *v = grad_image + 4 * (y * width + x);
+            double T = 1, behind = 0;
+            for (int c = 0; c < 4; ++c) out[c] = 0;
+            for (int pass = 0; pass < 2; ++pass) {
+                T = 1;
+                for (int i = 0; i < n; ++i) {
+                    Splat<double> s = project(lens_of(lens), bound_of(means + 3 * i, rotations + 9 * i, scales + 3 * i), opacity[i]);
+                    if (!s.seen) continue;
+                    double dx = x + 0.5 - s.x, dy = y + 0.5 - s.y, a;
+                    bool clipped;
+                    double weight = composite(dx * (dx * s.ha + dy * s.b) + dy * dy * s.hc, s.s_max, opacity[i], T, a, clipped);
+                    const double *c = rgb + 3 * i;
+                    if (pass == 0) {
+                        for (int k = 0; k < 3; ++k) out[k] += weight * c[k];
+                        out[3] += weight;
+                        continue;
+                    }
+                    double g = composite_backward(weight, a, clipped, v[0] * c[0] + v[1] * c[1] + v[2] * c[2] + v[3], behind);
+                    const double row[9] = {g, g * dx, g * dy, g * dx * dx, g * dx * dy, g * dy * dy,
+                                           weight * v[0], weight * v[1], weight * v[2]};
+                    for (int k = 0; k < 9; ++k) moments[9 * i + k] += row[k];
+                }
+                behind = v[0] * out[0] + v[1] * out[1] + v[2] * out[2] + v[3] * out[3];
+            }
+        }
+    for (int i = 0; i < n; ++i) {
+        Bound<double> g = bound_of(means + 3 * i, rotations + 9 * i, scales + 3 * i), zero = {};
+        Splat<double> s = project(lens_of(lens), g, opacity[i]);
+        put_bound(s.seen ? project_backward(lens_of(lens), g, s, moments + 9 * i) : zero, gm + 3 * i, gr + 9 * i, gs + 3 * i);
+        for (int c = 0; c < 3; ++c) grgb[3 * i + c] = moments[9 * i + 6 + c];
+        go[i] = moments[9 * i] / opacity[i];
+    }
+    delete[] moments;
+}
+
+void turn_all(int n, const double *pose, double *matrices, const double *grad, double *grad_pose) {
+    for (int i = 0; i < n; ++i) {
+        rodrigues(pose + 3 * i, matrices + 9 * i);
+        rodrigues_backward(pose + 3 * i, grad + 9 * i, grad_pose + 3 * i);
+    }
+}
+
+void adam_all(int n, int size, double *value, const double *grad, double *first, double *second, const long long *count, double rate) {
+    for (int i = 0; i < n; ++i)
+        adam_row(value + size * i, grad + size * i, first + size * i, second + size * i, size, int(count[i]), rate);
+}
+
+void limit_all(int n, double *mu, double *quat, double *log_scale, double *rgb, double *logit, const double *start,
+               const double *face_scale, double needle, double largest, double reach, double pull) {
+    Bounds<double> bounds = {needle, largest, reach};
+    for (int i = 0; i < n; ++i)
+        limit(mu + 3 * i, quat + 4 * i, log_scale + 3 * i, rgb + 3 * i, logit[i], start + 3 * i, face_scale[i], bounds, pull);
+}
+}
