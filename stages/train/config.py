@@ -23,7 +23,7 @@ class TrainConfig:
     """Of the placement, the order of the frames and the backgrounds."""
     holdout: int = 8
     """Every k-th frame in the order of the body's yaw is kept for judging; 0, or a clip shorter than k, keeps none."""
-    mu_rate: float = 4e-4
+    mu_rate: float = 1.5e-3
     """Adam rate of the places (face units) at the start; falls to a hundredth."""
     rgb_rate: float = 1e-2
     """Adam rate of the colours at the start; falls to a tenth, as do the three below."""
@@ -43,7 +43,7 @@ class TrainConfig:
     """Weight of 1 - SSIM beside L2."""
     sobel: float = 0.0
     """Weight of the Sobel term beside L2."""
-    mask: float = 0.1
+    mask: float = 0.3
     """Weight of the L2 between the avatar's alpha and the mask."""
     needle: float = 4.0
     """Longest axis of a gaussian over its middle one, at most."""

@@ -1,0 +1,50 @@
+"""Held-out frames: spaced in yaw, and judged with their neighbours' pose correction."""
+
+import numpy as np
+from gsac.stages.train.holdout import carry_corrections, spaced_in_yaw, yaw
+from scipy.spatial.transform import Rotation
+
+
+def turning(yaws):
+    upright = Rotation.from_rotvec([np.pi, 0, 0])
+    return (upright * Rotation.from_rotvec(np.asarray(yaws)[:, None] * [0.0, -1.0, 0.0])).as_rotvec()
+
+
+def test_yaw_is_zero_facing_the_camera_and_follows_the_turn():
+    yaws = np.radians([0, 30, 90, -120, 179])
+    np.testing.assert_allclose(np.abs(yaw(turning(yaws))), np.abs(yaws), atol=1e-9)
+    assert yaw(turning([0.0]))[0] == 0 or abs(yaw(turning([0.0]))[0]) < 1e-9
+
+
+def test_held_out_frames_are_spaced_in_yaw_not_in_time():
+    rng = np.random.default_rng(0)
+    yaws = rng.permutation(np.linspace(-3, 3, 64))
+    held = spaced_in_yaw(turning(yaws), np.ones(64, bool), 8)
+    assert len(held) == 8
+    gaps = np.diff(np.sort(yaws[held]))
+    np.testing.assert_allclose(gaps, gaps[0])
+
+
+def test_unusable_frames_are_never_held_out_and_short_clips_keep_all():
+    orient = turning(np.linspace(-3, 3, 20))
+    usable = np.ones(20, bool)
+    usable[::2] = False
+    assert not set(spaced_in_yaw(orient, usable, 4)) & set(range(0, 20, 2))
+    assert not len(spaced_in_yaw(orient[:7], np.ones(7, bool), 8))
+    assert not len(spaced_in_yaw(orient, usable, 0))
+    assert not len(spaced_in_yaw(orient[:1], np.ones(1, bool), 8))
+
+
+def test_a_correction_shared_by_all_frames_reaches_the_held_out_ones():
+    rng = np.random.default_rng(1)
+    pose, transl = rng.normal(0, 1, (9, 5, 3)), rng.normal(0, 1, (9, 3))
+    turn = Rotation.from_rotvec(rng.normal(0, 0.05, (5, 3)))
+    refined = np.stack([(Rotation.from_rotvec(p) * turn).as_rotvec() for p in pose])
+    trained = np.ones(9, bool)
+    trained[[0, 4, 8]] = False
+    given = np.where(trained[:, None, None], refined, pose)
+    got, shift = carry_corrections(pose, transl, given, transl + trained[:, None] * [0.1, 0, -0.2], trained)
+    for t in range(9):
+        left_over = Rotation.from_rotvec(got[t]).inv() * Rotation.from_rotvec(refined[t])
+        np.testing.assert_allclose(left_over.magnitude(), 0, atol=1e-9)
+    np.testing.assert_allclose(shift, transl + [0.1, 0, -0.2])

@@ -1,0 +1,96 @@
+"""The whole stage on a small turning person."""
+
+import json
+
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import read_arrays
+from gsac.stages.contract import BadInput, StageError, make_config
+from gsac.stages.train import STAGE, fast
+from gsac.stages.train.stage import run
+
+
+def metrics(job):
+    for output in STAGE.outputs:
+        output.check(job.out / output.path)
+    return json.loads((job.out / "metrics.json").read_text())
+
+
+@pytest.mark.slow
+def test_held_out_frames_are_rendered_better_as_training_goes_on_and_poses_come_nearer_the_truth(job):
+    made = job()
+    run(made)
+    figures = metrics(made)
+    assert figures["psnr_fg"] > 15.5 and figures["alpha_iou"] > 0.8
+    assert figures["psnr_fg"] > figures["curve"][0]["psnr_fg"] + 2
+    assert figures["psnr_fg"] > figures["psnr_fg_fit"] + 2, "the neighbours' pose correction reaches held-out frames"
+    assert figures["psnr_fg_ttpo"] > figures["psnr_fg"] and figures["lpips"] is None
+    assert len(figures["heldout_frames"]) == 3 and figures["trained_frames"] == 9
+    assert (made.out / f"heldout/{figures['heldout_frames'][0]:06d}_render.png").is_file()
+    before, after = read_arrays(made.inputs["smplx/body.npz"]), read_arrays(made.out / "body.npz")
+    error = [abs(np.median(a["transl"][:, 0])) for a in (before, after)]
+    assert error[1] < 0.6 * error[0]
+    np.testing.assert_array_equal(before["betas"], after["betas"])
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_avatar(job):
+    jobs = [job(name, steps=40, pose_test_steps=0, seed=seed) for name, seed in (("a", 0), ("b", 0), ("c", 1))]
+    for each in jobs:
+        run(each)
+    for name in ("avatar.npz", "body.npz"):
+        assert (jobs[0].out / name).read_bytes() == (jobs[1].out / name).read_bytes()
+    assert (jobs[0].out / "avatar.npz").read_bytes() != (jobs[2].out / "avatar.npz").read_bytes()
+
+
+@pytest.mark.slow
+def test_empty_masks_are_left_out_with_a_warning_that_names_the_frames(job):
+    made = job(blank=(2, 5), steps=10)
+    run(made)
+    figures = metrics(made)
+    assert "000002" in made.warnings[0] and "000005" in made.warnings[0]
+    assert figures["trained_frames"] + len(figures["heldout_frames"]) == 10
+    assert not {2, 5} & set(figures["heldout_frames"])
+
+
+def test_masks_that_are_all_empty_stop_the_stage(job):
+    made = job(frames=2, blank=(0, 1), steps=5)
+    with pytest.raises(StageError, match="every mask is empty"):
+        run(made)
+
+
+@pytest.mark.slow
+def test_one_photo_gives_an_avatar_without_a_measure_and_says_so(job):
+    made = job(frames=1, steps=10, timestamps=False)
+    run(made)
+    figures = metrics(made)
+    assert figures["psnr_fg"] is None and figures["psnr_full_ttpo"] is None and figures["heldout_frames"] == []
+    assert any("not measured" in w for w in made.warnings)
+
+
+def test_poses_that_do_not_belong_to_the_frames_are_refused(job):
+    made = job(frames=2, steps=5)
+    (made.inputs["split/frames"] / "000001.png").unlink()
+    with pytest.raises(StageError, match="2 poses.*1 frames"):
+        run(made)
+
+
+def test_a_number_that_is_not_finite_stops_with_step_and_quantity(job, monkeypatch):
+    made = job(frames=2, steps=5, holdout=0)
+    plain = fast.Trainer._image_loss
+
+    def poisoned(self, image, target):
+        loss, gradient = plain(self, image, target)
+        self.calls = getattr(self, "calls", 0) + 1
+        return (float("nan"), gradient) if self.calls == 3 else (loss, gradient)
+
+    monkeypatch.setattr(fast.Trainer, "_image_loss", poisoned)
+    with pytest.raises(StageError, match="loss is not finite at step 2"):
+        run(made)
+
+
+@pytest.mark.parametrize("name, value", [("recipe", "magic"), ("holdout", 1), ("gaussians", 3), ("steps", 0),
+                                         ("pose_rate", -1.0), ("pose_rate", float("nan"))])
+def test_wrong_parameters_are_named(name, value):
+    with pytest.raises(BadInput, match=f"train.{name}"):
+        make_config(STAGE, {name: value})
