@@ -14,5 +14,5 @@ STAGE = Stage(
     inputs=("split/clip.json", "handgap/keypoints.npz", "face/face.npz", "segment/alpha"),
     outputs=(Output("body.npz", check_body),),
     config=SmplxConfig,
-    packages=("numpy", "scipy", "numba"),
+    packages=("numpy", "scipy", "numba", "torch"),
 )

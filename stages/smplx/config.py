@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 from gsac.stages.contract import BadInput
 
-METHODS = ("lm",)
+METHODS = ("lm", "paper")
 
 
 @dataclass
 class SmplxConfig:
     method: str = "lm"
-    """How the body is fitted: `lm` solves all frames at once by Levenberg-Marquardt."""
+    """How the body is fitted: `lm` solves all frames at once by Levenberg-Marquardt; `paper` is the published co-registration by
+    Adam, slower and less exact."""
     height_m: float | None = None
     """The person's height; fixes the scale that one camera cannot see. None leaves it to the shape prior."""
     focal_px: float | None = None

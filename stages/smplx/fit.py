@@ -58,6 +58,8 @@ class Sightings:
     height: int
     focal_px: float | None
     detector: str = ""
+    face: dict[str, np.ndarray] | None = None
+    """Arrays of face.npz."""
 
     @property
     def seen(self) -> np.ndarray:
@@ -80,6 +82,9 @@ class Fit:
     iou: np.ndarray  # (T,) body against alpha before the last round; NaN without alpha
     reprojection: np.ndarray  # (T,) median px of the body points
     steps: int
+    joint_offset: np.ndarray | None = None  # (55, 3) m, where the method moves joints
+    notes: tuple[str, ...] = ()
+    """Sentences that the user should read."""
 
 
 def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress) -> Fit:

@@ -15,6 +15,17 @@ LOST = 0.5
 """Joint spread, m, of a frame in which nobody was seen: far more than any fitted frame's."""
 
 
+def published(*clip):
+    """The paper's fit; torch takes seconds to load, so only who asks for it does."""
+    from gsac.stages.smplx.paper import fit_clip as fit_as_published
+
+    return fit_as_published(*clip)
+
+
+METHODS = {"lm": fit_clip, "paper": published}
+"""smplx.method -> (body, sightings, outlines, config, progress) -> Fit."""
+
+
 def run(job: Job) -> None:
     clip = Clip.read(job.inputs["split/clip.json"])
     points = read_arrays(job.inputs["handgap/keypoints.npz"])
@@ -22,7 +33,7 @@ def run(job: Job) -> None:
     body = Body.load()
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px, str(points["detector"]))
+                          clip.focal_px, str(points["detector"]), face)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
@@ -30,12 +41,14 @@ def run(job: Job) -> None:
     if len(outlines) != len(sightings.xy):
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
-        fit = fit_clip(body, sightings, outlines, job.config, job.progress)
+        fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
     expression = face["expression"]
     if expression.shape[1] != body.exprdirs.shape[2]:
         raise StageError(f"face.npz has {expression.shape[1]} expressions, the body model {body.exprdirs.shape[2]}")
     params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression)
     params.jaw_pose = face["jaw"].astype(np.float32)
+    if fit.joint_offset is not None:
+        params.joint_offset = fit.joint_offset.astype(np.float32)
     params.joints = body.posed(params)[1]
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     params.sigma_joints[~seen] = LOST
@@ -45,6 +58,8 @@ def run(job: Job) -> None:
 
 def warn(job: Job, fit, seen: np.ndarray, params, clip: Clip) -> None:
     """Says which frames are not to be trusted and what one camera left open."""
+    for note in fit.notes:
+        job.warn(note)
     if not seen.all():
         job.warn(f"Frames {listed(~seen)} show no person; their pose is interpolated")
     poor = np.nan_to_num(fit.iou, nan=1.0) < POOR_IOU
