@@ -36,9 +36,9 @@ DEPTH_TRUST = 0.4
 OUTLINE_SPREAD = 0.006
 ADULT_HEIGHT = (1.72, 0.02)
 """The stated scale prior, metres and spread: one camera cannot see scale, and clothes make a free scale read people as small."""
-FOCAL_GUESS = 1.0
+FOCAL_GUESS = 0.95
 """Focal length when nothing is known, as a share of the picture's longer side: between a phone's main lens and a tele."""
-FOCAL_SPREAD = 0.2
+FOCAL_SPREAD = 0.15
 VIEW = np.radians(30)
 """Yaw that makes another view of the person."""
 POSED_AT_ONCE = 64
