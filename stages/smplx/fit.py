@@ -222,8 +222,8 @@ def fit_fingers(body: Body, sightings: Sightings, problem: Problem, state: State
 
 
 def joint_spread(problem: Problem, state: State) -> np.ndarray:
-    """(T, 55) m: how far each joint may be off, from the posterior of its own joint rotations (diagonal of the normal equations)."""
-    system = problem.linearise(state)
+    """(T, 55) m: how far each joint may be off by what its frame shows alone, each unknown by itself."""
+    system = problem.of_each_frame(state)
     n = problem.size
     information = system.band[:, np.arange(n), np.arange(n)]
     angle = 1 / np.sqrt(np.maximum(information[:, :-3].reshape(len(state.local), -1, 3).min(-1), 1e-6))

@@ -103,6 +103,14 @@ class Problem:
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
     def linearise(self, state: State) -> System:
+        system = self.of_each_frame(state)
+        self._add_temporal(system, state)
+        residual, jacobian = self._shared_residual(state)
+        system.add_shared(jacobian, residual)
+        return system
+
+    def of_each_frame(self, state: State) -> System:
+        """Normal equations of what each frame shows by itself, and of the pose prior."""
         system = System.zeros(len(state.local), self.size, len(state.betas) + 1)
         chain = self.skeleton.pose(state.local, state.betas)
         for t, x in enumerate(self.points(chain, state)):
@@ -110,9 +118,6 @@ class Problem:
         for t, x in self.outline_points(chain, state):
             self._add_outline(system, state, chain, t, x)
         self._add_prior(system, state)
-        self._add_temporal(system, state)
-        residual, jacobian = self._shared_residual(state)
-        system.add_shared(jacobian, residual)
         return system
 
     def points(self, chain: Chain, state: State) -> list[np.ndarray]:
