@@ -1,0 +1,52 @@
+"""Truth clips for the fit, and what the stages before it see in them. Both are made once and kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gsac.benchmarks.fit.truth import Truth, read_truth
+from gsac.cache.store import Store
+from gsac.pipeline.events import PlainReporter
+from gsac.pipeline.params import resolve
+from gsac.pipeline.project import Project
+from gsac.pipeline.run import Chain, Options
+from gsac.pipeline.workspace import Workspace
+from gsac.stages.contract import BadInput
+from gsac.stages.smplx import STAGE
+
+FRAMES, HEIGHT = 60, 1280
+
+
+@dataclass
+class Case:
+    """One clip that waits for its fit."""
+
+    name: str
+    truth: Truth
+    inputs: dict[str, Path]
+    """Ports of `smplx`."""
+
+
+def truth_folder(folder: Path, seed: int, say: PlainReporter) -> Path:
+    """The turntable's clip of a seed, rendered unless it is there."""
+    if not (folder / "truth.npz").is_file():
+        from gsac.benchmarks.turntable.clip import make_clip
+
+        make_clip(folder, seed=seed, frames=FRAMES, height=HEIGHT,
+                  progress=lambda done, total, unit: say.progress(folder.name, done, total, unit))
+    return folder
+
+
+def seen(folder: Path, store: Store, out: Path, say: PlainReporter) -> Case:
+    """Runs what `smplx` takes with the default parameters, or takes it from the store. folder: clip.mp4, mask/, truth.npz."""
+    if not (folder / "clip.mp4").is_file() or not (folder / "truth.npz").is_file():
+        raise BadInput(f"{folder}: expected a truth clip (clip.mp4, mask/, truth.npz), as gsac.benchmarks.turntable makes it")
+    project = Project.at_hand()
+    configs = resolve(project)
+    workspace = Workspace(out)
+    clip = (folder / "clip.mp4").resolve()
+    workspace.prepare(clip, project, configs)
+    for last in dict.fromkeys(port.split("/")[0] for port in STAGE.inputs):
+        Chain(project, configs, store, workspace, say).run(clip, Options(until=last))
+    return Case(folder.name, read_truth(folder), {port: workspace.path(port) for port in STAGE.inputs})

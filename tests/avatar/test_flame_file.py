@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.flame_file import ARRAYS, read_flame
+
+
+@pytest.fixture(scope="module")
+def arrays():
+    rng = np.random.default_rng(0)
+    made = {name: rng.normal(0, 0.01, shape).astype(np.float32) for name, shape in ARRAYS.items()}
+    made["f"] = rng.integers(0, 5023, (9976, 3)).astype(np.uint32)
+    made["weights"] = np.full((5023, 5), 0.2)
+    made["kintree_table"] = np.array([[2**32 - 1, 0, 1, 1, 1], [0, 1, 2, 3, 4]], np.int64)
+    return made
+
+
+def written(tmp_path, arrays):
+    np.savez(tmp_path / "FLAME_NEUTRAL.npz", **arrays)
+    return tmp_path / "FLAME_NEUTRAL.npz"
+
+
+def test_a_file_of_the_official_shapes_is_read(tmp_path, arrays):
+    flame = read_flame(written(tmp_path, arrays))
+    assert flame.parents.tolist() == [-1, 0, 1, 1, 1]
+    assert flame.shapedirs.shape == (5023, 3, 300) and flame.exprdirs.shape == (5023, 3, 100)
+    expected = arrays["v_template"] + 2 * arrays["shapedirs"][:, :, 1] - arrays["shapedirs"][:, :, 300]
+    np.testing.assert_allclose(flame.rest([0, 2], [-1]), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", list(ARRAYS))
+def test_an_array_that_is_missing_or_misshapen_is_named(tmp_path, arrays, name):
+    wrong = arrays | {name: arrays[name][:-1]}
+    with pytest.raises(ArtifactError, match=f"array {name} has shape .* expected"):
+        read_flame(written(tmp_path, wrong))
+    del wrong[name]
+    with pytest.raises(ArtifactError, match=f"array {name} is missing"):
+        read_flame(written(tmp_path, wrong))
+
+
+def test_pickles_are_refused_without_being_read(tmp_path):
+    with pytest.raises(ArtifactError, match="run code"):
+        read_flame(tmp_path / "generic_model.pkl")
+
+
+def test_pickled_objects_inside_are_refused(tmp_path, arrays):
+    with pytest.raises(ArtifactError, match="array v_template is a pickled object"):
+        read_flame(written(tmp_path, arrays | {"v_template": np.array([{}], object)}))
+
+
+def test_faces_and_weights_must_make_sense(tmp_path, arrays):
+    with pytest.raises(ArtifactError, match="names vertex 5023"):
+        read_flame(written(tmp_path, arrays | {"f": np.full((9976, 3), 5023)}))
+    with pytest.raises(ArtifactError, match="sum to one"):
+        read_flame(written(tmp_path, arrays | {"weights": np.full((5023, 5), 0.1)}))
