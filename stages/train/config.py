@@ -22,7 +22,7 @@ class TrainConfig:
     seed: int = 0
     """Of the placement, the order of the frames and the backgrounds."""
     holdout: int = 8
-    """Every k-th frame in the order of the body's yaw is kept for judging; 0, or a clip shorter than k, keeps none."""
+    """Every k-th frame in the order of the body's yaw is kept for judging, at least one; 0, or fewer than 5 frames, keep none."""
     mu_rate: float = 1.5e-3
     """Adam rate of the places (face units) at the start; falls to a hundredth."""
     rgb_rate: float = 1e-2

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+FEWEST = 5
+"""Frames below which every one is needed for training."""
+
 
 def yaw(global_orient: np.ndarray) -> np.ndarray:
     """global_orient: (T, 3) axis-angle. Returns (T,) rad in -pi..pi, 0 where the body faces the camera."""
@@ -13,10 +16,14 @@ def yaw(global_orient: np.ndarray) -> np.ndarray:
 
 
 def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> np.ndarray:
-    """Indices of the frames to hold out: every `every`-th of the usable (T,) bool frames in the order of yaw."""
+    """Indices of the frames to hold out: every `every`-th of the usable (T,) bool frames in the order of yaw.
+
+    A short clip keeps one; fewer than `FEWEST` frames keep none.
+    """
     frames = np.flatnonzero(usable)
-    if every < 2 or len(frames) < every:
+    if every < 2 or len(frames) < FEWEST:
         return np.zeros(0, np.int64)
+    every = min(every, len(frames))
     return np.sort(frames[np.argsort(yaw(global_orient)[frames], kind="stable")][every // 2::every])
 
 

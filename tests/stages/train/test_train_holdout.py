@@ -25,12 +25,13 @@ def test_held_out_frames_are_spaced_in_yaw_not_in_time():
     np.testing.assert_allclose(gaps, gaps[0])
 
 
-def test_unusable_frames_are_never_held_out_and_short_clips_keep_all():
+def test_unusable_frames_are_never_held_out_short_clips_keep_one_and_the_shortest_none():
     orient = turning(np.linspace(-3, 3, 20))
     usable = np.ones(20, bool)
     usable[::2] = False
     assert not set(spaced_in_yaw(orient, usable, 4)) & set(range(0, 20, 2))
-    assert not len(spaced_in_yaw(orient[:7], np.ones(7, bool), 8))
+    assert len(spaced_in_yaw(orient[:7], np.ones(7, bool), 8)) == 1
+    assert not len(spaced_in_yaw(orient[:4], np.ones(4, bool), 8))
     assert not len(spaced_in_yaw(orient, usable, 0))
     assert not len(spaced_in_yaw(orient[:1], np.ones(1, bool), 8))
 
