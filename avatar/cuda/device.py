@@ -1,0 +1,120 @@
+"""The few driver calls that the trainer needs: memory, launches, graphs, events. One context, one stream."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+
+import numpy as np
+from gsac.avatar.cuda import why_not
+from gsac.avatar.cuda.kernels import KERNELS, cubin
+
+
+class NoDevice(Exception):
+    """There is no GPU that can be used; the words say why."""
+
+
+class DeviceError(Exception):
+    """A driver call failed: its name and the driver's word for it."""
+
+
+def _call(name: str, *arguments):
+    from cuda.bindings import driver
+
+    error, *out = getattr(driver, name)(*arguments)
+    if error != driver.CUresult.CUDA_SUCCESS:
+        hint = "; use fewer gaussians, smaller images or a smaller batch" if "OUT_OF_MEMORY" in error.name else ""
+        raise DeviceError(f"{name}: {error.name}{hint}")
+    return out[0] if len(out) == 1 else out
+
+
+class Buffer:
+    """An array on the device."""
+
+    def __init__(self, shape, dtype):
+        self.shape, self.dtype = tuple(np.atleast_1d(shape)), np.dtype(dtype)
+        self.bytes = int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
+        self.pointer = int(_call("cuMemAlloc", max(self.bytes, 16)))
+
+    def write(self, array: np.ndarray) -> Buffer:
+        array = np.ascontiguousarray(array, self.dtype)
+        if array.nbytes != self.bytes:
+            raise ValueError(f"the buffer is {self.shape}, the array {array.shape}")
+        _call("cuMemcpyHtoD", self.pointer, array.ctypes.data, self.bytes)
+        return self
+
+    def read(self) -> np.ndarray:
+        array = np.empty(self.shape, self.dtype)
+        _call("cuMemcpyDtoH", array.ctypes.data, self.pointer, self.bytes)
+        return array
+
+    def fill(self, byte: int) -> Buffer:
+        _call("cuMemsetD8", self.pointer, byte, self.bytes)
+        return self
+
+    def free(self) -> None:
+        if self.pointer:
+            _call("cuMemFree", self.pointer)
+            self.pointer = 0
+
+
+class Device:
+    """The first GPU, its stream, and the kernels by name. Raises NoDevice where there is none."""
+
+    def __init__(self):
+        if why := why_not():
+            raise NoDevice(why)
+        from cuda.bindings import driver
+
+        self._driver = driver
+        handle = _call("cuDeviceGet", 0)
+        _call("cuCtxSetCurrent", _call("cuDevicePrimaryCtxRetain", handle))
+        attribute = driver.CUdevice_attribute
+        major, minor, self.processors = (_call("cuDeviceGetAttribute", a, handle) for a in (
+            attribute.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR, attribute.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR,
+            attribute.CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT))
+        self.name = _call("cuDeviceGetName", 128, handle).split(b"\0")[0].decode()
+        self.architecture = f"sm_{major}{minor}"
+        module = _call("cuModuleLoadData", cubin(self.architecture))
+        self.kernels = {name: _call("cuModuleGetFunction", module, name.encode()) for name in KERNELS}
+        self.stream = _call("cuStreamCreate", driver.CUstream_flags.CU_STREAM_DEFAULT)
+
+    def launch(self, kernel: str, grid: tuple[int, int], threads: int, struct: ctypes.Structure) -> None:
+        """The kernel takes one struct by value."""
+        arguments = (ctypes.c_void_p * 1)(ctypes.addressof(struct))
+        _call("cuLaunchKernel", self.kernels[kernel], grid[0], grid[1], 1, threads, 1, 1, 0, self.stream,
+              ctypes.addressof(arguments), 0)
+
+    def wait(self) -> None:
+        _call("cuStreamSynchronize", self.stream)
+
+    def graph(self, record: Callable[[], None]):
+        """What `record` launches, as one graph; `replay` runs it."""
+        driver = self._driver
+        _call("cuStreamBeginCapture", self.stream, driver.CUstreamCaptureMode.CU_STREAM_CAPTURE_MODE_THREAD_LOCAL)
+        record()
+        captured = _call("cuStreamEndCapture", self.stream)
+        ready = _call("cuGraphInstantiate", captured, 0)
+        _call("cuGraphDestroy", captured)
+        return ready
+
+    def replay(self, graph) -> None:
+        _call("cuGraphLaunch", graph, self.stream)
+
+    def drop(self, graph) -> None:
+        _call("cuGraphExecDestroy", graph)
+
+    def event(self):
+        return _call("cuEventCreate", 0)
+
+    def mark(self, event) -> None:
+        _call("cuEventRecord", event, self.stream)
+
+    def milliseconds(self, begin, end) -> float:
+        _call("cuEventSynchronize", end)
+        return float(_call("cuEventElapsedTime", begin, end))
+
+    def used(self) -> tuple[int, int]:
+        """Bytes of the GPU's memory in use by anyone, and all there are."""
+        free, total = _call("cuMemGetInfo")
+        return int(total) - int(free), int(total)

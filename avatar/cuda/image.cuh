@@ -1,0 +1,249 @@
+// Losses of the image and their gradient, on the tiles where render or target show anything; elsewhere both are background.
+
+constexpr int REACH = 5, WIDE = TILE + 2 * REACH, PITCH = WIDE + 1;
+constexpr float C1 = 1e-4f, C2 = 9e-4f;
+// 11-tap gaussian, sigma 1.5
+__device__ constexpr float WINDOW[11] = {0.00102838f, 0.00759876f, 0.03600077f, 0.10936069f, 0.21300554f, 0.26601172f,
+                                         0.21300554f, 0.10936069f, 0.03600077f, 0.00759876f, 0.00102838f};
+
+// A tile with the frame it lies in.
+struct Place {
+    int b, tile, left, top, width, height, columns;
+};
+
+FORMULA Place place_of(const Scene &s, int tile) {
+    Place p;
+    p.tile = tile;
+    p.b = tile / s.max_tiles;
+    const Now &now = s.now[p.b];
+    int t = tile % s.max_tiles;
+    p.columns = now.columns;
+    p.left = t % now.columns * TILE;
+    p.top = t / now.columns * TILE;
+    p.width = now.frame.width;
+    p.height = now.frame.height;
+    return p;
+}
+
+struct Pixel {
+    float3 image, target;
+    float alpha, mask;
+};
+
+// Render and target over the batch's background; a tile without gaussians was not rendered.
+FORMULA Pixel pixel_of(const Scene &s, const Place &p, int x, int y) {
+    const Now &now = s.now[p.b];
+    const float byte = 1 / 255.0f;
+    uchar4 true_pixel = ((const uchar4 *)s.pixels)[now.frame.pixels + size_t(y) * p.width + x];
+    float4 render = {0, 0, 0, 0};
+    if (s.tile_count[p.b * s.max_tiles + y / TILE * p.columns + x / TILE])
+        render = ((const float4 *)s.image)[size_t(p.b) * s.max_pixels + y * p.width + x];
+    Pixel out;
+    out.alpha = render.w;
+    out.mask = true_pixel.w * byte;
+    float clear = 1 - out.alpha, clear_target = 1 - out.mask;
+    out.image = {render.x + clear * now.background[0], render.y + clear * now.background[1], render.z + clear * now.background[2]};
+    out.target = {true_pixel.x * byte + clear_target * now.background[0], true_pixel.y * byte + clear_target * now.background[1],
+                  true_pixel.z * byte + clear_target * now.background[2]};
+    return out;
+}
+
+// Sum over the block, at thread 0.
+FORMULA float sum_block(float v, float *scratch) {
+    v = sum_warp(v);
+    if (threadIdx.x % 32 == 0) scratch[threadIdx.x / 32] = v;
+    __syncthreads();
+    float sum = 0;
+    if (threadIdx.x == 0)
+        for (unsigned w = 0; w < blockDim.x / 32; ++w) sum += scratch[w];
+    return sum;
+}
+
+// (blocks). The tile's share of the loss, and SSIM's slopes by the window means: dS/dmx, dS/dq, dS/dp for three channels.
+extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
+    __shared__ float image[3][WIDE * PITCH], target[3][WIDE * PITCH], blurred[4][3][WIDE * TILE], scratch[8];
+    if (halted(s)) return;
+    int tid = threadIdx.x, total = s.state->near;
+    for (int item = blockIdx.x; item < total; item += gridDim.x) {
+        const Place p = place_of(s, s.near[item]);
+        const float share = 1.0f / (3.0f * p.width * p.height);
+        float loss = 0;
+        __syncthreads();
+        for (int e = tid; e < WIDE * WIDE; e += PIXELS) {
+            int r = e / WIDE, c = e % WIDE, x = p.left + c - REACH, y = p.top + r - REACH;
+            Pixel pixel = {};
+            if (x >= 0 && y >= 0 && x < p.width && y < p.height) {
+                pixel = pixel_of(s, p, x, y);
+                if (r >= REACH && c >= REACH && r < REACH + TILE && c < REACH + TILE) {
+                    float dx = pixel.image.x - pixel.target.x, dy = pixel.image.y - pixel.target.y;
+                    float dz = pixel.image.z - pixel.target.z, da = pixel.alpha - pixel.mask;
+                    loss += share * (dx * dx + dy * dy + dz * dz) + 3 * share * s.mask * da * da;
+                }
+            }
+            int to = r * PITCH + c;
+            image[0][to] = pixel.image.x; image[1][to] = pixel.image.y; image[2][to] = pixel.image.z;
+            target[0][to] = pixel.target.x; target[1][to] = pixel.target.y; target[2][to] = pixel.target.z;
+        }
+        __syncthreads();
+        if (s.ssim > 0) {
+            for (int task = tid; task < 3 * WIDE * 4; task += PIXELS) {
+                int channel = task / (WIDE * 4), r = task / 4 % WIDE, c = task % 4 * 4;
+                float out[4][4] = {};
+#pragma unroll
+                for (int i = 0; i < 14; ++i) {
+                    float x = image[channel][r * PITCH + c + i], y = target[channel][r * PITCH + c + i];
+                    float q = x * x + y * y, xy = x * y;
+#pragma unroll
+                    for (int k = 0; k < 4; ++k)
+                        if (i - k >= 0 && i - k < 11) {
+                            float w = WINDOW[i - k];
+                            out[0][k] += w * x; out[1][k] += w * y; out[2][k] += w * q; out[3][k] += w * xy;
+                        }
+                }
+#pragma unroll
+                for (int m = 0; m < 4; ++m)
+                    for (int k = 0; k < 4; ++k) blurred[m][channel][r * TILE + c + k] = out[m][k];
+            }
+            __syncthreads();
+            for (int task = tid; task < 3 * TILE * 4; task += PIXELS) {
+                int channel = task / (TILE * 4), c = task % TILE, r = task / TILE % 4 * 4;
+                float mean[4][4] = {};
+#pragma unroll
+                for (int m = 0; m < 4; ++m)
+#pragma unroll
+                    for (int i = 0; i < 14; ++i) {
+                        float v = blurred[m][channel][(r + i) * TILE + c];
+#pragma unroll
+                        for (int k = 0; k < 4; ++k)
+                            if (i - k >= 0 && i - k < 11) mean[m][k] += WINDOW[i - k] * v;
+                    }
+#pragma unroll
+                for (int k = 0; k < 4; ++k) {
+                    int x = p.left + c, y = p.top + r + k;
+                    if (x >= p.width || y >= p.height) continue;
+                    float mx = mean[0][k], my = mean[1][k], squares = mx * mx + my * my, product = mx * my;
+                    float a1 = 2 * product + C1, a2 = 2 * (mean[3][k] - product) + C2, b1 = squares + C1, b2 = mean[2][k] - squares + C2;
+                    float scale = 1 / (b1 * b2), similarity = a1 * a2 * scale, over_b2 = similarity / b2;
+                    loss += s.ssim * share * (1 - similarity);
+                    float *to = s.slopes + (size_t(p.b) * 9 + channel) * s.max_pixels + y * p.width + x;
+                    to[0] = 2 * ((a2 - a1) * my * scale + (over_b2 - similarity / b1) * mx);
+                    to[size_t(3) * s.max_pixels] = -over_b2;
+                    to[size_t(6) * s.max_pixels] = 2 * a1 * scale;
+                }
+            }
+        }
+        if (s.sobel > 0) {
+            int r = tid / TILE, c = tid % TILE;
+            if (p.left + c < p.width && p.top + r < p.height) {
+                int at = (r + REACH) * PITCH + c + REACH;
+                for (int channel = 0; channel < 3; ++channel) {
+                    float d[3][3];
+                    for (int i = 0; i < 3; ++i)
+                        for (int k = 0; k < 3; ++k) {
+                            int e = at + (i - 1) * PITCH + k - 1;
+                            d[i][k] = image[channel][e] - target[channel][e];
+                        }
+                    float across = (d[0][2] + 2 * d[1][2] + d[2][2] - d[0][0] - 2 * d[1][0] - d[2][0]) / 4;
+                    float down = (d[2][0] + 2 * d[2][1] + d[2][2] - d[0][0] - 2 * d[0][1] - d[0][2]) / 4;
+                    loss += s.sobel * share * (across * across + down * down);
+                }
+            }
+        }
+        loss = sum_block(loss, scratch);
+        if (tid == 0) s.tile_loss[p.tile] = loss;
+    }
+}
+
+// (blocks). Gradient of the loss by the render's premultiplied colour and alpha, on the tiles that gaussians reach.
+extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
+    __shared__ float slope[9][WIDE * PITCH];
+    __shared__ float blurred[3][WIDE * TILE];
+    if (halted(s)) return;
+    int tid = threadIdx.x, heavy = s.state->heavy, total = heavy + s.state->light;
+    for (int item = blockIdx.x; item < total; item += gridDim.x) {
+        const Place p = place_of(s, item < heavy ? s.heavy[item] : s.light[item - heavy]);
+        const float share = 1.0f / (3.0f * p.width * p.height);
+        int r = tid / TILE, c = tid % TILE, x = p.left + c, y = p.top + r;
+        bool inside = x < p.width && y < p.height;
+        Pixel pixel = {};
+        float sobel[3] = {}, grad[3] = {};
+        if (inside) pixel = pixel_of(s, p, x, y);
+        const float image[3] = {pixel.image.x, pixel.image.y, pixel.image.z};
+        const float target[3] = {pixel.target.x, pixel.target.y, pixel.target.z};
+        if (s.sobel > 0) {
+            // the difference image with two pixels around the tile, its responses with one, in the slopes' room
+            float(*d)[WIDE * PITCH] = slope, (*across)[WIDE * PITCH] = slope + 3, (*down)[WIDE * PITCH] = slope + 6;
+            __syncthreads();
+            for (int e = tid; e < 20 * 20; e += PIXELS) {
+                int ex = p.left + e % 20 - 2, ey = p.top + e / 20 - 2;
+                Pixel other = {};
+                if (ex >= 0 && ey >= 0 && ex < p.width && ey < p.height) other = pixel_of(s, p, ex, ey);
+                d[0][e] = other.image.x - other.target.x;
+                d[1][e] = other.image.y - other.target.y;
+                d[2][e] = other.image.z - other.target.z;
+            }
+            __syncthreads();
+            for (int e = tid; e < 18 * 18; e += PIXELS) {
+                int ex = p.left + e % 18 - 1, ey = p.top + e / 18 - 1, at = (e / 18 + 1) * 20 + e % 18 + 1;
+                bool real = ex >= 0 && ey >= 0 && ex < p.width && ey < p.height;
+                for (int k = 0; k < 3; ++k) {
+                    const float *v = d[k] + at;
+                    across[k][e] = real ? (v[-19] + 2 * v[1] + v[21] - v[-21] - 2 * v[-1] - v[19]) / 4 : 0;
+                    down[k][e] = real ? (v[19] + 2 * v[20] + v[21] - v[-21] - 2 * v[-20] - v[-19]) / 4 : 0;
+                }
+            }
+            __syncthreads();
+            int at = (r + 1) * 18 + c + 1;
+            for (int k = 0; k < 3; ++k) {
+                const float *a = across[k] + at, *v = down[k] + at;
+                sobel[k] = 2 * s.sobel * share * (a[-19] + 2 * a[-1] + a[17] - a[-17] - 2 * a[1] - a[19] + v[-19] + 2 * v[-18] + v[-17]
+                                                  - v[17] - 2 * v[18] - v[19]) / 4;
+            }
+        }
+        if (s.ssim > 0) {
+            __syncthreads();
+            for (int e = tid; e < WIDE * WIDE; e += PIXELS) {
+                int er = e / WIDE, ec = e % WIDE, ex = p.left + ec - REACH, ey = p.top + er - REACH;
+                bool real = ex >= 0 && ey >= 0 && ex < p.width && ey < p.height;
+                const float *from = s.slopes + size_t(p.b) * 9 * s.max_pixels + ey * p.width + ex;
+#pragma unroll
+                for (int k = 0; k < 9; ++k) slope[k][er * PITCH + ec] = real ? from[size_t(k) * s.max_pixels] : 0;
+            }
+            __syncthreads();
+            for (int channel = 0; channel < 3; ++channel) {
+                for (int task = tid; task < 3 * WIDE * 4; task += PIXELS) {
+                    int field = task / (WIDE * 4), er = task / 4 % WIDE, ec = task % 4 * 4;
+                    float out[4] = {};
+#pragma unroll
+                    for (int i = 0; i < 14; ++i) {
+                        float v = slope[field * 3 + channel][er * PITCH + ec + i];
+#pragma unroll
+                        for (int k = 0; k < 4; ++k)
+                            if (i - k >= 0 && i - k < 11) out[k] += WINDOW[i - k] * v;
+                    }
+#pragma unroll
+                    for (int k = 0; k < 4; ++k) blurred[field][er * TILE + ec + k] = out[k];
+                }
+                __syncthreads();
+                float mean[3] = {};
+#pragma unroll
+                for (int field = 0; field < 3; ++field)
+#pragma unroll
+                    for (int i = 0; i < 11; ++i) mean[field] += WINDOW[i] * blurred[field][(r + i) * TILE + c];
+                grad[channel] = -s.ssim * share * (mean[0] + 2 * mean[1] * image[channel] + mean[2] * target[channel]);
+                __syncthreads();
+            }
+        }
+        if (!inside) continue;
+        const Now &now = s.now[p.b];
+        float4 out = {0, 0, 0, 6 * share * s.mask * (pixel.alpha - pixel.mask)};
+        for (int k = 0; k < 3; ++k) {
+            grad[k] += 2 * share * (image[k] - target[k]) + sobel[k];
+            out.w -= grad[k] * now.background[k];
+        }
+        out.x = grad[0];
+        out.y = grad[1];
+        out.z = grad[2];
+        ((float4 *)s.grad_image)[size_t(p.b) * s.max_pixels + y * p.width + x] = out;
+    }
+}

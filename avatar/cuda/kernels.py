@@ -1,0 +1,69 @@
+"""The kernels' text, and its machine code: compiled by NVRTC for the GPU that is there, kept by source and architecture."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+from gsac.avatar.cuda.scene import declarations
+
+SOURCES = ("formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "update.cuh")
+KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "image_gradient", "blend_backward", "gaussian_step",
+           "gather", "joint_step")
+"""In the order of a step."""
+OPTIONS = ("--std=c++17", "--extra-device-vectorization")
+
+
+class CompileError(Exception):
+    """NVRTC's own words."""
+
+
+def source() -> str:
+    folder = Path(__file__).parent
+    first, *rest = ((folder / name).read_text().replace("#pragma once\n", "") for name in SOURCES)
+    return "\n".join([first, declarations(), *rest])
+
+
+def folder() -> Path:
+    """$GSAC_CACHE/kernels, else ~/.cache/gsac/kernels."""
+    named = os.environ.get("GSAC_CACHE")
+    return (Path(named) if named else Path.home() / ".cache" / "gsac") / "kernels"
+
+
+def cubin(architecture: str) -> bytes:
+    """Machine code for an architecture such as sm_90; compiles (about 2 s) where it is not kept yet."""
+    from cuda.bindings import nvrtc
+
+    text = source()
+    version = "{1}.{2}".format(*nvrtc.nvrtcVersion())
+    key = hashlib.sha256("\0".join([architecture, version, *OPTIONS, text]).encode()).hexdigest()[:32]
+    kept = folder() / f"{key}.cubin"
+    if kept.is_file():
+        return kept.read_bytes()
+    code = compiled(text, architecture)
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=kept.parent, delete=False) as half:
+            half.write(code)
+        os.replace(half.name, kept)
+    except OSError:
+        pass  # a read-only home costs two seconds, not the run
+    return code
+
+
+def compiled(text: str, architecture: str) -> bytes:
+    from cuda.bindings import nvrtc
+
+    _, program = nvrtc.nvrtcCreateProgram(text.encode(), b"gsac.cu", 0, [], [])
+    options = [option.encode() for option in (f"--gpu-architecture={architecture}", *OPTIONS)]
+    error, = nvrtc.nvrtcCompileProgram(program, len(options), options)
+    if error != nvrtc.nvrtcResult.NVRTC_SUCCESS:
+        log = b" " * nvrtc.nvrtcGetProgramLogSize(program)[1]
+        nvrtc.nvrtcGetProgramLog(program, log)
+        raise CompileError(f"NVRTC cannot compile the kernels for {architecture}: {log.decode(errors='replace')}")
+    code = b" " * nvrtc.nvrtcGetCUBINSize(program)[1]
+    nvrtc.nvrtcGetCUBIN(program, code)
+    nvrtc.nvrtcDestroyProgram(program)
+    return code

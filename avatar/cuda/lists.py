@@ -1,0 +1,39 @@
+"""Fixed lists by which the kernels gather instead of scatter: sums then have one order, whatever the threads do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def joint_levels(parents: np.ndarray) -> np.ndarray:
+    """(J,) distance of each joint from its root; parents (-1: root) come before children."""
+    level = np.zeros(len(parents), np.int32)
+    for j, p in enumerate(parents):
+        level[j] = 0 if p < 0 else level[p] + 1
+    return level
+
+
+def children(parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """start (J + 1,) and the joints' children, child[start[j]:start[j + 1]]."""
+    parents = np.asarray(parents, np.int64)
+    child = np.argsort(parents, kind="stable")[(parents < 0).sum():]
+    return _starts(parents[child], len(parents)), child
+
+
+def joints_of(skin_index: np.ndarray, skin_weight: np.ndarray, joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """start (J + 1,), vertex and weight: the vertices that each joint carries."""
+    joint, weight = np.asarray(skin_index).reshape(-1), np.asarray(skin_weight).reshape(-1)
+    carried = np.flatnonzero(weight != 0)
+    carried = carried[np.argsort(joint[carried], kind="stable")]
+    return _starts(joint[carried], joints), carried // skin_index.shape[1], weight[carried]
+
+
+def vertices_of(faces: np.ndarray, face: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
+    """start (V + 1,) and item: 3 gaussian + corner, for the corners of gaussians' faces that are the vertex."""
+    corner = np.asarray(faces)[face].reshape(-1)
+    item = np.argsort(corner, kind="stable")
+    return _starts(corner[item], vertices), item
+
+
+def _starts(owner: np.ndarray, count: int) -> np.ndarray:
+    return np.searchsorted(owner, np.arange(count + 1)).astype(np.int32)

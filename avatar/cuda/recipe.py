@@ -1,0 +1,73 @@
+"""What a training on the GPU is told, and its plan: every step's frames, backgrounds and rates, drawn before the first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from gsac.avatar.cuda.scene import MOST_BATCH, PLAN
+
+
+@dataclass
+class Recipe:
+    """As `stages.train.config.TrainConfig` where the names agree; the defaults are those of recipe `fast`."""
+
+    steps: int = 1600
+    batch: int = 1
+    """Frames of one step, at most as many as there are."""
+    seed: int = 0
+    coarse_share: float = 0.45
+    """Part of the steps that run on the first of two levels."""
+    mu_rate: float = 4e-4
+    rgb_rate: float = 1e-2
+    quat_rate: float = 1e-2
+    scale_rate: float = 1e-2
+    opacity_rate: float = 3e-2
+    pose_rate: float = 1e-3
+    pose_pull: float = 1e-3
+    ssim: float = 0.1
+    sobel: float = 0.0
+    mask: float = 0.1
+    needle: float = 4.0
+    largest: float = 0.05
+    """Longest axis of a gaussian, m at rest."""
+    reach: float = 0.08
+    place_pull: float = 1e-3
+    turn_unit: float = 0.05
+    """rad in which a pose's distance from the fit is measured."""
+    shift_unit: float = 0.02
+    """m, likewise."""
+    hand_share: float = 0.1
+    """Pose rate of the fingers relative to the body's; jaw and eyes stay."""
+
+
+class Drawn(NamedTuple):
+    order: np.ndarray
+    """(steps, batch) int32, indices of frames; no frame twice in a step."""
+    background: np.ndarray
+    """(steps, batch, 3) float32."""
+    rates: np.ndarray
+    """(steps,) structured as `scene.PLAN`."""
+
+
+def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
+    """The same draws as `stages.train.fast` makes from the seed, for one frame a step."""
+    batch = min(recipe.batch, frames, MOST_BATCH)
+    random = np.random.default_rng(recipe.seed)
+    order, background = np.empty((recipe.steps, batch), np.int32), np.empty((recipe.steps, batch, 3), np.float32)
+    left: list[int] = []
+    for step in range(recipe.steps):
+        if len(left) < batch:
+            left = list(random.permutation(frames))
+        for b in range(batch):
+            order[step, b] = left.pop()
+            background[step, b] = random.random(3)
+    done = np.arange(recipe.steps) / max(recipe.steps, 1)
+    rates = np.zeros(recipe.steps, [(name, np.int32 if name == "level" else np.float32) for name in PLAN])
+    rates["level"] = np.where(done < recipe.coarse_share, 0, levels - 1)
+    for name, rate, end in (("mu", recipe.mu_rate, 0.01), ("quat", recipe.quat_rate, 0.1), ("log_scale", recipe.scale_rate, 0.1),
+                            ("rgb", recipe.rgb_rate, 0.1), ("opacity", recipe.opacity_rate, 0.1), ("pose", recipe.pose_rate, 0.01),
+                            ("place_pull", recipe.place_pull if recipe.mu_rate else 0.0, 0.01)):
+        rates[name] = rate * end**done
+    return Drawn(order, background, rates)

@@ -1,0 +1,60 @@
+"""The structs that host and kernels share: one table each, from which both the CUDA text and the ctypes class are made."""
+
+from __future__ import annotations
+
+import ctypes
+
+INT, FLOAT, LONG = ctypes.c_int, ctypes.c_float, ctypes.c_longlong
+_NAMES = {INT: "int", FLOAT: "float", LONG: "long long"}
+MOST_BATCH = 16
+
+FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT, "fy": FLOAT, "cx": FLOAT, "cy": FLOAT, "rest": INT,
+         "pose": INT, "spare": INT}
+"""pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: which vertices at rest and which pose it shows."""
+
+PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
+        "place_pull": FLOAT}
+"""Of one step: size of the images, Adam rates, and the share of its way that a gaussian is pulled back."""
+
+STATE = {name: INT for name in (
+    "step", "stop", "overflow", "needed", "most", "pairs", "listed", "checkpoints", "heavy", "light", "near", "segments",
+    "blend_ticket", "back_ticket", "frames_done")} | {"joints_done": INT * MOST_BATCH}
+"""Counters on the device. overflow: the lists were too short, nothing moves until they are longer; needed: how long."""
+
+POINTERS = {
+    "frames": "Frame", "pixels": "unsigned char", "occupied": "unsigned char", "plan": "Plan", "order": "int", "background": "float",
+    "state": "State", "now": "Now",
+    "rest": "float", "joints": "float", "parents": "int", "joint_level": "int", "child_start": "int", "child": "int",
+    "skin_index": "int", "skin_weight": "float", "corner": "int", "vertex_start": "int", "vertex_item": "int",
+    "joint_start": "int", "joint_vertex": "int", "joint_weight": "float",
+    "pose": "double", "fit": "double", "pose_first": "double", "pose_second": "double", "pose_share": "double", "pose_steps": "int",
+    "mu": "float", "quat": "float", "log_scale": "float", "rgb": "float", "logit": "float", "first": "float", "second": "float",
+    "start": "float", "face_scale": "float", "seen": "int",
+    "local": "float", "transform": "float", "vertices": "float", "grad_vertices": "float", "corner_grad": "float",
+    "joint_grad": "float", "splat": "float", "box": "unsigned short", "slot_start": "int", "depth": "float", "rank": "int",
+    "list": "unsigned long long", "moments": "float", "tile_count": "int", "tile_start": "int", "tile_check": "int",
+    "tile_done": "int", "near_flag": "unsigned char", "heavy": "int", "light": "int", "near": "int", "segment": "int",
+    "checkpoint": "float", "image": "float", "grad_image": "float", "slopes": "float", "tile_loss": "float", "losses": "float",
+    "grad_out": "float", "pose_grad_out": "double",
+}
+NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
+           "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
+           "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "spare": INT}
+
+
+def _struct(name: str, fields: dict) -> type[ctypes.Structure]:
+    return type(name, (ctypes.Structure,), {"_fields_": list(fields.items())})
+
+
+Frame, Plan, State = _struct("Frame", FRAME), _struct("Plan", PLAN), _struct("State", STATE)
+Scene = _struct("Scene", {name: ctypes.c_void_p for name in POINTERS} | NUMBERS)
+
+
+def declarations() -> str:
+    """The structs as CUDA text."""
+    lines = ["struct Now;"]
+    for name, fields in (("Frame", FRAME), ("Plan", PLAN), ("State", STATE)):
+        body = (f"{_NAMES.get(kind, 'int')} {field}{f'[{MOST_BATCH}]' if kind not in _NAMES else ''};" for field, kind in fields.items())
+        lines.append(f"struct {name} {{ {' '.join(body)} }};")
+    body = [f"{kind} *{name};" for name, kind in POINTERS.items()] + [f"{_NAMES[kind]} {name};" for name, kind in NUMBERS.items()]
+    return "\n".join([*lines, f"struct Scene {{ {' '.join(body)} }};", ""])

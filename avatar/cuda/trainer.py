@@ -1,0 +1,259 @@
+"""The driver: buffers, the steps' graph, and what comes back. All arrays that a step needs stay on the device."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import NamedTuple
+
+import numpy as np
+from gsac.avatar.binding import face_frames
+from gsac.avatar.camera import Camera
+from gsac.avatar.cuda.device import Buffer, Device
+from gsac.avatar.cuda.lists import children, joint_levels, joints_of, vertices_of
+from gsac.avatar.cuda.recipe import Recipe, draw
+from gsac.avatar.cuda.scene import FRAME, POINTERS, Scene, State
+from gsac.avatar.gaussians import Gaussians
+
+TILE, SEGMENT, JOINTS = 16, 128, 55
+BODY, JAW_EYES = slice(0, 22), slice(22, 25)
+REPLAY = 10
+"""Steps of one graph."""
+NOW = 256
+"""Bytes kept for each frame of the batch's `Now`; at least the struct's."""
+
+
+class BodyArrays(NamedTuple):
+    rest: np.ndarray
+    """(R, V, 3) m, vertices at rest."""
+    rest_of: np.ndarray
+    """(T,) which of them each frame wears."""
+    joints: np.ndarray
+    """(55, 3) m at rest."""
+    parents: np.ndarray
+    skin_index: np.ndarray
+    """(V, 4)."""
+    skin_weight: np.ndarray
+    """(V, 4), rows sum to one."""
+    faces: np.ndarray
+    """(F, 3)."""
+
+
+class Shot(NamedTuple):
+    pixels: np.ndarray
+    """(h, w, 4) uint8, premultiplied RGB and mask."""
+    camera: Camera
+
+
+class CudaTrainer:
+    """levels: one or two lists of T shots, coarse first; pose: (T, 55, 3) rad; transl: (T, 3) m.
+
+    Raises device.NoDevice without a GPU, device.DeviceError where it has too little memory.
+    """
+
+    def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: Gaussians,
+                 recipe: Recipe, device: Device | None = None, pair_room: int | None = None):
+        self.device = device or Device()
+        self.recipe, self.body, self.face = recipe, body, np.asarray(gaussians.face, np.int32)
+        self.frames, self.count = len(levels[0]), len(gaussians)
+        self.buffers: dict[str, Buffer] = {}
+        self.scene, self._graph = Scene(), None
+        drawn = draw(recipe, self.frames, len(levels))
+        self.batch, self.order, self.rates = drawn.order.shape[1], drawn.order, drawn.rates
+        self._numbers(levels)
+        self._upload_shots(levels)
+        self._upload("plan", drawn.rates.view(np.uint8), np.uint8)
+        self._upload("order", drawn.order, np.int32)
+        self._upload("background", drawn.background, np.float32)
+        self._upload_body(pose, transl)
+        self._upload_gaussians(gaussians)
+        self._scratch()
+        self._lists(pair_room or max(65536, 6 * self.count * self.batch))
+
+    def train(self, steps: int) -> None:
+        """So many steps more, as far as the recipe goes; lists that prove too short are made longer and nothing is lost."""
+        stop = min(self.state().step + steps, self.recipe.steps)
+        self._set_state(stop=stop)
+        while (left := stop - self.state().step) > 0:
+            if self._graph is None:
+                self._graph = self.device.graph(lambda: [self.step() for _ in range(REPLAY)])
+            for _ in range(-(-left // REPLAY)):
+                self.device.replay(self._graph)
+            self.device.wait()
+            state = self.state()
+            if state.overflow:
+                self._lists(state.needed * 3 // 2)
+
+    def step(self) -> None:
+        """Launches one step's kernels; no more than `stop` are carried out."""
+        for name in self.grids:
+            self.launch(name)
+
+    def launch(self, name: str) -> None:
+        self.device.launch(name, *self.grids[name], self.scene)
+
+    def state(self):
+        return State.from_buffer_copy(self.buffers["state"].read().tobytes())
+
+    def gaussians(self) -> Gaussians:
+        b = self.buffers
+        opacity = 1 / (1 + np.exp(-b["logit"].read().astype(np.float64)))
+        return Gaussians(self.face.copy(), b["mu"].read(), b["quat"].read(), b["log_scale"].read(), b["rgb"].read(),
+                         opacity.astype(np.float32))
+
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Pose (T, 55, 3) and translation (T, 3), float64."""
+        both = self.buffers["pose"].read()
+        return both[:, :JOINTS].copy(), both[:, JOINTS].copy()
+
+    def losses(self) -> np.ndarray:
+        """(steps done, batch)."""
+        return self.buffers["losses"].read()[: self.state().step]
+
+    def memory(self) -> int:
+        """Bytes of the device's memory that this training holds."""
+        return sum(b.bytes for b in self.buffers.values())
+
+    def close(self) -> None:
+        if self._graph is not None:
+            self.device.drop(self._graph)
+            self._graph = None
+        for buffer in self.buffers.values():
+            buffer.free()
+        self.buffers.clear()
+
+    def shot_size(self, step: int) -> tuple[int, int]:
+        """Height and width of the first frame of a step."""
+        level = self.rates["level"][step]
+        return self.sizes[level * self.frames + self.order[step, 0]]
+
+    def want_gradients(self) -> None:
+        """From now on the buffers `grad_out` (N, 14) and `pose_grad_out` (batch, 56, 3) hold the last step's gradients."""
+        self._empty("grad_out", (self.count, 14), np.float32)
+        self._empty("pose_grad_out", (self.batch, JOINTS + 1, 3), np.float64)
+        self._graph = None
+
+    def poison(self) -> None:
+        """NaN into all that a step must write before it reads."""
+        for name in self.scratch:
+            self.buffers[name].fill(255)
+
+    def _numbers(self, levels) -> None:
+        recipe, scene = self.recipe, self.scene
+        self.sizes = sizes = [shot.pixels.shape[:2] for level in levels for shot in level]
+        scene.frame_count, scene.batch, scene.count = self.frames, self.batch, self.count
+        scene.vertex_count = self.body.rest.shape[1]
+        scene.max_pixels = max(h * w for h, w in sizes)
+        scene.max_tiles = max(-(-h // TILE) * -(-w // TILE) for h, w in sizes)
+        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach"):
+            setattr(scene, name, getattr(recipe, name))
+
+    def _upload_shots(self, levels) -> None:
+        frames = np.zeros(len(levels) * self.frames, [(name, np.dtype(kind)) for name, kind in FRAME.items()])
+        pixels, flags = [], []
+        at = tiles = 0
+        for i, (t, shot) in enumerate((t, shot) for level in levels for t, shot in enumerate(level)):
+            h, w = shot.pixels.shape[:2]
+            rows, columns = -(-h // TILE), -(-w // TILE)
+            shown = np.zeros((rows * TILE, columns * TILE), bool)
+            shown[:h, :w] = shot.pixels.any(2)
+            frames[i] = (at, tiles, w, h, *shot.camera.focal, *shot.camera.center, self.body.rest_of[t], t, 0)
+            pixels.append(shot.pixels.reshape(-1))
+            flags.append(shown.reshape(rows, TILE, columns, TILE).any((1, 3)).reshape(-1))
+            at, tiles = at + h * w, tiles + rows * columns
+        self._upload("frames", frames.view(np.uint8), np.uint8)
+        self._upload("pixels", np.concatenate(pixels), np.uint8)
+        self._upload("occupied", np.concatenate(flags), np.uint8)
+
+    def _upload_body(self, pose, transl) -> None:
+        body = self.body
+        level = joint_levels(body.parents)
+        self.scene.levels = int(level.max()) + 1
+        child_start, child = children(body.parents)
+        joint_start, joint_vertex, joint_weight = joints_of(body.skin_index, body.skin_weight, JOINTS)
+        vertex_start, vertex_item = vertices_of(body.faces, self.face, body.rest.shape[1])
+        both = np.concatenate([np.asarray(pose, np.float64), np.asarray(transl, np.float64)[:, None]], 1)
+        share = np.full(JOINTS + 1, self.recipe.hand_share)
+        share[BODY], share[JAW_EYES], share[JOINTS] = 1, 0, 1
+        for name, array, kind in (
+                ("rest", body.rest, np.float32), ("joints", body.joints, np.float32), ("parents", body.parents, np.int32),
+                ("joint_level", level, np.int32), ("child_start", child_start, np.int32), ("child", child, np.int32),
+                ("skin_index", body.skin_index, np.int32), ("skin_weight", body.skin_weight, np.float32),
+                ("corner", np.asarray(body.faces)[self.face], np.int32), ("vertex_start", vertex_start, np.int32),
+                ("vertex_item", vertex_item, np.int32), ("joint_start", joint_start, np.int32),
+                ("joint_vertex", joint_vertex, np.int32), ("joint_weight", joint_weight, np.float32), ("pose", both, np.float64),
+                ("fit", both, np.float64), ("pose_share", share, np.float64)):
+            self._upload(name, array, kind)
+        for name in ("pose_first", "pose_second"):
+            self._empty(name, both.shape, np.float64).fill(0)
+        self._empty("pose_steps", self.frames, np.int32).fill(0)
+
+    def _upload_gaussians(self, gaussians: Gaussians) -> None:
+        opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
+        scale = face_frames(self.body.rest[0], self.body.faces).k[self.face]
+        for name, array in (("mu", gaussians.mu), ("quat", gaussians.quat), ("log_scale", gaussians.log_scale),
+                            ("rgb", gaussians.rgb), ("logit", np.log(opacity / (1 - opacity))), ("start", gaussians.mu),
+                            ("face_scale", scale)):
+            self._upload(name, array, np.float32)
+        for name in ("first", "second"):
+            self._empty(name, (14, self.count), np.float32).fill(0)
+        self._empty("seen", self.count, np.int32).fill(0)
+        self._empty("losses", (self.recipe.steps, self.batch), np.float32).fill(0)
+        self._empty("state", ctypes.sizeof(State), np.uint8).fill(0)
+
+    def _scratch(self) -> None:
+        batch, n, v = self.batch, self.count, self.scene.vertex_count
+        tiles, pixels = batch * self.scene.max_tiles, batch * self.scene.max_pixels
+        shapes = {
+            "local": (batch, JOINTS, 9), "transform": (batch, JOINTS, 12), "vertices": (batch, v, 3), "grad_vertices": (batch, v, 3),
+            "corner_grad": (batch, n, 9), "joint_grad": (batch, JOINTS, 12), "splat": (batch, n, 12), "depth": (batch, n),
+            "image": (pixels, 4), "grad_image": (pixels, 4), "tile_loss": tiles}
+        if self.recipe.ssim:
+            shapes["slopes"] = (9, pixels)
+        for name, shape in shapes.items():
+            self._empty(name, shape, np.float32)
+        integers = {"slot_start": (batch, n), "tile_count": tiles, "tile_start": tiles, "tile_check": tiles, "tile_done": tiles,
+                    "heavy": tiles, "light": tiles, "near": tiles}
+        for name, shape in integers.items():
+            self._empty(name, shape, np.int32)
+        self._empty("box", (batch, n, 4), np.uint16)
+        self._empty("near_flag", tiles, np.uint8)
+        self._empty("now", batch * NOW, np.uint8)
+        self.scratch = [*shapes, *integers, "box", "near_flag", "now"]
+        p = self.device.processors
+        self.grids = {
+            "skin": ((-(-v // 256), batch), 256), "project": ((-(-n // 128), batch), 128),
+            "allocate": ((-(-self.scene.max_tiles // 256), batch), 256), "fill": ((-(-n // 128), batch), 128),
+            "blend": ((min(tiles, 6 * p), 1), 256), "compare": ((min(tiles, 12 * p), 1), 256),
+            "image_gradient": ((min(tiles, 12 * p), 1), 256), "blend_backward": ((5 * p, 1), 256),
+            "gaussian_step": ((-(-n // 128), 1), 128), "gather": ((-(-v // 128), batch), 128), "joint_step": ((JOINTS, batch), 256)}
+
+    def _lists(self, room: int) -> None:
+        """Room for so many (tile, gaussian) pairs of a batch, and for what hangs on them."""
+        tiles = self.batch * self.scene.max_tiles
+        for name, shape, kind in (("rank", room, np.int32), ("list", room, np.uint64), ("moments", (room, 9), np.float32),
+                                  ("segment", (room // SEGMENT + tiles, 2), np.int32),
+                                  ("checkpoint", (room // SEGMENT + 1, TILE * TILE, 4), np.float32)):
+            self._empty(name, shape, kind)
+        self.scratch = list(dict.fromkeys([*self.scratch, "rank", "list", "moments", "segment", "checkpoint"]))
+        self.scene.pair_room = room
+        if self._graph is not None:
+            self.device.drop(self._graph)
+            self._graph = None
+        self._set_state(overflow=0)
+
+    def _set_state(self, **values: int) -> None:
+        state = self.state()
+        for name, value in values.items():
+            setattr(state, name, value)
+        self.buffers["state"].write(np.frombuffer(bytes(state), np.uint8))
+
+    def _upload(self, name: str, array: np.ndarray, kind) -> None:
+        self._empty(name, np.shape(array), kind).write(np.asarray(array))
+
+    def _empty(self, name: str, shape, kind) -> Buffer:
+        assert name in POINTERS
+        if name in self.buffers:
+            self.buffers[name].free()
+        self.buffers[name] = buffer = Buffer(shape, kind)
+        setattr(self.scene, name, buffer.pointer)
+        return buffer

@@ -1,0 +1,227 @@
+// From moments to moved gaussians and poses.
+
+// (blocks of gaussians). Sums a gaussian's moments over tiles and frames of the batch in a fixed order, then Adam.
+extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
+    if (halted(s)) return;
+    int i = blockIdx.x * 128 + threadIdx.x;
+    if (i >= s.count) return;
+    const Plan plan = s.now[0].plan;
+    float g_mu[3] = {}, g_quat[4] = {}, g_log_scale[3] = {}, g_rgb[3] = {}, g_logit = 0;
+    for (int b = 0; b < s.batch; ++b) {
+        int at = b * s.count + i;
+        ushort4 box = ((const ushort4 *)s.box)[at];
+        int tiles = (box.y - box.x) * (box.w - box.z);
+        float *corners = s.corner_grad + 9 * size_t(at);
+        if (tiles == 0) {
+            for (int c = 0; c < 9; ++c) corners[c] = 0;
+            continue;
+        }
+        float m[9] = {};
+        const float *from = s.moments + 9 * size_t(s.slot_start[at]);
+        for (int k = 0; k < tiles; ++k, from += 9)
+#pragma unroll
+            for (int c = 0; c < 9; ++c) m[c] += from[c];
+        Posed g = posed(s, b, i);
+        Splat<float> splat = project(g.lens, g.bound, g.opacity);
+        Bound<float> bound = project_backward(g.lens, g.bound, splat, m);
+        BindGradient<float> grad = bind_backward(g.face, g.turn, g.mu, g.log_scale, bound);
+        for (int c = 0; c < 3; ++c) {
+            corners[3 * c] = grad.corner[c].x;
+            corners[3 * c + 1] = grad.corner[c].y;
+            corners[3 * c + 2] = grad.corner[c].z;
+            g_log_scale[c] += grad.log_scale[c];
+            g_rgb[c] += m[6 + c];
+        }
+        g_mu[0] += grad.mu.x;
+        g_mu[1] += grad.mu.y;
+        g_mu[2] += grad.mu.z;
+        for (int c = 0; c < 4; ++c) g_quat[c] += grad.quat[c];
+        g_logit += m[0] * (1 - g.opacity);  // dL/do = m / o, do/dlogit = o (1 - o)
+    }
+    float share = 1.0f / s.batch;
+    for (int c = 0; c < 3; ++c) {
+        g_mu[c] *= share;
+        g_log_scale[c] *= share;
+        g_rgb[c] *= share;
+    }
+    for (int c = 0; c < 4; ++c) g_quat[c] *= share;
+    g_logit *= share;
+    if (s.grad_out) {
+        float *out = s.grad_out + 14 * size_t(i);
+        for (int c = 0; c < 3; ++c) {
+            out[c] = g_mu[c];
+            out[7 + c] = g_log_scale[c];
+            out[10 + c] = g_rgb[c];
+        }
+        for (int c = 0; c < 4; ++c) out[3 + c] = g_quat[c];
+        out[13] = g_logit;
+    }
+    int n = s.seen[i];
+    if (g_rgb[0] != 0 || g_rgb[1] != 0 || g_rgb[2] != 0) s.seen[i] = ++n;
+    // moments of Adam by number, so that a warp's loads lie together
+    float mu[3], quat[4], log_scale[3], rgb[3], logit = s.logit[i], first[14], second[14];
+    for (int c = 0; c < 14; ++c) {
+        first[c] = s.first[size_t(c) * s.count + i];
+        second[c] = s.second[size_t(c) * s.count + i];
+    }
+    for (int c = 0; c < 3; ++c) {
+        mu[c] = s.mu[3 * i + c];
+        log_scale[c] = s.log_scale[3 * i + c];
+        rgb[c] = s.rgb[3 * i + c];
+    }
+    for (int c = 0; c < 4; ++c) quat[c] = s.quat[4 * i + c];
+    adam_row(mu, g_mu, first, second, 3, n, plan.mu);
+    adam_row(quat, g_quat, first + 3, second + 3, 4, n, plan.quat);
+    adam_row(log_scale, g_log_scale, first + 7, second + 7, 3, n, plan.log_scale);
+    adam_row(rgb, g_rgb, first + 10, second + 10, 3, n, plan.rgb);
+    adam_row(&logit, &g_logit, first + 13, second + 13, 1, n, plan.opacity);
+    float start[3] = {s.start[3 * i], s.start[3 * i + 1], s.start[3 * i + 2]};
+    Bounds<float> bounds = {s.needle, s.largest, s.reach};
+    limit(mu, quat, log_scale, rgb, logit, start, s.face_scale[i], bounds, plan.place_pull);
+    for (int c = 0; c < 14; ++c) {
+        s.first[size_t(c) * s.count + i] = first[c];
+        s.second[size_t(c) * s.count + i] = second[c];
+    }
+    for (int c = 0; c < 3; ++c) {
+        s.mu[3 * i + c] = mu[c];
+        s.log_scale[3 * i + c] = log_scale[c];
+        s.rgb[3 * i + c] = rgb[c];
+    }
+    for (int c = 0; c < 4; ++c) s.quat[4 * i + c] = quat[c];
+    s.logit[i] = logit;
+}
+
+// (blocks of vertices, batch). A vertex's gradient: the corners of the gaussians on its faces, in their order.
+extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
+    if (halted(s)) return;
+    int b = blockIdx.y, v = blockIdx.x * 128 + threadIdx.x;
+    if (v >= s.vertex_count) return;
+    const float *corners = s.corner_grad + 9 * size_t(b) * s.count;
+    float x = 0, y = 0, z = 0;
+    for (int e = s.vertex_start[v]; e < s.vertex_start[v + 1]; ++e) {
+        const float *from = corners + 3 * s.vertex_item[e];
+        x += from[0];
+        y += from[1];
+        z += from[2];
+    }
+    float *to = s.grad_vertices + 3 * (size_t(b) * s.vertex_count + v);
+    to[0] = x;
+    to[1] = y;
+    to[2] = z;
+}
+
+// Back through the joint chain for frame b of the batch, leaves first, then Adam of its pose; one block.
+FORMULA void pose_step(const Scene &s, int b) {
+    __shared__ float grad[55][12], up[55][12], transform[55][12], local[55][9];
+    __shared__ float transl[3];
+    const Now &now = s.now[b];
+    int tid = threadIdx.x, j = tid;
+    for (int i = tid; i < 55 * 12; i += 256) {
+        (&grad[0][0])[i] = __ldcg(s.joint_grad + b * 55 * 12 + i);
+        (&transform[0][0])[i] = s.transform[b * 55 * 12 + i];
+    }
+    for (int i = tid; i < 55 * 9; i += 256) (&local[0][0])[i] = s.local[b * 55 * 9 + i];
+    __syncthreads();
+    if (tid < 3) {  // weights of a vertex sum to one, so the joints' translations sum to the vertices' gradient
+        float sum = 0;
+        for (int k = 0; k < 55; ++k) sum += grad[k][4 * tid + 3];
+        transl[tid] = sum;
+    }
+    __syncthreads();
+    double turn[3] = {};
+    for (int level = s.levels - 1; level >= 0; --level) {
+        if (j < 55 && s.joint_level[j] == level) {
+            float *G = grad[j];
+            for (int e = s.child_start[j]; e < s.child_start[j + 1]; ++e)
+                for (int c = 0; c < 12; ++c) G[c] += up[s.child[e]][c];
+            const float *J = s.joints + 3 * j;
+            for (int i = 0; i < 3; ++i)
+                for (int k = 0; k < 3; ++k) G[4 * i + k] -= G[4 * i + 3] * J[k];
+            int p = s.parents[j];
+            float g_local[9];
+            const float *P = transform[p < 0 ? 0 : p], *L = local[j];
+            for (int i = 0; i < 3; ++i)
+                for (int k = 0; k < 3; ++k)
+                    g_local[3 * i + k] = p < 0 ? G[4 * i + k] : P[i] * G[k] + P[4 + i] * G[4 + k] + P[8 + i] * G[8 + k];
+            for (int i = 0; i < 3; ++i) {
+                for (int k = 0; k < 3; ++k)
+                    up[j][4 * i + k] = G[4 * i + 3] * J[k] + G[4 * i] * L[3 * k] + G[4 * i + 1] * L[3 * k + 1] + G[4 * i + 2] * L[3 * k + 2];
+                up[j][4 * i + 3] = G[4 * i + 3];
+            }
+            rodrigues_backward(s.pose + (now.frame.pose * 56 + j) * 3, g_local, turn);
+        }
+        __syncthreads();
+    }
+    if (tid < 56) {
+        size_t at = (size_t(now.frame.pose) * 56 + tid) * 3;
+        int n = s.pose_steps[now.frame.pose] + 1;
+        double scale = 1 / (1 - pow(0.9, double(n))), unbias = 1 / (1 - pow(0.99, double(n)));
+        double unit = tid < 55 ? s.turn_unit : s.shift_unit, share = s.pose_share[tid];
+        for (int c = 0; c < 3; ++c) {
+            double g = tid < 55 ? turn[c] : double(transl[c]);
+            if (s.pose_grad_out) s.pose_grad_out[(size_t(b) * 56 + tid) * 3 + c] = g;
+            g += 2 * s.pose_pull * (s.pose[at + c] - s.fit[at + c]) / (unit * unit);
+            double first = s.pose_first[at + c] += 0.1 * (g - s.pose_first[at + c]);
+            double second = s.pose_second[at + c] += 0.01 * (g * g - s.pose_second[at + c]);
+            s.pose[at + c] -= share * now.plan.pose * first * scale / (sqrt(second * unbias) + 1e-12);
+        }
+    }
+    __syncthreads();
+    if (tid == 0) s.pose_steps[now.frame.pose] += 1;
+}
+
+// (55 joints, batch). Gradient of each joint's transform; the last block of a frame takes it to the pose and sums the loss,
+// the last of the batch ends the step.
+extern "C" __global__ void __launch_bounds__(256) joint_step(Scene s) {
+    __shared__ float part[8][12], scratch[8];
+    __shared__ int last;
+    if (halted(s)) return;
+    State &state = *s.state;
+    int j = blockIdx.x, b = blockIdx.y, tid = threadIdx.x;
+    const Now &now = s.now[b];
+    const float *rest = s.rest + 3 * size_t(now.frame.rest) * s.vertex_count, *grad = s.grad_vertices + 3 * size_t(b) * s.vertex_count;
+    float sum[12] = {};
+    for (int e = s.joint_start[j] + tid; e < s.joint_start[j + 1]; e += 256) {
+        int v = s.joint_vertex[e];
+        float w = s.joint_weight[e];
+        Vec<float> r = vec(rest + 3 * v);
+        for (int i = 0; i < 3; ++i) {
+            float g = w * grad[3 * v + i];
+            sum[4 * i] += g * r.x;
+            sum[4 * i + 1] += g * r.y;
+            sum[4 * i + 2] += g * r.z;
+            sum[4 * i + 3] += g;
+        }
+    }
+    for (int c = 0; c < 12; ++c) {
+        float v = sum_warp(sum[c]);
+        if (tid % 32 == 0) part[tid / 32][c] = v;
+    }
+    __syncthreads();
+    if (tid < 12) {
+        float v = 0;
+        for (int w = 0; w < 8; ++w) v += part[w][tid];
+        s.joint_grad[(b * 55 + j) * 12 + tid] = v;
+        __threadfence();
+    }
+    __syncthreads();
+    if (tid == 0) last = atomicAdd(&state.joints_done[b], 1) == 54;
+    __syncthreads();
+    if (!last) return;
+    __threadfence();
+    pose_step(s, b);
+    float loss = 0;
+    int tiles = now.columns * now.rows;
+    for (int t = tid; t < tiles; t += 256)
+        if (s.near_flag[b * s.max_tiles + t]) loss += s.tile_loss[b * s.max_tiles + t];
+    __syncthreads();
+    loss = sum_block(loss, scratch);
+    if (tid == 0) {
+        s.losses[state.step * s.batch + b] = loss;
+        __threadfence();
+        if (atomicAdd(&state.frames_done, 1) == s.batch - 1) {
+            state.frames_done = 0;
+            state.step += 1;
+        }
+    }
+}

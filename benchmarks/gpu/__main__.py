@@ -1,0 +1,92 @@
+"""python -m gsac.benchmarks.gpu [--quick] : checks, times, memory and distance to the ceilings, as one short table."""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+from gsac.avatar.cuda import why_not
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer frames, no long training")
+    quick = parser.parse_args().quick
+    if why := why_not():
+        raise SystemExit(f"benchmarks.gpu: {why}")
+    from gsac.avatar.cuda.device import Device
+    from gsac.avatar.cuda.recipe import Recipe
+    from gsac.benchmarks.gpu.check import LIMIT, errors
+    from gsac.benchmarks.gpu.figure import figure, start
+
+    began = time.perf_counter()
+    device = Device()
+    driver = device._driver.cuDriverGetVersion()[1]
+    print(f"device {device.name}, {device.processors} multiprocessors, driver for CUDA {driver // 1000}.{driver % 1000 // 10}; "
+          f"kernels ready after {time.perf_counter() - began:.1f} s", flush=True)
+
+    def done(what: str) -> None:
+        print(f"[{time.perf_counter() - began:6.1f} s] {what}", flush=True)
+
+    small = figure(3, 101, 67, 4000)
+    done("small figure")
+    losses = Recipe(steps=5, ssim=0.1, sobel=0.1)
+    for count in (1, 17, 1000, 12000, 100000):
+        report(f"101x67, {count}", errors(small, start(small.body, count), losses, device, 1024 if count < 2000 else None), LIMIT)
+    big = figure(12 if quick else 100, 1080, 1080)
+    done("figure of 1080x1080")
+    for count in (10000, 25000):
+        report(f"1080x1080, {count}", errors(big, start(big.body, count), losses, device), LIMIT)
+    done("checks")
+    measure(device, big, quick)
+    done("all")
+
+
+def report(name: str, found: dict[str, float], limit: float) -> None:
+    worst = max(found.values())
+    verdict = "ok" if worst <= limit else "MISSED"
+    print(f"check {name:18s} {verdict}  " + " ".join(f"{k} {v:.1e}" for k, v in found.items()), flush=True)
+
+
+def measure(device, figure, quick: bool) -> None:
+    from gsac.avatar.cuda.recipe import Recipe
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.timing import copy_bandwidth, kernel_microseconds, least_bytes, run_milliseconds, step_milliseconds
+
+    ceiling = copy_bandwidth(device)
+    print(f"copy ceiling {ceiling / 1e12:.2f} TB/s")
+    for count, batch in ((25000, 1), (25000, 4), (25000, 8), (10000, 1), (100000, 1)):
+        recipe = Recipe(steps=3000, batch=batch, ssim=0.1, sobel=0.1)
+        trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, count), recipe, device)
+        steps = step_milliseconds(trainer)
+        kernels, least = kernel_microseconds(trainer), least_bytes(trainer)
+        state = trainer.state()
+        print(f"step {count} gaussians, batch {batch}: median {np.median(steps) * 1e3:.0f} us ({min(steps) * 1e3:.0f}-"
+              f"{max(steps) * 1e3:.0f}), {np.median(steps) / batch * 1e3:.0f} us a frame; {trainer.memory() / 1e9:.2f} GB; "
+              f"{state.pairs} pairs, {state.heavy}+{state.light} tiles, {state.segments} segments")
+        for name, us in kernels.items():
+            print(f"    {name:16s} {us:7.1f} us  {least[name] / 1e6:7.2f} MB least, {least[name] / ceiling * 1e6:5.1f} us at the ceiling")
+        trainer.close()
+    if quick:
+        return
+    for batch, steps in ((1, 3000), (4, 750)):
+        recipe = Recipe(steps=steps, batch=batch, ssim=0.1, sobel=0.1, coarse_share=0)
+        results = []
+        for _ in range(2):
+            trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 25000), recipe, device)
+            trainer.train(0)
+            ms = run_milliseconds(trainer, steps)
+            results.append((trainer.gaussians(), trainer.poses(), trainer.losses()))
+            error = np.abs(trainer.poses()[0] - figure.true_pose)[:, :22].mean()
+            trainer.close()
+        same = all(np.array_equal(getattr(results[0][0], k), getattr(results[1][0], k)) for k in ("mu", "quat", "rgb", "opacity"))
+        loss = results[0][2].mean(1)
+        print(f"training {steps} steps of {batch}: {ms / 1e3:.3f} s; loss {loss[:20].mean():.5f} -> {loss[-100:].mean():.5f}; "
+              f"pose error {np.abs(figure.pose - figure.true_pose)[:, :22].mean():.5f} -> {error:.5f} rad; "
+              f"twice the same: {'yes' if same else 'NO'}; finite: {bool(np.isfinite(loss).all())}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

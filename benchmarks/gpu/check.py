@@ -1,0 +1,79 @@
+"""One step of the CUDA trainer against the same step of the CPU path: image, loss and every gradient."""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar import losses
+from gsac.avatar.cuda.recipe import Recipe
+from gsac.avatar.cuda.trainer import CudaTrainer, Shot
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.skinning import skin_backward
+from gsac.benchmarks.gpu.figure import Figure
+
+NAMES = ("image", "loss", "mu", "quat", "log_scale", "rgb", "logit", "pose", "transl")
+LIMIT = 1e-3
+
+
+def relative(got: np.ndarray, expected: np.ndarray) -> float:
+    """Norm of the difference over the norm of the expected; the difference itself where nothing is expected."""
+    got, expected = np.asarray(got, np.float64), np.asarray(expected, np.float64)
+    size = np.linalg.norm(expected)
+    return float(np.linalg.norm(got - expected) / (size if size > 0 else 1))
+
+
+def cpu_step(figure: Figure, shot: Shot, t: int, gaussians: Gaussians, background: np.ndarray, recipe: Recipe) -> dict:
+    """What frame t gives on the CPU: image (H, W, 4), loss and gradients by the names of `NAMES`."""
+    body = figure.body
+    rendering = render_bound(figure.vertices(figure.pose[t], figure.transl[t]), body.faces, gaussians, shot.camera)
+    pixels = shot.pixels.astype(np.float32) / np.float32(255)
+    clear = 1 - rendering.alpha[..., None]
+    image = rendering.rgb + clear * background
+    target = pixels[..., :3] + (1 - pixels[..., 3:]) * background
+    loss, gradient = losses.l2(image, target)
+    if recipe.ssim:
+        loss += recipe.ssim * (1 - losses.ssim(image, target, factor=-recipe.ssim, gradient=gradient).value)
+    if recipe.sobel:
+        loss += recipe.sobel * losses.sobel(image, target, factor=recipe.sobel, gradient=gradient).value
+    difference = rendering.alpha - pixels[..., 3]
+    loss += recipe.mask * float((difference**2).mean())
+    grad_alpha = 2 * recipe.mask / difference.size * difference - (gradient * background).sum(2)
+    grads = render_bound_backward(rendering.state, gradient, grad_alpha.astype(np.float32))
+    pose, transl, _, _ = skin_backward(grads.vertices, figure.pose[t], body.rest[0], body.joints, body.parents,
+                                       body.skin_index, body.skin_weight)
+    logit = grads.opacity * gaussians.opacity * (1 - gaussians.opacity)
+    return {"image": np.dstack([rendering.rgb, rendering.alpha]), "loss": loss, "mu": grads.mu, "quat": grads.quat,
+            "log_scale": grads.log_scale, "rgb": grads.rgb, "logit": logit, "pose": pose, "transl": transl}
+
+
+def cuda_step(trainer: CudaTrainer) -> dict:
+    """The next step of a trainer, under the same names; of its batch's first frame, scratch poisoned before."""
+    trainer.want_gradients()
+    trainer.poison()
+    before = trainer.state().step
+    trainer.train(1)
+    if trainer.state().step != before + 1:
+        raise RuntimeError("the step was not carried out")
+    frame = trainer.buffers
+    h, w = trainer.shot_size(before)
+    rows, columns = -(-h // 16), -(-w // 16)
+    image = frame["image"].read()[: h * w].reshape(h, w, 4)
+    reached = np.repeat(np.repeat(frame["tile_count"].read()[: rows * columns].reshape(rows, columns) > 0, 16, 0), 16, 1)[:h, :w]
+    grads, pose = frame["grad_out"].read(), frame["pose_grad_out"].read()[0]
+    parts = dict(zip(("mu", "quat", "log_scale", "rgb", "logit"), np.split(grads, (3, 7, 10, 13), 1), strict=True))
+    parts["logit"] = parts["logit"][:, 0]
+    return parts | {"image": np.where(reached[..., None], image, 0), "loss": trainer.losses()[before, 0], "pose": pose[:-1],
+                    "transl": pose[-1]}
+
+
+def errors(figure: Figure, gaussians: Gaussians, recipe: Recipe, device=None, pair_room=None) -> dict[str, float]:
+    """Relative error of each of `NAMES` at the first step."""
+    trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, gaussians, recipe, device, pair_room)
+    try:
+        shown = trainer.gaussians()
+        got = cuda_step(trainer)
+        t, background = int(trainer.order[0, 0]), trainer.buffers["background"].read()[0, 0]
+    finally:
+        trainer.close()
+    expected = cpu_step(figure, figure.shots[t], t, shown, background, recipe)
+    return {name: relative(got[name], expected[name]) for name in NAMES}

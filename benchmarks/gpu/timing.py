@@ -1,0 +1,85 @@
+"""Times by device events: whole steps by graph replays, kernels by events inside a graph, and the card's ceilings."""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar.cuda.device import Buffer, Device, _call
+from gsac.avatar.cuda.trainer import REPLAY, CudaTrainer
+
+
+def step_milliseconds(trainer: CudaTrainer, replays: int = 30, warm: int = 3) -> list[float]:
+    """Milliseconds of a step, one value for each replay of `REPLAY` steps."""
+    device = trainer.device
+    trainer.train(warm * REPLAY)
+    out = []
+    begin, end = device.event(), device.event()
+    for _ in range(replays):
+        device.wait()
+        device.mark(begin)
+        trainer.train(REPLAY)
+        device.mark(end)
+        out.append(device.milliseconds(begin, end) / REPLAY)
+    return out
+
+
+def run_milliseconds(trainer: CudaTrainer, steps: int) -> float:
+    """A whole training's time on the device, from its first kernel to its last; the graph is made before."""
+    device = trainer.device
+    begin, end = device.event(), device.event()
+    device.wait()
+    device.mark(begin)
+    trainer.train(steps)
+    device.mark(end)
+    return device.milliseconds(begin, end)
+
+
+def kernel_microseconds(trainer: CudaTrainer, repeats: int = 40) -> dict[str, float]:
+    """Median time of each kernel of a step, from events recorded between them in a graph."""
+    device, driver = trainer.device, trainer.device._driver
+    marks = [device.event() for _ in range(len(trainer.grids) + 1)]
+
+    def record() -> None:
+        flag = driver.CUevent_record_flags.CU_EVENT_RECORD_EXTERNAL
+        _call("cuEventRecordWithFlags", marks[0], device.stream, flag)
+        for name, mark in zip(trainer.grids, marks[1:], strict=True):
+            trainer.launch(name)
+            _call("cuEventRecordWithFlags", mark, device.stream, flag)
+
+    graph = device.graph(record)
+    trainer._set_state(stop=min(trainer.state().step + repeats, trainer.recipe.steps))
+    rows = []
+    for _ in range(repeats):
+        device.replay(graph)
+        device.wait()
+        rows.append([device.milliseconds(a, b) * 1e3 for a, b in zip(marks[:-1], marks[1:], strict=True)])
+    device.drop(graph)
+    return dict(zip(trainer.grids, np.median(rows, 0).tolist(), strict=True))
+
+
+def copy_bandwidth(device: Device, size: int = 1 << 30) -> float:
+    """Bytes read and written a second by a large copy on the device."""
+    a, b = Buffer(size, np.uint8).fill(1), Buffer(size, np.uint8)
+    begin, end, times = device.event(), device.event(), []
+    for _ in range(12):
+        device.mark(begin)
+        _call("cuMemcpyDtoDAsync", b.pointer, a.pointer, size, device.stream)
+        device.mark(end)
+        times.append(device.milliseconds(begin, end))
+    a.free()
+    b.free()
+    return 2 * size / np.median(times[2:]) * 1e3
+
+
+def least_bytes(trainer: CudaTrainer) -> dict[str, float]:
+    """Bytes that each kernel must move at least, from the last step's counters: inputs read once, outputs written once."""
+    state, s = trainer.state(), trainer.scene
+    batch, n, v, pairs = trainer.batch, s.count, s.vertex_count, state.pairs
+    active, near = (state.heavy + state.light) * 256, state.near * 256
+    posed = v * 12 + n * (12 + 12 + 16 + 12 + 4)
+    return {
+        "skin": batch * v * (12 + 12) + v * 32 + batch * s.max_tiles * 4, "project": batch * (posed + n * (48 + 8 + 8) + pairs / batch * 8),
+        "allocate": batch * s.max_tiles * 14, "fill": batch * n * 16 + pairs * 12, "blend": pairs * (16 + 48) + active * 16,
+        "compare": near * (16 + 4 + 36 * (s.ssim > 0)), "image_gradient": active * (16 + 4 + 16 + 36 * (s.ssim > 0)),
+        "blend_backward": pairs * (8 + 48 + 12 + 36) + active * 32,
+        "gaussian_step": pairs * 36 + batch * (posed + n * (12 + 36)) + n * 4 * 14 * 6, "gather": batch * (n * 36 + v * 12) + n * 12,
+        "joint_step": batch * v * 24 + v * 32}
