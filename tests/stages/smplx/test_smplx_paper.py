@@ -59,6 +59,12 @@ def test_the_schedule_is_the_published_one():
     assert PASSES[0].decays == (100, 250, 400) and BATCH == 64
 
 
+def test_every_method_that_can_be_chosen_is_there():
+    from gsac.stages.smplx import config, stage
+
+    assert tuple(stage.METHODS) == config.METHODS
+
+
 def test_six_numbers_and_rotations_say_the_same():
     turns = rotation.exp(np.random.default_rng(1).normal(0, 0.7, (20, 3)))
     tensor = torch.tensor(turns)

@@ -1,0 +1,60 @@
+import csv
+
+import pytest
+from gsac.benchmarks.fit import bench, chart, table
+from gsac.benchmarks.fit.clips import seen
+from gsac.benchmarks.fit.trial import Trial
+from gsac.stages.contract import BadInput
+
+
+def trial(clip, method, given, seconds, mm):
+    scores = {"joints_median_mm": mm * 0.8, "joints_mean_mm": mm, "iou_mean": 0.9, "iou_worst": 0.8, "reprojection_px": 5.0,
+              "focal_error": 0.0 if given else 0.04}
+    return Trial(clip, method, given, seconds, seconds * 2, scores)
+
+
+TRIALS = [trial("a", "lm", True, 4.0, 20.0), trial("a", "paper", True, 40.0, 30.0),
+          trial("b", "lm", True, 6.0, 30.0), trial("b", "paper", True, 80.0, 50.0)]
+
+
+def test_the_table_has_a_row_a_trial_the_mean_of_each_method_and_the_bar():
+    rows = table.rows(TRIALS)
+    both = [[clip, "given", method] for clip in ("a", "b", "all clips") for method in ("lm", "paper")]
+    assert [row[:3] for row in rows[1:]] == [*both, ["bar", "given", "lm"]]
+    column = rows[0].index("mean mm")
+    assert [row[column] for row in rows[5:]] == ["25.0", "40.0", "30.0"]
+    assert rows[5][rows[0].index("vertices mm")] == "-"
+    lines = table.text(TRIALS).splitlines()
+    assert len({len(line) for line in lines}) == 1
+
+
+def test_one_clip_needs_no_mean_row():
+    assert len(table.rows(TRIALS[:2])) == 1 + 2 + 1
+
+
+def test_the_gain_is_said_in_wall_and_cpu_time():
+    assert table.faster(TRIALS) == ["focal given: lm is 12.0x faster than paper by the clock and 12.0x by CPU time, "
+                                    "at 0.62 of its mean joint error"]
+    assert table.faster(TRIALS[:1]) == []
+
+
+def test_the_csv_holds_every_score_unrounded(tmp_path):
+    table.write_csv(TRIALS, tmp_path / "fit.csv")
+    rows = list(csv.DictReader(open(tmp_path / "fit.csv")))
+    assert [(r["clip"], r["method"]) for r in rows] == [("a", "lm"), ("a", "paper"), ("b", "lm"), ("b", "paper")]
+    assert float(rows[1]["joints_mean_mm"]) == 30 and float(rows[1]["cpu_s"]) == 80
+
+
+def test_the_chart_is_written_as_picture_and_as_vectors(tmp_path):
+    paths = chart.draw(TRIALS, tmp_path)
+    assert [p.name for p in paths] == ["fit.png", "fit.svg"]
+    assert paths[0].read_bytes()[:4] == b"\x89PNG" and "<svg" in paths[1].read_text()[:600]
+
+
+def test_a_folder_that_is_no_truth_clip_is_refused_by_name(tmp_path):
+    with pytest.raises(BadInput, match="expected a truth clip"):
+        seen(tmp_path, None, tmp_path / "out", None)
+
+
+def test_clips_that_measured_the_detector_are_not_what_is_reported():
+    assert not set(bench.parser().parse_args([]).seeds) & {11, 12}
