@@ -6,24 +6,26 @@ from dataclasses import dataclass
 
 from gsac.stages.contract import BadInput
 
-METHODS = ("paper", "paper-literal", "hermite", "gp")
+METHODS = ("turning", "gp", "hermite", "paper", "paper-literal")
 
 
 @dataclass
 class HandgapConfig:
-    method: str = "gp"
-    """How the arm moves through a gap: paper (constant rate of each segment's angle), paper-literal (the same as
-    printed), hermite (cubic with the speeds at both ends), gp (Gaussian process)."""
+    method: str = "turning"
+    """How the arm moves through a gap: turning (Gaussian process in the frame of the turning body), gp (Gaussian process
+    in the image), hermite (cubic with the speeds at both ends), paper (constant rate of each segment's angle),
+    paper-literal (the same as printed)."""
     seen_score: float = 0.5
     """A hand counts as seen again from this score on."""
     lost_score: float = 0.3
     """A hand that was seen counts as lost below this score."""
     min_seen: int = 3
     """Frames that a hand must be seen in a row inside a longer gap to be believed."""
-    max_gap_s: float = 2.0
+    max_gap_s: float = 5.0
     """Longer gaps stay missing."""
-    max_hold_s: float = 0.5
-    """At the clip's start and end, how long the nearest seen arm is held; what is further away stays missing."""
+    max_hold_s: float = 4.5
+    """At the clip's start and end, how far from the nearest seen arm one is still put: carried on by the turning body, or
+    held, by the other methods; what is further away stays missing."""
 
     def check(self) -> None:
         if self.method not in METHODS:

@@ -29,7 +29,7 @@ def run(job: Job) -> None:
     found = find_missing(xy, score, times, job.config)
     filled, drift = np.zeros(score.shape, bool), np.zeros(score.shape)
     if times is not None:
-        xy, filled, drift = fill_gaps(xy, found, times, job.config)
+        xy, filled, drift = fill_gaps(xy, score, keypoints["world"].astype(np.float64), found, times, job.config)
 
     unseen = filled.copy()
     for i, side in enumerate(SIDES):

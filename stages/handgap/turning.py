@@ -1,0 +1,155 @@
+"""A Gaussian process in the frame of the turning body: an arm that keeps its pose is nearly constant there.
+
+Seen sideways a point of the body at (x, z) in the body's frame lies at x cos y + z sin y for the turn y, so constant x and z
+of spread c have the covariance c^2 cos(y - y'), and x and z that stir in time that times a squared exponential of time.
+Up and down the point stays, but for the perspective that lets it sink and rise with the turn. Linear, so in closed form:
+the arm's pose in the body's frame is never named, and where nothing turns an ordinary Gaussian process is left.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from gsac.avatar.wholebody import ARM, HANDS
+from gsac.stages.handgap.find import runs
+from gsac.stages.handgap.gp import noise_px
+from gsac.stages.handgap.yaw import body_centre, body_turn
+
+LENGTHS_S = (0.25, 0.4, 0.6, 0.9, 1.4)
+"""Grid of the stirring's time constant."""
+STIRS = (0.015, 0.03, 0.06, 0.12, 0.24)
+"""Grid of its size, torso lengths."""
+NOISES = (0.002, 0.004, 0.008, 0.016)
+"""Grid of the detector's noise, torso lengths."""
+REACH, OFFSET = 0.8, 0.2
+"""Torso lengths from the body's axis, and of the middle of the seen torso from that axis."""
+TILT, BEND = 0.1, 0.05
+"""Torso lengths: perspective's share up and down, and its second harmonic of the turn."""
+LIKELY = 4.0
+"""Log likelihood below the best of the grid from which on a process has no say."""
+BIAS_SHARE = 0.3
+"""Of the stirring, what keeps to the image and not to the body: the detector's habits."""
+MOST_FRAMES, NEAR_S = 200, 1.5
+"""Of a long clip, all seen frames this close to a gap are used, and every n-th of the others."""
+
+
+@dataclass
+class Turner:
+    """What is known of the body around the arms."""
+
+    centre: np.ndarray  # (T, 2) px
+    turn: np.ndarray  # (T,) rad
+    torso: float  # px
+    times: np.ndarray  # (T,) s
+
+
+def watch(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.ndarray, torso: np.ndarray) -> Turner:
+    """torso: (T,) px, inf where it is not seen."""
+    size = float(np.median(torso))
+    if not np.isfinite(size):
+        seen = xy[score > 0]
+        size = max(float(np.ptp(seen, axis=0).max()) / 3, 1.0) if len(seen) else 1.0
+    return Turner(body_centre(xy, score), body_turn(xy, score, world, times, size), size, times)
+
+
+def fill_arm(xy, filled, drift, side: str, lost, unsure, body: Turner, config) -> None:
+    """xy (T, 133, 2), filled (T, 133) and drift (T, 133) in place.
+
+    lost: (3, T) bool, frames of elbow, wrist and hand to fill; unsure: (3, T) bool, frames not to learn from. Each part is put
+    from the body's centre and from every joint above it that is seen, weighted by how sure they are.
+    """
+    measured, chain = xy.copy(), ARM[side]
+    hand = np.arange(133)[HANDS[side]]
+    all_seen = np.ones(len(xy), bool)
+    anchors = [(body.centre, all_seen)] + [(measured[:, chain[i + 1]], ~unsure[i]) for i in range(2)]
+    for part, points in enumerate(([chain[1]], [chain[2]], hand)):
+        asked = lost[part] & within(lost[part], ~unsure[part], body.times, config)
+        if not asked.any() or unsure[part].all():
+            continue
+        lead = len(points) - 1 if part < 2 else int(np.flatnonzero(hand == chain[3])[0])
+        place, precision = np.zeros((len(xy), len(points), 2)), np.zeros((len(xy), 2))
+        for anchor, believed in anchors[: part + 1]:
+            here, learnt = asked & believed, ~unsure[part] & believed
+            if not here.any() or learnt.sum() < 3 and anchor is not body.centre:
+                continue
+            tracks = measured[:, points] - anchor[:, None]
+            mean, spread = predict(tracks, lead, learnt, here, body.turn, body.times, body.torso)
+            sure = 1 / (spread**2 + noise_px(anchor, believed) ** 2 + 1e-6)
+            place[here] += sure[:, None] * (mean + anchor[here, None])
+            precision[here] += sure
+        xy[np.ix_(asked, points)] = place[asked] / precision[asked, None]
+        filled[np.ix_(asked, points)] = True
+        drift[np.ix_(asked, points)] = np.sqrt((1 / precision[asked]).mean(1))[:, None]
+
+
+def within(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config) -> np.ndarray:
+    """(T,) bool: gone, in a gap that is short enough or near enough to the seen end of the clip."""
+    out = np.zeros(len(gone), bool)
+    for first, last in runs(gone):
+        earlier, later = times[:first][seen[:first]], times[last:][seen[last:]]
+        if len(earlier) and len(later):
+            out[first:last] = later[0] - earlier[-1] <= config.max_gap_s
+        elif len(earlier) or len(later):
+            nearest = earlier[-1] if len(earlier) else later[0]
+            out[first:last] = np.abs(times[first:last] - nearest) <= config.max_hold_s
+    return out & gone
+
+
+def predict(tracks: np.ndarray, lead: int, seen: np.ndarray, asked: np.ndarray, turn: np.ndarray, times: np.ndarray,
+            torso: float) -> tuple[np.ndarray, np.ndarray]:
+    """tracks: (T, P, 2) px from the body's centre or a seen joint; lead: the one of the P that the grid is judged by;
+    seen, asked: (T,) bool; turn: (T,) rad; torso: px.
+
+    Returns places (A, P, 2) px of the asked frames and their standard deviation (A, 2) px, the noise of a detection left out.
+    """
+    known = chosen(seen, asked, times)
+    answers = [_along(axis, tracks[known][:, :, axis] / torso, lead, turn[known], times[known], turn[asked], times[asked])
+               for axis in range(2)]
+    return np.stack([mean for mean, _ in answers], 2) * torso, np.sqrt(np.stack([v for _, v in answers], 1)) * torso
+
+
+def _along(axis, values, lead, turn, times, turn_asked, times_asked) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (A, P) and variance (A,) along one axis: the processes of the grid, averaged by how likely they make the lead."""
+    middle = values.mean(0) if axis else 0.0
+    tried = []
+    for length, stir in itertools.product(LENGTHS_S, STIRS):
+        size, basis = np.linalg.eigh(covariance(axis, turn, turn, times, times, length, stir))
+        along = basis.T @ (values - middle)
+        for noise in NOISES:
+            total = np.maximum(size, 0) + noise**2
+            tried.append((-0.5 * (along[:, lead] ** 2 / total + np.log(total)).sum(), length, stir, total, basis, along))
+    best = max(entry[0] for entry in tried)
+    likely = [entry for entry in tried if entry[0] > best - LIKELY]
+    weights = np.exp([entry[0] - best for entry in likely])
+    means, variances = [], []
+    for _, length, stir, total, basis, along in likely:
+        cross = covariance(axis, turn_asked, turn, times_asked, times, length, stir) @ basis
+        prior = covariance(axis, *np.zeros((4, 1)), length, stir)[0, 0]
+        means.append(middle + cross / total @ along)
+        variances.append(np.maximum(prior - (cross**2 / total).sum(1), 0))
+    mean = np.average(means, 0, weights)
+    apart = np.average([(m[:, lead] - mean[:, lead]) ** 2 for m in means], 0, weights)
+    return mean, np.average(variances, 0, weights) + apart
+
+
+def covariance(axis: int, turn, turn2, time, time2, length: float, stir: float) -> np.ndarray:
+    """(n, m) of the places sideways (axis 0) or up and down (axis 1), torso lengths squared."""
+    apart = turn[:, None] - turn2
+    near = np.exp(-0.5 * ((time[:, None] - time2) / length) ** 2)
+    if axis == 0:
+        fixed = REACH**2 * np.cos(apart) + OFFSET**2 + BEND**2 * np.cos(2 * apart)
+        return fixed + stir**2 * near * (np.cos(apart) + BIAS_SHARE**2)
+    return REACH**2 + TILT**2 * np.cos(apart) + BEND**2 * np.cos(2 * apart) + stir**2 * near
+
+
+def chosen(seen: np.ndarray, asked: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Indices of the seen frames to learn from."""
+    known = np.flatnonzero(seen)
+    if len(known) <= MOST_FRAMES:
+        return known
+    near = np.abs(times[known][:, None] - times[asked]).min(1) <= NEAR_S
+    room = max(MOST_FRAMES - near.sum(), MOST_FRAMES // 4)
+    stride = max(1, int(np.ceil((~near).sum() / room)))
+    return np.sort(np.concatenate([known[near], known[~near][::stride]]))
