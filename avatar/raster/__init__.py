@@ -135,6 +135,18 @@ def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) 
     return gradients
 
 
+def screen_gradients(state: State) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 2) gradient with respect to the splats' centres, 1/px, of the last backward pass, and (N,) bool, in the image at all."""
+    moments = state.workspace.take("moments", (len(state.pair_slot), project.MOMENTS), state.means.dtype)
+    visible = np.diff(state.slot_start) > 0
+    g = np.zeros((len(visible), 2))
+    if visible.any():
+        g[visible] = np.add.reduceat(moments[:, 1:3], state.slot_start[:-1][visible], axis=0)
+    x, y = g.T
+    ha, b, hc = (state.splats[:, c] for c in (project.HA, project.B, project.HC))
+    return np.stack([2 * ha * x + b * y, b * x + 2 * hc * y], 1), visible
+
+
 def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, camera: Camera,
                  workspace: Workspace | None = None) -> Rendering:
     """vertices: (V, 3) m, camera frame; faces: (F, 3) int: the gaussians bound to the posed mesh, rendered."""

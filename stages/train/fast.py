@@ -20,6 +20,7 @@ from gsac.stages.train.offsets import Offsets, fold
 from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import View, person_crop
 
+STEPS = 1600
 COARSE_SHARE = 0.45
 """Part of the steps that run at half the size."""
 OFFSET_SHARE = 0.6
@@ -33,7 +34,6 @@ LARGEST = 0.05
 LEAST_SHOWN = 0.1
 """Pixels of a half-size frame, on average over the frames, that a gaussian must fill to have a colour of its own."""
 GAIN_RATE = 2e-3
-CHECKPOINTS = 20
 
 
 def fit(task: Task) -> Fit:
@@ -43,19 +43,17 @@ def fit(task: Task) -> Fit:
     fine = {int(t): person_crop(task.views[t]) for t in task.trained}
     coarse = {t: v.halved() for t, v in fine.items()}
     trainer = Trainer(start(task, coarse), task)
-    order, loss_sum, since = [], 0.0, 0
-    for step in range(config.steps):
+    steps = config.steps or STEPS
+    order = []
+    for step in range(steps):
         if not order:
             order = list(rng.permutation(task.trained))
-        t, done = int(order.pop()), step / config.steps
+        t, done = int(order.pop()), step / steps
         if trainer.offsets and done >= OFFSET_SHARE:
             trainer.fold_offsets()
-        loss_sum += trainer.step(t, (coarse if done < COARSE_SHARE else fine)[t], done, rng.random(3), step)
-        since += 1
-        if (step + 1) * CHECKPOINTS // config.steps > step * CHECKPOINTS // config.steps or step + 1 == config.steps:
-            task.checkpoint(step + 1, loss_sum / since, trainer.gaussians())
-            loss_sum, since = 0.0, 0
-        task.progress(step + 1, config.steps, "steps")
+        loss = trainer.step(t, (coarse if done < COARSE_SHARE else fine)[t], done, rng.random(3), step)
+        task.checkpoint(step + 1, steps, loss, trainer.gaussians)
+        task.progress(step + 1, steps, "steps")
     if trainer.offsets:
         trainer.fold_offsets()
     return Fit(*trainer.recoloured(coarse), dict(trainer.gains))
@@ -121,7 +119,7 @@ class Trainer:
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
         self._guard(number, loss, grads)
         self._move(grads, shown.opacity, done)
-        grad_rest = self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
+        grad_rest, _ = self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
         if self.offsets:
             self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
             self.poses.offset = self.offsets.offset

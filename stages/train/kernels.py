@@ -71,6 +71,19 @@ def adam_rows(value, grad, first, second, count, rate):
 
 
 @njit(cache=True, error_model="numpy")
+def adam(value, grad, first, second, count, rate):
+    """One Adam step (0.9, 0.999) of all of value (N, C); count: steps so far, this one included."""
+    scale = rate / (1 - 0.9**count)
+    unbias = 1 / (1 - 0.999**count)
+    for i in range(value.shape[0]):
+        for c in range(value.shape[1]):
+            g = np.float64(grad[i, c])
+            first[i, c] += 0.1 * (g - first[i, c])
+            second[i, c] += 0.001 * (g * g - second[i, c])
+            value[i, c] -= scale * first[i, c] / (math.sqrt(second[i, c] * unbias) + 1e-15)
+
+
+@njit(cache=True, error_model="numpy")
 def count_rows(grad, count):
     """Adds one to count (N,) where the row of grad (N, C) is not zero."""
     for i in range(grad.shape[0]):

@@ -33,6 +33,7 @@ class Poses:
         self.offset = np.zeros((len(body.v_template), 3), np.float32)
         """(V, 3) m, added to the vertices at rest."""
         self.rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self.betas, self.beta_moments, self.beta_count = np.array(params.betas, np.float64), np.zeros((2, len(params.betas))), 0
 
     def copy(self) -> Poses:
         """The same poses, to be changed apart; Adam starts anew."""
@@ -45,7 +46,7 @@ class Poses:
         """Vertices (V, 3) float32 and joints (55, 3) at rest, with the frame's expression."""
         if t not in self.rests:
             p = self.params
-            vertices, joints = self.body.rest(p.betas, self.body.effective_expression(p, t), p.joint_offset)
+            vertices, joints = self.body.rest(self.betas, self.body.effective_expression(p, t), p.joint_offset)
             self.rests[t] = np.ascontiguousarray(vertices, np.float32), np.asarray(joints, np.float64)
         return self.rests[t]
 
@@ -57,9 +58,9 @@ class Poses:
         return posed + self.transl[t].astype(np.float32)
 
     def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> np.ndarray:
-        """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradient of the rest vertices (V, 3)."""
+        """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradients of rest vertices (V, 3) and joints (55, 3)."""
         rest, joints = self.rest(t)
-        grad_pose, grad_transl, grad_rest, _ = skin_backward(
+        grad_pose, grad_transl, grad_rest, grad_joints = skin_backward(
             np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest + self.offset, joints,
             self.body.parents, self.body.skin_index, self.body.skin_weight)
         grad = np.concatenate([grad_pose, grad_transl[None]]).astype(np.float64)
@@ -73,12 +74,27 @@ class Poses:
         move = rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
         self.pose[t] -= self.share * move[:-1]
         self.transl[t] -= move[-1]
-        return grad_rest
+        return grad_rest, grad_joints
+
+    def shape_gradient(self, grad_rest: np.ndarray, grad_joints: np.ndarray) -> np.ndarray:
+        """(B,) gradient of the betas from those of the rest vertices (V, 3) and joints (55, 3)."""
+        on_vertices = grad_rest + self.body.J_regressor.T @ grad_joints
+        return np.tensordot(on_vertices, self.body.shapedirs[:, :, :len(self.betas)], 2)
+
+    def step_betas(self, grad: np.ndarray, rate: float) -> None:
+        """One Adam step of the betas (B,), which all frames share."""
+        self.beta_count += 1
+        first, second = self.beta_moments
+        first += 0.1 * (grad - first)
+        second += 0.01 * (grad**2 - second)
+        self.betas -= rate * (first / (1 - 0.9**self.beta_count)) / (np.sqrt(second / (1 - 0.99**self.beta_count)) + 1e-12)
+        self.rests.clear()
 
     def refined(self):
         """BodyParams with the poses as they stand; `joints` computed anew."""
         flat = self.pose.astype(np.float32).reshape(len(self.pose), -1)
-        params = replace(self.params, global_orient=flat[:, :3], body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69],
+        params = replace(self.params, betas=self.betas.astype(np.float32), global_orient=flat[:, :3],
+                         body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69],
                          leye_pose=flat[:, 69:72], reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120],
                          right_hand_pose=flat[:, 120:165], transl=self.transl.astype(np.float32))
         params.joints = np.concatenate([self.body.posed(params, [t])[1] for t in range(params.frames)])

@@ -18,6 +18,8 @@ from gsac.stages.train.recipes import RECIPES
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
 
+LOSS_ROWS = 20
+"""How many rows of the curve tell the loss."""
 TRAIN_SAMPLE = 8
 """How many trained frames `psnr_fg_train` is taken over."""
 
@@ -51,6 +53,11 @@ def run(job: Job) -> None:
     run.write()
 
 
+def due(step: int, steps: int, times: int) -> bool:
+    """Whether one of `times` even marks of a run is reached by this step (from 1)."""
+    return step * times // steps > (step - 1) * times // steps
+
+
 class Run:
     """One training: the recipe under a clock, and what is written of it."""
 
@@ -59,6 +66,7 @@ class Run:
         self.is_trained = np.zeros(len(views), bool)
         self.is_trained[trained] = True
         self.curve: list[dict] = []
+        self.losses: list[float] = []
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
         self.workspace = Workspace()
 
@@ -71,12 +79,17 @@ class Run:
     def clock(self) -> np.ndarray:
         return np.array([time.perf_counter(), time.process_time()]) - self.began - self.aside
 
-    def checkpoint(self, step: int, loss: float, gaussians) -> None:
+    def checkpoint(self, step: int, steps: int, loss: float, gaussians) -> None:
+        self.losses.append(loss)
+        if not due(step, steps, LOSS_ROWS) and not due(step, steps, self.job.config.curve):
+            return
         before = self.clock()
         seconds, cpu_seconds = (round(float(x), 3) for x in before)
-        row = {"step": step, "seconds": seconds, "cpu_seconds": cpu_seconds, "loss": loss}
-        if len(self.held):
-            row["psnr_fg"] = self.psnr_fg(gaussians, self.carried(), self.held)
+        row = {"step": step, "seconds": seconds, "cpu_seconds": cpu_seconds, "loss": float(np.mean(self.losses))}
+        self.losses.clear()
+        if len(self.held) and due(step, steps, self.job.config.curve):
+            now = gaussians()
+            row |= {"psnr_fg": self.psnr_fg(now, self.carried(), self.held), "n_gaussians": len(now)}
         self.curve.append(row)
         self.aside += self.clock() - before
 
@@ -124,7 +137,7 @@ class Run:
                 "*_ttpo": f"that pose, {config.pose_test_steps} steps optimised on the held-out image, avatar frozen",
                 "psnr_fg_fit": "the body fit's pose as it came",
             },
-            "n_gaussians": len(gaussians), "steps": config.steps, "recipe": config.recipe, "seed": config.seed,
+            "n_gaussians": len(gaussians), "steps": self.curve[-1]["step"], "recipe": config.recipe, "seed": config.seed,
             "image_size": [self.views[0].camera.width, self.views[0].camera.height],
             "seconds": round(float(self.seconds), 3), "cpu_seconds": round(float(self.cpu_seconds), 3),
             "trained_frames": len(self.trained), "heldout_frames": [int(t) for t in held],
@@ -133,4 +146,4 @@ class Run:
                         for row, other in zip(rows, ttpo or [{"mse_fg": None}] * len(rows), strict=True)],
             "unseen_gaussians": int((~self.result.seen).sum()),
             "curve": self.curve,
-        }
+        } | self.result.figures

@@ -22,8 +22,8 @@ class Task:
     """As fitted; the recipe refines those of `trained`."""
     config: TrainConfig
     progress: Callable[[int, int, str], None]
-    checkpoint: Callable[[int, float, Gaussians], None] = lambda step, loss, gaussians: None
-    """To be called a few dozen times on the way: step, mean loss since the last call, the gaussians as they stand."""
+    checkpoint: Callable[[int, int, float, Callable[[], Gaussians]], None] = lambda step, steps, loss, gaussians: None
+    """To be called after each step: steps done and in all, the step's loss, what gives the gaussians as they stand."""
 
 
 @dataclass
@@ -33,3 +33,5 @@ class Fit:
     """(N,) bool, whether training frames show the gaussian; the colour of the others is a guess."""
     gains: dict[int, np.ndarray] = field(default_factory=dict)
     """Frame -> (3,) learned gain per channel, where exposure is learned."""
+    figures: dict = field(default_factory=dict)
+    """What the recipe has to say in metrics.json."""

@@ -1,0 +1,65 @@
+"""Densification of recipe `paper`: gaussians whose image place is pulled at strongly are cloned or split.
+
+3DGS (Kerbl et al. 2023) as HAHA sets it: eleven events of a 3000-step run, nothing is pruned.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+FIRST, LAST, EVERY, PHASE = 100, 2500, 201, 99
+"""Events are the steps strictly between FIRST and LAST that leave PHASE when divided by EVERY."""
+LARGEST = 0.1
+"""Scales are LARGEST * sigmoid(logit), in units of the face."""
+THRESHOLD = 5e-5
+"""Mean length of the batch loss's gradient with respect to a gaussian's place in the image, from -1 to 1 across the frame."""
+SMALL = 0.005
+"""Largest scale, in units of the face, up to which a gaussian is cloned and not split."""
+SHRINK, SHIFT = 1.6, 0.2
+
+
+class Densifier:
+    """Sums of gradient lengths since the last event."""
+
+    def __init__(self, count: int):
+        self.reset(count)
+
+    def reset(self, count: int) -> None:
+        self.length, self.hits = np.zeros(count), np.zeros(count, np.int64)
+
+    def note(self, gradient: np.ndarray, visible: np.ndarray) -> None:
+        """gradient: (N, 2) of one image, -1..1 across the frame; visible: (N,) bool."""
+        self.length += np.where(visible, np.linalg.norm(gradient, axis=1), 0)
+        self.hits += visible
+
+    def after(self, step: int, trainer, rng: np.random.Generator) -> None:
+        """Grows the trainer's gaussians where the step is an event. New ones start with empty Adam moments."""
+        if not (FIRST < step < LAST and step % EVERY == PHASE):
+            return
+        chosen = np.flatnonzero(self.length / np.maximum(self.hits, 1) >= THRESHOLD)
+        trainer.append(chosen, children(trainer.values, chosen, rng))
+        self.reset(len(trainer.face))
+
+
+def children(values: dict[str, np.ndarray], chosen: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Rows to append, one for each chosen (n,); parents that split are changed in place.
+
+    values: mu (N, 3), quat (N, 4), scale (N, 3) logits, and others that are copied. Of a split both halves are
+    moved by samples of the parent, its deviation times SHIFT, away from the body along the face's normal (y).
+    """
+    new = {name: value[chosen].copy() for name, value in values.items()}
+    act = LARGEST / (1 + np.exp(-new["scale"].astype(np.float64)))
+    split = act.max(1) > SMALL
+    parents, act = chosen[split], act[split]
+    if len(parents):
+        turn = Rotation.from_quat(new["quat"][split][:, [1, 2, 3, 0]])
+        shifts = [turn.apply(rng.normal(size=act.shape) * act * SHIFT) for _ in range(2)]
+        for shift in shifts:
+            shift[:, 1] = np.abs(shift[:, 1])
+        share = act / SHRINK / LARGEST
+        logits = np.log(share / (1 - share)).astype(np.float32)
+        new["mu"][split] += shifts[0].astype(np.float32)
+        values["mu"][parents] += shifts[1].astype(np.float32)
+        new["scale"][split] = values["scale"][parents] = logits
+    return new
