@@ -21,13 +21,20 @@ FORMULA int2 own_pixel() {
     return {warp % 2 * 8 + lane % 8, warp / 2 * 4 + lane / 8};
 }
 
-// Which of the 32 staged entries from `base` on reach the warp's pixels, whose centre is (x, y).
+// Which of the 32 staged entries from `base` on reach the warp's pixel centres, (x - 3.5 .. x + 3.5) by (y - 1.5 .. y + 1.5):
+// the least exponent over that box lies at its point nearest to the centre, or on an edge that faces the centre.
 FORMULA unsigned reaching(const Staged &staged, int base, int n, float x, float y) {
     int j = base + threadIdx.x % 32;
     bool hit = false;
     if (j < n) {
-        float4 a = staged.a[j];
-        hit = fabsf(a.x - x) <= staged.b[j].w + 3.5f && fabsf(a.y - y) <= staged.c[j].w + 1.5f;
+        float4 a = staged.a[j], b = staged.b[j];
+        float x0 = x - 3.5f - a.x, x1 = x0 + 7, y0 = y - 1.5f - a.y, y1 = y0 + 3;
+        float dx = fminf(fmaxf(0, x0), x1), dy = fminf(fmaxf(0, y0), y1);
+        if (fabsf(dx) <= b.w && fabsf(dy) <= staged.c[j].w) {
+            float ey = fminf(fmaxf(-a.w * dx / (2 * b.x), y0), y1), ex = fminf(fmaxf(-a.w * dy / (2 * a.z), x0), x1);
+            float least = fminf(dx * (dx * a.z + ey * a.w) + ey * ey * b.x, ex * (ex * a.z + dy * a.w) + dy * dy * b.x);
+            hit = least <= b.y * 1.0001f + 1e-4f;
+        }
     }
     return __ballot_sync(~0u, hit);
 }

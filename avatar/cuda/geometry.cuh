@@ -50,12 +50,18 @@ extern "C" __global__ void __launch_bounds__(256) skin(Scene s) {
     }
     for (int i = blockIdx.x * 256 + tid; i < s.max_tiles; i += gridDim.x * 256) s.tile_count[b * s.max_tiles + i] = 0;
 
-    if (tid < 55) rodrigues(s.pose + (frame.pose * 56 + tid) * 3, local[tid]);
+    int own_level = -1, p = 0;
+    float J[3] = {};
+    if (tid < 55) {
+        own_level = s.joint_level[tid];
+        p = s.parents[tid];
+        for (int c = 0; c < 3; ++c) J[c] = s.joints[3 * tid + c];
+        rodrigues(s.pose + (frame.pose * 56 + tid) * 3, local[tid]);
+    }
     __syncthreads();
     for (int level = 0; level < s.levels; ++level) {
-        if (tid < 55 && s.joint_level[tid] == level) {
-            int p = s.parents[tid];
-            const float *J = s.joints + 3 * tid, *L = local[tid], *P = transform[p < 0 ? 0 : p];
+        if (own_level == level) {
+            const float *L = local[tid], *P = transform[p < 0 ? 0 : p];
             float *A = transform[tid];
             for (int i = 0; i < 3; ++i) {
                 for (int k = 0; k < 3; ++k)

@@ -1,6 +1,8 @@
 // Losses of the image and their gradient, on the tiles where render or target show anything; elsewhere both are background.
 
-constexpr int REACH = 5, WIDE = TILE + 2 * REACH, PITCH = WIDE + 1;
+constexpr int REACH = 5, WIDE = TILE + 2 * REACH;
+// Row lengths in shared memory: lanes that take one row each, 16 bytes at a time, meet no bank twice.
+constexpr int PITCH = 28, BLURRED = 20;
 constexpr float C1 = 1e-4f, C2 = 9e-4f;
 // 11-tap gaussian, sigma 1.5
 __device__ constexpr float WINDOW[11] = {0.00102838f, 0.00759876f, 0.03600077f, 0.10936069f, 0.21300554f, 0.26601172f,
@@ -59,9 +61,21 @@ FORMULA float sum_block(float v, float *scratch) {
     return sum;
 }
 
+FORMULA void load_row(const float *from, float *to) {
+#pragma unroll
+    for (int i = 0; i < 4; ++i) {
+        float4 v = ((const float4 *)from)[i];
+        to[4 * i] = v.x;
+        to[4 * i + 1] = v.y;
+        to[4 * i + 2] = v.z;
+        to[4 * i + 3] = v.w;
+    }
+}
+
 // (blocks). The tile's share of the loss, and SSIM's slopes by the window means: dS/dmx, dS/dq, dS/dp for three channels.
 extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
-    __shared__ float image[3][WIDE * PITCH], target[3][WIDE * PITCH], blurred[4][3][WIDE * TILE], scratch[8];
+    __shared__ __align__(16) float image[3][WIDE * PITCH], target[3][WIDE * PITCH], blurred[4][3][WIDE * BLURRED];
+    __shared__ float scratch[8];
     if (halted(s)) return;
     int tid = threadIdx.x, total = s.state->near;
     for (int item = blockIdx.x; item < total; item += gridDim.x) {
@@ -86,23 +100,24 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
         }
         __syncthreads();
         if (s.ssim > 0) {
-            for (int task = tid; task < 3 * WIDE * 4; task += PIXELS) {
-                int channel = task / (WIDE * 4), r = task / 4 % WIDE, c = task % 4 * 4;
-                float out[4][4] = {};
+            for (int task = tid; task < 3 * 4 * WIDE; task += PIXELS) {
+                int channel = task / (4 * WIDE), r = task % WIDE, c = task / WIDE % 4 * 4;
+                float x[16], y[16], out[4][4] = {};
+                load_row(image[channel] + r * PITCH + c, x);
+                load_row(target[channel] + r * PITCH + c, y);
 #pragma unroll
                 for (int i = 0; i < 14; ++i) {
-                    float x = image[channel][r * PITCH + c + i], y = target[channel][r * PITCH + c + i];
-                    float q = x * x + y * y, xy = x * y;
+                    float q = x[i] * x[i] + y[i] * y[i], xy = x[i] * y[i];
 #pragma unroll
                     for (int k = 0; k < 4; ++k)
                         if (i - k >= 0 && i - k < 11) {
                             float w = WINDOW[i - k];
-                            out[0][k] += w * x; out[1][k] += w * y; out[2][k] += w * q; out[3][k] += w * xy;
+                            out[0][k] += w * x[i]; out[1][k] += w * y[i]; out[2][k] += w * q; out[3][k] += w * xy;
                         }
                 }
 #pragma unroll
                 for (int m = 0; m < 4; ++m)
-                    for (int k = 0; k < 4; ++k) blurred[m][channel][r * TILE + c + k] = out[m][k];
+                    *(float4 *)(blurred[m][channel] + r * BLURRED + c) = {out[m][0], out[m][1], out[m][2], out[m][3]};
             }
             __syncthreads();
             for (int task = tid; task < 3 * TILE * 4; task += PIXELS) {
@@ -112,7 +127,7 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
                 for (int m = 0; m < 4; ++m)
 #pragma unroll
                     for (int i = 0; i < 14; ++i) {
-                        float v = blurred[m][channel][(r + i) * TILE + c];
+                        float v = blurred[m][channel][(r + i) * BLURRED + c];
 #pragma unroll
                         for (int k = 0; k < 4; ++k)
                             if (i - k >= 0 && i - k < 11) mean[m][k] += WINDOW[i - k] * v;
@@ -156,8 +171,7 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
 
 // (blocks). Gradient of the loss by the render's premultiplied colour and alpha, on the tiles that gaussians reach.
 extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
-    __shared__ float slope[9][WIDE * PITCH];
-    __shared__ float blurred[3][WIDE * TILE];
+    __shared__ __align__(16) float slope[9][WIDE * PITCH], blurred[9][WIDE * BLURRED];
     if (halted(s)) return;
     int tid = threadIdx.x, heavy = s.state->heavy, total = heavy + s.state->light;
     for (int item = blockIdx.x; item < total; item += gridDim.x) {
@@ -210,29 +224,35 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
                 for (int k = 0; k < 9; ++k) slope[k][er * PITCH + ec] = real ? from[size_t(k) * s.max_pixels] : 0;
             }
             __syncthreads();
-            for (int channel = 0; channel < 3; ++channel) {
-                for (int task = tid; task < 3 * WIDE * 4; task += PIXELS) {
-                    int field = task / (WIDE * 4), er = task / 4 % WIDE, ec = task % 4 * 4;
-                    float out[4] = {};
+            for (int task = tid; task < 9 * 4 * WIDE; task += PIXELS) {
+                int plane = task / (4 * WIDE), er = task % WIDE, ec = task / WIDE % 4 * 4;
+                float v[16], out[4] = {};
+                load_row(slope[plane] + er * PITCH + ec, v);
 #pragma unroll
-                    for (int i = 0; i < 14; ++i) {
-                        float v = slope[field * 3 + channel][er * PITCH + ec + i];
+                for (int i = 0; i < 14; ++i)
 #pragma unroll
-                        for (int k = 0; k < 4; ++k)
-                            if (i - k >= 0 && i - k < 11) out[k] += WINDOW[i - k] * v;
-                    }
-#pragma unroll
-                    for (int k = 0; k < 4; ++k) blurred[field][er * TILE + ec + k] = out[k];
-                }
-                __syncthreads();
-                float mean[3] = {};
-#pragma unroll
-                for (int field = 0; field < 3; ++field)
-#pragma unroll
-                    for (int i = 0; i < 11; ++i) mean[field] += WINDOW[i] * blurred[field][(r + i) * TILE + c];
-                grad[channel] = -s.ssim * share * (mean[0] + 2 * mean[1] * image[channel] + mean[2] * target[channel]);
-                __syncthreads();
+                    for (int k = 0; k < 4; ++k)
+                        if (i - k >= 0 && i - k < 11) out[k] += WINDOW[i - k] * v[i];
+                *(float4 *)(blurred[plane] + er * BLURRED + ec) = {out[0], out[1], out[2], out[3]};
             }
+            __syncthreads();
+            for (int task = tid; task < 9 * 4 * TILE; task += PIXELS) {
+                int plane = task / (4 * TILE), ec = task % TILE, er = task / TILE % 4 * 4;
+                float out[4] = {};
+#pragma unroll
+                for (int i = 0; i < 14; ++i) {
+                    float v = blurred[plane][(er + i) * BLURRED + ec];
+#pragma unroll
+                    for (int k = 0; k < 4; ++k)
+                        if (i - k >= 0 && i - k < 11) out[k] += WINDOW[i - k] * v;
+                }
+#pragma unroll
+                for (int k = 0; k < 4; ++k) slope[plane][(er + k) * TILE + ec] = out[k];
+            }
+            __syncthreads();
+            for (int k = 0; k < 3; ++k)
+                grad[k] = -s.ssim * share * (slope[k][tid] + 2 * slope[3 + k][tid] * image[k] + slope[6 + k][tid] * target[k]);
+            __syncthreads();
         }
         if (!inside) continue;
         const Now &now = s.now[p.b];

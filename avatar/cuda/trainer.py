@@ -225,7 +225,7 @@ class CudaTrainer:
             "allocate": ((-(-self.scene.max_tiles // 256), batch), 256), "fill": ((-(-n // 128), batch), 128),
             "blend": ((min(tiles, 6 * p), 1), 256), "compare": ((min(tiles, 12 * p), 1), 256),
             "image_gradient": ((min(tiles, 12 * p), 1), 256), "blend_backward": ((5 * p, 1), 256),
-            "gaussian_step": ((-(-n // 128), 1), 128), "gather": ((-(-v // 128), batch), 128), "joint_step": ((JOINTS, batch), 256)}
+            "gaussian_step": ((-(-n // 128), 1), 128), "gather": ((-(-v // 128), batch), 128), "joint_step": ((JOINTS + 1, batch), 512)}
 
     def _lists(self, room: int) -> None:
         """Room for so many (tile, gaussian) pairs of a batch, and for what hangs on them."""

@@ -98,7 +98,9 @@ extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
     if (v >= s.vertex_count) return;
     const float *corners = s.corner_grad + 9 * size_t(b) * s.count;
     float x = 0, y = 0, z = 0;
-    for (int e = s.vertex_start[v]; e < s.vertex_start[v + 1]; ++e) {
+    int end = s.vertex_start[v + 1];
+#pragma unroll 4
+    for (int e = s.vertex_start[v]; e < end; ++e) {
         const float *from = corners + 3 * s.vertex_item[e];
         x += from[0];
         y += from[1];
@@ -114,13 +116,24 @@ extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
 FORMULA void pose_step(const Scene &s, int b) {
     __shared__ float grad[55][12], up[55][12], transform[55][12], local[55][9];
     __shared__ float transl[3];
+    __shared__ int child[55];
     const Now &now = s.now[b];
-    int tid = threadIdx.x, j = tid;
-    for (int i = tid; i < 55 * 12; i += 256) {
+    int tid = threadIdx.x, j = tid, own_level = -1, p = 0, child_begin = 0, child_end = 0, n = 0;
+    float J[3] = {}, g_local[9] = {};
+    if (tid < 56) n = s.pose_steps[now.frame.pose] + 1;
+    if (tid < 55) {
+        own_level = s.joint_level[j];
+        p = s.parents[j];
+        child_begin = s.child_start[j];
+        child_end = s.child_start[j + 1];
+        for (int c = 0; c < 3; ++c) J[c] = s.joints[3 * j + c];
+        child[j] = j < 54 ? s.child[j] : 0;
+    }
+    for (int i = tid; i < 55 * 12; i += blockDim.x) {
         (&grad[0][0])[i] = __ldcg(s.joint_grad + b * 55 * 12 + i);
         (&transform[0][0])[i] = s.transform[b * 55 * 12 + i];
     }
-    for (int i = tid; i < 55 * 9; i += 256) (&local[0][0])[i] = s.local[b * 55 * 9 + i];
+    for (int i = tid; i < 55 * 9; i += blockDim.x) (&local[0][0])[i] = s.local[b * 55 * 9 + i];
     __syncthreads();
     if (tid < 3) {  // weights of a vertex sum to one, so the joints' translations sum to the vertices' gradient
         float sum = 0;
@@ -130,15 +143,12 @@ FORMULA void pose_step(const Scene &s, int b) {
     __syncthreads();
     double turn[3] = {};
     for (int level = s.levels - 1; level >= 0; --level) {
-        if (j < 55 && s.joint_level[j] == level) {
+        if (own_level == level) {
             float *G = grad[j];
-            for (int e = s.child_start[j]; e < s.child_start[j + 1]; ++e)
-                for (int c = 0; c < 12; ++c) G[c] += up[s.child[e]][c];
-            const float *J = s.joints + 3 * j;
+            for (int e = child_begin; e < child_end; ++e)
+                for (int c = 0; c < 12; ++c) G[c] += up[child[e]][c];
             for (int i = 0; i < 3; ++i)
                 for (int k = 0; k < 3; ++k) G[4 * i + k] -= G[4 * i + 3] * J[k];
-            int p = s.parents[j];
-            float g_local[9];
             const float *P = transform[p < 0 ? 0 : p], *L = local[j];
             for (int i = 0; i < 3; ++i)
                 for (int k = 0; k < 3; ++k)
@@ -148,13 +158,12 @@ FORMULA void pose_step(const Scene &s, int b) {
                     up[j][4 * i + k] = G[4 * i + 3] * J[k] + G[4 * i] * L[3 * k] + G[4 * i + 1] * L[3 * k + 1] + G[4 * i + 2] * L[3 * k + 2];
                 up[j][4 * i + 3] = G[4 * i + 3];
             }
-            rodrigues_backward(s.pose + (now.frame.pose * 56 + j) * 3, g_local, turn);
         }
         __syncthreads();
     }
+    if (tid < 55) rodrigues_backward(s.pose + (now.frame.pose * 56 + j) * 3, g_local, turn);
     if (tid < 56) {
         size_t at = (size_t(now.frame.pose) * 56 + tid) * 3;
-        int n = s.pose_steps[now.frame.pose] + 1;
         double scale = 1 / (1 - pow(0.9, double(n))), unbias = 1 / (1 - pow(0.99, double(n)));
         double unit = tid < 55 ? s.turn_unit : s.shift_unit, share = s.pose_share[tid];
         for (int c = 0; c < 3; ++c) {
@@ -170,54 +179,60 @@ FORMULA void pose_step(const Scene &s, int b) {
     if (tid == 0) s.pose_steps[now.frame.pose] += 1;
 }
 
-// (55 joints, batch). Gradient of each joint's transform; the last block of a frame takes it to the pose and sums the loss,
-// the last of the batch ends the step.
-extern "C" __global__ void __launch_bounds__(256) joint_step(Scene s) {
-    __shared__ float part[8][12], scratch[8];
+// (55 joints and one for the loss, batch). Gradient of each joint's transform, and the frame's loss; the last block of a frame
+// takes the gradient to the pose, the last of the batch ends the step.
+extern "C" __global__ void __launch_bounds__(512) joint_step(Scene s) {
+    __shared__ float part[16][12], scratch[16];
     __shared__ int last;
     if (halted(s)) return;
     State &state = *s.state;
     int j = blockIdx.x, b = blockIdx.y, tid = threadIdx.x;
     const Now &now = s.now[b];
-    const float *rest = s.rest + 3 * size_t(now.frame.rest) * s.vertex_count, *grad = s.grad_vertices + 3 * size_t(b) * s.vertex_count;
-    float sum[12] = {};
-    for (int e = s.joint_start[j] + tid; e < s.joint_start[j + 1]; e += 256) {
-        int v = s.joint_vertex[e];
-        float w = s.joint_weight[e];
-        Vec<float> r = vec(rest + 3 * v);
-        for (int i = 0; i < 3; ++i) {
-            float g = w * grad[3 * v + i];
-            sum[4 * i] += g * r.x;
-            sum[4 * i + 1] += g * r.y;
-            sum[4 * i + 2] += g * r.z;
-            sum[4 * i + 3] += g;
+    if (j == 55) {
+        float loss = 0;
+        int tiles = now.columns * now.rows;
+#pragma unroll 4
+        for (int t = tid; t < tiles; t += 512)
+            if (s.near_flag[b * s.max_tiles + t]) loss += s.tile_loss[b * s.max_tiles + t];
+        loss = sum_block(loss, scratch);
+        if (tid == 0) s.losses[state.step * s.batch + b] = loss;
+    } else {
+        const float *rest = s.rest + 3 * size_t(now.frame.rest) * s.vertex_count;
+        const float *grad = s.grad_vertices + 3 * size_t(b) * s.vertex_count;
+        float sum[12] = {};
+        int end = s.joint_start[j + 1];
+#pragma unroll 4
+        for (int e = s.joint_start[j] + tid; e < end; e += 512) {
+            int v = s.joint_vertex[e];
+            float w = s.joint_weight[e];
+            Vec<float> r = vec(rest + 3 * v);
+            for (int i = 0; i < 3; ++i) {
+                float g = w * grad[3 * v + i];
+                sum[4 * i] += g * r.x;
+                sum[4 * i + 1] += g * r.y;
+                sum[4 * i + 2] += g * r.z;
+                sum[4 * i + 3] += g;
+            }
+        }
+        for (int c = 0; c < 12; ++c) {
+            float v = sum_warp(sum[c]);
+            if (tid % 32 == 0) part[tid / 32][c] = v;
+        }
+        __syncthreads();
+        if (tid < 12) {
+            float v = 0;
+            for (int w = 0; w < 16; ++w) v += part[w][tid];
+            s.joint_grad[(b * 55 + j) * 12 + tid] = v;
         }
     }
-    for (int c = 0; c < 12; ++c) {
-        float v = sum_warp(sum[c]);
-        if (tid % 32 == 0) part[tid / 32][c] = v;
-    }
+    __threadfence();
     __syncthreads();
-    if (tid < 12) {
-        float v = 0;
-        for (int w = 0; w < 8; ++w) v += part[w][tid];
-        s.joint_grad[(b * 55 + j) * 12 + tid] = v;
-        __threadfence();
-    }
-    __syncthreads();
-    if (tid == 0) last = atomicAdd(&state.joints_done[b], 1) == 54;
+    if (tid == 0) last = atomicAdd(&state.joints_done[b], 1) == 55;
     __syncthreads();
     if (!last) return;
     __threadfence();
     pose_step(s, b);
-    float loss = 0;
-    int tiles = now.columns * now.rows;
-    for (int t = tid; t < tiles; t += 256)
-        if (s.near_flag[b * s.max_tiles + t]) loss += s.tile_loss[b * s.max_tiles + t];
-    __syncthreads();
-    loss = sum_block(loss, scratch);
     if (tid == 0) {
-        s.losses[state.step * s.batch + b] = loss;
         __threadfence();
         if (atomicAdd(&state.frames_done, 1) == s.batch - 1) {
             state.frames_done = 0;

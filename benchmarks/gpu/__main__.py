@@ -34,6 +34,9 @@ def main() -> None:
     losses = Recipe(steps=5, ssim=0.1, sobel=0.1)
     for count in (1, 17, 1000, 12000, 100000):
         report(f"101x67, {count}", errors(small, start(small.body, count), losses, device, 1024 if count < 2000 else None), LIMIT)
+    inside = figure(3, 101, 67, 100)
+    inside.transl[:, 2] = 0.1
+    report("camera in the body", errors(inside, start(inside.body, 3000), losses, device), LIMIT)
     big = figure(12 if quick else 100, 1080, 1080)
     done("figure of 1080x1080")
     for count in (10000, 25000):
@@ -43,10 +46,11 @@ def main() -> None:
     done("all")
 
 
-def report(name: str, found: dict[str, float], limit: float) -> None:
-    worst = max(found.values())
-    verdict = "ok" if worst <= limit else "MISSED"
-    print(f"check {name:18s} {verdict}  " + " ".join(f"{k} {v:.1e}" for k, v in found.items()), flush=True)
+def report(name: str, found: tuple[dict, dict], limit: float) -> None:
+    settled, everything = found
+    verdict = "ok" if max(settled.values()) <= limit else "MISSED"
+    print(f"check {name:18s} {verdict}  " + " ".join(f"{k} {v:.1e}" for k, v in settled.items())
+          + f"; with swaps of depth order {max(everything.values()):.1e}", flush=True)
 
 
 def measure(device, figure, quick: bool) -> None:

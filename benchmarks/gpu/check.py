@@ -12,14 +12,22 @@ from gsac.avatar.skinning import skin_backward
 from gsac.benchmarks.gpu.figure import Figure
 
 NAMES = ("image", "loss", "mu", "quat", "log_scale", "rgb", "logit", "pose", "transl")
+PER_GAUSSIAN = ("mu", "quat", "log_scale", "rgb", "logit")
 LIMIT = 1e-3
+SWAPS = 1e-3
+"""Share of the gaussians that may lie so near another in depth that float32 decides which is in front. Such a pair trades
+gradients: the CPU's own float32 differs from its float64 in the same way (25,000 gaussians: 3 pairs, 5e-3 of the colours' norm)."""
 
 
-def relative(got: np.ndarray, expected: np.ndarray) -> float:
-    """Norm of the difference over the norm of the expected; the difference itself where nothing is expected."""
+def relative(got: np.ndarray, expected: np.ndarray, leave: int = 0) -> float:
+    """Norm of the difference over the norm of the expected (over 1 where nothing is expected).
+
+    leave: so many rows, those that differ most, are left out of the difference.
+    """
     got, expected = np.asarray(got, np.float64), np.asarray(expected, np.float64)
     size = np.linalg.norm(expected)
-    return float(np.linalg.norm(got - expected) / (size if size > 0 else 1))
+    rows = np.sort(np.linalg.norm((got - expected).reshape(len(got), -1) if got.ndim else (got - expected)[None, None], axis=1))
+    return float(np.linalg.norm(rows[: len(rows) - leave]) / (size if size > 0 else 1))
 
 
 def cpu_step(figure: Figure, shot: Shot, t: int, gaussians: Gaussians, background: np.ndarray, recipe: Recipe) -> dict:
@@ -66,8 +74,8 @@ def cuda_step(trainer: CudaTrainer) -> dict:
                     "transl": pose[-1]}
 
 
-def errors(figure: Figure, gaussians: Gaussians, recipe: Recipe, device=None, pair_room=None) -> dict[str, float]:
-    """Relative error of each of `NAMES` at the first step."""
+def errors(figure: Figure, gaussians: Gaussians, recipe: Recipe, device=None, pair_room=None) -> tuple[dict, dict]:
+    """Relative error of each of `NAMES` at the first step: without the gaussians of `SWAPS`, and of all."""
     trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, gaussians, recipe, device, pair_room)
     try:
         shown = trainer.gaussians()
@@ -76,4 +84,6 @@ def errors(figure: Figure, gaussians: Gaussians, recipe: Recipe, device=None, pa
     finally:
         trainer.close()
     expected = cpu_step(figure, figure.shots[t], t, shown, background, recipe)
-    return {name: relative(got[name], expected[name]) for name in NAMES}
+    leave = {name: int(SWAPS * len(gaussians)) for name in PER_GAUSSIAN}
+    return ({name: relative(got[name], expected[name], leave.get(name, 0)) for name in NAMES},
+            {name: relative(got[name], expected[name]) for name in NAMES})

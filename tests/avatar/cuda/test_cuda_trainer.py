@@ -1,0 +1,149 @@
+"""The CUDA trainer: what holds without a GPU, and, where there is one, that it does what the CPU path does."""
+
+import ctypes
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from gsac.avatar.cuda import lists, scene, why_not
+from gsac.avatar.cuda.recipe import Recipe, draw
+
+gpu = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
+
+
+def test_importing_the_cuda_path_loads_nothing_heavy():
+    code = ("import sys, gsac.avatar.cuda, gsac.avatar.cuda.recipe, gsac.avatar.cuda.kernels; "
+            "print([m for m in ('torch', 'numba', 'cuda', 'cuda.bindings') if m in sys.modules])")
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+@pytest.mark.skipif(why_not() is None, reason="there is a GPU here")
+def test_without_a_gpu_the_device_says_why_it_cannot_be_used():
+    from gsac.avatar.cuda.device import Device, NoDevice
+
+    with pytest.raises(NoDevice, match="GPU|driver|gsac\\[gpu\\]"):
+        Device()
+
+
+def test_structs_are_laid_out_alike_for_host_and_kernels(tmp_path):
+    compiler = shutil.which("g++") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no gcc here: the structs' layout is not compiled")
+    sizes = ", ".join(f"sizeof({name})" for name in ("Frame", "Plan", "State", "Scene"))
+    text = scene.declarations() + f"\n#include <cstddef>\nextern \"C\" void sizes(int *out) {{ int all[] = {{{sizes}, " \
+        "(int)offsetof(Scene, ssim), (int)offsetof(Frame, fx)}; for (int i = 0; i < 6; ++i) out[i] = all[i]; }"
+    (tmp_path / "sizes.cpp").write_text(text)
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", tmp_path / "sizes.so", tmp_path / "sizes.cpp"], check=True)
+    out = (ctypes.c_int * 6)()
+    ctypes.CDLL(str(tmp_path / "sizes.so")).sizes(out)
+    assert list(out) == [*(ctypes.sizeof(getattr(scene, name)) for name in ("Frame", "Plan", "State", "Scene")),
+                         scene.Scene.ssim.offset, scene.Frame.fx.offset]
+
+
+def test_the_plan_draws_what_the_cpu_recipe_draws():
+    drawn = draw(Recipe(steps=30, seed=5, coarse_share=0.5), 7, 2)
+    random, left = np.random.default_rng(5), []
+    for step in range(30):
+        if not left:
+            left = list(random.permutation(7))
+        assert drawn.order[step, 0] == left.pop()
+        np.testing.assert_array_equal(drawn.background[step, 0], random.random(3).astype(np.float32))
+    assert (drawn.rates["level"] == np.repeat([0, 1], 15)).all()
+    np.testing.assert_allclose(drawn.rates["mu"], 4e-4 * 0.01 ** (np.arange(30) / 30), rtol=1e-6)
+
+
+def test_a_step_never_holds_a_frame_twice():
+    order = draw(Recipe(steps=50, batch=4), 6, 1).order
+    assert all(len(set(row)) == 4 for row in order)
+    assert draw(Recipe(steps=2, batch=4), 3, 1).order.shape == (2, 3)
+
+
+def test_lists_hold_every_corner_weight_and_child_once():
+    random = np.random.default_rng(0)
+    faces, face = random.integers(0, 9, (20, 3)), random.integers(0, 20, 50)
+    start, item = lists.vertices_of(faces, face, 9)
+    assert sorted(item) == list(range(150))
+    for v in range(9):
+        mine = item[start[v]:start[v + 1]]
+        assert (faces[face].reshape(-1)[mine] == v).all() and (np.diff(mine) > 0).all()
+    index, weight = random.integers(0, 5, (30, 4)), random.random((30, 4)) * (random.random((30, 4)) > 0.3)
+    start, vertex, kept = lists.joints_of(index, weight, 5)
+    for j in range(5):
+        np.testing.assert_allclose(kept[start[j]:start[j + 1]].sum(), weight[index == j].sum())
+    assert start[-1] == (weight != 0).sum() and len(vertex) == start[-1]
+    start, child = lists.children(np.array([-1, 0, 0, 1, 3]))
+    assert [list(child[start[j]:start[j + 1]]) for j in range(5)] == [[1, 2], [3], [], [4], []]
+    assert list(lists.joint_levels(np.array([-1, 0, 0, 1, 3]))) == [0, 1, 1, 2, 3]
+
+
+@pytest.fixture(scope="module")
+def figure():
+    from gsac.benchmarks.gpu.figure import figure
+
+    return figure(4, 101, 67, 3000)
+
+
+@gpu
+@pytest.mark.parametrize("count", [1, 17, 1000, 100000])
+@pytest.mark.parametrize("weights", [{"ssim": 0.1, "sobel": 0.1}, {"ssim": 0.0, "sobel": 0.0, "mask": 0.0}])
+def test_image_loss_and_gradients_are_those_of_the_cpu_path(figure, count, weights):
+    from gsac.benchmarks.gpu.check import LIMIT, errors
+    from gsac.benchmarks.gpu.figure import start
+
+    found, _ = errors(figure, start(figure.body, count), Recipe(steps=1, **weights))
+    assert max(found.values()) < LIMIT, found
+
+
+@gpu
+def test_gaussians_behind_the_camera_and_without_opacity_are_skipped_as_on_the_cpu(figure):
+    from dataclasses import replace
+
+    from gsac.benchmarks.gpu.check import LIMIT, errors
+    from gsac.benchmarks.gpu.figure import start
+
+    near = replace(figure, transl=figure.transl.copy())
+    near.transl[:, 2] = 0.1
+    gaussians = start(figure.body, 3000)
+    gaussians.opacity[::3] = 0
+    found, _ = errors(near, gaussians, Recipe(steps=1))
+    assert max(found.values()) < LIMIT, found
+
+
+@gpu
+@pytest.mark.parametrize("batch", [1, 3])
+def test_lists_too_short_grow_and_change_no_result_and_a_seed_gives_one_result(figure, batch):
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import start
+
+    results = []
+    for room in (100, None, None):
+        trainer = CudaTrainer(figure.body, [figure.halved(), figure.shots], figure.pose, figure.transl, start(figure.body, 2000),
+                              Recipe(steps=43, batch=batch, sobel=0.1), pair_room=room)
+        trainer.poison()
+        trainer.train(17)
+        trainer.train(100)
+        assert trainer.state().step == 43
+        g, (pose, transl) = trainer.gaussians(), trainer.poses()
+        results.append([g.mu, g.quat, g.log_scale, g.rgb, g.opacity, pose, transl, trainer.losses()])
+        trainer.close()
+    for a, b, c in zip(*results, strict=True):
+        assert np.isfinite(a).all()
+        np.testing.assert_array_equal(a, b)
+        np.testing.assert_array_equal(b, c)
+    losses = results[0][-1].mean(1)
+    assert losses[-5:].mean() < losses[20:25].mean()
+
+
+@gpu
+def test_many_gaussians_on_one_tile_are_sorted_beyond_the_fast_path(figure):
+    from dataclasses import replace
+
+    from gsac.benchmarks.gpu.check import LIMIT, errors
+    from gsac.benchmarks.gpu.figure import start
+
+    far = replace(figure, transl=figure.transl.copy())
+    far.transl[:, 2] = 60
+    found, _ = errors(far, start(figure.body, 20000), Recipe(steps=1))
+    assert max(found.values()) < LIMIT, found
