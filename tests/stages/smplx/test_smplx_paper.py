@@ -203,3 +203,19 @@ def test_smoothing_keeps_a_steady_turn_and_takes_out_shaking():
     off = [np.linalg.norm(rotation.log(back @ r), axis=-1).mean() for r in (shaken, smooth_rotations(shaken))]
     assert off[1] < 0.7 * off[0]
     assert smooth_linear(np.ones((5, 3))).shape == (5, 3)
+
+
+@pytest.mark.parametrize("frames", [1, 65])
+def test_one_photo_and_more_frames_than_a_batch_are_fitted(body, frames):
+    told = []
+    sightings = sightings_of(body, person(body, frames), seconds=frames > 1)
+    sightings.score[0, 20:] = 0
+    if frames > 1:
+        sightings.score[30], sightings.xy[30] = 0, np.nan
+    tiny = (Pass(8, 0.1, (4,), 4, True), Pass(2, 0.01, (1,), 0, False))
+    fit = fit_clip(body, sightings, [], SmplxConfig(method="paper"), lambda *done: told.append(done), tiny)
+    steps = 10 * -(-frames // BATCH)
+    assert told[-1] == (steps, steps, "steps")
+    assert all(np.isfinite(a).all() for a in (fit.state.local, fit.state.transl, fit.state.betas, fit.sigma_joints))
+    turned = fit.state.local[:, 0] @ np.swapaxes(fit.state.local[:, 0], -1, -2)
+    np.testing.assert_allclose(turned, np.tile(np.eye(3), (frames, 1, 1)), atol=1e-5)
