@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import datetime
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gsac.cache.errors import FULL, CacheFullError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
 from gsac.cache.record import Record, RunInfo
@@ -19,9 +21,12 @@ from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.params import plain
 from gsac.pipeline.plan import Verdict
+from gsac.stages.contract import BadInput, StageError
 
 METRICS_OUTPUT = "metrics.json"
 """An output of this name is also kept in the action record."""
+LITTLE_ROOM = 16 << 20
+"""A stage that fails with fewer bytes than this left had no room: many libraries that write do not say so."""
 
 
 @dataclass
@@ -72,12 +77,18 @@ class Actor:
 
         self.logs.mkdir(parents=True, exist_ok=True)
         log = self.logs / f"{name}.log"
-        end = run_child({
+        order = {
             "declaration": f"{project.package}.{name}", "entry": project.entry(name),
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
             "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
             "device": self.keys.device,
-        }, log, hear)
+        }
+        try:
+            end = run_child(order, log, hear)
+        except StageError as error:
+            if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
+                raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
+            raise
         info.seconds, info.cpu_seconds, info.peak_rss_mb = end["seconds"], end["cpu_seconds"], end["peak_rss_mb"]
         info.log_tail = tail(log)
         return info

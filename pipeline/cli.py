@@ -10,6 +10,7 @@ import contextlib
 import errno
 import importlib
 import json
+import os
 import signal
 import sys
 from typing import Any
@@ -32,6 +33,9 @@ COMMANDS = {
     "report": "write report.html of a run's folder",
 }
 
+PATH_ERRORS = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
+"""A path that the user gave cannot be what it has to be."""
+
 
 def main(argv: list[str] | None = None) -> None:
     """Entry point; exits with an ExitCode."""
@@ -43,18 +47,20 @@ def execute(argv: list[str]) -> ExitCode:
     with contextlib.suppress(ValueError):  # not in the main thread
         for how in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(how, _interrupt)
-    arguments = _parser(argv).parse_args(argv)
+    arguments = None
     try:
+        arguments = _parser(argv).parse_args(argv)
         return arguments.do(arguments)
-    except KeyboardInterrupt:
-        _complain("interrupted; finished stages are kept")
+    except KeyboardInterrupt as error:
+        return _give_up("interrupted; finished stages are kept", ExitCode.INTERRUPTED, arguments, error)
+    except BrokenPipeError:  # whoever read the answer has gone: the rest goes nowhere, and quietly
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.INTERRUPTED
     except Exception as error:
         code = exit_code(error)
         if code is None:
             raise
-        _complain(_words(error))
-        return code
+        return _give_up(_words(error), code, arguments, error)
 
 
 def exit_code(error: BaseException) -> ExitCode | None:
@@ -73,7 +79,7 @@ def exit_code(error: BaseException) -> ExitCode | None:
         return ExitCode.FAILED
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return ExitCode.FAILED
-    if isinstance(error, OSError) and error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+    if isinstance(error, OSError) and error.errno in PATH_ERRORS:
         return ExitCode.USAGE
     return None
 
@@ -81,6 +87,14 @@ def exit_code(error: BaseException) -> ExitCode | None:
 def emit(content: dict[str, Any]) -> None:
     """The one object of --json: the last line of stdout."""
     print(json.dumps(content), flush=True)
+
+
+def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None, error: BaseException) -> ExitCode:
+    """Says why, with --json on stdout too; what was done before, a command leaves in the error's `summary`."""
+    if getattr(arguments, "json", False):
+        emit({"stages": [], "outputs": {}, "metrics": {}} | getattr(error, "summary", {}) | {"error": message})
+    _complain(message)
+    return code
 
 
 def _parser(argv: list[str]) -> argparse.ArgumentParser:

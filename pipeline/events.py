@@ -18,7 +18,8 @@ class PlainReporter(AbstractContextManager):
 
     def __init__(self, stream: TextIO | None = None):
         self._stream = stream or sys.stderr
-        self._began = self._last = 0.0
+        self._last = 0.0
+        self._first: tuple[float, int] | None = None
 
     def __exit__(self, *exc) -> None:
         pass
@@ -27,15 +28,22 @@ class PlainReporter(AbstractContextManager):
         print(message, file=self._stream, flush=True)
 
     def starts(self, stage: str, why: str) -> None:
-        self._began = self._last = time.monotonic()
+        self._last, self._first = time.monotonic(), None
         self.note(f"{stage}: starts ({why})")
 
     def progress(self, stage: str, done: int, total: int, unit: str) -> None:
+        words = self._words(done, total, unit)
         now = time.monotonic()
         if now - self._last < PLAIN_GAP_S:
             return
         self._last = now
-        self.note(f"{stage}: {progress_words(done, total, unit, now - self._began)}")
+        self.note(f"{stage}: {words}")
+
+    def _words(self, done: int, total: int, unit: str) -> str:
+        """The rate counts from the first sign of progress: what came before was loading and compiling."""
+        now = time.monotonic()
+        self._first = self._first or (now, done)
+        return progress_words(done, total, unit, now - self._first[0], self._first[1])
 
     def warning(self, stage: str, message: str) -> None:
         self.note(f"{stage}: warning: {message}")
@@ -67,7 +75,7 @@ class TerminalReporter(PlainReporter):
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
         self._close()
-        self._began = time.monotonic()
+        self._first = None
         self._bar = Progress(
             SpinnerColumn(), TextColumn("{task.fields[stage]:<10}", markup=False), BarColumn(),
             TextColumn("{task.fields[words]}", markup=False), console=self._console, transient=True,
@@ -77,8 +85,7 @@ class TerminalReporter(PlainReporter):
 
     def progress(self, stage: str, done: int, total: int, unit: str) -> None:
         if self._bar is not None:
-            words = progress_words(done, total, unit, time.monotonic() - self._began)
-            self._bar.update(self._task, completed=done, total=total or None, words=words)
+            self._bar.update(self._task, completed=done, total=total or None, words=self._words(done, total, unit))
 
     def warning(self, stage: str, message: str) -> None:
         self._console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
@@ -101,11 +108,11 @@ def reporter(plain: bool = False) -> PlainReporter:
     return PlainReporter() if plain or not sys.stderr.isatty() else TerminalReporter()
 
 
-def progress_words(done: int, total: int, unit: str, elapsed_s: float) -> str:
-    """`30/60 frames, 4.1 frames/s, 7 s left`"""
+def progress_words(done: int, total: int, unit: str, elapsed_s: float, before: int = 0) -> str:
+    """`30/60 frames, 4.1 frames/s, 7 s left`; `before`: how many were done when the time began."""
     words = f"{done}/{total} {unit}" if total else f"{done} {unit}"
-    if done > 0 and elapsed_s > 0:
-        rate = done / elapsed_s
+    if done > before and elapsed_s > 0:
+        rate = (done - before) / elapsed_s
         words += f", {rate:.3g} {unit}/s"
         if total:
             words += f", {duration((total - done) / rate)} left"

@@ -215,6 +215,8 @@ def clip_digest(clip: Path, store: Store) -> str:
         return tree_digest(clip, store.memo)[0]
     except OSError as e:
         raise BadInput(f"{clip}: cannot be read ({e.strerror})") from e
+    except CacheError as e:
+        raise BadInput(f"the clip cannot be read: {e}; take it out of the folder") from e
 
 
 def _ports(record: Record) -> dict[str, str]:

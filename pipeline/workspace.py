@@ -22,9 +22,11 @@ from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.params import to_yaml
 from gsac.pipeline.project import Project
+from gsac.pipeline.report_hook import REPORT
 from gsac.stages.contract import BadInput
 
 DAG, PARAMS, RUN, METRICS = "dvc.yaml", "params.yaml", "run.json", "metrics.json"
+LOGS = "logs"
 
 OWN_STORE = ".store"
 """Where results lie if the cache cannot be written."""
@@ -83,6 +85,9 @@ class Workspace:
     def prepare(self, clip: Path, project: Project, configs: dict[str, Any]) -> None:
         """Makes the folder a workspace for this clip and these parameters."""
         self._refuse_foreign(project)
+        if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
+            raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
+                           "folder elsewhere")
         self.root.mkdir(parents=True, exist_ok=True)
         write_text(self.root / DAG, project.dag.read_text())
         write_text(self.root / PARAMS, to_yaml(configs, notes=False))
@@ -118,6 +123,11 @@ class Workspace:
                 Graph.load(self.root / DAG)
             except BadInput as e:
                 raise BadInput(f"--out {self.root} holds another project's {DAG} ({e}); choose another folder") from e
+            return
+        for name in (*project.graph.steps, PARAMS, RUN, METRICS, REPORT, LOGS):
+            if os.path.lexists(self.root / name):
+                raise BadInput(f"--out {self.root} is not the folder of a run and holds {name}, which would be written "
+                               "over; choose another folder, or move it away")
 
     def write_json(self, name: str, content: Any) -> None:
         write_text(self.root / name, json.dumps(content, indent=1) + "\n")
@@ -133,8 +143,13 @@ def write_text(path: Path, text: str) -> None:
         if path.read_text() == text:
             return
     temp = path.with_name(f".{path.name}-{os.getpid()}")
-    temp.write_text(text)
-    os.replace(temp, path)
+    try:
+        temp.write_text(text)
+        os.replace(temp, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            temp.unlink()
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def link(target: Path, path: Path) -> None:

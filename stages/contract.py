@@ -7,6 +7,7 @@ output folder. A stage never imports another stage, the engine or the cache.
 
 from __future__ import annotations
 
+import math
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -87,12 +88,14 @@ def make_config(stage: Stage, values: dict[str, Any]) -> Any:
 def _typed(name: str, value: Any, hint: Any) -> Any:
     """The value as the field's type; 1 becomes 1.0 for a float, and YAML 1.1's text `4e-4` a number."""
     kinds = typing.get_args(hint) or (hint,)
-    if type(value) in kinds:
-        return value
     if float in kinds and isinstance(value, (int, str)) and not isinstance(value, bool):
         try:
-            return float(value)
+            value = float(value)
         except ValueError:
             pass
+    if isinstance(value, float) and not math.isfinite(value):
+        raise BadInput(f"parameter {name} is {value!r}; expected a finite number")
+    if type(value) in kinds:
+        return value
     words = " or ".join("null" if k is type(None) else k.__name__ for k in kinds)
     raise BadInput(f"parameter {name} is {value!r}; expected {words}")

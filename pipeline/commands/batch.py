@@ -32,7 +32,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     voice = PlainReporter()
-    workers = arguments.jobs or max(1, (os.cpu_count() or 1) // 2)
+    workers = max(1, (os.cpu_count() or 1) // 2) if arguments.jobs is None else arguments.jobs
     if workers < 1:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
     executor = make_executor(arguments.executor, workers)

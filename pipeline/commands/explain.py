@@ -6,7 +6,7 @@ import argparse
 
 from gsac.cache.key import KeyParts
 from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, add_params, add_workspace, answers, open_store, open_workspace
+from gsac.pipeline.commands.options import add_json, add_params, add_workspace, answers, open_store_of, open_workspace
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.run import Chain, Options
 
@@ -23,7 +23,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     workspace, project, configs = open_workspace(arguments, arguments.folder)
     project.graph.step(arguments.stage)
     with answers(arguments) as voice:
-        chain = Chain(project, configs, open_store(voice), workspace, voice)
+        chain = Chain(project, configs, open_store_of(workspace, voice), workspace, voice)
         verdict = chain.forecast(workspace.require_clip(), Options(until=arguments.stage))[-1]
         voice.note(f"{verdict.stage}: {verdict.reason.value}")
         if not verdict.changes:

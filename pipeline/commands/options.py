@@ -11,7 +11,7 @@ from gsac.cache.store import Store
 from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.workspace import Workspace
+from gsac.pipeline.workspace import OWN_STORE, Workspace
 
 
 def add_params(command: argparse.ArgumentParser) -> None:
@@ -43,6 +43,12 @@ def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
         return store
     reporter.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")
     return Store(instead, say=reporter.note, below=store)
+
+
+def open_store_of(workspace: Workspace, reporter: PlainReporter) -> Store:
+    """The store that a run in this folder would use now: its own where the cache may only be read."""
+    store, own = Store.open(say=reporter.note), workspace.root / OWN_STORE
+    return store if store.writable or not own.is_dir() else Store(own, say=reporter.note, below=store)
 
 
 def open_workspace(

@@ -49,16 +49,17 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def carry_out(chain: Chain, clip: Path, options: Options, voice: PlainReporter, json: bool) -> ExitCode:
-    """The run itself; the JSON object comes out whether it ends well or not."""
+    """The run itself; what was done is in the JSON object whether it ends well or not."""
     try:
         chain.run(clip, options)
         report(chain, voice)
-    except StageFailedError:
-        report(chain, voice)
+    except BaseException as error:
+        error.summary = chain.summary()
+        if isinstance(error, StageFailedError):
+            report(chain, voice)
         raise
-    finally:
-        if json:
-            emit(chain.summary())
+    if json:
+        emit(chain.summary())
     voice.note(f"results: {chain.workspace.root}")
     return ExitCode.OK
 

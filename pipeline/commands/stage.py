@@ -56,9 +56,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         try:
             result = do_one(keys, store, voice, arguments.name, digests, paths, out, logs, arguments.force)
         except StageFailedError as error:
-            if arguments.json:
-                failed = StageResult(arguments.name, Outcome.FAILED, "", error=str(error.cause))
-                emit({"stages": [failed.to_json()], "outputs": {}, "metrics": {}})
+            failed = StageResult(arguments.name, Outcome.FAILED, "", error=str(error.cause))
+            error.summary = {"stages": [failed.to_json()]}
             raise
     if arguments.json:
         ports = {f"{arguments.name}/{o.path}": str(out / o.path) for o in project.stage(arguments.name).outputs}

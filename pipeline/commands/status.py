@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 
 from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, add_params, add_workspace, answers, open_store, open_workspace
+from gsac.pipeline.commands.options import add_json, add_params, add_workspace, answers, open_store_of, open_workspace
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.run import Chain, Options
@@ -22,7 +22,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     workspace, project, configs = open_workspace(arguments, arguments.folder)
     with answers(arguments) as voice:
-        store = open_store(voice)
+        store = open_store_of(workspace, voice)
         chain = Chain(project, configs, store, workspace, voice)
         verdicts = [
             dataclasses.replace(v, reason=Reason.OUTPUT) if v.current and not workspace.shows(store, v.record) else v

@@ -16,6 +16,7 @@ from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
 SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"}
 UNSUPPORTED = {".heic", ".heif", ".dng", ".raw", ".cr2", ".nef"}
+VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi"}
 PLATE = "plate"
 
 
@@ -32,8 +33,9 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
         raise BadInput(f"{folder.name}: has {len(plates)} plates ({', '.join(p.name for p in plates)}); keep one.")
     photos = [p for p in images if p.stem.lower() != PLATE]
     if not photos:
-        raise BadInput(f"{folder.name}: holds no photos; expected {', '.join(sorted(SUFFIXES))} files of one person, "
-                       "or give a video file.")
+        videos = [p.name for p in files if p.suffix.lower() in VIDEO_SUFFIXES]
+        hint = f"or give one of its {len(videos)} videos, such as {folder.name}/{videos[0]}" if videos else "or give a video file"
+        raise BadInput(f"{folder.name}: holds no photos; expected {', '.join(sorted(SUFFIXES))} files of one person, {hint}.")
     return photos, plates[0] if plates else None
 
 

@@ -45,7 +45,7 @@ def probe(path: Path) -> Video:
             return _probe(container, path)
     except (av.FFmpegError, OSError) as e:
         raise BadInput(f"{path.name}: not a video that ffmpeg can read ({_reason(e)}). If it plays elsewhere, "
-                       "convert it to MP4 (H.264) and try again.") from e
+                       "convert it to MP4 (H.264); if it does not, it is cut off or damaged: copy it from the phone again.") from e
 
 
 def _probe(container: av.container.InputContainer, path: Path) -> Video:
