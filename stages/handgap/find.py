@@ -175,12 +175,14 @@ def hysteresis(hand_score: np.ndarray, misplaced: np.ndarray, config) -> np.ndar
 
 
 def without_islands(missing: np.ndarray, min_seen: int) -> np.ndarray:
-    """Seen runs shorter than min_seen between two longer missing runs become missing: a lost hand's false finds."""
+    """Seen runs shorter than min_seen, between missing runs no shorter and together over twice as long, become missing: a
+    lost hand's false finds."""
     missing = missing.copy()
     edges = runs(missing)
     for (a0, a1), (s0, s1), (b0, b1) in zip(edges, edges[1:], edges[2:], strict=False):
         length = s1 - s0
-        if not missing[s0] and length < min_seen and a1 - a0 > length and b1 - b0 > length:
+        before, after = a1 - a0, b1 - b0
+        if not missing[s0] and length < min_seen and min(before, after) >= length and before + after > 2 * length:
             missing[s0:s1] = True
     return missing
 

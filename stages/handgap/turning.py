@@ -9,7 +9,7 @@ the arm's pose in the body's frame is never named, and where nothing turns an or
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from gsac.avatar.wholebody import ARM, HANDS
@@ -43,6 +43,17 @@ class Turner:
     turn: np.ndarray  # (T,) rad
     torso: float  # px
     times: np.ndarray  # (T,) s
+    spectra: dict = field(default_factory=dict)
+    """(axis, seen frames) -> eigenvalues and vectors of each process of the grid; parts of one arm share their frames."""
+
+    def spectrum(self, axis: int, known: np.ndarray) -> list[tuple[float, float, np.ndarray, np.ndarray]]:
+        """known: (K,) frames. Returns length s, stir, eigenvalues (K,), vectors (K, K) of each process."""
+        key = axis, known.tobytes()
+        if key not in self.spectra:
+            turn, times = self.turn[known], self.times[known]
+            self.spectra[key] = [(length, stir, *np.linalg.eigh(covariance(axis, turn, turn, times, times, length, stir)))
+                                 for length, stir in itertools.product(LENGTHS_S, STIRS)]
+        return self.spectra[key]
 
 
 def watch(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.ndarray, torso: np.ndarray) -> Turner:
@@ -75,7 +86,7 @@ def fill_arm(xy, filled, drift, side: str, lost, unsure, body: Turner, config) -
             if not here.any() or learnt.sum() < 3 and anchor is not body.centre:
                 continue
             tracks = measured[:, points] - anchor[:, None]
-            mean, spread = predict(tracks, lead, learnt, here, body.turn, body.times, body.torso)
+            mean, spread = predict(tracks, lead, learnt, here, body)
             sure = 1 / (spread**2 + noise_px(anchor, believed) ** 2 + 1e-6)
             place[here] += sure[:, None] * (mean + anchor[here, None])
             precision[here] += sure
@@ -97,25 +108,24 @@ def within(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config) -> np.
     return out & gone
 
 
-def predict(tracks: np.ndarray, lead: int, seen: np.ndarray, asked: np.ndarray, turn: np.ndarray, times: np.ndarray,
-            torso: float) -> tuple[np.ndarray, np.ndarray]:
+def predict(tracks: np.ndarray, lead: int, seen: np.ndarray, asked: np.ndarray, body: Turner,
+            ) -> tuple[np.ndarray, np.ndarray]:
     """tracks: (T, P, 2) px from the body's centre or a seen joint; lead: the one of the P that the grid is judged by;
-    seen, asked: (T,) bool; turn: (T,) rad; torso: px.
+    seen, asked: (T,) bool.
 
     Returns places (A, P, 2) px of the asked frames and their standard deviation (A, 2) px, the noise of a detection left out.
     """
-    known = chosen(seen, asked, times)
-    answers = [_along(axis, tracks[known][:, :, axis] / torso, lead, turn[known], times[known], turn[asked], times[asked])
-               for axis in range(2)]
-    return np.stack([mean for mean, _ in answers], 2) * torso, np.sqrt(np.stack([v for _, v in answers], 1)) * torso
+    known = chosen(seen, asked, body.times)
+    answers = [_along(axis, tracks[known][:, :, axis] / body.torso, lead, known, asked, body) for axis in range(2)]
+    places, variances = zip(*answers, strict=True)
+    return np.stack(places, 2) * body.torso, np.sqrt(np.stack(variances, 1)) * body.torso
 
 
-def _along(axis, values, lead, turn, times, turn_asked, times_asked) -> tuple[np.ndarray, np.ndarray]:
+def _along(axis: int, values, lead: int, known, asked, body: Turner) -> tuple[np.ndarray, np.ndarray]:
     """Mean (A, P) and variance (A,) along one axis: the processes of the grid, averaged by how likely they make the lead."""
     middle = values.mean(0) if axis else 0.0
     tried = []
-    for length, stir in itertools.product(LENGTHS_S, STIRS):
-        size, basis = np.linalg.eigh(covariance(axis, turn, turn, times, times, length, stir))
+    for length, stir, size, basis in body.spectrum(axis, known):
         along = basis.T @ (values - middle)
         for noise in NOISES:
             total = np.maximum(size, 0) + noise**2
@@ -125,7 +135,7 @@ def _along(axis, values, lead, turn, times, turn_asked, times_asked) -> tuple[np
     weights = np.exp([entry[0] - best for entry in likely])
     means, variances = [], []
     for _, length, stir, total, basis, along in likely:
-        cross = covariance(axis, turn_asked, turn, times_asked, times, length, stir) @ basis
+        cross = covariance(axis, body.turn[asked], body.turn[known], body.times[asked], body.times[known], length, stir) @ basis
         prior = covariance(axis, *np.zeros((4, 1)), length, stir)[0, 0]
         means.append(middle + cross / total @ along)
         variances.append(np.maximum(prior - (cross**2 / total).sum(1), 0))

@@ -22,6 +22,8 @@ class Person:
     truth: np.ndarray
     """(T, 133, 2) px."""
     times: np.ndarray
+    world: np.ndarray
+    """(T, 133, 3) m, as detected."""
 
 
 def turning(frames=100, fps=10.0, noise=1.5, seed=0, arm_angle=0.35, swing=0.12, turns=1.0, start=0.0) -> Person:
@@ -60,7 +62,8 @@ def turning(frames=100, fps=10.0, noise=1.5, seed=0, arm_angle=0.35, swing=0.12,
     depth = DISTANCE - z
     truth = np.stack([FOCAL * x / depth + CENTRE[0], FOCAL * y / depth + CENTRE[1]], axis=2)
     xy = truth + rng.normal(0, noise, truth.shape)
-    return Person(xy, np.full((frames, 133), 0.95), truth, times)
+    world = np.stack([x, y, -z], axis=2) + rng.normal(0, 0.02, points.shape)
+    return Person(xy, np.full((frames, 133), 0.95), truth, times, world)
 
 
 def lose(person: Person, side: str, first: int, last: int, wrist=True, elbow=False) -> Person:
@@ -91,7 +94,7 @@ def through_stage(person: Person, folder, photos=False, **config):
     source, out = folder / "keypoints.npz", folder / "out"
     out.mkdir()
     write_arrays(source, xy=person.xy.astype(np.float32), score=person.score.astype(np.float32),
-                 world=np.zeros((*person.score.shape, 3), np.float32), detector=np.array("synthetic"))
+                 world=person.world.astype(np.float32), detector=np.array("synthetic"))
     times = None if photos else person.times.tolist()
     Clip(None if photos else 10.0, times, 720, 1280, None, "0").write(folder / "clip.json")
     warnings = []
