@@ -10,7 +10,7 @@ from gsac.avatar.cuda import why_not
 from gsac.avatar.cuda.kernels import KERNELS, cubin
 
 
-class NoDevice(Exception):
+class NoDeviceError(Exception):
     """There is no GPU that can be used; the words say why."""
 
 
@@ -59,11 +59,11 @@ class Buffer:
 
 
 class Device:
-    """The first GPU, its stream, and the kernels by name. Raises NoDevice where there is none."""
+    """The first GPU, its stream, and the kernels by name. Raises NoDeviceError where there is none."""
 
     def __init__(self):
         if why := why_not():
-            raise NoDevice(why)
+            raise NoDeviceError(why)
         from cuda.bindings import driver
 
         self._driver = driver

@@ -45,7 +45,9 @@ extern "C" __global__ void __launch_bounds__(256) skin(Scene s) {
         now.columns = (frame.width + TILE - 1) / TILE;
         now.rows = (frame.height + TILE - 1) / TILE;
         now.go = 1;
-        if (b == 0) state.pairs = state.listed = state.checkpoints = state.heavy = state.light = state.near = state.segments = state.blend_ticket = state.back_ticket = 0;
+        if (b == 0)
+            state.pairs = state.listed = state.checkpoints = state.heavy = state.light = state.near = state.segments = state.blend_ticket = state.back_ticket = state.barrier =
+            state.peak = 0;
         state.joints_done[b] = 0;
     }
     for (int i = blockIdx.x * 256 + tid; i < s.max_tiles; i += gridDim.x * 256) s.tile_count[b * s.max_tiles + i] = 0;
@@ -78,7 +80,7 @@ extern "C" __global__ void __launch_bounds__(256) skin(Scene s) {
     }
     int v = blockIdx.x * 256 + tid;
     if (v >= s.vertex_count) return;
-    Vec<float> rest = vec(s.rest + 3 * (size_t(frame.rest) * s.vertex_count + v)), out = {0, 0, 0};
+    Vec<float> rest = vec(s.rest + 3 * (size_t(frame.rest) * s.vertex_count + v)) + vec(s.offset + 3 * v), out = {0, 0, 0};
     const double *transl = s.pose + (frame.pose * 56 + 55) * 3;
     for (int k = 0; k < 4; ++k) {
         float w = s.skin_weight[4 * v + k];

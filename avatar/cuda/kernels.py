@@ -9,9 +9,9 @@ from pathlib import Path
 
 from gsac.avatar.cuda.scene import declarations
 
-SOURCES = ("formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "update.cuh")
+SOURCES = ("formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "update.cuh", "offsets.cuh")
 KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "image_gradient", "blend_backward", "gaussian_step",
-           "gather", "joint_step")
+           "gather", "joint_step", "offset_step")
 """In the order of a step."""
 OPTIONS = ("--std=c++17", "--extra-device-vectorization")
 

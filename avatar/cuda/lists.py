@@ -35,5 +35,12 @@ def vertices_of(faces: np.ndarray, face: np.ndarray, vertices: int) -> tuple[np.
     return _starts(corner[item], vertices), item
 
 
+def neighbours(faces: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
+    """start (V + 1,) and the vertices that share an edge with each vertex."""
+    i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64).T
+    both = np.unique(np.r_[i, j] * vertices + np.r_[j, i])
+    return _starts(both // vertices, vertices), both % vertices
+
+
 def _starts(owner: np.ndarray, count: int) -> np.ndarray:
     return np.searchsorted(owner, np.arange(count + 1)).astype(np.int32)

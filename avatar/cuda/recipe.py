@@ -38,6 +38,12 @@ class Recipe:
     """rad in which a pose's distance from the fit is measured."""
     shift_unit: float = 0.02
     """m, likewise."""
+    offset_rate: float = 0.0
+    """m of a step of the body's displacement at rest, falls to a tenth over its share of the steps; 0 learns none."""
+    offset_share: float = 0.6
+    """Part of the steps that move it; then `CudaTrainer.replace` takes the gaussians that it was folded into."""
+    smoothness: float = 30.0
+    """lambda of the displacement's smoothing."""
     hand_share: float = 0.1
     """Pose rate of the fingers relative to the body's; jaw and eyes stay."""
 
@@ -70,4 +76,5 @@ def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
                             ("rgb", recipe.rgb_rate, 0.1), ("opacity", recipe.opacity_rate, 0.1), ("pose", recipe.pose_rate, 0.01),
                             ("place_pull", recipe.place_pull if recipe.mu_rate else 0.0, 0.01)):
         rates[name] = rate * end**done
+    rates["offset"] = np.where(done < recipe.offset_share, recipe.offset_rate * 0.1 ** (done / max(recipe.offset_share, 1e-9)), 0)
     return Drawn(order, background, rates)

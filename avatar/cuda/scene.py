@@ -13,12 +13,12 @@ FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT,
 """pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: which vertices at rest and which pose it shows."""
 
 PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
-        "place_pull": FLOAT}
-"""Of one step: size of the images, Adam rates, and the share of its way that a gaussian is pulled back."""
+        "place_pull": FLOAT, "offset": FLOAT}
+"""Of one step: size of the images, Adam rates, the share of its way that a gaussian is pulled back, m of an offset's step."""
 
 STATE = {name: INT for name in (
     "step", "stop", "overflow", "needed", "most", "pairs", "listed", "checkpoints", "heavy", "light", "near", "segments",
-    "blend_ticket", "back_ticket", "frames_done")} | {"joints_done": INT * MOST_BATCH}
+    "blend_ticket", "back_ticket", "frames_done", "barrier", "peak")} | {"joints_done": INT * MOST_BATCH}
 """Counters on the device. overflow: the lists were too short, nothing moves until they are longer; needed: how long."""
 
 POINTERS = {
@@ -35,11 +35,14 @@ POINTERS = {
     "list": "unsigned long long", "moments": "float", "tile_count": "int", "tile_start": "int", "tile_check": "int",
     "tile_done": "int", "near_flag": "unsigned char", "heavy": "int", "light": "int", "near": "int", "segment": "int",
     "checkpoint": "float", "image": "float", "grad_image": "float", "slopes": "float", "tile_loss": "float", "losses": "float",
+    "near_start": "int", "near_vertex": "int", "offset_share": "float", "offset": "float", "grad_rest": "float", "gathered": "float",
+    "offset_first": "float", "offset_second": "float", "solve_step": "float",
     "grad_out": "float", "pose_grad_out": "double",
 }
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
-           "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "spare": INT}
+           "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
+           "most_near": INT, "spare": INT}
 
 
 def _struct(name: str, fields: dict) -> type[ctypes.Structure]:

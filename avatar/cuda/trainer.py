@@ -9,13 +9,13 @@ import numpy as np
 from gsac.avatar.binding import face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda.device import Buffer, Device
-from gsac.avatar.cuda.lists import children, joint_levels, joints_of, vertices_of
+from gsac.avatar.cuda.lists import children, joint_levels, joints_of, neighbours, vertices_of
 from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.cuda.scene import FRAME, POINTERS, Scene, State
 from gsac.avatar.gaussians import Gaussians
 
 TILE, SEGMENT, JOINTS = 16, 128, 55
-BODY, JAW_EYES = slice(0, 22), slice(22, 25)
+BODY, JAW_EYES, FINGERS = slice(0, 22), slice(22, 25), 25
 REPLAY = 10
 """Steps of one graph."""
 NOW = 256
@@ -47,7 +47,7 @@ class Shot(NamedTuple):
 class CudaTrainer:
     """levels: one or two lists of T shots, coarse first; pose: (T, 55, 3) rad; transl: (T, 3) m.
 
-    Raises device.NoDevice without a GPU, device.DeviceError where it has too little memory.
+    Raises device.NoDeviceError without a GPU, device.DeviceError where it has too little memory.
     """
 
     def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: Gaussians,
@@ -104,6 +104,17 @@ class CudaTrainer:
         """Pose (T, 55, 3) and translation (T, 3), float64."""
         both = self.buffers["pose"].read()
         return both[:, :JOINTS].copy(), both[:, JOINTS].copy()
+
+    def offset(self) -> np.ndarray:
+        """(V, 3) m, the displacement of the vertices at rest that the gaussians now ride on."""
+        return self.buffers["offset"].read()
+
+    def replace(self, gaussians: Gaussians) -> None:
+        """From here on these places, rotations and sizes (`stages.train.offsets.fold`) on the plain body."""
+        for name in ("mu", "quat", "log_scale"):
+            self.buffers[name].write(getattr(gaussians, name))
+        self.buffers["start"].write(gaussians.mu)
+        self.buffers["offset"].fill(0)
 
     def losses(self) -> np.ndarray:
         """(steps done, batch)."""
@@ -183,6 +194,15 @@ class CudaTrainer:
                 ("joint_vertex", joint_vertex, np.int32), ("joint_weight", joint_weight, np.float32), ("pose", both, np.float64),
                 ("fit", both, np.float64), ("pose_share", share, np.float64)):
             self._upload(name, array, kind)
+        near_start, near_vertex = neighbours(np.asarray(body.faces), body.rest.shape[1])
+        self.scene.smoothness, self.scene.most_near = self.recipe.smoothness, int(np.diff(near_start).max())
+        on_fingers = np.where(np.asarray(body.skin_index) >= FINGERS, body.skin_weight, 0).sum(1)
+        for name, array, kind in (("near_start", near_start, np.int32), ("near_vertex", near_vertex, np.int32),
+                                  ("offset_share", 1 - on_fingers, np.float32)):
+            self._upload(name, array, kind)
+        for name, shape in (("offset", (body.rest.shape[1], 3)), ("offset_first", (body.rest.shape[1], 3)),
+                            ("gathered", (body.rest.shape[1], 3)), ("offset_second", 1)):
+            self._empty(name, shape, np.float32).fill(0)
         for name in ("pose_first", "pose_second"):
             self._empty(name, both.shape, np.float64).fill(0)
         self._empty("pose_steps", self.frames, np.int32).fill(0)
@@ -206,7 +226,7 @@ class CudaTrainer:
         shapes = {
             "local": (batch, JOINTS, 9), "transform": (batch, JOINTS, 12), "vertices": (batch, v, 3), "grad_vertices": (batch, v, 3),
             "corner_grad": (batch, n, 9), "joint_grad": (batch, JOINTS, 12), "splat": (batch, n, 12), "depth": (batch, n),
-            "image": (pixels, 4), "grad_image": (pixels, 4), "tile_loss": tiles}
+            "grad_rest": (batch, v, 3), "solve_step": (2, v, 3), "image": (pixels, 4), "grad_image": (pixels, 4), "tile_loss": tiles}
         if self.recipe.ssim:
             shapes["slopes"] = (9, pixels)
         for name, shape in shapes.items():
@@ -226,6 +246,8 @@ class CudaTrainer:
             "blend": ((min(tiles, 6 * p), 1), 256), "compare": ((min(tiles, 12 * p), 1), 256),
             "image_gradient": ((min(tiles, 12 * p), 1), 256), "blend_backward": ((5 * p, 1), 256),
             "gaussian_step": ((-(-n // 128), 1), 128), "gather": ((-(-v // 128), batch), 128), "joint_step": ((JOINTS + 1, batch), 512)}
+        if self.recipe.offset_rate:
+            self.grids["offset_step"] = ((-(-v // 256), 1), 256)
 
     def _lists(self, room: int) -> None:
         """Room for so many (tile, gaussian) pairs of a batch, and for what hangs on them."""

@@ -91,7 +91,8 @@ extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
     s.logit[i] = logit;
 }
 
-// (blocks of vertices, batch). A vertex's gradient: the corners of the gaussians on its faces, in their order.
+// (blocks of vertices, batch). A vertex's gradient: the corners of the gaussians on its faces, in their order; the same at rest
+// where offsets are learned.
 extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
     if (halted(s)) return;
     int b = blockIdx.y, v = blockIdx.x * 128 + threadIdx.x;
@@ -110,6 +111,19 @@ extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
     to[0] = x;
     to[1] = y;
     to[2] = z;
+    if (s.now[b].plan.offset == 0) return;
+    Vec<float> at_rest = {0, 0, 0};
+    for (int k = 0; k < 4; ++k) {
+        float w = s.skin_weight[4 * v + k];
+        const float *A = s.transform + (b * 55 + s.skin_index[4 * v + k]) * 12;
+        at_rest.x += w * (A[0] * x + A[4] * y + A[8] * z);
+        at_rest.y += w * (A[1] * x + A[5] * y + A[9] * z);
+        at_rest.z += w * (A[2] * x + A[6] * y + A[10] * z);
+    }
+    to = s.grad_rest + 3 * (size_t(b) * s.vertex_count + v);
+    to[0] = at_rest.x;
+    to[1] = at_rest.y;
+    to[2] = at_rest.z;
 }
 
 // Back through the joint chain for frame b of the batch, leaves first, then Adam of its pose; one block.
@@ -205,7 +219,7 @@ extern "C" __global__ void __launch_bounds__(512) joint_step(Scene s) {
         for (int e = s.joint_start[j] + tid; e < end; e += 512) {
             int v = s.joint_vertex[e];
             float w = s.joint_weight[e];
-            Vec<float> r = vec(rest + 3 * v);
+            Vec<float> r = vec(rest + 3 * v) + vec(s.offset + 3 * v);
             for (int i = 0; i < 3; ++i) {
                 float g = w * grad[3 * v + i];
                 sum[4 * i] += g * r.x;

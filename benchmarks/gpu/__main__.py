@@ -43,6 +43,8 @@ def main() -> None:
         report(f"1080x1080, {count}", errors(big, start(big.body, count), losses, device), LIMIT)
     done("checks")
     measure(device, big, quick)
+    done("times")
+    compare(big)
     done("all")
 
 
@@ -51,6 +53,24 @@ def report(name: str, found: tuple[dict, dict], limit: float) -> None:
     verdict = "ok" if max(settled.values()) <= limit else "MISSED"
     print(f"check {name:18s} {verdict}  " + " ".join(f"{k} {v:.1e}" for k, v in settled.items())
           + f"; with swaps of depth order {max(everything.values()):.1e}", flush=True)
+
+
+def compare(figure) -> None:
+    """The same loop in torch + gsplat, where gsplat is installed."""
+    from importlib.util import find_spec
+
+    from gsac.avatar.cuda.recipe import Recipe
+    from gsac.benchmarks.gpu.figure import start
+
+    if find_spec("torch") is None or find_spec("gsplat") is None:
+        print("torch + gsplat: not installed, not measured")
+        return
+    from gsac.benchmarks.gpu.baseline import seconds_per_step
+
+    for compiled in (False, True):
+        took = seconds_per_step(figure, start(figure.body, 25000), Recipe(ssim=0.1, sobel=0.1), compiled)
+        print(f"torch + gsplat, {'torch.compile' if compiled else 'eager'}: {took * 1e3:.2f} ms a step, {took * 3000:.1f} s for 3000 "
+              "steps of one frame", flush=True)
 
 
 def measure(device, figure, quick: bool) -> None:

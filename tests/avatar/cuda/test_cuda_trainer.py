@@ -21,9 +21,9 @@ def test_importing_the_cuda_path_loads_nothing_heavy():
 
 @pytest.mark.skipif(why_not() is None, reason="there is a GPU here")
 def test_without_a_gpu_the_device_says_why_it_cannot_be_used():
-    from gsac.avatar.cuda.device import Device, NoDevice
+    from gsac.avatar.cuda.device import Device, NoDeviceError
 
-    with pytest.raises(NoDevice, match="GPU|driver|gsac\\[gpu\\]"):
+    with pytest.raises(NoDeviceError, match="GPU|driver|gsac\\[gpu\\]"):
         Device()
 
 
@@ -132,8 +132,67 @@ def test_lists_too_short_grow_and_change_no_result_and_a_seed_gives_one_result(f
         assert np.isfinite(a).all()
         np.testing.assert_array_equal(a, b)
         np.testing.assert_array_equal(b, c)
-    losses = results[0][-1].mean(1)
-    assert losses[-5:].mean() < losses[20:25].mean()
+
+
+@gpu
+def test_training_lowers_the_loss_and_moves_the_poses_towards_the_truth(figure):
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import start
+
+    trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 4000),
+                          Recipe(steps=400, pose_pull=0))
+    trainer.train(400)
+    losses, (_, transl) = trainer.losses()[:, 0], trainer.poses()
+    trainer.close()
+    assert losses[-40:].mean() < 0.4 * losses[:40].mean()
+    assert np.abs(transl - figure.true_transl)[:, :2].mean() < np.abs(figure.transl - figure.true_transl)[:, :2].mean()
+
+
+@gpu
+def test_offsets_are_those_of_the_cpu_recipe(figure):
+    from types import SimpleNamespace
+
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.check import relative
+    from gsac.benchmarks.gpu.figure import start
+    from gsac.stages.train.offsets import Offsets
+
+    body = figure.body
+    offsets = Offsets(SimpleNamespace(faces=body.faces, v_template=body.rest[0], skin_index=body.skin_index,
+                                      skin_weight=body.skin_weight))
+    trainer = CudaTrainer(body, [figure.shots], figure.pose, figure.transl, start(body, 3000),
+                          Recipe(steps=20, offset_rate=1e-3, offset_share=0.6))
+    for step in range(20):
+        trainer.train(1)
+        rate = float(trainer.rates["offset"][step])
+        assert (rate > 0) == (step < 12)
+        if rate:
+            offsets.gather(trainer.buffers["grad_rest"].read()[0].astype(np.float64), rate)
+        if step == 3:
+            assert relative(trainer.offset(), offsets.offset) < 2e-2
+    assert np.abs(offsets.offset).max() > 1e-4
+    assert relative(trainer.offset(), offsets.offset) < 2e-2
+    plain = trainer.gaussians()
+    trainer.replace(plain)
+    assert not trainer.offset().any()
+    trainer.close()
+
+
+@gpu
+def test_gradient_at_rest_is_that_of_the_cpu_path(figure):
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.avatar.skinning import skin_backward
+    from gsac.benchmarks.gpu.check import relative
+    from gsac.benchmarks.gpu.figure import start
+
+    body = figure.body
+    trainer = CudaTrainer(body, [figure.shots], figure.pose, figure.transl, start(body, 3000), Recipe(steps=4, offset_rate=1e-3))
+    trainer.train(1)
+    t = int(trainer.order[0, 0])
+    vertices, at_rest = (trainer.buffers[name].read()[0] for name in ("grad_vertices", "grad_rest"))
+    trainer.close()
+    expected = skin_backward(vertices, figure.pose[t], body.rest[0], body.joints, body.parents, body.skin_index, body.skin_weight)[2]
+    assert np.linalg.norm(expected) > 0 and relative(at_rest, expected) < 1e-5
 
 
 @gpu
