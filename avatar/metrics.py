@@ -39,12 +39,21 @@ def ssim(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.mean((2 * ma * mb + c1) * (2 * cov + c2) / ((ma**2 + mb**2 + c1) * (va + vb + c2))))
 
 
+def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
+    """Gradient energy of an image over that of the truth in a region: below 1 for a blurred image, above for a noisy one.
+
+    image, truth: (H, W, 3); region: (H, W) bool. Central differences; NaN where the truth is flat.
+    """
+    own, true = (sum((np.gradient(x, axis=axis)[region] ** 2).sum() for axis in (0, 1)) for x in (image, truth))
+    return float(own / true) if true > 0 else float("nan")
+
+
 def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> dict[str, float]:
     """One image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1.
 
     `mse_white`, `mse_black`: the whole frame on that background. `mse_fg`: the person only, that is pixels where mask
     or alpha is at least 0.5, on white, so that a missing and an added limb both cost. `ssim`: whole frame on white.
-    `alpha_iou`: of alpha and mask at 0.5.
+    `alpha_iou`: of alpha and mask at 0.5. `detail`: gradient energy over the truth's, where both show the person.
     """
     white, white_truth = composite(rgb, alpha, WHITE), composite(truth, mask, WHITE)
     error = ((white - white_truth) ** 2).mean(2)
@@ -56,6 +65,7 @@ def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarra
         "mse_fg": float(error[either].mean()) if either.any() else float("nan"),
         "fg_pixels": int(either.sum()), "ssim": ssim(white, white_truth),
         "alpha_iou": float(both.sum() / either.sum()) if either.any() else float("nan"),
+        "detail": detail(white, white_truth, both) if both.any() else float("nan"),
     }
 
 
@@ -82,5 +92,5 @@ def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
         "psnr_full": mean_psnr("mse_white"), "psnr_full_pooled": pooled("mse_white", None),
         "psnr_full_black": mean_psnr("mse_black"), "psnr_fg": mean_psnr("mse_fg"),
         "psnr_fg_pooled": pooled("mse_fg", "fg_pixels"), "ssim": mean("ssim"), "lpips": None,
-        "alpha_iou": mean("alpha_iou"),
+        "alpha_iou": mean("alpha_iou"), "detail": mean("detail"),
     }

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from gsac.stages.contract import BadInput
 
 RECIPES = ("fast", "paper")
+AUTO = "auto"
+"""`gaussians` that the ladder of sizes chooses."""
 
 
 @dataclass
 class TrainConfig:
     recipe: str = "fast"
     """Which optimisation fits the gaussians: fast, or paper: one gaussian a face and rates of its own."""
-    gaussians: int = 12000
-    """How many gaussians; recipe paper has one a face instead."""
+    gaussians: int | str = 12000
+    """How many gaussians; auto: the fewest that the held-out frames cannot tell from the best; paper: one a face instead."""
     steps: int | None = None
     """Optimisation steps; null: the recipe's own, 1600 of one frame (fast), 3000 of four (paper)."""
     height: int = 540
@@ -59,7 +61,11 @@ class TrainConfig:
     def check(self) -> None:
         if self.recipe not in RECIPES:
             raise BadInput(f"train.recipe is {self.recipe!r}; choices: {', '.join(RECIPES)}")
-        for name, low in (("gaussians", 100), ("steps", 1), ("height", 64), ("holdout", 0), ("curve", 0), ("pose_test_steps", 0),
+        if isinstance(self.gaussians, str) and self.gaussians != AUTO:
+            raise BadInput(f"train.gaussians is {self.gaussians!r}; give a number, or {AUTO}")
+        if self.gaussians != AUTO and self.gaussians < 100:
+            raise BadInput(f"train.gaussians is {self.gaussians}; it must be at least 100, or {AUTO}")
+        for name, low in (("steps", 1), ("height", 64), ("holdout", 0), ("curve", 0), ("pose_test_steps", 0),
                           ("needle", 1)):
             if getattr(self, name) is not None and getattr(self, name) < low:
                 raise BadInput(f"train.{name} is {getattr(self, name)}; it must be at least {low}")

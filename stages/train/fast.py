@@ -36,13 +36,19 @@ LEAST_SHOWN = 0.1
 GAIN_RATE = 2e-3
 
 
-def fit(task: Task) -> Fit:
-    """Raises StageError naming the step and the quantity that is no longer finite."""
+def fit(task: Task, count: int | None = None) -> Fit:
+    """count: how many gaussians, else as configured. Raises StageError naming the step and the quantity that is not finite."""
+    trainer, _, coarse = train(task, count or task.config.gaussians)
+    return Fit(*trainer.recoloured(coarse), dict(trainer.gains))
+
+
+def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, View]]:
+    """The trained gaussians, and the trained frames at full and at half the size."""
     config = task.config
     rng = np.random.default_rng(config.seed)
     fine = {int(t): person_crop(task.views[t]) for t in task.trained}
     coarse = {t: v.halved() for t, v in fine.items()}
-    trainer = Trainer(start(task, coarse), task)
+    trainer = Trainer(start(task, coarse, count), task)
     steps = config.steps or STEPS
     order = []
     for step in range(steps):
@@ -56,14 +62,14 @@ def fit(task: Task) -> Fit:
         task.progress(step + 1, steps, "steps")
     if trainer.offsets:
         trainer.fold_offsets()
-    return Fit(*trainer.recoloured(coarse), dict(trainer.gains))
+    return trainer, fine, coarse
 
 
-def start(task: Task, coarse: dict[int, View]) -> Gaussians:
+def start(task: Task, coarse: dict[int, View], count: int) -> Gaussians:
     """Gaussians spread over the body of the first frame, coloured from the frames."""
     faces = task.poses.body.faces
     rest = task.poses.rest(int(task.trained[0]))[0]
-    gaussians = Gaussians.area(rest, faces, task.config.gaussians, task.config.seed)
+    gaussians = Gaussians.area(rest, faces, count, task.config.seed)
     every = -(-len(task.trained) // COLOUR_FRAMES)
     frames = [PosedFrame(task.poses.vertices(int(t)), coarse[int(t)].camera, coarse[int(t)].pixels)
               for t in task.trained[::every]]
@@ -80,10 +86,12 @@ def places(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndar
 class Trainer:
     """Gaussians with Adam's state, and one step of the optimisation."""
 
-    def __init__(self, gaussians: Gaussians, task: Task):
+    def __init__(self, gaussians: Gaussians, task: Task, settled: bool = False):
+        """settled: the surface and the poses stay where they are."""
         self.config, self.poses = task.config, task.poses
         self.rest = task.poses.rest(int(task.trained[0]))[0]
-        self.offsets = Offsets(task.poses.body)
+        self.settled = settled
+        self.offsets = None if settled else Offsets(task.poses.body)
         self.faces, self.face = task.poses.body.faces, gaussians.face
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
@@ -119,7 +127,8 @@ class Trainer:
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
         self._guard(number, loss, grads)
         self._move(grads, shown.opacity, done)
-        grad_rest, _ = self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
+        if not self.settled:
+            grad_rest, _ = self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
         if self.offsets:
             self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
             self.poses.offset = self.offsets.offset

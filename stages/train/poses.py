@@ -7,12 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 from gsac.avatar.skinning import joint_transforms, skin, skin_backward
+from gsac.stages.train.holdout import carry_corrections
 
 BODY, JAW_EYES = slice(0, 22), slice(22, 25)
 HAND_SHARE = 0.1
 """Rate of the fingers, relative to the body's: an image says little about them."""
 TURN, SHIFT = 0.05, 0.02
 """rad and m in which the distance from the fit is measured."""
+
+
+def carried(poses: Poses, trained: np.ndarray) -> Poses:
+    """A copy in which every frame that is not among `trained` (indices) is corrected as its trained neighbours are."""
+    is_trained = np.zeros(len(poses.pose), bool)
+    is_trained[trained] = True
+    out = poses.copy()
+    out.pose, out.transl = carry_corrections(out.fit_pose, out.fit_transl, out.pose, out.transl, is_trained)
+    return out
 
 
 class Poses:

@@ -12,8 +12,8 @@ from gsac.avatar.metrics import psnr, summary
 from gsac.avatar.workspace import Workspace
 from gsac.stages.contract import Job, StageError
 from gsac.stages.train.evaluate import align_pose, judge, turned
-from gsac.stages.train.holdout import carry_corrections, spaced_in_yaw
-from gsac.stages.train.poses import Poses
+from gsac.stages.train.holdout import spaced_in_yaw
+from gsac.stages.train.poses import Poses, carried
 from gsac.stages.train.recipes import RECIPES
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
@@ -63,8 +63,6 @@ class Run:
 
     def __init__(self, job: Job, poses: Poses, views, trained: np.ndarray, held: np.ndarray):
         self.job, self.poses, self.views, self.trained, self.held = job, poses, views, trained, held
-        self.is_trained = np.zeros(len(views), bool)
-        self.is_trained[trained] = True
         self.curve: list[dict] = []
         self.losses: list[float] = []
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
@@ -72,7 +70,7 @@ class Run:
 
     def fit(self) -> None:
         self.began = np.array([time.perf_counter(), time.process_time()])
-        task = Task(self.views, self.trained, self.poses, self.job.config, self.job.progress, self.checkpoint)
+        task = Task(self.views, self.trained, self.held, self.poses, self.job.config, self.job.progress, self.checkpoint)
         self.result = RECIPES[self.job.config.recipe](task)
         self.seconds, self.cpu_seconds = self.clock()
 
@@ -95,10 +93,7 @@ class Run:
 
     def carried(self) -> Poses:
         """The poses with every frame that was not trained on corrected as its neighbours are."""
-        poses = self.poses.copy()
-        poses.pose, poses.transl = carry_corrections(poses.fit_pose, poses.fit_transl, poses.pose, poses.transl,
-                                                     self.is_trained)
-        return poses
+        return carried(self.poses, self.trained)
 
     def psnr_fg(self, gaussians, poses: Poses, frames) -> float | None:
         return summary(judge(gaussians, poses, frames, self.views, None, self.workspace))["psnr_fg"]

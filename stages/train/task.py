@@ -18,6 +18,8 @@ class Task:
     """(T,) whole frames at the height that is trained on."""
     trained: np.ndarray
     """Indices of the frames to train on."""
+    held: np.ndarray
+    """Indices of the frames kept for judging; a recipe may choose by them, never fit to them."""
     poses: Poses
     """As fitted; the recipe refines those of `trained`."""
     config: TrainConfig

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gsac.avatar.metrics import psnr, score, ssim, summary
+from gsac.avatar.metrics import detail, psnr, score, ssim, summary
 
 
 def square(value=0.5, size=40, at=10, side=20):
@@ -57,3 +57,15 @@ def test_an_empty_frame_gives_no_person_figure_and_no_nan_in_the_summary():
     assert figures["psnr_fg"] is None and figures["psnr_fg_pooled"] is None and figures["alpha_iou"] is None
     assert figures["psnr_full"] > 50
     assert summary([])["psnr_full"] is None
+
+
+def test_detail_falls_with_blur_and_rises_with_noise():
+    import cv2
+
+    rng = np.random.default_rng(0)
+    truth = cv2.GaussianBlur(rng.random((40, 40, 3)), (0, 0), 1.0)
+    region = np.ones((40, 40), bool)
+    assert detail(truth, truth, region) == 1
+    assert detail(cv2.GaussianBlur(truth, (0, 0), 1.0), truth, region) < 0.8
+    assert detail(truth + rng.normal(0, 0.1, truth.shape), truth, region) > 1.2
+    assert np.isnan(detail(truth, np.zeros_like(truth), region))

@@ -1,0 +1,65 @@
+"""gsac bench size: held-out quality against the number of gaussians, with the automatic choice marked.
+
+The line is the ladder of `train.gaussians: auto`; crosses are trainings that had the number from the start.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from pathlib import Path
+
+from gsac.benchmarks import training
+
+FIELDS = ("n_gaussians", "psnr_fg_mean", "psnr_fg_error", "detail_mean", "detail_error", "chosen")
+
+
+def parser() -> argparse.ArgumentParser:
+    out = argparse.ArgumentParser(prog="gsac bench size", description=__doc__.splitlines()[0])
+    training.declare(out, "size")
+    out.add_argument("--scratch", type=int, nargs="*", default=[], metavar="N", help="also train these numbers from the start")
+    out.add_argument("--steps", type=int, default=None, help="steps of a training (default: the recipe's)")
+    return out
+
+
+def main(argv: list[str] | None = None) -> int:
+    options = parser().parse_args(argv)
+    from gsac.benchmarks.size import chart
+    from gsac.pipeline.events import PlainReporter
+
+    say = PlainReporter(sys.stderr)
+    options.out.mkdir(parents=True, exist_ok=True)
+    ladders: dict[str, list[dict]] = {}
+    scratch: dict[str, list[tuple[int, float]]] = {}
+    for case in training.cases(options, say):
+        common = {"height": options.height, "steps": options.steps}
+        folder = options.out / "trainings"
+        ladders[case.name] = training.train(case, folder / f"{case.name}_auto", gaussians="auto", **common)["size_curve"]
+        scratch[case.name] = []
+        for count in options.scratch:
+            metrics = training.train(case, folder / f"{case.name}_{count}", gaussians=count, **common)
+            scratch[case.name].append((count, metrics["psnr_fg_ttpo"]))
+    words = text(ladders)
+    print(words)
+    (options.out / "size.txt").write_text(words + "\n")
+    write_csv(ladders, options.out / "size.csv")
+    chart.draw(ladders, scratch, options.out)
+    return 0
+
+
+def text(ladders: dict[str, list[dict]]) -> str:
+    """One row a clip and size; the choice has a star."""
+    lines = [f"{'clip':>16}  gaussians  psnr_fg aligned   detail"]
+    for clip, rungs in ladders.items():
+        lines += [f"{clip:>16}  {r['n_gaussians']:9d}  {r['psnr_fg_mean']:7.2f} +- {r['psnr_fg_error']:4.2f}  "
+                  f"{r['detail_mean']:7.3f}{'  *' if r['chosen'] else ''}" for r in rungs]
+    return "\n".join(lines)
+
+
+def write_csv(ladders: dict[str, list[dict]], path: Path) -> None:
+    with open(path, "w", newline="") as f:
+        sheet = csv.writer(f)
+        sheet.writerow(["clip", *FIELDS])
+        for clip, rungs in ladders.items():
+            sheet.writerows([clip, *(rung[name] for name in FIELDS)] for rung in rungs)

@@ -1,0 +1,59 @@
+"""One training as a curve, and what many curves say together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from gsac.stages.contract import BadInput
+
+WORST_S, WORST_DB = 3600.0, 20.0
+"""Reference point of the hypervolume."""
+
+
+@dataclass
+class Trial:
+    clip: str
+    recipe: str
+    steps: int
+    seed: int
+    curve: list[tuple[float, float]]
+    """CPU seconds so far and held-out psnr_fg, dB."""
+    cpu_s: float
+    psnr_fg: float
+    psnr_fg_ttpo: float | None
+    ssim: float
+    detail: float
+    n_gaussians: int
+    peak_gb: float
+
+
+def trial(clip: str, metrics: dict) -> Trial:
+    """metrics: as `benchmarks.training.train` gives them. Raises BadInput where no frame was held out."""
+    curve = [(row["cpu_seconds"], row["psnr_fg"]) for row in metrics["curve"] if "psnr_fg" in row]
+    if not curve or metrics["psnr_fg"] is None:
+        raise BadInput(f"{clip}: no frame is held out, there is nothing to compare by")
+    curve.append((metrics["cpu_seconds"], metrics["psnr_fg"]))
+    return Trial(clip, metrics["recipe"], metrics["steps"], metrics["seed"], curve, metrics["cpu_seconds"], metrics["psnr_fg"],
+                 metrics["psnr_fg_ttpo"], metrics["ssim"], metrics["detail"], metrics["n_gaussians"], metrics["peak_gb"])
+
+
+def seconds_to(trial: Trial, quality: float) -> float | None:
+    """CPU seconds of the first checkpoint at or above the quality, dB."""
+    return next((s for s, q in trial.curve if q >= quality), None)
+
+
+def pareto(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Points (seconds, dB) that no other beats in both, by seconds."""
+    out: list[tuple[float, float]] = []
+    for s, q in sorted(points, key=lambda p: (p[0], -p[1])):
+        if not out or q > out[-1][1]:
+            out.append((s, q))
+    return out
+
+
+def hypervolume(points: list[tuple[float, float]]) -> float:
+    """Area between the Pareto line and (`WORST_S`, `WORST_DB`), in decades times dB."""
+    line = [p for p in pareto(points) if p[0] < WORST_S and p[1] > WORST_DB]
+    ends = [s for s, _ in line[1:]] + [WORST_S] if line else []
+    return sum((q - WORST_DB) * math.log10(end / s) for (s, q), end in zip(line, ends, strict=True))

@@ -1,0 +1,39 @@
+"""The rule that picks a size from a ladder of avatars, all judged on the same frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MOST_LOST = 0.3
+"""dB below the best that no standard error excuses."""
+
+
+@dataclass
+class Rung:
+    """One size, judged."""
+
+    n_gaussians: int
+    psnr_fg: list[float]
+    """dB, one a frame."""
+    detail: list[float]
+    """`metrics.detail`, one a frame."""
+
+    def means(self) -> dict[str, float]:
+        """Mean and standard error over the frames."""
+        return {"psnr_fg_mean": float(np.mean(self.psnr_fg)), "psnr_fg_error": standard_error(self.psnr_fg),
+                "detail_mean": float(np.mean(self.detail)), "detail_error": standard_error(self.detail)}
+
+
+def choose(rungs: list[Rung]) -> Rung:
+    """The smallest rung within one standard error of the best in PSNR (and `MOST_LOST`) and in detail."""
+    best = max(rungs, key=lambda r: np.mean(r.psnr_fg))
+    least = np.mean(best.psnr_fg) - min(standard_error(best.psnr_fg), MOST_LOST)
+    least_detail = np.mean(best.detail) - standard_error(best.detail)
+    good = [r for r in rungs if np.mean(r.psnr_fg) >= least and np.mean(r.detail) >= least_detail]
+    return min(good, key=lambda r: r.n_gaussians)
+
+
+def standard_error(values: list[float]) -> float:
+    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0

@@ -1,0 +1,63 @@
+"""What the training charts are made of, on made-up trainings."""
+
+import csv
+
+import numpy as np
+import pytest
+from gsac.benchmarks import training
+from gsac.benchmarks.size import bench as size
+from gsac.benchmarks.size import chart as size_chart
+from gsac.benchmarks.speed_accuracy import chart, table
+from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto, seconds_to
+from gsac.stages.contract import BadInput
+
+
+def made(recipe, curve, clip="a", steps=100, seed=0):
+    return Trial(clip, recipe, steps, seed, curve, *curve[-1], curve[-1][1] + 1, 0.95, 0.9, 1000, 0.5)
+
+
+FAST = made("fast", [(2.0, 21.0), (10.0, 25.0), (40.0, 26.5)])
+PAPER = made("paper", [(50.0, 22.0), (400.0, 25.0)])
+
+
+def test_seconds_to_a_quality_are_those_of_the_first_checkpoint_that_has_it():
+    assert seconds_to(FAST, 25.0) == 10.0 and seconds_to(FAST, 25.1) == 40.0 and seconds_to(PAPER, 26.0) is None
+
+
+def test_the_pareto_line_holds_what_nothing_beats():
+    assert pareto(FAST.curve + PAPER.curve) == FAST.curve
+    assert pareto([(1.0, 21.0), (1.0, 23.0), (2.0, 22.0)]) == [(1.0, 23.0)]
+
+
+def test_hypervolume_is_the_area_to_an_hour_and_20_db():
+    assert hypervolume([(36.0, 25.0)]) == pytest.approx(10.0)
+    assert hypervolume([(36.0, 25.0), (360.0, 26.0)]) == pytest.approx(11.0)
+    assert hypervolume([(36.0, 19.0), (5000.0, 30.0)]) == 0
+
+
+def test_the_comparison_names_the_ratio_and_the_difference():
+    words = table.text([FAST, PAPER])
+    assert "reaches paper's 25.00 dB after 10.0 CPU s, 40.0x sooner" in words and "best end is +1.50 dB" in words
+    assert "never reaches paper's 27.00 dB" in table.text([FAST, made("paper", [(400.0, 27.0)])])
+
+
+def test_spread_of_seeds_and_unreached_qualities_are_in_the_table():
+    row = table.text([FAST, made("fast", [(2.0, 21.0), (20.0, 24.5)], seed=1)]).splitlines()[2]
+    assert f"{np.std([26.5, 24.5], ddof=1):.2f}" in row and row.split()[-1] == "-"
+    assert row.split()[-4:-2] == ["15.0", "-"], "24 dB after 10 and 20 s; 25 dB by one of the two only"
+
+
+def test_charts_and_csv_are_written(tmp_path):
+    table.write_csv([FAST, PAPER], tmp_path / "s.csv")
+    assert len(list(csv.reader(open(tmp_path / "s.csv")))) == 6
+    rungs = [{"n_gaussians": n, "psnr_fg_mean": 25.0, "psnr_fg_error": 0.1, "detail_mean": 0.9, "detail_error": 0.01,
+              "chosen": n == 400} for n in (1000, 400)]
+    size.write_csv({"a": rungs}, tmp_path / "n.csv")
+    assert list(csv.reader(open(tmp_path / "n.csv")))[2][1] == "400" and size.text({"a": rungs}).splitlines()[2].endswith("*")
+    for path in chart.draw([FAST, PAPER], tmp_path) + size_chart.draw({"a": rungs}, {"a": [(400, 24.0)]}, tmp_path):
+        assert path.stat().st_size > 5000
+
+
+def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):
+    with pytest.raises(BadInput, match="there is no split/frames"):
+        training.of_run(tmp_path)

@@ -1,0 +1,59 @@
+"""The ladder of sizes: the rule on made-up figures, the thinning on real gaussians, the whole on the small person."""
+
+import json
+
+import numpy as np
+import pytest
+from gsac.avatar.gaussians import Gaussians
+from gsac.stages.contract import BadInput, make_config
+from gsac.stages.train import STAGE, ladder
+from gsac.stages.train.sizes import Rung, choose, standard_error
+from gsac.stages.train.stage import run
+
+
+def rung(count, psnr, detail=0.9, spread=0.1):
+    wobble = np.array([-1, 0, 1, 0])
+    return Rung(count, list(psnr + spread * wobble), list(detail + 0.02 * wobble))
+
+
+def test_the_smallest_size_within_one_standard_error_of_the_best_is_chosen():
+    error = standard_error(rung(1, 0.0).psnr_fg)
+    rungs = [rung(8000, 26.0), rung(4000, 26.01), rung(2000, 26.01 - 0.9 * error), rung(1000, 26.01 - 1.1 * error)]
+    assert choose(rungs).n_gaussians == 2000
+
+
+def test_a_blurred_size_is_not_chosen_however_good_its_psnr():
+    assert choose([rung(8000, 26.0), rung(4000, 26.0, detail=0.8)]).n_gaussians == 8000
+
+
+def test_frames_that_differ_much_excuse_no_loss_above_the_bar():
+    rungs = [rung(8000, 26.0, spread=4), rung(4000, 25.8, spread=4), rung(2000, 25.6, spread=4)]
+    assert choose(rungs).n_gaussians == 4000
+
+
+def test_text_that_is_not_auto_is_refused():
+    with pytest.raises(BadInput, match="train.gaussians is 'many'"):
+        make_config(STAGE, {"gaussians": "many"})
+
+
+@pytest.mark.slow
+def test_auto_judges_its_sizes_and_takes_one_of_them(job, monkeypatch):
+    monkeypatch.setattr(ladder, "SIZES", (1200, 600, 150))
+    monkeypatch.setattr(ladder, "REFIT", 40)
+    made = job(gaussians="auto", pose_test_steps=0)
+    run(made)
+    figures = json.loads((made.out / "metrics.json").read_text())
+    curve = figures["size_curve"]
+    assert [row["n_gaussians"] for row in curve] == [1200, 600, 150]
+    chosen = [row["n_gaussians"] for row in curve if row["chosen"]]
+    assert len(Gaussians.read(made.out / "avatar.npz")) == pytest.approx(chosen[0], abs=1)
+    assert curve[2]["psnr_fg_mean"] < curve[0]["psnr_fg_mean"], "150 gaussians are not enough for a person"
+    assert curve[2]["psnr_fg_mean"] > curve[0]["psnr_fg_mean"] - 4, "what is left after thinning covers the person"
+
+
+@pytest.mark.slow
+def test_auto_without_held_out_frames_takes_a_fixed_size(job, monkeypatch):
+    monkeypatch.setattr(ladder, "UNJUDGED", 700)
+    made = job(gaussians="auto", frames=3, steps=5)
+    run(made)
+    assert json.loads((made.out / "metrics.json").read_text())["n_gaussians"] == 700
