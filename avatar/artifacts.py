@@ -9,8 +9,10 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:  # numpy is imported where it works: every `gsac status` reads this file
+    import numpy as np
 
 
 class ArtifactError(Exception):
@@ -68,6 +70,7 @@ def write_frame(path: Path, rgb: np.ndarray) -> None:
 
 def read_alpha(path: Path) -> np.ndarray:
     """(H, W) float32 in 0..1 from a one-channel half EXR."""
+    import numpy as np
     import OpenEXR
 
     with OpenEXR.File(str(path)) as f:
@@ -79,22 +82,29 @@ def write_alpha(path: Path, alpha: np.ndarray) -> None:
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with OpenEXR.File(header, {"A": alpha.astype(np.float16)}) as f:
+    with OpenEXR.File(header, {"A": alpha.astype("float16")}) as f:
         f.write(str(path))
 
 
 def write_arrays(path: Path, **arrays: np.ndarray) -> None:
     """Compressed npz, no pickle, byte-deterministic."""
+    import numpy as np
+
     with open(path, "wb") as f:
         np.savez_compressed(f, **arrays)
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """All arrays of an npz; objects are refused."""
+    import zipfile
+    import zlib
+
+    import numpy as np
+
     try:
         with np.load(path, allow_pickle=False) as z:
             return {k: z[k] for k in z.files}
-    except (OSError, ValueError, KeyError) as e:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as e:
         raise ArtifactError(f"{path}: not a readable npz ({e})") from e
 
 
@@ -116,6 +126,12 @@ def check_arrays(path: Path, shapes: dict[str, tuple]) -> dict[str, np.ndarray]:
     return arrays
 
 
+def _finite(array: np.ndarray) -> bool:
+    import numpy as np
+
+    return array.dtype.kind != "f" or bool(np.isfinite(array).all())
+
+
 KEYPOINT_SHAPES = {"xy": ("T", 133, 2), "score": ("T", 133), "world": ("T", 133, 3), "detector": ()}
 FILLED_SHAPES = KEYPOINT_SHAPES | {"missing": ("T", 2), "filled": ("T", 133), "sigma": ("T", 133)}
 FACE_SHAPES = {"valid": ("T",), "expression": ("T", "E"), "jaw": ("T", 3), "shape": ("S",), "landmarks": ("T", "L", 3)}
@@ -131,7 +147,7 @@ AVATAR_SHAPES = {"face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": 
 def check_keypoints(path: Path) -> None:
     arrays = check_arrays(path, KEYPOINT_SHAPES)
     score = arrays["score"]
-    if not (np.isfinite(score).all() and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
+    if not (_finite(score) and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
         raise ArtifactError(f"{path}: score must lie in 0..1")
 
 
@@ -146,14 +162,14 @@ def check_face(path: Path) -> None:
 def check_body(path: Path) -> None:
     arrays = check_arrays(path, BODY_SHAPES)
     for name, a in arrays.items():
-        if a.dtype.kind == "f" and not np.isfinite(a).all():
+        if not _finite(a):
             raise ArtifactError(f"{path}: array {name} is not finite")
 
 
 def check_avatar(path: Path) -> None:
     arrays = check_arrays(path, AVATAR_SHAPES)
     for name in AVATAR_SHAPES:
-        if not np.isfinite(arrays[name]).all():
+        if not _finite(arrays[name]):
             raise ArtifactError(f"{path}: array {name} is not finite")
 
 
