@@ -36,7 +36,7 @@ class LocalExecutor:
         self._pool.shutdown(wait=False, cancel_futures=True)
         for process in list(self._running):
             with contextlib.suppress(ProcessLookupError):
-                process.send_signal(signal.SIGINT)
+                process.terminate()  # SIGINT is deaf in what a shell put in the background
         self._pool.shutdown(wait=True)
 
     def submit(self, job: ClipJob) -> None:

@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import signal
 import subprocess
 from types import SimpleNamespace
 
@@ -149,3 +150,25 @@ def test_the_rate_counts_from_the_first_sign_of_progress(monkeypatch):
     reporter.progress("train", 51, 101, "steps")
     assert "5 steps/s, 10 s left" in lines.getvalue()
     assert progress_words(1, 101, "steps", 0.0, 1) == "1/101 steps"
+
+
+def test_a_batch_ends_its_clips_even_where_the_shell_made_them_deaf_to_ctrl_c(toy):
+    folder = toy.root / "clips"
+    folder.mkdir()
+    (folder / "one.mp4").write_text("alpha beta")
+    batch = subprocess.Popen(toy.command("batch", folder, "--out", toy.out, "--set", "cut.pause_s=60"), env=toy.env,
+                             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
+    toy.wait_for(lambda: toy.runs == ["cut"])
+    batch.terminate()
+    batch.communicate(timeout=20)
+    assert batch.returncode == ExitCode.INTERRUPTED
+    assert not list((toy.cache / "tmp").iterdir()), "the clip's stage has gone, and what it was writing"
+
+
+def test_status_knows_the_results_that_a_run_kept_beside_a_cache_that_cannot_be_written(toy):
+    toy.root.joinpath("cache").write_text("not a folder")
+    toy.ran()
+    assert (toy.out / ".store").is_dir()
+    assert toy.gsac("status", toy.out).code == ExitCode.OK
+    assert "up to date" in toy.gsac("explain", "join", toy.out).out
