@@ -27,6 +27,8 @@ REACH, OFFSET = 0.8, 0.2
 """Torso lengths from the body's axis, and of the middle of the seen torso from that axis."""
 TILT, BEND = 0.1, 0.05
 """Torso lengths: perspective's share up and down, and its second harmonic of the turn."""
+LEVERS = (1.0, 1.5, 2.0)
+"""How many times as far as the joint above a point is taken to go: an arm swings from the shoulder."""
 LIKELY = 4.0
 """Log likelihood below the best of the grid from which on a process has no say."""
 BIAS_SHARE = 0.3
@@ -74,14 +76,15 @@ def fill_arm(xy, filled, drift, side: str, lost, unsure, body: Turner, config) -
     measured, chain = xy.copy(), ARM[side]
     hand = np.arange(133)[HANDS[side]]
     all_seen = np.ones(len(xy), bool)
-    anchors = [(body.centre, all_seen)] + [(measured[:, chain[i + 1]], ~unsure[i]) for i in range(2)]
+    anchors = [[(body.centre, all_seen)]] + [
+        [(body.centre + lever * (measured[:, chain[i + 1]] - body.centre), ~unsure[i]) for lever in LEVERS] for i in range(2)]
     for part, points in enumerate(([chain[1]], [chain[2]], hand)):
         asked = lost[part] & within(lost[part], ~unsure[part], body.times, config)
         if not asked.any() or unsure[part].all():
             continue
         lead = len(points) - 1 if part < 2 else int(np.flatnonzero(hand == chain[3])[0])
-        place, precision = np.zeros((len(xy), len(points), 2)), np.zeros((len(xy), 2))
-        for anchor, believed in anchors[: part + 1]:
+        place, precision, answers = np.zeros((len(xy), len(points), 2)), np.zeros((len(xy), 2)), np.zeros((len(xy), 1))
+        for anchor, believed in sum(anchors[: part + 1], []):
             here, learnt = asked & believed, ~unsure[part] & believed
             if not here.any() or learnt.sum() < 3 and anchor is not body.centre:
                 continue
@@ -90,9 +93,11 @@ def fill_arm(xy, filled, drift, side: str, lost, unsure, body: Turner, config) -
             sure = 1 / (spread**2 + noise_px(anchor, believed) ** 2 + 1e-6)
             place[here] += sure[:, None] * (mean + anchor[here, None])
             precision[here] += sure
+            answers[here] += 1
         xy[np.ix_(asked, points)] = place[asked] / precision[asked, None]
         filled[np.ix_(asked, points)] = True
-        drift[np.ix_(asked, points)] = np.sqrt((1 / precision[asked]).mean(1))[:, None]
+        # The answers share most of what they know, so that several are hardly surer than one.
+        drift[np.ix_(asked, points)] = np.sqrt((answers[asked] / precision[asked]).mean(1))[:, None]
 
 
 def within(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config) -> np.ndarray:
