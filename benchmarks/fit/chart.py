@@ -15,6 +15,7 @@ COLOURS = {"lm": "#0b6e4f", "paper": "#b5532a"}
 LABELS = {"lm": "lm: Levenberg-Marquardt, all frames at once", "paper": "paper: published co-registration, Adam"}
 BAR_MM, BAR_S = 30.0, 5.0
 """What the fit is held to: mean joint error, and seconds for 60 frames."""
+TICKS_S = [n * 10.0**power for power in range(-1, 4) for n in (1, 2, 5)]
 
 
 def draw(trials: list[Trial], folder: Path) -> list[Path]:
@@ -43,7 +44,10 @@ def draw(trials: list[Trial], folder: Path) -> list[Path]:
              xlim=(min(times.min(), BAR_S) / 2, times.max() * 2.2), ylim=(0, None))
     axes.text(axes.get_xlim()[0] * 1.08, BAR_MM, f" the bar: {BAR_MM:.0f} mm in {BAR_S:.0f} s", va="bottom", fontsize=7,
               color=COLOURS["lm"])
+    low, high = axes.get_xlim()
+    axes.set_xticks([x for x in TICKS_S if low <= x <= high], minor=False)
     axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")
     axes.grid(alpha=0.25, which="both", lw=0.5)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=7, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
