@@ -200,7 +200,7 @@ def test_files_are_linked_with_their_sizes(whole):
 
 def test_a_parameter_that_is_not_at_its_default_shows_both(whole):
     text = Page(whole / "report.html").text("parameters")
-    assert re.search(r"train\.steps 77 \(default \d+\)", text)
+    assert re.search(r"train\.steps 77 \(default \w+\)", text)
     assert "train.seed 0 (default" not in text
 
 
