@@ -39,6 +39,13 @@ FORMULA unsigned reaching(const Staged &staged, int base, int n, float x, float 
     return __ballot_sync(~0u, hit);
 }
 
+FORMULA float alpha_at(const Staged &staged, int j, float x, float y) {
+    float4 p = staged.a[j], q = staged.b[j];
+    float dx = x - p.x, dy = y - p.y;
+    bool clipped;
+    return alpha_of(dx * (dx * p.z + dy * p.w) + dy * dy * q.x, q.y, q.z, clipped);
+}
+
 // Sorts n keys ascending with the whole block; strides inside a warp's own 64 keys need no block barrier.
 FORMULA void sort(unsigned long long *keys, int n) {
     int room = 2;
@@ -110,16 +117,19 @@ extern "C" __global__ void __launch_bounds__(PIXELS) blend(Scene s) {
             for (int base = 0; base < here; base += 32) {
                 unsigned hits = reaching(staged, base, here, middle_x, middle_y);
                 while (hits) {
+                    // two at a time: their alphas do not wait for each other
                     int j = base + __ffs(hits) - 1;
                     hits &= hits - 1;
-                    float4 p = staged.a[j], q = staged.b[j], c = staged.c[j];
-                    float dx = px - p.x, dy = py - p.y, a;
-                    bool clipped;
-                    float weight = composite(dx * (dx * p.z + dy * p.w) + dy * dy * q.x, q.y, q.z, T, a, clipped);
-                    red += weight * c.x;
-                    green += weight * c.y;
-                    blue += weight * c.z;
-                    alpha += weight;
+                    bool both = hits != 0;
+                    int k = both ? base + __ffs(hits) - 1 : j;
+                    hits &= hits - 1;
+                    float first = alpha_at(staged, j, px, py), second = both ? alpha_at(staged, k, px, py) : 0;
+                    float4 c = staged.c[j], e = staged.c[k];
+                    float weight = composite(first, T), other = composite(second, T);
+                    red += weight * c.x + other * e.x;
+                    green += weight * c.y + other * e.y;
+                    blue += weight * c.z + other * e.z;
+                    alpha += weight + other;
                 }
                 if (__all_sync(~0u, T == 0)) break;
             }
@@ -200,9 +210,9 @@ extern "C" __global__ void __launch_bounds__(PIXELS) blend_backward(Scene s) {
                     int bit = __ffs(hits) - 1, j = base + bit;
                     hits &= hits - 1;
                     float4 p = staged.a[j], q = staged.b[j], c = staged.c[j];
-                    float dx = px - p.x, dy = py - p.y, a;
+                    float dx = px - p.x, dy = py - p.y;
                     bool clipped;
-                    float weight = composite(dx * (dx * p.z + dy * p.w) + dy * dy * q.x, q.y, q.z, T, a, clipped);
+                    float a = alpha_of(dx * (dx * p.z + dy * p.w) + dy * dy * q.x, q.y, q.z, clipped), weight = composite(a, T);
                     if (!__any_sync(~0u, weight > 0)) continue;
                     float g = composite_backward(weight, a, clipped, v.x * c.x + v.y * c.y + v.z * c.z + v.w, behind);
                     float eight[8] = {g, g * dx, g * dy, g * dx * dx, g * dx * dy, g * dy * dy, weight * v.x, weight * v.y};

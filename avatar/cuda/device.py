@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from gsac.avatar.cuda import why_not
@@ -75,9 +75,14 @@ class Device:
             attribute.CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT))
         self.name = _call("cuDeviceGetName", 128, handle).split(b"\0")[0].decode()
         self.architecture = f"sm_{major}{minor}"
-        module = _call("cuModuleLoadData", cubin(self.architecture))
-        self.kernels = {name: _call("cuModuleGetFunction", module, name.encode()) for name in KERNELS}
+        self.kernels: dict = {}
+        self.load(cubin(self.architecture), KERNELS)
         self.stream = _call("cuStreamCreate", driver.CUstream_flags.CU_STREAM_DEFAULT)
+
+    def load(self, code: bytes, names: Iterable[str]) -> None:
+        """Adds kernels from machine code."""
+        module = _call("cuModuleLoadData", code)
+        self.kernels |= {name: _call("cuModuleGetFunction", module, name.encode()) for name in names}
 
     def launch(self, kernel: str, grid: tuple[int, int], threads: int, struct: ctypes.Structure) -> None:
         """The kernel takes one struct by value."""

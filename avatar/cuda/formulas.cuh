@@ -237,17 +237,20 @@ FORMULA Bound<real> project_backward(const Lens<real> &lens, const Bound<real> &
 
 #ifdef __CUDACC__
 FORMULA float falloff(float s) { return __expf(-s); }
+FORMULA float quotient(float a, float b) { return __fdividef(a, b); }
 #endif
 FORMULA double falloff(double s) { return exp(-s); }
+FORMULA double quotient(double a, double b) { return a / b; }
 
-// One gaussian at one pixel. T: transmittance, 0 once stopped; returns its weight. T is moved on.
-template <class real> FORMULA real composite(real s, real s_max, real opacity, real &T, real &a, bool &clipped) {
-    a = 0;
-    clipped = false;
-    if (!(s <= s_max)) return 0;
+// Alpha of one gaussian at one pixel, 0 outside its rim.
+template <class real> FORMULA real alpha_of(real s, real s_max, real opacity, bool &clipped) {
     real raw = opacity * falloff(s);
     clipped = raw > real(MAX_ALPHA);
-    a = clipped ? real(MAX_ALPHA) : raw;
+    return s <= s_max ? fmin(raw, real(MAX_ALPHA)) : real(0);
+}
+
+// Its weight in the pixel. T: transmittance, 0 once stopped; is moved on.
+template <class real> FORMULA real composite(real a, real &T) {
     real weight = T * a, after = T - weight;
     bool stopped = after <= real(STOP);
     T = stopped ? real(0) : after;
@@ -258,7 +261,7 @@ template <class real> FORMULA real composite(real s, real s_max, real opacity, r
 template <class real> FORMULA real composite_backward(real weight, real a, bool clipped, real colour, real &behind) {
     real own = weight * colour;
     behind -= own;
-    return weight > 0 && !clipped ? own - a * behind / (1 - a) : real(0);
+    return weight > 0 && !clipped ? own - quotient(a * behind, 1 - a) : real(0);
 }
 
 // sin t / t, (1 - cos t) / t^2 and the derivative of each by t, divided by t.

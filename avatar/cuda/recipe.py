@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ class Recipe:
     seed: int = 0
     coarse_share: float = 0.45
     """Part of the steps that run on the first of two levels."""
-    mu_rate: float = 4e-4
+    mu_rate: float = 1.5e-3
     rgb_rate: float = 1e-2
     quat_rate: float = 1e-2
     scale_rate: float = 1e-2
@@ -28,7 +28,7 @@ class Recipe:
     pose_pull: float = 1e-3
     ssim: float = 0.1
     sobel: float = 0.0
-    mask: float = 0.1
+    mask: float = 0.3
     needle: float = 4.0
     largest: float = 0.05
     """Longest axis of a gaussian, m at rest."""
@@ -46,6 +46,12 @@ class Recipe:
     """lambda of the displacement's smoothing."""
     hand_share: float = 0.1
     """Pose rate of the fingers relative to the body's; jaw and eyes stay."""
+
+    @classmethod
+    def of(cls, config, **more) -> Recipe:
+        """From a `TrainConfig`: the fields that both have, `more` on top. It knows no exposure: refuse that before."""
+        given = {f.name: getattr(config, f.name, None) for f in fields(cls)}
+        return cls(**({name: value for name, value in given.items() if value is not None} | more))
 
 
 class Drawn(NamedTuple):

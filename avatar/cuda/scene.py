@@ -22,7 +22,8 @@ STATE = {name: INT for name in (
 """Counters on the device. overflow: the lists were too short, nothing moves until they are longer; needed: how long."""
 
 POINTERS = {
-    "frames": "Frame", "pixels": "unsigned char", "occupied": "unsigned char", "plan": "Plan", "order": "int", "background": "float",
+    "frames": "Frame", "pixels": "unsigned char", "occupied": "unsigned char", "plan": "Plan", "order": "int",
+    "background": "float",
     "state": "State", "now": "Now",
     "rest": "float", "joints": "float", "parents": "int", "joint_level": "int", "child_start": "int", "child": "int",
     "skin_index": "int", "skin_weight": "float", "corner": "int", "vertex_start": "int", "vertex_item": "int",
@@ -35,8 +36,8 @@ POINTERS = {
     "list": "unsigned long long", "moments": "float", "tile_count": "int", "tile_start": "int", "tile_check": "int",
     "tile_done": "int", "near_flag": "unsigned char", "heavy": "int", "light": "int", "near": "int", "segment": "int",
     "checkpoint": "float", "image": "float", "grad_image": "float", "slopes": "float", "tile_loss": "float", "losses": "float",
-    "near_start": "int", "near_vertex": "int", "offset_share": "float", "offset": "float", "grad_rest": "float", "gathered": "float",
-    "offset_first": "float", "offset_second": "float", "solve_step": "float",
+    "near_start": "int", "near_vertex": "int", "offset_share": "float", "offset": "float", "grad_rest": "float",
+    "gathered": "float", "offset_first": "float", "offset_second": "float", "solve_step": "float",
     "grad_out": "float", "pose_grad_out": "double",
 }
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
@@ -57,7 +58,7 @@ def declarations() -> str:
     """The structs as CUDA text."""
     lines = ["struct Now;"]
     for name, fields in (("Frame", FRAME), ("Plan", PLAN), ("State", STATE)):
-        body = (f"{_NAMES.get(kind, 'int')} {field}{f'[{MOST_BATCH}]' if kind not in _NAMES else ''};" for field, kind in fields.items())
+        body = (f"{_NAMES[kind]} {field};" if kind in _NAMES else f"int {field}[{MOST_BATCH}];" for field, kind in fields.items())
         lines.append(f"struct {name} {{ {' '.join(body)} }};")
     body = [f"{kind} *{name};" for name, kind in POINTERS.items()] + [f"{_NAMES[kind]} {name};" for name, kind in NUMBERS.items()]
     return "\n".join([*lines, f"struct Scene {{ {' '.join(body)} }};", ""])

@@ -224,9 +224,11 @@ class CudaTrainer:
         batch, n, v = self.batch, self.count, self.scene.vertex_count
         tiles, pixels = batch * self.scene.max_tiles, batch * self.scene.max_pixels
         shapes = {
-            "local": (batch, JOINTS, 9), "transform": (batch, JOINTS, 12), "vertices": (batch, v, 3), "grad_vertices": (batch, v, 3),
+            "local": (batch, JOINTS, 9), "transform": (batch, JOINTS, 12), "vertices": (batch, v, 3),
+            "grad_vertices": (batch, v, 3),
             "corner_grad": (batch, n, 9), "joint_grad": (batch, JOINTS, 12), "splat": (batch, n, 12), "depth": (batch, n),
-            "grad_rest": (batch, v, 3), "solve_step": (2, v, 3), "image": (pixels, 4), "grad_image": (pixels, 4), "tile_loss": tiles}
+            "grad_rest": (batch, v, 3), "solve_step": (2, v, 3), "image": (pixels, 4), "grad_image": (pixels, 4),
+            "tile_loss": tiles}
         if self.recipe.ssim:
             shapes["slopes"] = (9, pixels)
         for name, shape in shapes.items():
@@ -245,7 +247,8 @@ class CudaTrainer:
             "allocate": ((-(-self.scene.max_tiles // 256), batch), 256), "fill": ((-(-n // 128), batch), 128),
             "blend": ((min(tiles, 6 * p), 1), 256), "compare": ((min(tiles, 12 * p), 1), 256),
             "image_gradient": ((min(tiles, 12 * p), 1), 256), "blend_backward": ((5 * p, 1), 256),
-            "gaussian_step": ((-(-n // 128), 1), 128), "gather": ((-(-v // 128), batch), 128), "joint_step": ((JOINTS + 1, batch), 512)}
+            "gaussian_step": ((-(-n // 128), 1), 128), "gather": ((-(-v // 128), batch), 128),
+            "joint_step": ((JOINTS + 1, batch), 512)}
         if self.recipe.offset_rate:
             self.grids["offset_step"] = ((-(-v // 256), 1), 256)
 

@@ -69,29 +69,42 @@ def compare(figure) -> None:
 
     for compiled in (False, True):
         took = seconds_per_step(figure, start(figure.body, 25000), Recipe(ssim=0.1, sobel=0.1), compiled)
-        print(f"torch + gsplat, {'torch.compile' if compiled else 'eager'}: {took * 1e3:.2f} ms a step, {took * 3000:.1f} s for 3000 "
-              "steps of one frame", flush=True)
+        print(f"torch + gsplat, {'torch.compile' if compiled else 'eager'}: {took * 1e3:.2f} ms a step, "
+              f"{took * 3000:.1f} s for 3000 steps of one frame", flush=True)
 
 
 def measure(device, figure, quick: bool) -> None:
     from gsac.avatar.cuda.recipe import Recipe
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
-    from gsac.benchmarks.gpu.timing import copy_bandwidth, kernel_microseconds, least_bytes, run_milliseconds, step_milliseconds
+    from gsac.benchmarks.gpu.timing import (
+        copy_bandwidth,
+        evaluations,
+        float_rate,
+        kernel_microseconds,
+        least_bytes,
+        run_milliseconds,
+        step_milliseconds,
+        useful_operations,
+    )
 
-    ceiling = copy_bandwidth(device)
-    print(f"copy ceiling {ceiling / 1e12:.2f} TB/s")
+    copied, counted = copy_bandwidth(device), float_rate(device)
+    print(f"ceilings: copy {copied / 1e12:.2f} TB/s, float32 {counted / 1e12:.1f} T operations/s")
     for count, batch in ((25000, 1), (25000, 4), (25000, 8), (10000, 1), (100000, 1)):
         recipe = Recipe(steps=3000, batch=batch, ssim=0.1, sobel=0.1)
-        trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, count), recipe, device)
+        trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, count), recipe,
+                              device)
         steps = step_milliseconds(trainer)
-        kernels, least = kernel_microseconds(trainer), least_bytes(trainer)
-        state = trainer.state()
+        kernels, least, state = kernel_microseconds(trainer), least_bytes(trainer), trainer.state()
+        useful = useful_operations(trainer, batch * evaluations(figure, trainer.gaussians()))
         print(f"step {count} gaussians, batch {batch}: median {np.median(steps) * 1e3:.0f} us ({min(steps) * 1e3:.0f}-"
               f"{max(steps) * 1e3:.0f}), {np.median(steps) / batch * 1e3:.0f} us a frame; {trainer.memory() / 1e9:.2f} GB; "
               f"{state.pairs} pairs, {state.heavy}+{state.light} tiles, {state.segments} segments")
         for name, us in kernels.items():
-            print(f"    {name:16s} {us:7.1f} us  {least[name] / 1e6:7.2f} MB least, {least[name] / ceiling * 1e6:5.1f} us at the ceiling")
+            floors = f"{least[name] / 1e6:7.2f} MB = {least[name] / copied * 1e6:5.1f} us"
+            if name in useful:
+                floors += f", {useful[name] / 1e9:6.3f} G operations = {useful[name] / counted * 1e6:5.1f} us"
+            print(f"    {name:16s} {us:7.1f} us; at the ceilings {floors}")
         trainer.close()
     if quick:
         return
@@ -99,8 +112,8 @@ def measure(device, figure, quick: bool) -> None:
         recipe = Recipe(steps=steps, batch=batch, ssim=0.1, sobel=0.1, coarse_share=0)
         results = []
         for _ in range(2):
-            trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 25000), recipe, device)
-            trainer.train(0)
+            trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 25000), recipe,
+                                  device)
             ms = run_milliseconds(trainer, steps)
             results.append((trainer.gaussians(), trainer.poses(), trainer.losses()))
             error = np.abs(trainer.poses()[0] - figure.true_pose)[:, :22].mean()

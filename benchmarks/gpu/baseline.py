@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from gsac.avatar.cuda.lists import joint_levels
 from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.gaussians import Gaussians
 from gsac.benchmarks.gpu.figure import Figure
+from torch.nn import functional
 
 
-def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compiled: bool, steps: int = 60, warm: int = 20) -> float:
+def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compiled: bool, steps: int = 60,
+                     warm: int = 20) -> float:
     """One frame a step, by device events; compiled: skinning + binding and the losses through torch.compile."""
     from gsplat import rasterization
 
@@ -55,10 +56,10 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
         v0, v1, v2 = vertices[corner].unbind(1)
         cross = torch.linalg.cross(v2 - v1, v0 - v1)
         area2, side = cross.norm(dim=1).clamp(min=1e-12), (v0 - v2).norm(dim=1)
-        a, n = F.normalize(v2 - v1, dim=1), cross / area2[:, None]
+        a, n = functional.normalize(v2 - v1, dim=1), cross / area2[:, None]
         axes = torch.stack([a, n, torch.linalg.cross(a, n)], 2)
         size = 10 * (area2 / side + side)
-        w, i, j, k = F.normalize(quat, dim=1).unbind(1)
+        w, i, j, k = functional.normalize(quat, dim=1).unbind(1)
         own = torch.stack([1 - 2 * (j * j + k * k), 2 * (i * j - w * k), 2 * (i * k + w * j), 2 * (i * j + w * k),
                            1 - 2 * (i * i + k * k), 2 * (j * k - w * i), 2 * (i * k - w * j), 2 * (j * k + w * i),
                            1 - 2 * (i * i + j * j)], 1).reshape(-1, 3, 3)
@@ -68,7 +69,8 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
 
     def blur(images):
         flat = images.reshape(-1, 1, *images.shape[-2:])
-        flat = F.conv2d(F.conv2d(flat, window.view(1, 1, 1, 11), padding=(0, 5)), window.view(1, 1, 11, 1), padding=(5, 0))
+        flat = functional.conv2d(flat, window.view(1, 1, 1, 11), padding=(0, 5))
+        flat = functional.conv2d(flat, window.view(1, 1, 11, 1), padding=(5, 0))
         return flat.reshape(images.shape)
 
     def loss_of(rgb, alpha, shot, background):
@@ -78,8 +80,8 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
         mx, my, q, p = blur(torch.stack([image, target, image**2 + target**2, image * target]))
         squares, product = mx * mx + my * my, mx * my
         similarity = (2 * product + 1e-4) * (2 * (p - product) + 9e-4) / ((squares + 1e-4) * (q - squares + 9e-4))
-        edges = F.conv2d((image - target)[None], filters, padding=1, groups=3)
-        return (F.mse_loss(image, target) + recipe.ssim * (1 - similarity.mean()) + recipe.sobel * 2 * (edges**2).mean()
+        edges = functional.conv2d((image - target)[None], filters, padding=1, groups=3)
+        return (functional.mse_loss(image, target) + recipe.ssim * (1 - similarity.mean()) + recipe.sobel * 2 * (edges**2).mean()
                 + recipe.mask * ((alpha[..., 0] - truth[..., 3]) ** 2).mean())
 
     if compiled:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 from gsac.avatar.cuda.device import Buffer, Device, _call
+from gsac.avatar.cuda.kernels import compiled
 from gsac.avatar.cuda.trainer import REPLAY, CudaTrainer
+from gsac.avatar.raster import render_bound
 
 
 def step_milliseconds(trainer: CudaTrainer, replays: int = 30, warm: int = 3) -> list[float]:
@@ -70,6 +74,55 @@ def copy_bandwidth(device: Device, size: int = 1 << 30) -> float:
     return 2 * size / np.median(times[2:]) * 1e3
 
 
+class _Spin(ctypes.Structure):
+    _fields_ = [("out", ctypes.c_void_p), ("turns", ctypes.c_int)]
+
+
+SPIN = """
+struct Spin { float *out; int turns; };
+extern "C" __global__ void spin(Spin s) {
+    float x[8], a = 1.0f + threadIdx.x * 1e-9f, b = blockIdx.x * 1e-9f;
+    for (int k = 0; k < 8; ++k) x[k] = k + b;
+    for (int i = 0; i < s.turns; ++i)
+#pragma unroll
+        for (int k = 0; k < 8; ++k) x[k] = x[k] * a + b;
+    float sum = 0;
+    for (int k = 0; k < 8; ++k) sum += x[k];
+    s.out[blockIdx.x * blockDim.x + threadIdx.x] = sum;
+}
+"""
+
+
+def float_rate(device: Device, turns: int = 4096) -> float:
+    """float32 operations a second of independent multiply-adds, an addition and a multiplication counted as two."""
+    device.load(compiled(SPIN, device.architecture), ["spin"])
+    blocks = device.processors * 16
+    out = Buffer(blocks * 256, np.float32)
+    begin, end, times = device.event(), device.event(), []
+    for _ in range(12):
+        device.mark(begin)
+        device.launch("spin", (blocks, 1), 256, _Spin(out.pointer, turns))
+        device.mark(end)
+        times.append(device.milliseconds(begin, end))
+    out.free()
+    return blocks * 256 * 16 * turns / np.median(times[2:]) * 1e3
+
+
+def useful_operations(trainer: CudaTrainer, evaluations: float) -> dict[str, float]:
+    """float32 operations that the four large kernels cannot avoid; evaluations: (gaussian, pixel) pairs that are composited."""
+    state, ssim = trainer.state(), trainer.scene.ssim > 0
+    active, near = (state.heavy + state.light) * 256, state.near * 256
+    return {"blend": 32 * evaluations, "blend_backward": 62 * evaluations,
+            "compare": near * 3 * (20 + ssim * (4 * 44 + 40)), "image_gradient": active * 3 * (20 + ssim * (3 * 44 + 6))}
+
+
+def evaluations(figure, gaussians, t: int = 0) -> float:
+    """(Gaussian, pixel) pairs of a frame in the 4x4 blocks that the CPU path composites."""
+    vertices = figure.vertices(figure.pose[t], figure.transl[t])
+    rendering = render_bound(vertices, figure.body.faces, gaussians, figure.shots[t].camera)
+    return 16.0 * sum(bin(int(mask)).count("1") for mask in rendering.state.pair_mask)
+
+
 def least_bytes(trainer: CudaTrainer) -> dict[str, float]:
     """Bytes that each kernel must move at least, from the last step's counters: inputs read once, outputs written once."""
     state, s = trainer.state(), trainer.scene
@@ -77,9 +130,11 @@ def least_bytes(trainer: CudaTrainer) -> dict[str, float]:
     active, near = (state.heavy + state.light) * 256, state.near * 256
     posed = v * 12 + n * (12 + 12 + 16 + 12 + 4)
     return {
-        "skin": batch * v * (12 + 12) + v * 32 + batch * s.max_tiles * 4, "project": batch * (posed + n * (48 + 8 + 8) + pairs / batch * 8),
+        "skin": batch * v * (12 + 12) + v * 32 + batch * s.max_tiles * 4,
+        "project": batch * (posed + n * (48 + 8 + 8) + pairs / batch * 8),
         "allocate": batch * s.max_tiles * 14, "fill": batch * n * 16 + pairs * 12, "blend": pairs * (16 + 48) + active * 16,
         "compare": near * (16 + 4 + 36 * (s.ssim > 0)), "image_gradient": active * (16 + 4 + 16 + 36 * (s.ssim > 0)),
         "blend_backward": pairs * (8 + 48 + 12 + 36) + active * 32,
-        "gaussian_step": pairs * 36 + batch * (posed + n * (12 + 36)) + n * 4 * 14 * 6, "gather": batch * (n * 36 + v * 12) + n * 12,
+        "gaussian_step": pairs * 36 + batch * (posed + n * (12 + 36)) + n * 4 * 14 * 6,
+        "gather": batch * (n * 36 + v * 12) + n * 12,
         "joint_step": batch * v * 24 + v * 32}

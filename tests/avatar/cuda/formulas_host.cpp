@@ -69,9 +69,10 @@ void render_all(int n, const double *lens, const double *means, const double *ro
                 for (int i = 0; i < n; ++i) {
                     Splat<double> s = project(lens_of(lens), bound_of(means + 3 * i, rotations + 9 * i, scales + 3 * i), opacity[i]);
                     if (!s.seen) continue;
-                    double dx = x + 0.5 - s.x, dy = y + 0.5 - s.y, a;
+                    double dx = x + 0.5 - s.x, dy = y + 0.5 - s.y;
                     bool clipped;
-                    double weight = composite(dx * (dx * s.ha + dy * s.b) + dy * dy * s.hc, s.s_max, opacity[i], T, a, clipped);
+                    double a = alpha_of(dx * (dx * s.ha + dy * s.b) + dy * dy * s.hc, s.s_max, opacity[i], clipped);
+                    double weight = composite(a, T);
                     const double *c = rgb + 3 * i;
                     if (pass == 0) {
                         for (int k = 0; k < 3; ++k) out[k] += weight * c[k];
