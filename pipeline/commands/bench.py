@@ -28,6 +28,6 @@ def names() -> list[str]:
     import gsac.benchmarks
 
     packages = [m.name for m in pkgutil.iter_modules(gsac.benchmarks.__path__) if m.ispkg]
-    folders = [f"{root}/{package}" for package in packages for root in gsac.benchmarks.__path__]
-    found = {m.module_finder.path for m in pkgutil.iter_modules(folders) if m.name == "bench"}
-    return sorted(folder.rsplit("/", 1)[1].replace("_", "-") for folder in found)
+    roots = gsac.benchmarks.__path__
+    found = [p for p in packages if any(m.name == "bench" for m in pkgutil.iter_modules([f"{root}/{p}" for root in roots]))]
+    return sorted(name.replace("_", "-") for name in found)

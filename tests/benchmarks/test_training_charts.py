@@ -9,6 +9,7 @@ from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart
 from gsac.benchmarks.speed_accuracy import chart, table
 from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto, seconds_to
+from gsac.pipeline.commands.bench import names
 from gsac.stages.contract import BadInput
 
 
@@ -61,3 +62,7 @@ def test_charts_and_csv_are_written(tmp_path):
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):
     with pytest.raises(BadInput, match="there is no split/frames"):
         training.of_run(tmp_path)
+
+
+def test_every_benchmark_is_found_by_its_name():
+    assert {"fit", "size", "speed-accuracy"} <= set(names())
