@@ -97,11 +97,11 @@ class Window:
 
 
 def windows(frames: int, gap: int, rng, inside: int = 3) -> list[Window]:
-    """At random places inside, and at both ends of the clip; left, right and both hands in turn."""
+    """At random places inside, of the left, the right and both hands in turn, and at both ends of the clip, of both."""
     room = frames - gap - 2 * MARGIN
     firsts = [(int(rng.integers(room + 1)) + MARGIN, "inside") for _ in range(inside) if room >= 0]
     turn = (("left",), ("right",), ("left", "right"))
-    return [Window(first, first + gap, turn[(i + gap // 2) % 3], where, lost)
+    return [Window(first, first + gap, turn[(i + gap // 2) % 3 if where == "inside" else 2], where, lost)
             for i, (first, where) in enumerate([*firsts, (0, "end"), (frames - gap, "end")]) for lost in ("arm", "hand")]
 
 
