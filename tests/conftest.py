@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -232,8 +233,10 @@ class Toy:
         return [sys.executable, "-P", "-m", "gsac.pipeline.cli", *map(str, arguments)]
 
     def start(self, *arguments: object, **env: str) -> subprocess.Popen:
+        """With Ctrl-C working, even where the tests themselves run in a shell's background."""
         return subprocess.Popen(self.command(*arguments), cwd=self.root, env=self.env | env, text=True,
-                                stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
 
     def gsac(self, *arguments: object, cwd: Path | None = None, **env: str) -> Done:
         done = subprocess.run(self.command(*arguments), cwd=cwd or self.root, env=self.env | env, text=True,
