@@ -65,7 +65,7 @@ class Actor:
     def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path) -> RunInfo:
         name, project = parts.stage, self.keys.project
         now = datetime.datetime.now(datetime.UTC)
-        info = RunInfo(started=now.isoformat(timespec="seconds"), device=self.keys.device)
+        info = RunInfo(started=now.isoformat(timespec="seconds"), device=parts.device or self.keys.device)
 
         def hear(event: dict[str, Any]) -> None:
             if event["event"] == "progress":
@@ -81,7 +81,7 @@ class Actor:
             "declaration": f"{project.package}.{name}", "entry": project.entry(name),
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
             "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
-            "device": self.keys.device,
+            "device": info.device,
         }
         try:
             end = run_child(order, log, hear)

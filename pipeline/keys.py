@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
+from gsac.avatar.cuda import why_not
 from gsac.cache.code import code_parts
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
@@ -20,6 +19,8 @@ from gsac.stages.contract import BadInput
 DEVICE = "GSAC_DEVICE"
 """Environment variable: `cpu` or `cuda`, instead of what is found."""
 DEVICES = ("cpu", "cuda")
+AUTO = "auto"
+"""Value of a stage's parameter `device` that leaves the choice to the engine."""
 
 
 class Keys:
@@ -35,26 +36,40 @@ class Keys:
     def device(self) -> str:
         return device_class()
 
+    def device_of(self, name: str) -> str:
+        """What the stage computes on: its own parameter `device`, or what there is where that is `auto`; empty: it is all the same.
+
+        Raises BadInput where the parameter names a device that is not there.
+        """
+        if not self.project.stage(name).uses_device:
+            return ""
+        wanted = getattr(self.configs[name], "device", AUTO)
+        if wanted == "cuda" != self.device:
+            why = f"{DEVICE} is cpu" if os.environ.get(DEVICE) else why_not()
+            raise BadInput(f"{name}.device is cuda, but {why}; or set {name}.device to auto")
+        return self.device if wanted == AUTO else wanted
+
     def parts(self, name: str, inputs: dict[str, str]) -> KeyParts:
         """inputs: port -> tree digest."""
         stage = self.project.stage(name)
-        config = self.configs[name]
+        config, device = self.configs[name], self.device_of(name)
+        params = plain(config)
+        if device:
+            params.pop("device", None)  # what was chosen counts, not whether it was asked for
         return KeyParts(
             stage=name,
             inputs=dict(inputs),
-            params=plain(config),
+            params=params,
             code=code_parts(self.project.entry(name), stage.code, self.memo),
             models={model: self.models.sha256(model) for model in stage.models(config)},
             packages={package: package_version(package) for package in stage.packages},
-            device=self.device if stage.uses_device else "",
+            device=device,
         )
 
 
 def device_class() -> str:
-    """`cuda` where both the driver and the [gpu] extra are there, else `cpu`; GSAC_DEVICE overrules."""
+    """`cuda` where a GPU can be used, else `cpu`; GSAC_DEVICE overrules."""
     named = os.environ.get(DEVICE)
     if named and named not in DEVICES:
         raise BadInput(f"{DEVICE}={named}: unknown device; choices: {', '.join(DEVICES)}")
-    if named:
-        return named
-    return "cuda" if Path("/dev/nvidiactl").exists() and importlib.util.find_spec("cuda") is not None else "cpu"
+    return named or ("cpu" if why_not() else "cuda")

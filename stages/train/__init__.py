@@ -18,5 +18,6 @@ STAGE = Stage(
         Output("heldout", check_folder),
     ),
     config=TrainConfig,
+    uses_device=True,
     packages=("numpy", "numba", "scipy", "opencv-contrib-python-headless", "OpenEXR"),
 )

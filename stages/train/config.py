@@ -8,13 +8,16 @@ from gsac.stages.contract import BadInput
 
 RECIPES = ("fast", "paper")
 AUTO = "auto"
-"""`gaussians` that the ladder of sizes chooses."""
+"""`gaussians` that the ladder of sizes chooses; `device` that the engine chooses."""
+DEVICES = (AUTO, "cpu", "cuda")
 
 
 @dataclass
 class TrainConfig:
     recipe: str = "fast"
     """Which optimisation fits the gaussians: fast, or paper: one gaussian a face and rates of its own."""
+    device: str = AUTO
+    """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
     gaussians: int | str = 12000
     """How many gaussians; auto: the fewest that the held-out frames cannot tell from the best; paper: one a face instead."""
     steps: int | None = None
@@ -61,6 +64,10 @@ class TrainConfig:
     def check(self) -> None:
         if self.recipe not in RECIPES:
             raise BadInput(f"train.recipe is {self.recipe!r}; choices: {', '.join(RECIPES)}")
+        if self.device not in DEVICES:
+            raise BadInput(f"train.device is {self.device!r}; choices: {', '.join(DEVICES)}")
+        if self.device == "cuda" and self.exposure:
+            raise BadInput("train.exposure is learned on the CPU only; set train.device to cpu, or train.exposure to false")
         if isinstance(self.gaussians, str) and self.gaussians != AUTO:
             raise BadInput(f"train.gaussians is {self.gaussians!r}; give a number, or {AUTO}")
         if self.gaussians != AUTO and self.gaussians < 100:
