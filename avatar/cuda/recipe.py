@@ -17,6 +17,8 @@ class Recipe:
     batch: int = 1
     """Frames of one step, at most as many as there are."""
     seed: int = 0
+    begin: float = 0.0
+    """Share of its way at which the training begins, for the rates: a refit begins late."""
     coarse_share: float = 0.45
     """Part of the steps that run on the first of two levels."""
     mu_rate: float = 1.5e-3
@@ -75,7 +77,7 @@ def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
         for b in range(batch):
             order[step, b] = left.pop()
             background[step, b] = random.random(3)
-    done = np.arange(recipe.steps) / max(recipe.steps, 1)
+    done = recipe.begin + (1 - recipe.begin) * np.arange(recipe.steps) / max(recipe.steps, 1)
     rates = np.zeros(recipe.steps, [(name, np.int32 if name == "level" else np.float32) for name in PLAN])
     rates["level"] = np.where(done < recipe.coarse_share, 0, levels - 1)
     for name, rate, end in (("mu", recipe.mu_rate, 0.01), ("quat", recipe.quat_rate, 0.1), ("log_scale", recipe.scale_rate, 0.1),

@@ -57,6 +57,9 @@ class CudaTrainer:
         self.frames, self.count = len(levels[0]), len(gaussians)
         self.buffers: dict[str, Buffer] = {}
         self.scene, self._graph = Scene(), None
+        self.seconds = 0.0
+        """On the device, by its own clock, in all calls of `train`."""
+        self._clock = self.device.event(), self.device.event()
         drawn = draw(recipe, self.frames, len(levels))
         self.batch, self.order, self.rates = drawn.order.shape[1], drawn.order, drawn.rates
         self._numbers(levels)
@@ -73,6 +76,8 @@ class CudaTrainer:
         """So many steps more, as far as the recipe goes; lists that prove too short are made longer and nothing is lost."""
         stop = min(self.state().step + steps, self.recipe.steps)
         self._set_state(stop=stop)
+        begin, end = self._clock
+        self.device.mark(begin)
         while (left := stop - self.state().step) > 0:
             if self._graph is None:
                 self._graph = self.device.graph(lambda: [self.step() for _ in range(REPLAY)])
@@ -82,6 +87,8 @@ class CudaTrainer:
             state = self.state()
             if state.overflow:
                 self._lists(state.needed * 3 // 2)
+        self.device.mark(end)
+        self.seconds += self.device.milliseconds(begin, end) / 1e3
 
     def step(self) -> None:
         """Launches one step's kernels; no more than `stop` are carried out."""

@@ -17,7 +17,7 @@ from gsac.stages.contract import StageError
 from gsac.stages.train.colours import PosedFrame, fill_unseen, read_colours
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.offsets import Offsets, fold
-from gsac.stages.train.task import Fit, Task
+from gsac.stages.train.task import Fit, Loop, Task
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 1600
@@ -36,9 +36,9 @@ LEAST_SHOWN = 0.1
 GAIN_RATE = 2e-3
 
 
-def fit(task: Task, count: int | None = None) -> Fit:
+def fit(task: Task, loop: Loop, count: int | None = None) -> Fit:
     """count: how many gaussians, else as configured. Raises StageError naming the step and the quantity that is not finite."""
-    trainer, _, coarse = train(task, count or task.config.gaussians)
+    trainer, _, coarse = loop.train(task, count or task.config.gaussians)
     return Fit(*trainer.recoloured(coarse), dict(trainer.gains))
 
 
@@ -46,8 +46,7 @@ def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, V
     """The trained gaussians, and the trained frames at full and at half the size."""
     config = task.config
     rng = np.random.default_rng(config.seed)
-    fine = {int(t): person_crop(task.views[t]) for t in task.trained}
-    coarse = {t: v.halved() for t, v in fine.items()}
+    fine, coarse = crops(task)
     trainer = Trainer(start(task, coarse, count), task)
     steps = config.steps or STEPS
     order = []
@@ -63,6 +62,12 @@ def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, V
     if trainer.offsets:
         trainer.fold_offsets()
     return trainer, fine, coarse
+
+
+def crops(task: Task) -> tuple[dict[int, View], dict[int, View]]:
+    """The trained frames, cut to the person, at full and at half the size."""
+    fine = {int(t): person_crop(task.views[t]) for t in task.trained}
+    return fine, {t: v.halved() for t, v in fine.items()}
 
 
 def start(task: Task, coarse: dict[int, View], count: int) -> Gaussians:

@@ -18,7 +18,7 @@ from gsac.stages.train import fast
 from gsac.stages.train.evaluate import align_pose, judge
 from gsac.stages.train.poses import carried
 from gsac.stages.train.sizes import Rung, choose
-from gsac.stages.train.task import Fit, Task
+from gsac.stages.train.task import Fit, Loop, Task
 
 SIZES = (24000, 16000, 12000, 8000, 6000, 4000, 2000, 1000)
 UNJUDGED = 12000
@@ -32,18 +32,18 @@ EVENNESS = 0.5
 """Power of what a gaussian shows in the chance to keep it: 1 would leave holes where many show little, 0 is blind."""
 
 
-def fit(task: Task) -> Fit:
+def fit(task: Task, loop: Loop) -> Fit:
     """As `fast.fit`, with `size_curve` and `size_rule` among the figures."""
     if not len(task.held):
-        return fast.fit(task, UNJUDGED)
-    trainer, fine, coarse = fast.train(task, SIZES[0])
+        return fast.fit(task, loop, UNJUDGED)
+    trainer, fine, coarse = loop.train(task, SIZES[0])
     poses, workspace = carried(task.poses, task.trained), Workspace()
     for t in task.held:
         align_pose(trainer.gaussians(), poses, int(t), task.views[t], ALIGN_STEPS)
     rungs, trainers = [], []
     for size in SIZES:
         if size != SIZES[0]:
-            trainer = refit(task, thinned(trainer.gaussians(), size, task, fine, workspace), fine)
+            trainer = loop.refit(task, thinned(trainer.gaussians(), size, task, fine, workspace), fine)
         rows = judge(trainer.gaussians(), poses, task.held, task.views, None, workspace)
         rungs.append(Rung(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
         trainers.append(trainer)

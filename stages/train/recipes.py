@@ -1,13 +1,20 @@
-"""The recipes by name: what `train.recipe` chooses from. A recipe is `fit(Task) -> Fit`."""
+"""The recipes by name and device: what `train.recipe` and `train.device` choose from. A recipe is `fit(Task) -> Fit`."""
 
-from gsac.stages.train import fast, ladder, paper
+from functools import partial
+
+from gsac.stages.train import cuda, fast, ladder, paper
 from gsac.stages.train.config import AUTO
-from gsac.stages.train.task import Fit, Task
+from gsac.stages.train.task import Fit, Loop, Task
 
 
-def fit_fast(task: Task) -> Fit:
+def fit_fast(loop: Loop, task: Task) -> Fit:
     """The given number of gaussians, or the ladder."""
-    return ladder.fit(task) if task.config.gaussians == AUTO else fast.fit(task)
+    return ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
 
 
-RECIPES = {"fast": fit_fast, "paper": paper.fit}
+RECIPES = {
+    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit)),
+    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit)),
+    ("paper", "cpu"): paper.fit,
+    ("paper", "cuda"): paper.fit,
+}

@@ -8,9 +8,10 @@ import time
 import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.cuda import why_not
 from gsac.avatar.metrics import psnr, summary
 from gsac.avatar.workspace import Workspace
-from gsac.stages.contract import Job, StageError
+from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.train.evaluate import align_pose, judge, turned
 from gsac.stages.train.holdout import spaced_in_yaw
 from gsac.stages.train.poses import Poses, carried
@@ -26,6 +27,7 @@ TRAIN_SAMPLE = 8
 
 def run(job: Job) -> None:
     config = job.config
+    check_device(config, job.device)
     clip = Clip.read(job.inputs["split/clip.json"])
     params = BodyParams.read(job.inputs["smplx/body.npz"])
     frames = job.inputs["split/frames"]
@@ -53,6 +55,14 @@ def run(job: Job) -> None:
     run.write()
 
 
+def check_device(config, device: str) -> None:
+    """Raises BadInput where the parameters cannot be met on the device of the job."""
+    if device == "cuda" and (why := why_not()):
+        raise BadInput(f"train is to run on cuda, but {why}; or set train.device to cpu")
+    if device == "cuda" and config.exposure:
+        raise BadInput("train.exposure is learned on the CPU only; set train.device to cpu, or train.exposure to false")
+
+
 def due(step: int, steps: int, times: int) -> bool:
     """Whether one of `times` even marks of a run is reached by this step (from 1)."""
     return step * times // steps > (step - 1) * times // steps
@@ -70,20 +80,27 @@ class Run:
 
     def fit(self) -> None:
         self.began = np.array([time.perf_counter(), time.process_time()])
-        task = Task(self.views, self.trained, self.held, self.poses, self.job.config, self.job.progress, self.checkpoint)
-        self.result = RECIPES[self.job.config.recipe](task)
+        task = Task(self.views, self.trained, self.held, self.poses, self.job.config, self.job.progress, self.checkpoint,
+                    self.marks)
+        self.result = RECIPES[self.job.config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
 
     def clock(self) -> np.ndarray:
         return np.array([time.perf_counter(), time.process_time()]) - self.began - self.aside
 
-    def checkpoint(self, step: int, steps: int, loss: float, gaussians) -> None:
+    def marks(self, steps: int) -> list[int]:
+        """The steps that get a row of the curve."""
+        return [step for step in range(1, steps + 1) if any(due(step, steps, n) for n in (LOSS_ROWS, self.job.config.curve))]
+
+    def checkpoint(self, step: int, steps: int, loss: float, gaussians, gpu_seconds: float | None = None) -> None:
         self.losses.append(loss)
-        if not due(step, steps, LOSS_ROWS) and not due(step, steps, self.job.config.curve):
+        if not any(due(step, steps, n) for n in (LOSS_ROWS, self.job.config.curve)):
             return
         before = self.clock()
         seconds, cpu_seconds = (round(float(x), 3) for x in before)
         row = {"step": step, "seconds": seconds, "cpu_seconds": cpu_seconds, "loss": float(np.mean(self.losses))}
+        if gpu_seconds is not None:
+            row["gpu_seconds"] = round(gpu_seconds, 4)
         self.losses.clear()
         if len(self.held) and due(step, steps, self.job.config.curve):
             now = gaussians()
@@ -132,7 +149,8 @@ class Run:
                 "*_ttpo": f"that pose, {config.pose_test_steps} steps optimised on the held-out image, avatar frozen",
                 "psnr_fg_fit": "the body fit's pose as it came",
             },
-            "n_gaussians": len(gaussians), "steps": self.curve[-1]["step"], "recipe": config.recipe, "seed": config.seed,
+            "n_gaussians": len(gaussians), "steps": self.curve[-1]["step"], "recipe": config.recipe,
+            "device": self.job.device, "gpu_seconds": self.curve[-1].get("gpu_seconds"), "seed": config.seed,
             "image_size": [self.views[0].camera.width, self.views[0].camera.height],
             "seconds": round(float(self.seconds), 3), "cpu_seconds": round(float(self.cpu_seconds), 3),
             "trained_frames": len(self.trained), "heldout_frames": [int(t) for t in held],

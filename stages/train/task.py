@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from gsac.avatar.gaussians import Gaussians
@@ -24,8 +25,11 @@ class Task:
     """As fitted; the recipe refines those of `trained`."""
     config: TrainConfig
     progress: Callable[[int, int, str], None]
-    checkpoint: Callable[[int, int, float, Callable[[], Gaussians]], None] = lambda step, steps, loss, gaussians: None
-    """To be called after each step: steps done and in all, the step's loss, what gives the gaussians as they stand."""
+    checkpoint: Callable[..., None] = lambda step, steps, loss, gaussians, gpu_seconds=None: None
+    """To be called after each step: steps done and in all, the step's loss, what gives the gaussians as they stand, and the time
+    on the GPU so far where it runs there."""
+    marks: Callable[[int], list[int]] = lambda steps: []
+    """Of so many steps, those after which `checkpoint` looks at gaussians and poses."""
 
 
 @dataclass
@@ -37,3 +41,12 @@ class Fit:
     """Frame -> (3,) learned gain per channel, where exposure is learned."""
     figures: dict = field(default_factory=dict)
     """What the recipe has to say in metrics.json."""
+
+
+class Loop(NamedTuple):
+    """The steps of recipe `fast` on one device."""
+
+    train: Callable[[Task, int], tuple[Any, dict[int, View], dict[int, View]]]
+    """As `fast.train`."""
+    refit: Callable[[Task, Gaussians, dict[int, View]], Any]
+    """As `ladder.refit`."""

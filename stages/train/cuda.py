@@ -1,0 +1,106 @@
+"""Recipe `fast` on the GPU: the CPU's start, the steps inside `CudaTrainer`, and a CPU trainer that takes the result over.
+
+Draws, rates and order of the steps are those of `fast.train`; what comes after the steps is the same code.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from gsac.avatar.cuda.device import DeviceError
+from gsac.avatar.cuda.kernels import CompileError
+from gsac.avatar.cuda.recipe import Recipe
+from gsac.avatar.cuda.trainer import BodyArrays, CudaTrainer, Shot
+from gsac.avatar.gaussians import Gaussians
+from gsac.stages.contract import StageError
+from gsac.stages.train import fast, ladder
+from gsac.stages.train.offsets import fold
+from gsac.stages.train.task import Task
+from gsac.stages.train.views import View
+
+
+def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[int, View]]:
+    """As `fast.train`. Raises StageError where the GPU fails, or naming the step and the quantity that is not finite."""
+    fine, coarse = fast.crops(task)
+    gaussians = fast.start(task, coarse, count)
+    recipe = Recipe.of(task.config, offset_rate=fast.OFFSET_RATE)
+    with training(task, [coarse, fine], gaussians, recipe) as trainer:
+        follow(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
+        body = trainer.body
+        trainer.replace(fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces))
+        follow(trainer, task, recipe.steps)
+        hand_back(trainer, task)
+        gaussians = finite(trainer.gaussians(), recipe.steps)
+    return fast.Trainer(gaussians, task, settled=True), fine, coarse
+
+
+def refit(task: Task, gaussians: Gaussians, views: dict[int, View]) -> fast.Trainer:
+    """As `ladder.refit`."""
+    recipe = Recipe.of(task.config, steps=ladder.REFIT, begin=ladder.REFIT_FROM, coarse_share=0.0, pose_rate=0.0)
+    with training(task, [views], gaussians, recipe) as trainer:
+        trainer.train(recipe.steps)
+        gaussians = finite(trainer.gaussians(), recipe.steps)
+    return fast.Trainer(gaussians, task, settled=True)
+
+
+@contextmanager
+def training(task: Task, levels: list[dict[int, View]], gaussians: Gaussians, recipe: Recipe,
+             kind: type[CudaTrainer] = CudaTrainer) -> Iterator[CudaTrainer]:
+    """A trainer over the task's trained frames, closed at the end. levels: frame -> view, coarse first."""
+    trainer = None
+    try:
+        shots = [[Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained] for views in levels]
+        poses = task.poses
+        trainer = kind(body_arrays(task), shots, poses.pose[task.trained], poses.transl[task.trained], gaussians, recipe)
+        yield trainer
+    except (DeviceError, CompileError) as error:
+        raise StageError(f"train on the GPU: {error}; or set train.device to cpu") from error
+    finally:
+        if trainer is not None:
+            trainer.close()
+
+
+def body_arrays(task: Task) -> BodyArrays:
+    """The body as the trained frames wear it; the first frame's rest comes first."""
+    body, rests, rest_of, known = task.poses.body, [], [], {}
+    for t in task.trained:
+        vertices, joints = task.poses.rest(int(t))
+        at = known.setdefault(vertices.tobytes(), len(rests))
+        if at == len(rests):
+            rests.append(vertices)
+        rest_of.append(at)
+    return BodyArrays(np.stack(rests), np.array(rest_of), joints, np.asarray(body.parents), body.skin_index, body.skin_weight,
+                      np.asarray(body.faces))
+
+
+def follow(trainer: CudaTrainer, task: Task, until: int) -> None:
+    """Trains up to a step, and says at every mark on the way how far it is."""
+    steps, done = trainer.recipe.steps, trainer.state().step
+    for stop in [*(mark for mark in task.marks(steps) if done < mark < until), until]:
+        trainer.train(stop - done)
+        losses = trainer.losses()[done:].mean(1)
+        if not np.isfinite(losses).all():
+            raise StageError(f"train: the loss is not finite at step {done + int(np.argmin(np.isfinite(losses)))}; look at "
+                             "smplx/body.npz, or lower the rates (train.*_rate)")
+        hand_back(trainer, task)
+        for step, loss in enumerate(losses, done + 1):
+            task.checkpoint(step, steps, float(loss), trainer.gaussians, trainer.seconds)
+        task.progress(stop, steps, "steps")
+        done = stop
+
+
+def hand_back(trainer: CudaTrainer, task: Task) -> None:
+    """The poses of the task as they stand on the GPU."""
+    task.poses.pose[task.trained], task.poses.transl[task.trained] = trainer.poses()
+    task.poses.offset = trainer.offset()
+
+
+def finite(gaussians: Gaussians, step: int) -> Gaussians:
+    for name in ("mu", "quat", "log_scale", "rgb", "opacity"):
+        if not np.isfinite(getattr(gaussians, name)).all():
+            raise StageError(f"train: {name} is not finite after step {step}; look at smplx/body.npz, or lower the rates "
+                             "(train.*_rate)")
+    return gaussians
