@@ -1,0 +1,30 @@
+"""The arrays that the package uploads once, from an avatar; the C# loader makes the same, and a test holds them equal."""
+
+import numpy as np
+
+
+def packed(avatar):
+    """Buffer name -> array, as Gsac.compute reads it."""
+    V, M = len(avatar.vertices), len(avatar.expression_vertex)
+    which = np.repeat(np.arange(len(avatar.expression_names)), np.diff(avatar.expression_start))
+    order = np.lexsort((which, avatar.expression_vertex))
+    first = np.searchsorted(avatar.expression_vertex[order], np.arange(V + 1))
+    moves = np.concatenate([avatar.expression_delta, which[:, None]], 1).astype(np.float32)[order].reshape(M, 4)
+    weight = np.rint(avatar.skin_weight * 65535).astype(np.uint32)
+    index = avatar.skin_index.astype(np.uint32)
+    skin = np.zeros((V + 1, 4), np.uint32)
+    skin[:V, 0] = index[:, 0] | index[:, 1] << 8 | index[:, 2] << 16 | index[:, 3] << 24
+    skin[:V, 1], skin[:V, 2] = weight[:, 0] | weight[:, 1] << 16, weight[:, 2] | weight[:, 3] << 16
+    skin[:, 3] = first
+    g = avatar.gaussians
+    N = len(g["face"])
+    corners = np.zeros((N, 4), np.uint32)
+    corners[:, :3] = avatar.faces[g["face"]]
+    local = np.zeros((N, 3, 4), np.float32)
+    quat = g["quat"] / np.linalg.norm(g["quat"].astype(np.float64), axis=1, keepdims=True)
+    local[:, 0, :3], local[:, 1], local[:, 2, :3] = g["mu"], quat[:, [1, 2, 3, 0]], np.exp(g["log_scale"])
+    return {
+        "GsacRest": np.concatenate([avatar.vertices, np.ones((V, 1), np.float32)], 1), "GsacSkin": skin, "GsacMoves": moves,
+        "GsacCorners": corners, "GsacLocal": local,
+        "GsacColours": np.concatenate([g["rgb"], g["opacity"][:, None]], 1).astype(np.float32),
+    }

@@ -1,0 +1,11 @@
+// Stands for Unity's file of this name in the tests: what the package's shader takes from it, for one eye.
+#define UNITY_MATRIX_V unity_MatrixV
+#define UNITY_MATRIX_P glstate_matrix_projection
+#define UNITY_VERTEX_INPUT_INSTANCE_ID
+#define UNITY_VERTEX_OUTPUT_STEREO
+#define UNITY_SETUP_INSTANCE_ID(input)
+#define UNITY_INITIALIZE_VERTEX_OUTPUT_STEREO(output)
+#define UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input)
+float4x4 unity_MatrixV;
+float4x4 glstate_matrix_projection;
+float4 _ScreenParams;

@@ -1,0 +1,113 @@
+"""The shader that Unity draws splats with: it compiles for every render pipeline, and its picture is the trainer's."""
+
+import numpy as np
+import pytest
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.camera import Camera
+from gsac.avatar.raster import render
+from gsac.avatar.rotation import exp
+from gsac.stages.export.rigged import RiggedAvatar
+
+PIPELINES = ["", "UniversalPipeline", "HDRenderPipeline"]
+SIZE = 256
+
+
+@pytest.fixture(scope="module")
+def programs(hlsl, shaders, tmp_path_factory):
+    """Pipeline -> (vertex, fragment)."""
+    folder = tmp_path_factory.mktemp("passes")
+    out = {}
+    for pipeline, text in hlsl.shader_passes(shaders / "GsacSplats.shader").items():
+        source = folder / f"pass{pipeline}.hlsl"
+        source.write_text(text)
+        out[pipeline] = [hlsl.Program(hlsl.compile_hlsl(source, entry, stage, folder, [shaders, hlsl.SHIMS]), entry)
+                         for entry, stage in (("Vertex", "vert"), ("Fragment", "frag"))]
+    return out
+
+
+def test_every_render_pipeline_has_a_pass_that_compiles(programs):
+    assert sorted(programs) == sorted(PIPELINES)
+
+
+@pytest.fixture(scope="module")
+def scene(exported, packing):
+    """2,500 gaussians of an avatar in its own space, a turned and shifted root, an off-centre camera, and the truth."""
+    avatar = RiggedAvatar.read(exported / "avatar.gsac")
+    pick = np.arange(2500) * len(avatar.gaussians["face"]) // 2500
+    avatar.gaussians = {name: array[pick] for name, array in avatar.gaussians.items()}
+    avatar.gaussians["log_scale"] = avatar.gaussians["log_scale"] + .4
+    g = avatar.gaussians
+    bound = bind(face_frames(avatar.posed(avatar.pose("A")), avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    turn = exp(np.array([.1, .7, 0]))
+    model = np.concatenate([turn, [[.3], [-.35], [.2]]], 1)
+    view = np.concatenate([exp(np.array([.15, 0, .1])), [[.1], [-.1], [-2.6]]], 1)  # y up, -z ahead
+    camera = Camera((240.0, 250.0), (119.0, 131.5), SIZE, SIZE)
+    flip = np.diag([1.0, -1, -1])
+    total = flip @ view[:, :3] @ model[:, :3]
+    place = flip @ (view[:, :3] @ model[:, 3] + view[:, 3])
+    truth = render((bound.means @ total.T + place).astype(np.float32), (total @ bound.rotations).astype(np.float32),
+                   bound.scales, g["rgb"], g["opacity"], camera)
+    return {"avatar": avatar, "bound": bound, "model": model, "view": view, "camera": camera, "total": total, "place": place,
+            "truth": np.concatenate([truth.rgb, truth.alpha[..., None]], 2)}
+
+
+def projection(camera, flipped):
+    """4x4 for an eye with y up and -z ahead; flipped: y down in clip space, as Unity has it when it draws to a texture."""
+    fx, fy = (2 * f / s for f, s in zip(camera.focal, (camera.width, camera.height), strict=True))
+    shift_x, shift_y = 1 - 2 * camera.center[0] / camera.width, 2 * camera.center[1] / camera.height - 1
+    p = np.array([[fx, 0, shift_x, 0], [0, fy, shift_y, 0], [0, 0, -1.0, -.02], [0, 0, -1, 0]])
+    if flipped:
+        p[1] *= -1
+    return p
+
+
+def picture(gpu, hlsl, packing, programs, scene, pipeline, flipped=False, linear=0):
+    g, bound = scene["avatar"].gaussians, scene["bound"]
+    N = len(g["face"])
+    half = bound.rotations * bound.scales[:, None]
+    c = half @ half.transpose(0, 2, 1)
+    splats = np.zeros((N, 12), np.float32)
+    splats[:, :3], splats[:, 3:9] = bound.means, c[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    order = np.argsort(-(bound.means @ scene["total"][2]), kind="stable").astype(np.uint32)
+    gpu.put("GsacSplats", splats)
+    gpu.put("GsacColours", packing.packed(scene["avatar"])["GsacColours"])
+    gpu.put("GsacKeys", order | np.uint32(5 << 13))
+    view = np.vstack([scene["view"], [0, 0, 0, 1]])
+    eye = -scene["view"][:, :3].T @ scene["view"][:, 3]
+    if pipeline == "HDRenderPipeline":
+        view[:3, 3] = 0
+    screen = np.array([SIZE, SIZE, 0, 0])
+    parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(scene["camera"], flipped).T,
+                  "_ScreenParams": screen, "_ScaledScreenParams": screen, "_ScreenSize": screen,
+                  "_WorldSpaceCameraPos": [*eye, 0], "GsacBlend": np.array([.3, .999, 1 / 255, linear]), "GsacIndexBits": 13,
+                  **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
+    return hlsl.Painting(gpu, *programs[pipeline], SIZE, SIZE, N).draw(parameters)
+
+
+@pytest.mark.parametrize("pipeline", PIPELINES)
+def test_the_picture_is_the_trainers_at_55_db(gpu, hlsl, packing, programs, scene, pipeline):
+    got = picture(gpu, hlsl, packing, programs, scene, pipeline)
+    assert (scene["truth"][..., 3] > .5).mean() > .05, "the figure is in the picture"
+    mse = ((got - scene["truth"]) ** 2).mean()
+    print(f"{pipeline or 'built-in'}: PSNR {-10 * np.log10(mse):.1f} dB, max {abs(got - scene['truth']).max():.4f}")
+    assert -10 * np.log10(mse) > 55
+
+
+def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, hlsl, packing, programs, scene):
+    got = picture(gpu, hlsl, packing, programs, scene, "", flipped=True)[::-1]
+    assert -10 * np.log10(((got - scene["truth"]) ** 2).mean()) > 55
+
+
+def test_in_a_linear_project_an_opaque_colour_is_the_display_colour_made_linear(gpu, hlsl, packing, programs, scene):
+    one = scene | {"bound": type(scene["bound"])(*(a[:1] for a in scene["bound"])), "avatar": _first(scene["avatar"])}
+    got = picture(gpu, hlsl, packing, programs, one, "", linear=1)
+    peak = got.reshape(-1, 4)[got[..., 3].argmax()]
+    rgb = one["avatar"].gaussians["rgb"][0].astype(np.float64)
+    linear = np.where(rgb > .04045, ((rgb + .055) / 1.055) ** 2.4, rgb / 12.92)
+    np.testing.assert_allclose(peak[:3] / peak[3], linear, atol=2e-3)
+
+
+def _first(avatar):
+    from dataclasses import replace
+
+    return replace(avatar, gaussians={name: array[:1] for name, array in avatar.gaussians.items()})
