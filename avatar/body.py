@@ -113,7 +113,10 @@ class Body:
 
     @classmethod
     def load(cls, path: Path | str | None = None) -> Body:
-        """The open body, or an official `SMPLX_*.npz`. Raises `ArtifactError` naming the array that is wrong."""
+        """The open body, or an official `SMPLX_*.npz`, of which the leading shape and expression directions are taken.
+
+        Raises `ArtifactError` naming the array that is wrong.
+        """
         from gsac.avatar.body_file import read_body_file
 
         path = Path(path) if path else OPEN_BODY

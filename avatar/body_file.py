@@ -19,6 +19,14 @@ SMPLX_KEYPOINT_JOINTS = {
 } | {91 + 1 + 4 * f + i: 25 + 3 * g + i for f, g in enumerate((4, 0, 1, 3, 2)) for i in range(3)} \
   | {112 + 1 + 4 * f + i: 40 + 3 * g + i for f, g in enumerate((4, 0, 1, 3, 2)) for i in range(3)}
 """COCO-WholeBody keypoint -> joint, for a file without a keypoint matrix (hand fingers: thumb, index, middle, ring, pinky)."""
+SMPLX_KEYPOINT_VERTICES = {
+    0: 9120, 1: 9448, 2: 9929, 3: 6, 4: 616, 17: 5770, 18: 5780, 19: 8846, 20: 8463, 21: 8474, 22: 8635,
+    95: 5361, 99: 4933, 103: 5058, 107: 5169, 111: 5286, 116: 8079, 120: 7669, 124: 7794, 128: 7905, 132: 8022,
+}
+"""COCO-WholeBody keypoint -> vertex of SMPL-X's mesh: nose, eyes, ears, toes, heels and finger tips."""
+SMPLX_VERTICES = 10475
+MOST_BETAS, MOST_EXPRESSIONS = 20, 10
+"""Directions taken of an official file: one clip says nothing about the later ones, whose variance is small."""
 
 
 def read_body_file(path: Path) -> dict:
@@ -31,14 +39,18 @@ def read_body_file(path: Path) -> dict:
     check_sizes(path, a, v)
     shapes = np.asarray(a["shapedirs"], np.float32)
     names = [str(n) for n in a["expression_names"]] if "expression_names" in a else None
-    betas = int(a["num_betas"]) if "num_betas" in a else official_betas(path, shapes.shape[2])
-    expressions = shapes.shape[2] - betas
+    if "num_betas" in a:
+        shapedirs, exprdirs = np.split(shapes, [int(a["num_betas"])], 2)
+    else:
+        shapedirs, exprdirs = np.split(shapes, [official_betas(path, shapes.shape[2])], 2)
+        shapedirs, exprdirs = shapedirs[:, :, :MOST_BETAS], exprdirs[:, :, :MOST_EXPRESSIONS]
+    expressions = exprdirs.shape[2]
     matrix = keypoint_matrix(a, v)
     from gsac.avatar.body import SMPLX_JOINTS
 
     return {
         "v_template": np.asarray(a["v_template"], np.float32), "faces": np.asarray(a["f"], np.int32),
-        "shapedirs": np.ascontiguousarray(shapes[:, :, :betas]), "exprdirs": np.ascontiguousarray(shapes[:, :, betas:]),
+        "shapedirs": np.ascontiguousarray(shapedirs), "exprdirs": np.ascontiguousarray(exprdirs),
         "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": four_heaviest(np.asarray(a["weights"], np.float32)),
         "parents": parents_of(a["kintree_table"]), "joint_names": tuple(SMPLX_JOINTS),
         "expression_names": tuple(names or (f"expression{i}" for i in range(expressions))),
@@ -107,7 +119,7 @@ def four_heaviest(weights: np.ndarray) -> np.ndarray:
 
 
 def keypoint_matrix(a: dict, v: int) -> sparse.csr_matrix:
-    """(133, V); official files have the joints' regressors for body and hands, and their face landmarks."""
+    """(133, V); official files have the joints' regressors and known vertices for body and hands, and their face landmarks."""
     if "keypoint_row" in a:
         entries = (np.asarray(a["keypoint_weight"], np.float32), (a["keypoint_row"].astype(int), a["keypoint_vertex"].astype(int)))
         return sparse.csr_matrix(entries, shape=(133, v))
@@ -115,6 +127,8 @@ def keypoint_matrix(a: dict, v: int) -> sparse.csr_matrix:
     regressor = np.asarray(a["J_regressor"], np.float32)
     for keypoint, joint in SMPLX_KEYPOINT_JOINTS.items():
         dense[keypoint] = regressor[joint]
+    for keypoint, vertex in SMPLX_KEYPOINT_VERTICES.items() if v == SMPLX_VERTICES else ():
+        dense[keypoint, vertex] = 1
     if "lmk_faces_idx" in a and "lmk_bary_coords" in a:
         for i, (face, bary) in enumerate(zip(a["lmk_faces_idx"], a["lmk_bary_coords"], strict=True)):
             for vertex, weight in zip(a["f"][int(face)], bary, strict=True):

@@ -131,8 +131,8 @@ def body_sheet(footage: Footage) -> Sheet:
     params = BodyParams.read(footage.results.path("smplx/body.npz"))
     body = Body.load()
     if params.model and params.model != body.digest:
-        raise AbsentError(f"The body was fitted with another body model ({params.model[:12]}) than the one at hand "
-                          f"({body.digest[:12]}), so it cannot be drawn.")
+        raise AbsentError(f"The body was fitted with a body model of your own ({params.model[:12]}), which this page does not "
+                          "carry; it is drawn for the open body only.")
     crop = footage.crop(WIDE, HIGH)
     k = footage.keypoints
     height, width = footage.frame(0).shape[:2]

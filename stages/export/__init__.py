@@ -22,4 +22,5 @@ STAGE = Stage(
     ),
     config=ExportConfig,
     packages=("numpy", "scipy"),
+    models=lambda config: config.models(),
 )

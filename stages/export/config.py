@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gsac.stages.body_choice import OPEN, brought
 from gsac.stages.contract import BadInput
 
 POSES = ("a", "t")
@@ -12,6 +13,8 @@ ANIMATIONS = ("wave", "walk")
 
 @dataclass
 class ExportConfig:
+    body_model: str = OPEN
+    """Which body; the same as smplx.body_model."""
     ply_pose: str = "a"
     """Pose of avatar.ply: a (arms half down) or t (arms out)."""
     ply_pad_sh: bool = False
@@ -20,6 +23,10 @@ class ExportConfig:
     """Clips that avatar.gsac, avatar.glb and viewer.html carry, by name with commas between; the first plays first."""
     licence: str = "All rights stay with the person shown"
     """Words about the use of this person's likeness, kept in the files."""
+
+    def models(self) -> tuple[str, ...]:
+        """Names of the model files that this configuration needs."""
+        return brought(self.body_model)
 
     def check(self) -> None:
         if self.ply_pose not in POSES:

@@ -9,6 +9,7 @@ from gsac.avatar.artifacts import Clip
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
+from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.motion import add_motion
@@ -25,10 +26,7 @@ BODY_LICENCE = "the body model's own terms; the embedded open body is CC0-1.0"
 
 def run(job: Job) -> None:
     params = BodyParams.read(job.inputs["train/body.npz"])
-    body = Body.load()
-    if params.model and params.model != body.digest:
-        raise BadInput(f"{job.inputs['train/body.npz']}: it was fitted with the body model {params.model[:12]}, "
-                       f"but the one at hand is {body.digest[:12]}; run again from the stage smplx")
+    body = load_body(job, "export", params.model)
     gaussians = Gaussians.read(job.inputs["train/avatar.npz"])
     if not len(gaussians) or gaussians.face.min() < 0 or gaussians.face.max() >= len(body.faces):
         raise BadInput(f"{job.inputs['train/avatar.npz']}: its {len(gaussians)} gaussians must be at least one and "

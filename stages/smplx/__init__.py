@@ -15,4 +15,5 @@ STAGE = Stage(
     outputs=(Output("body.npz", check_body),),
     config=SmplxConfig,
     packages=("numpy", "scipy", "numba", "torch"),
+    models=lambda config: config.models(),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gsac.stages.body_choice import OPEN, brought
 from gsac.stages.contract import BadInput
 
 METHODS = ("lm", "paper")
@@ -14,6 +15,9 @@ class SmplxConfig:
     method: str = "lm"
     """How the body is fitted: `lm` solves all frames at once by Levenberg-Marquardt; `paper` is the published co-registration by
     Adam, slower and less exact."""
+    body_model: str = OPEN
+    """Which body: `open`, or the name under which `gsac models add NAME SMPLX_NEUTRAL.npz` keeps your own; train and export
+    must be given the same."""
     height_m: float | None = None
     """The person's height; fixes the scale that one camera cannot see. None leaves it to the shape prior."""
     focal_px: float | None = None
@@ -26,6 +30,10 @@ class SmplxConfig:
     """Weight of the silhouette against the key points; 0 leaves it out."""
     smoothness: float = 1.0
     """Weight of the temporal terms."""
+
+    def models(self) -> tuple[str, ...]:
+        """Names of the model files that this configuration needs."""
+        return brought(self.body_model)
 
     def check(self) -> None:
         if self.method not in METHODS:

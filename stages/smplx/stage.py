@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
-from gsac.avatar.body import Body
+from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
+from gsac.stages.smplx.mimic import mimic
 from gsac.stages.smplx.silhouette import read_outline
 from threadpoolctl import threadpool_limits
 
@@ -30,7 +31,7 @@ def run(job: Job) -> None:
     clip = Clip.read(job.inputs["split/clip.json"])
     points = read_arrays(job.inputs["handgap/keypoints.npz"])
     face = read_arrays(job.inputs["face/face.npz"])
-    body = Body.load()
+    body = load_body(job, "smplx")
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
                           clip.focal_px, str(points["detector"]), face)
@@ -42,11 +43,11 @@ def run(job: Job) -> None:
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
-    expression = face["expression"]
-    if expression.shape[1] != body.exprdirs.shape[2]:
-        raise StageError(f"face.npz has {expression.shape[1]} expressions, the body model {body.exprdirs.shape[2]}")
+    expression, jaw, lost = mimic(body, face)
+    if lost:
+        job.warn(lost)
     params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression)
-    params.jaw_pose = face["jaw"].astype(np.float32)
+    params.jaw_pose = jaw
     if fit.joint_offset is not None:
         params.joint_offset = fit.joint_offset.astype(np.float32)
     params.joints = body.posed(params)[1]

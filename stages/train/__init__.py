@@ -20,4 +20,5 @@ STAGE = Stage(
     config=TrainConfig,
     uses_device=True,
     packages=("numpy", "numba", "scipy", "opencv-contrib-python-headless", "OpenEXR"),
+    models=lambda config: config.models(),
 )

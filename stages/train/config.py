@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gsac.stages.body_choice import OPEN, brought
 from gsac.stages.contract import BadInput
 
 RECIPES = ("fast", "paper")
@@ -14,6 +15,8 @@ DEVICES = (AUTO, "cpu", "cuda")
 
 @dataclass
 class TrainConfig:
+    body_model: str = OPEN
+    """Which body; the same as smplx.body_model."""
     recipe: str = "fast"
     """Which optimisation fits the gaussians: fast, or paper: one gaussian a face and rates of its own."""
     device: str = AUTO
@@ -60,6 +63,10 @@ class TrainConfig:
     """Share of that distance that each step takes back, relative to the rate of the places."""
     pose_test_steps: int = 40
     """Steps of the test-time pose optimisation behind the `*_ttpo` figures; 0 leaves these figures null."""
+
+    def models(self) -> tuple[str, ...]:
+        """Names of the model files that this configuration needs."""
+        return brought(self.body_model)
 
     def check(self) -> None:
         if self.recipe not in RECIPES:

@@ -7,10 +7,11 @@ import time
 
 import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
-from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.body import BodyParams
 from gsac.avatar.cuda import why_not
 from gsac.avatar.metrics import psnr, summary
 from gsac.avatar.workspace import Workspace
+from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.train.evaluate import align_pose, judge, turned
 from gsac.stages.train.holdout import spaced_in_yaw
@@ -34,7 +35,7 @@ def run(job: Job) -> None:
     count = len(frame_paths(frames))
     if params.frames != count:
         raise StageError(f"smplx/body.npz has {params.frames} poses, split/frames has {count} frames; run smplx again")
-    body = Body.load()
+    body = load_body(job, "train", params.model)
     camera = params.camera(clip.width, clip.height)
     views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height)
     if len(empty) == count:
