@@ -1,8 +1,10 @@
-"""The bars, on bodies that turn with sway and swinging arms and a detector's errors: benchmarks/handgap.py, a small part."""
+"""The bars, on bodies that turn with sway and swinging arms and a detector's errors: benchmarks/handgap, a small part."""
 
 import numpy as np
 import pytest
-from gsac.benchmarks.handgap import detection, measure, summary, turning_body
+from gsac.benchmarks.handgap.clips import turning_body
+from gsac.benchmarks.handgap.failures import detection
+from gsac.benchmarks.handgap.gaps import measure, summary
 
 pytestmark = pytest.mark.slow
 METHODS = ("turning", "gp", "hermite", "paper")

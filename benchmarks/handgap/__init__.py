@@ -1,0 +1,1 @@
+"""Hidden hands: found and filled, every method, against the truth."""

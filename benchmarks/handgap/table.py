@@ -1,0 +1,58 @@
+"""Tables and the chart."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import matplotlib
+from gsac.stages.handgap.config import METHODS, HandgapConfig
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+DEFAULT = HandgapConfig.method
+
+
+def text(rows: list[dict], title: str) -> str:
+    """Mean / median / 95 % px by gap and method, with jump and the share within sigma of the default."""
+    lines = []
+    for where, lost in sorted({(r["place"], r["lost"]) for r in rows}, reverse=True):
+        lines += [f"\n{title}: {where}, {lost} lost; palm error px, mean / median / 95 %",
+                  "gap  " + "".join(f"{m:>22}" for m in METHODS) + "   jump turning/paper  turning/forearm  within sigma"]
+        for gap in sorted({r["gap"] for r in rows}):
+            cell = {r["method"]: r for r in rows if (r["place"], r["lost"], r["gap"]) == (where, lost, gap)}
+            if not cell:
+                continue
+            lines.append(f"{gap:3d}  " + "".join(
+                f"{c['mean_px']:8.1f} /{c['median_px']:5.1f} /{c['p95_px']:5.0f}" for c in (cell[m] for m in METHODS))
+                + f"   {cell['turning']['jump_px']:6.1f} / {cell['paper']['jump_px']:5.1f}"
+                + f"  {cell['turning']['mean_forearm']:12.2f}  {cell['turning']['within_sigma']:12.2f}")
+    return "\n".join(lines)
+
+
+def chart(rows: list[dict], path: Path) -> None:
+    pairs = sorted({(r["place"], r["lost"]) for r in rows}, reverse=True)
+    figure, axes = plt.subplots(1, len(pairs), figsize=(4 * len(pairs), 3.6), layout="constrained", squeeze=False)
+    for axis, (where, lost) in zip(axes[0], pairs, strict=True):
+        draw(axis, rows, where, lost)
+    axes[0, 0].legend(fontsize=7)
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def draw(axis: plt.Axes, rows: list[dict], where: str, lost: str) -> None:
+    """Palm error against the length of the gap, one line a method."""
+    for method in METHODS:
+        line = sorted((r["gap"], r["mean_px"]) for r in rows if (r["place"], r["lost"], r["method"]) == (where, lost, method))
+        axis.plot(*zip(*line, strict=True), marker="o", ms=3, lw=2.4 if method == DEFAULT else 1.2, label=method)
+    axis.set(title=f"{'Inside the clip' if where == 'inside' else 'At start and end'}, {lost} lost",
+             xlabel="frames missing (10 a second)", ylabel="palm error, px (mean)", yscale="log")
+    axis.grid(alpha=0.3)
+
+
+def save(rows: list[dict], path: Path) -> None:
+    with open(path, "w", newline="") as f:
+        writer = csv.DictWriter(f, rows[0].keys())
+        writer.writeheader()
+        writer.writerows({k: round(float(v), 4) if isinstance(v, float) else v for k, v in r.items()} for r in rows)
