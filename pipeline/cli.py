@@ -30,6 +30,7 @@ COMMANDS = {
     "models": "list, pull and add model files",
     "bench": "run a benchmark",
     "view": "show an avatar in the browser",
+    "render": "make a video of an avatar, moving or from all sides",
     "report": "write report.html of a run's folder",
 }
 

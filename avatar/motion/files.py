@@ -1,0 +1,25 @@
+"""Motion files of other tools as motions of the avatar: read, then retarget."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from gsac.avatar.motion.amass import read_amass
+from gsac.avatar.motion.bvh import read_bvh
+from gsac.avatar.motion.retarget import retarget
+from gsac.avatar.motion.source import Motion, MotionError
+
+SUFFIXES = (".bvh", ".npz")
+
+
+def read_motion(path: Path, joint_names: list[str], parents: np.ndarray, joints: np.ndarray) -> Motion:
+    """A BVH or AMASS-style npz file as a motion of the skeleton joint_names (J), parents (J,), joints (J, 3) at rest, m.
+
+    Raises `MotionError`, naming the file and the line or array.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise MotionError(f"{path}: motion is read from {' and '.join(SUFFIXES)}, not from {suffix or 'a file without suffix'}")
+    source = read_bvh(path) if suffix == ".bvh" else read_amass(path, joint_names, parents, joints)
+    return retarget(source, joint_names, parents, joints, str(path))

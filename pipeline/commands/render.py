@@ -1,0 +1,132 @@
+"""gsac render AVATAR: a video of the avatar, moving as a motion file says or seen from all sides."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from pathlib import Path
+
+from gsac.pipeline.cli import emit
+from gsac.pipeline.commands.options import add_json
+from gsac.pipeline.events import PlainReporter, reporter
+from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.stages.contract import BadInput, StageError
+
+FILE = "avatar.gsac"
+SIZES = (16, 4096)
+TURN_S = 6.0
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    command.add_argument("avatar", type=Path, metavar="AVATAR",
+                         help="avatar.gsac, or the folder of a run or its export folder")
+    command.add_argument("--motion", metavar="FILE",
+                         help="a .bvh or AMASS-style .npz file, or the name of a clip in the avatar (walk, wave); "
+                              "without it the avatar is seen from all sides")
+    command.add_argument("--out", type=Path, default=Path("clip.mp4"), metavar="FILE", help="default: clip.mp4")
+    command.add_argument("--size", default="720x960", metavar="WxH", help="pixels, even numbers; default: 720x960")
+    command.add_argument("--fps", type=float, default=30.0, metavar="N", help="default: 30")
+    command.add_argument("--seconds", type=float, metavar="N",
+                         help=f"no more of the motion than this; of the turn, how long it takes (default: {TURN_S:g})")
+    command.add_argument("--background", default="2b303b", metavar="RRGGBB", help="default: 2b303b")
+    add_json(command)
+    command.set_defaults(do=do)
+
+
+def do(arguments: argparse.Namespace) -> ExitCode:
+    width, height = size(arguments.size)
+    background = colour(arguments.background)
+    if not 1 <= arguments.fps <= 240:
+        raise BadInput(f"--fps {arguments.fps:g}: expected 1 to 240")
+    if arguments.seconds is not None and not 0 < arguments.seconds <= 3600:
+        raise BadInput(f"--seconds {arguments.seconds:g}: expected more than 0, at most 3600")
+    out = arguments.out.absolute()
+    if out.suffix.lower() != ".mp4" or out.is_dir() or not out.parent.is_dir():
+        raise BadInput(f"--out {arguments.out}: expected a file .mp4 in a folder that exists")
+    file = find_avatar(arguments.avatar)
+    with reporter(plain=arguments.json) as voice:
+        frames, seconds = film(file, arguments, out, (width, height), background, voice)
+    if arguments.json:
+        emit({"stages": [{"name": "render", "status": Outcome.RAN.value, "seconds": seconds, "key": None}],
+              "outputs": {"video": str(out)},
+              "metrics": {"frames": frames, "fps": arguments.fps, "width": width, "height": height,
+                          "seconds_a_frame": seconds / frames}})
+    else:
+        print(out)
+    return ExitCode.OK
+
+
+def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int], background: list[float],
+         voice: PlainReporter) -> tuple[int, float]:
+    """Writes the video. Returns its frames and the seconds that it took."""
+    import numpy as np
+    from gsac.avatar.artifacts import ArtifactError
+    from gsac.avatar.video import Video, VideoError
+    from gsac.stages.export.film import frames, performance, turntable
+    from gsac.stages.export.rigged import RiggedAvatar
+
+    began = time.monotonic()
+    voice.starts("render", f"{file.name} to {out}")
+    try:
+        avatar = RiggedAvatar.read(file)
+        motion = find_motion(arguments.motion, avatar)
+        plan = (turntable(avatar, arguments.seconds or TURN_S, arguments.fps) if motion is None
+                else performance(motion, arguments.fps, arguments.seconds))
+        with Video(out, *size, arguments.fps) as video:
+            for done, frame in enumerate(frames(avatar, plan, *size, np.array(background))):
+                voice.progress("render", done, len(plan), "frames")
+                video.add(frame)
+    except ArtifactError as e:
+        raise BadInput(str(e)) from e
+    except VideoError as e:
+        raise StageError(str(e)) from e
+    seconds = time.monotonic() - began
+    voice.ends("render", Outcome.RAN, seconds)
+    return len(plan), seconds
+
+
+def find_motion(asked: str | None, avatar):
+    """The motion of a file, or of the avatar's own clips by name; None where none is asked for."""
+    from gsac.avatar.motion.files import read_motion
+    from gsac.avatar.motion.source import Motion
+
+    if asked is None:
+        return None
+    if Path(asked).is_file():
+        return read_motion(Path(asked), avatar.joint_names, avatar.parents, avatar.joints)
+    if asked not in avatar.clips:
+        raise BadInput(f"--motion {asked}: no such file, and the avatar's clips are: {', '.join(avatar.clips) or 'none'}")
+    import numpy as np
+
+    clip = avatar.clips[asked]
+    closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]
+    rotation = np.zeros((len(closed), len(avatar.joints), 3), np.float32)
+    rotation[:, [avatar.joint_names.index(name) for name in clip.joints]] = clip.rotation[closed]
+    return Motion(clip.fps, rotation, clip.transl[closed])
+
+
+def find_avatar(path: Path) -> Path:
+    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none."""
+    if path.is_file():
+        return path
+    for folder in (path / "export", path):
+        if (folder / FILE).is_file():
+            return folder / FILE
+    raise BadInput(f"{path}: no {FILE} here; give the file, or the folder of a run whose stage export is done")
+
+
+def size(words: str) -> tuple[int, int]:
+    """Width and height of `WxH`."""
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", words)
+    numbers = [int(n) for n in found.groups()] if found else []
+    if not numbers or not all(SIZES[0] <= n <= SIZES[1] and n % 2 == 0 for n in numbers):
+        raise BadInput(f"--size {words}: expected WIDTHxHEIGHT, even numbers of {SIZES[0]} to {SIZES[1]}, for example 720x960")
+    return numbers[0], numbers[1]
+
+
+def colour(words: str) -> list[float]:
+    """r, g, b in 0..1 of `rrggbb`."""
+    if not re.fullmatch(r"#?[0-9a-fA-F]{6}", words):
+        raise BadInput(f"--background {words}: expected six hexadecimal digits, for example ffffff")
+    return [int(words.lstrip("#")[i:i + 2], 16) / 255 for i in (0, 2, 4)]

@@ -1,0 +1,100 @@
+"""gsac render by its command line, on the small figure of the export's tests."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gsac.pipeline.cli import execute
+
+TESTS = Path(__file__).parents[1]
+
+
+def helpers(path, name):
+    spec = importlib.util.spec_from_file_location(name, TESTS / path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+export = helpers("stages/export/conftest.py", "export_helpers")
+motion = helpers("avatar/motion/conftest.py", "motion_helpers")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run's folder with avatar.gsac, and in it a walk to the left as Mixamo would name and measure it, z up."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "export").mkdir()
+    figure = export.make_figure()
+    (folder / "export" / "avatar.gsac").write_bytes(figure.to_bytes())
+    clip = figure.clips["walk"]
+    rotation = np.zeros((len(clip.rotation), len(figure.joints), 3), np.float32)
+    rotation[:, [figure.joint_names.index(name) for name in clip.joints]] = clip.rotation
+    skeleton = motion.Skeleton(figure.joint_names, figure.parents, figure.joints)
+    walk = motion.Motion(clip.fps, rotation, clip.transl)
+    names = [motion.mixamo(n) for n in figure.joint_names]
+    (folder / "walk.bvh").write_text(motion.bvh_text(skeleton, walk, names, unit=100, world=motion.Z_UP))
+    return folder
+
+
+def film(path):
+    av = pytest.importorskip("av")
+    with av.open(str(path)) as file:
+        return np.stack([f.to_ndarray(format="rgb24") for f in file.decode(video=0)]).astype(float)
+
+
+def render(capsys, *words):
+    code = execute(["render", *map(str, words)])
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def test_without_a_motion_the_avatar_turns_once(run, tmp_path, capsys):
+    code, out, _ = render(capsys, run, "--out", tmp_path / "turn.mp4", "--size", "96x128", "--seconds", 1, "--fps", 8, "--json")
+    answer = json.loads(out.splitlines()[-1])
+    assert code == 0 and answer["outputs"] == {"video": str(tmp_path / "turn.mp4")} and answer["metrics"]["frames"] == 8
+    seen = film(tmp_path / "turn.mp4")
+    assert seen.shape == (8, 128, 96, 3) and np.abs(seen[0] - seen[4]).mean() > 2
+
+
+def test_a_walk_from_another_tool_is_the_walk_that_the_avatar_carries(run, tmp_path, capsys):
+    for name, asked in (("own", "walk"), ("bvh", run / "walk.bvh")):
+        code, out, _ = render(capsys, run / "export" / "avatar.gsac", "--motion", asked, "--out", tmp_path / f"{name}.mp4",
+                              "--size", "96x128", "--fps", 20, "--background", "000000")
+        assert (code, out) == (0, f"{tmp_path / name}.mp4\n")
+    own, other = film(tmp_path / "own.mp4"), film(tmp_path / "bvh.mp4")
+    assert len(own) == len(other) + 1, "its own clip closes its loop"
+    difference = np.abs(own[:-1] - other).mean()
+    assert difference < 2.5, "the first frame of a motion faces us, the own clip's is turned by 4 degrees"
+    assert difference < 0.4 * np.abs(own[:-1, :, ::-1] - other).mean(), "not mirrored"
+    assert difference < 0.5 * np.abs(np.roll(own[:-1], 11, 0) - other).mean(), "the same foot goes first"
+
+
+@pytest.mark.parametrize(("words", "named"), [
+    (["--size", "97x128"], "--size 97x128"), (["--size", "big"], "--size big"), (["--fps", "0"], "--fps 0"),
+    (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"),
+    (["--out", "clip.avi"], "clip.avi"), (["--motion", "jump"], "jump: no such file, and the avatar's clips are: wave, walk")])
+def test_a_wrong_word_is_named_and_what_is_expected(run, tmp_path, capsys, monkeypatch, words, named):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = render(capsys, run, *words)
+    assert code == 2 and named in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_motion_names_its_line_and_leaves_no_video(run, tmp_path, capsys):
+    lines = (run / "walk.bvh").read_text().splitlines()
+    lines[-2] = "1 2 x"
+    (tmp_path / "odd.bvh").write_text("\n".join(lines))
+    code, out, err = render(capsys, run, "--motion", tmp_path / "odd.bvh", "--out", tmp_path / "a.mp4", "--json")
+    assert code == 2 and f"odd.bvh, line {len(lines) - 1}: 3 numbers" in err
+    assert "odd.bvh" in json.loads(out.splitlines()[-1])["error"] and not (tmp_path / "a.mp4").exists()
+
+
+def test_a_folder_without_an_avatar_and_a_damaged_one_are_named(run, tmp_path, capsys):
+    code, _, err = render(capsys, tmp_path)
+    assert code == 2 and str(tmp_path) in err and "avatar.gsac" in err
+    (tmp_path / "avatar.gsac").write_bytes((run / "export" / "avatar.gsac").read_bytes()[:999])
+    code, _, err = render(capsys, tmp_path, "--out", tmp_path / "a.mp4")
+    assert code == 2 and "truncated" in err
