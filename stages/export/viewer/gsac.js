@@ -5,6 +5,8 @@ const GSAC_VERSION = 1;
 const GSAC_HEADER = 32;
 const GSAC_MAX_FILE = 256 * 2 ** 20;
 const GSAC_MAX_HEAD = 2 ** 20;
+const GSAC_MAX_BLOCKS = 1024;
+const GSAC_MAX_JOINTS = 256;
 const GSAC_TYPES = { f32: Float32Array, f16: Uint16Array, u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, i16: Int16Array };
 
 class GsacError extends Error {
@@ -59,6 +61,7 @@ function unpackGsac(buffer) {
     throw new GsacError("head", "it does not parse");
   }
   if (!isTable(head) || !isTable(head.blocks)) throw new GsacError("head", "it lacks the table `blocks`");
+  if (Object.keys(head.blocks).length > GSAC_MAX_BLOCKS) throw new GsacError("block", "it lists too many blocks");
   const blocks = {}, spans = [];
   for (const [name, entry] of Object.entries(head.blocks)) {
     const size = blockBytes(name, entry, fileBytes - start);
@@ -89,7 +92,7 @@ function blockBytes(name, entry, room) {
     throw bad("has a shape that is not a short list of lengths");
   }
   if (!Number.isInteger(offset) || offset < 0 || offset % 16) throw bad("has a bad offset");
-  if (scale !== undefined && !(Math.abs(scale) > 0 && Math.abs(scale) < 1e6)) throw bad("has a bad scale");
+  if (scale !== undefined && !(typeof scale === "number" && Math.abs(scale) > 0 && Math.abs(scale) < 1e6)) throw bad("has a bad scale");
   const size = shape.reduce((a, b) => a * b, GSAC_TYPES[entry.dtype].BYTES_PER_ELEMENT);
   if (offset + size > room) throw bad("ends after the file");
   return size;
@@ -110,38 +113,63 @@ function readAvatar(buffer) {
     }
     return found.data;
   };
-  const index = (name, limit, ...shape) => {
+  const typed = (name, real, shape) => {
     const data = block(name, ...shape);
-    for (const i of data) if (!(Number.isInteger(i) && i < limit)) throw new GsacError("value", `${name} points outside`);
+    if ((data instanceof Float32Array) !== real) throw new GsacError("block", `block ${name} has another type than expected`);
+    return data;
+  };
+  const index = (name, limit, ...shape) => {
+    const data = typed(name, false, shape);
+    for (const i of data) if (!(i >= 0 && i < limit)) throw new GsacError("value", `${name} points outside`);
     return data;
   };
   const finite = (name, ...shape) => {
-    const data = block(name, ...shape);
+    const data = typed(name, true, shape);
     for (const x of data) if (!Number.isFinite(x)) throw new GsacError("value", `${name} is not finite`);
     return data;
   };
-  if (!isTable(head.joints) || !isTable(head.poses) || !isTable(head.licence)) throw new GsacError("head", "a table is missing");
-  const names = list(head.joints.names, "joints.names"), parents = list(head.joints.parents, "joints.parents");
-  if (!names.length || parents.length !== names.length ||
+  const words = (value, what) => {
+    if (!isTable(value) || !Object.values(value).every((w) => typeof w === "string")) throw new GsacError("head", `${what} holds more than text`);
+  };
+  const different = (value, what) => {
+    if (!list(value, what).every((n) => typeof n === "string") || new Set(value).size !== value.length) {
+      throw new GsacError("head", `${what} is not a list of different names`);
+    }
+    return value;
+  };
+  if (head.format !== "gsac") throw new GsacError("head", "format is not gsac");
+  if (!isTable(head.joints) || !isTable(head.poses)) throw new GsacError("head", "a table is missing");
+  words(head.licence, "licence");
+  words(head.provenance, "provenance");
+  const names = different(head.joints.names, "joints.names"), parents = list(head.joints.parents, "joints.parents");
+  if (!names.length || names.length > GSAC_MAX_JOINTS || parents.length !== names.length ||
       !parents.every((p, j) => Number.isInteger(p) && (j === 0 ? p === -1 : p >= 0 && p < j))) {
     throw new GsacError("value", "parents must name an earlier joint each");
   }
   const vertices = finite("rest.vertices", null, 3), V = vertices.length / 3;
   const faces = index("rest.faces", V, null, 3);
-  const expressions = list(head.expressions, "expressions");
+  const expressions = different(head.expressions, "expressions");
+  finite("expression.jaw", expressions.length, 3);
   const moved = index("expression.vertex", V, null);
   const start = index("expression.start", moved.length + 1, expressions.length + 1);
-  for (let e = 0; e < expressions.length; e++) {
-    if (start[e] > start[e + 1]) throw new GsacError("value", "expression.start must rise");
+  let rises = start[0] === 0 && start[expressions.length] === moved.length;
+  for (let e = 0; e < expressions.length; e++) rises = rises && start[e] <= start[e + 1];
+  if (!rises) throw new GsacError("value", "expression.start must rise from 0 to the number of moved vertices");
+  const weights = finite("skin.weight", V, 4);
+  for (let w = 0; w < weights.length; w += 4) {
+    const four = weights.subarray(w, w + 4), sum = four.reduce((a, b) => a + b, 0);
+    if (Math.abs(sum - 1) > 1e-3 || Math.min(...four) < 0) throw new GsacError("value", "skin.weight must have rows that sum to 1");
   }
+  if (V === 0) throw new GsacError("value", "the mesh has no vertices");
   const level = list(head.levels, "levels")[0];
   if (!isTable(level) || typeof level.prefix !== "string") throw new GsacError("head", "levels is empty");
   const face = index(`${level.prefix}.face`, faces.length / 3, null), N = face.length;
+  if (level.count !== N) throw new GsacError("value", `level 0 says it has other than ${N} gaussians`);
   const gaussian = (name, ...shape) => finite(`${level.prefix}.${name}`, N, ...shape);
   for (const pose of Object.values(head.poses)) {
     const rows = isTable(pose) ? Object.entries(pose) : [["", null]];
     for (const [joint, r] of rows) {
-      if (!names.includes(joint) || !Array.isArray(r) || r.length !== 3 || !r.every((x) => Math.abs(x) < 100)) {
+      if (!names.includes(joint) || !Array.isArray(r) || r.length !== 3 || !r.every((x) => typeof x === "number" && Math.abs(x) < 100)) {
         throw new GsacError("head", "a pose is not a table of joint -> axis-angle");
       }
     }
@@ -149,19 +177,27 @@ function readAvatar(buffer) {
   const clips = {};
   for (const clip of list(head.clips, "clips")) {
     if (!isTable(clip)) throw new GsacError("head", "a clip is not a table");
-    const joints = list(clip.joints, "clip.joints").map((name) => names.indexOf(name));
+    const joints = different(clip.joints, "clip.joints").map((name) => names.indexOf(name));
+    if (typeof clip.name !== "string" || typeof clip.fps !== "number" || typeof clip.loop !== "boolean") {
+      throw new GsacError("head", "a clip lacks its name, fps or loop");
+    }
+    if (Object.hasOwn(clips, clip.name)) throw new GsacError("value", `clip ${clip.name} comes twice`);
     if (!(clip.fps >= 0.1 && clip.fps <= 1000) || joints.includes(-1)) throw new GsacError("value", "a clip names unknown joints or has no rate");
     const rotation = finite(`clip.${clip.name}.rotation`, null, joints.length, 3);
     const keys = blocks[`clip.${clip.name}.rotation`].shape[0];
     if (keys === 0) throw new GsacError("value", "a clip has no keys");
     clips[clip.name] = { fps: clip.fps, loop: clip.loop, joints, keys, rotation, transl: finite(`clip.${clip.name}.transl`, keys, 3) };
   }
+  const quat = gaussian("quat", 4);
+  for (let q = 0; q < quat.length; q += 4) {
+    if (Math.abs(Math.hypot(...quat.subarray(q, q + 4)) ** 2 - 1) > 1e-2) throw new GsacError("value", "quat must hold unit quaternions");
+  }
   return {
     names, parents, vertices, faces, expressions, start, moved, clips, head,
     joints: finite("rest.joints", names.length, 3),
-    skinIndex: index("skin.index", names.length, V, 4), skinWeight: finite("skin.weight", V, 4),
+    skinIndex: index("skin.index", names.length, V, 4), skinWeight: weights,
     delta: finite("expression.delta", moved.length, 3), poses: head.poses,
-    face, mu: gaussian("mu", 3), quat: gaussian("quat", 4), logScale: gaussian("log_scale", 3),
+    face, mu: gaussian("mu", 3), quat, logScale: gaussian("log_scale", 3),
     rgb: gaussian("rgb", 3), opacity: gaussian("opacity"),
   };
 }

@@ -52,3 +52,27 @@ def kernels(hlsl, shaders, tmp_path_factory):
     sources = {name: shaders / "Gsac.compute" for name in names} | {"BindParts": HERE / "parts.compute"}
     return {name: hlsl.Program(hlsl.compile_hlsl(source, name, "comp", folder, [shaders]), name)
             for name, source in sources.items()}
+
+
+@pytest.fixture(scope="session")
+def mono():
+    """The module mono.py, where its Debian packages are there."""
+    module = helper("mono")
+    missing = module.missing_packages()
+    if missing:
+        pytest.skip(f"needs the Debian packages {', '.join(missing)}")
+    return module
+
+
+@pytest.fixture(scope="session")
+def package():
+    """Folder of the package's sources."""
+    from gsac.stages import export
+
+    return Path(export.__file__).parent / "unity"
+
+
+@pytest.fixture(scope="session")
+def programs_folder():
+    """Folder of the tests' own C# programs."""
+    return HERE / "programs"

@@ -1,0 +1,101 @@
+"""Damaged and hostile `.gsac` files, each with the faults that a reader may give it (docs/gsac-format.md)."""
+
+import copy
+import json
+import random
+import zlib
+
+import numpy as np
+from gsac.stages.export.container import HEADER, MAGIC, VERSION, pack, unpack
+
+
+def parts(data):
+    start = HEADER.size + HEADER.unpack_from(data)[2]
+    return json.loads(data[HEADER.size:start]), data[start:]
+
+
+def built(head, body):
+    """A file whose header and checksum are right, whatever its head says."""
+    text = head if isinstance(head, bytes) else json.dumps(head).encode()
+    text += b" " * (-(HEADER.size + len(text)) % 16)
+    rest = text + body
+    return HEADER.pack(MAGIC, VERSION, len(text), HEADER.size + len(rest), zlib.crc32(rest), 0) + rest
+
+
+def with_values(data, name, value):
+    """The avatar with the second row of a block set to `value`, as stored."""
+    head, _ = unpack(data)
+    _, body = parts(data)
+    plain = {k: {n: v for n, v in e.items() if n != "scale"} for k, e in head["blocks"].items()}
+    stored = {k: v.copy() for k, v in unpack(built(head | {"blocks": plain}, body))[1].items()}
+    stored[name][1] = value
+    scales = {k: e["scale"] for k, e in head["blocks"].items() if "scale" in e}
+    return pack({k: v for k, v in head.items() if k != "blocks"}, stored, scales)
+
+
+def files(data):
+    """Name -> (bytes, fault words one of which is right)."""
+    out = {"whole": (data, {"ok"})}
+    for cut in [0, 1, 7, 8, 12, 31, 32, 33, 4000, len(data) // 2, len(data) - 1]:
+        out[f"cut{cut}"] = data[:cut], {"truncated"} if cut else {"not_gsac"}
+    out["longer"] = data + b"\0", {"oversized"}
+    out["said_huge"] = data[:16] + (1 << 60).to_bytes(8, "little") + data[24:], {"oversized"}
+    out["said_short"] = data[:16] + (64).to_bytes(8, "little") + data[24:], {"oversized"}
+    out["version"] = data[:8] + b"\2\0\0\0" + data[12:], {"version"}
+    out["png"] = b"\x89PNG\r\n\x1a\n" + data[8:], {"not_gsac"}
+    out["text_mode"] = data.replace(b"\r\n", b"\n", 1), {"not_gsac"}
+    out["flipped"] = data[:500] + bytes([data[500] ^ 4]) + data[501:], {"checksum"}
+    for size in (0xffffffff, 1 << 21, len(data), 17):
+        out[f"head_size{size}"] = data[:12] + size.to_bytes(4, "little") + data[16:], {"head"}
+    for n, text in enumerate([b"", b"[]", b"{", b"[" * 100_000, b'{"blocks":{},"x":NaN}', b"\xff\xfe", b'{"blocks":[]}',
+                              b'{"a":"' + b"x" * 2000, b'{"blocks":{}', b'{"blocks":{}}x', b'{"blocks" {}}', b'{"x":1e}',
+                              b'{"x":01}', b'{"x":"\x01"}', b'{"x":"\\q"}', b"null", b'{"x":-}']):
+        out[f"json{n}"] = built(text, b""), {"head"}
+    head, body = parts(data)
+    for n, change in enumerate([
+            {"offset": -16}, {"offset": 8}, {"offset": 1 << 60}, {"offset": 1e300}, {"offset": True}, {"offset": None},
+            {"offset": "0"}, {"shape": [1 << 40, 3]}, {"shape": [-1, 3]}, {"shape": [1 << 26] * 4}, {"shape": "x"},
+            {"shape": [2] * 60}, {"shape": [1.5]}, {"shape": [True]}, {"dtype": "f128"}, {"dtype": "u16"}, {"dtype": None},
+            {"dtype": []}, {"dtype": "__proto__"}, {"scale": 1e308}, {"scale": "1"}, {"scale": 0}, {"scale": None},
+            {"shape": [1 << 26, 0, 3]}, {"shape": [3]}, {"offset": head["blocks"]["gaussian.rgb"]["offset"]}]):
+        blocks = copy.deepcopy(head["blocks"])
+        blocks["gaussian.mu"] |= change
+        out[f"block{n}"] = built(head | {"blocks": blocks}, body), {"block"}
+    for name in head["blocks"]:
+        out[f"without_{name}"] = built(head | {"blocks": {k: v for k, v in head["blocks"].items() if k != name}}, body), {"block"}
+    many = {f"x{i}": {"offset": 0, "dtype": "u8", "shape": [0]} for i in range(5000)}
+    out["many_blocks"] = built(head | {"blocks": head["blocks"] | many}, body), {"block"}
+    for name, value in [("rest.faces", 60000), ("skin.index", 200), ("expression.vertex", 60000), ("expression.start", 60000),
+                        ("gaussian.face", 60000), ("skin.weight", 65535), ("rest.vertices", np.nan), ("gaussian.mu", np.inf),
+                        ("gaussian.quat", 0), ("rest.joints", -np.inf), ("clip.wave.transl", np.nan)]:
+        out[f"value_{name}"] = with_values(data, name, value), {"value"}
+    joints = head["joints"]
+    for n, change in enumerate([
+            {"joints": None}, {"joints": {"names": ["a"], "parents": [0]}}, {"joints": {"names": [], "parents": []}},
+            {"joints": joints | {"parents": [-1, *range(1, 55)]}}, {"joints": joints | {"parents": [-1] * 55}},
+            {"joints": joints | {"parents": [-1, *[1 << 70] * 54]}}, {"joints": joints | {"parents": 7}},
+            {"joints": joints | {"names": ["a"] * 55}},
+            {"levels": []}, {"levels": [{"prefix": 3, "count": 1}]}, {"levels": [{"prefix": "gaussian", "count": 1}]},
+            {"levels": {}}, {"levels": [3]}, {"poses": {"T": {"nobody": [0, 0, 0]}}}, {"poses": {"T": 1}},
+            {"poses": {"T": {"head": [0, 0]}}}, {"poses": {"T": {"head": [0, "0", 0]}}}, {"poses": {"T": {"head": [1e9, 0, 0]}}},
+            {"poses": []}, {"clips": [{}]}, {"clips": 3}, {"clips": [1]}, {"clips": [head["clips"][0]] * 2},
+            {"clips": [head["clips"][0] | {"fps": 0}]}, {"clips": [head["clips"][0] | {"fps": "20"}]},
+            {"clips": [head["clips"][0] | {"joints": ["tail"]}]}, {"clips": [head["clips"][0] | {"loop": 1}]},
+            {"clips": [head["clips"][0] | {"name": "other"}]}, {"expressions": "abc"}, {"expressions": [1, 2]},
+            {"licence": {"x": 1}}, {"licence": []}, {"provenance": None}, {"format": "other"}, {"format": None}]):
+        out[f"head{n}"] = built(head | change, body), {"head", "value", "block"}
+    return out
+
+
+def fuzzed(data, count, seed=0):
+    """Files damaged at a few places of head or blocks, with a repaired checksum: the reader's own checks have to find it."""
+    rng = random.Random(seed)
+    head_end = HEADER.size + HEADER.unpack_from(data)[2]
+    out = {}
+    for n in range(count):
+        damaged = bytearray(data)
+        for _ in range(rng.randint(1, 4)):
+            damaged[rng.randrange(HEADER.size, head_end if rng.random() < .8 else len(data))] = rng.randrange(256)
+        damaged[24:28] = zlib.crc32(damaged[HEADER.size:]).to_bytes(4, "little")
+        out[f"fuzz{n}"] = bytes(damaged)
+    return out

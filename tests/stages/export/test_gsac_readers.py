@@ -1,0 +1,116 @@
+"""The readers of `.gsac` in Python, C# (Mono) and JavaScript (node): the same numbers, the same named faults."""
+
+import importlib.util
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from gsac.stages import export
+from gsac.stages.export.container import GsacError
+from gsac.stages.export.rigged import RiggedAvatar
+
+HERE = Path(__file__).parent
+JS = r"""
+const fs = require("fs"), path = require("path");
+const { readAvatar, GsacError } = new Function(fs.readFileSync(process.argv[2], "utf8") + "; return { readAvatar, GsacError };")();
+for (const name of fs.readdirSync(process.argv[3])) {
+  const bytes = fs.readFileSync(path.join(process.argv[3], name));
+  let word = "ok";
+  try {
+    readAvatar(new Uint8Array(bytes).buffer);
+  } catch (e) {
+    if (!(e instanceof GsacError)) throw e;
+    word = e.fault;
+  }
+  console.log(name, word);
+}
+"""
+
+
+def beside(name):
+    spec = importlib.util.spec_from_file_location(f"gsac_export_{Path(name).stem}", HERE / name)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def python_words(files):
+    words = {}
+    for name, data in files.items():
+        try:
+            RiggedAvatar.from_bytes(data)
+            words[name] = "ok"
+        except GsacError as e:
+            words[name] = e.fault.name.lower()
+    return words
+
+
+def words_of(text):
+    return dict(line.split() for line in text.splitlines())
+
+
+def csharp_words(folder, tmp_path):
+    mono = beside("unity/mono.py")
+    if mono.missing_packages():
+        pytest.skip(f"needs the Debian packages {', '.join(mono.missing_packages())}")
+    core = Path(export.__file__).parent / "unity" / "Runtime" / "Core"
+    programs = HERE / "unity" / "programs"
+    exe = mono.compile_csharp([*core.glob("*.cs"), programs / "Dump.cs", programs / "Read.cs"], tmp_path / "read.exe")
+    return words_of(mono.run(exe, "faults", folder, heap="48m"))
+
+
+def javascript_words(folder, tmp_path):
+    if not shutil.which("node"):
+        pytest.skip("needs node")
+    script = tmp_path / "read.js"
+    script.write_text(JS)
+    done = subprocess.run(["node", "--max-old-space-size=64", str(script), str(Path(export.__file__).parent / "viewer" / "gsac.js"),
+                           str(folder)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return words_of(done.stdout)
+
+
+READERS = {"csharp": csharp_words, "javascript": javascript_words}
+
+
+@pytest.fixture(scope="module")
+def collection(figure):
+    """Name -> (bytes, right words), the damaged and hostile files."""
+    return beside("hostile.py").files(figure.to_bytes())
+
+
+@pytest.fixture(scope="module")
+def fuzzed(figure):
+    return beside("hostile.py").fuzzed(figure.to_bytes(), 300)
+
+
+def folder_of(files, folder):
+    folder.mkdir()
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    return folder
+
+
+def wrong(words, collection):
+    assert words.keys() == collection.keys()
+    return {name: (word, collection[name][1]) for name, word in words.items() if word not in collection[name][1]}
+
+
+def test_python_names_the_fault_of_every_hostile_file(collection):
+    assert wrong(python_words({name: data for name, (data, _) in collection.items()}), collection) == {}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_the_reader_names_the_fault_of_every_hostile_file_in_little_memory(reader, collection, tmp_path):
+    folder = folder_of({name: data for name, (data, _) in collection.items()}, tmp_path / "files")
+    assert wrong(READERS[reader](folder, tmp_path), collection) == {}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_fuzz_a_file_that_python_refuses_the_reader_refuses_and_none_crashes_it(reader, fuzzed, tmp_path):
+    words = READERS[reader](folder_of(fuzzed, tmp_path / "files"), tmp_path)
+    expected = python_words(fuzzed)
+    differ = {name: (words[name], word) for name, word in expected.items() if (words[name] == "ok") != (word == "ok")}
+    assert differ == {}
+    assert 0.2 < sum(word != "ok" for word in expected.values()) / len(expected) < 0.99, "some of both"
