@@ -99,11 +99,20 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 
 def parse_yaml(text: str, source: str) -> Any:
+    """What the text holds. BadInput for text that is not YAML, and for a key given twice, of which YAML would keep the last."""
     import yaml
 
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+        def construct_mapping(self, node, deep=False):
+            seen = set()
+            for key, _ in node.value:
+                if str(key.value) in seen:
+                    raise BadInput(f"{source}: line {key.start_mark.line + 1}: {key.value} is given a second time; keep one")
+                seen.add(str(key.value))
+            return super().construct_mapping(node, deep)
+
     try:
-        return yaml.load(text, loader)  # noqa: S506, both loaders are safe ones
+        return yaml.load(text, Loader)  # noqa: S506, both base loaders are safe ones
     except yaml.YAMLError as e:
         raise BadInput(f"{source}: not valid YAML ({' '.join(str(e).split())})") from e
 

@@ -19,6 +19,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if not (arguments.folder / RUN).is_file():
         raise BadInput(f"{arguments.folder}: not the folder of a run (no {RUN}); `gsac run CLIP --out DIR` makes one")
     from gsac.pipeline.report import write_report
+    from gsac.pipeline.report.results import Results
 
+    if not Results(arguments.folder).has_run:
+        raise BadInput(f"{arguments.folder / RUN}: not the record of a run; run the clip again to write it anew")
     print(write_report(arguments.folder))
     return ExitCode.OK

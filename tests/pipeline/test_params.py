@@ -81,6 +81,8 @@ def test_later_sources_win_and_types_are_those_of_yaml(toy):
     ("left: {word: middle}", ["mine.yaml", "left.word", "middle", "first, last"]),
     ("leftt: {word: last}", ["mine.yaml", "leftt", "cut, left, right, join"]),
     ("left: 3", ["mine.yaml", "left", "3"]),
+    ("left:\n  word: last\n  word: first\n", ["mine.yaml", "line 3", "word", "second time"]),
+    ("left: {word: last}\nleft: {keep: 1}\n", ["mine.yaml", "line 2", "left", "second time"]),
     ("left: [", ["mine.yaml", "YAML"]),
     ("- 1", ["mine.yaml", "sections"]),
     (b"\xff\xfe\x00", ["mine.yaml", "cannot be read"]),

@@ -141,6 +141,12 @@ def test_a_users_mistake_is_one_clear_line_and_exit_code_2(toy, arguments, word)
     assert done.code == 2 and word in done.err and "Traceback" not in done.err
 
 
+def test_report_refuses_a_folder_whose_record_of_the_run_is_nonsense(toy, tmp_path):
+    (tmp_path / "run.json").write_text("[1, 2]")
+    done = toy.gsac("report", str(tmp_path))
+    assert done.code == 2 and "run.json: not the record of a run" in done.err and not (tmp_path / "report.html").exists()
+
+
 def test_nobodys_dvc_yaml_is_written_over(toy):
     toy.out.mkdir()
     (toy.out / "dvc.yaml").write_text("stages: {fit: {cmd: python fit.py}}")
