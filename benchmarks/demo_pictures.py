@@ -64,7 +64,8 @@ def viewed(page: Path):
         shot = Path(home) / "shot.png"
         subprocess.run([browser, "--headless", "--no-sandbox", "--hide-scrollbars", "--use-angle=swiftshader",
                         "--enable-unsafe-swiftshader", f"--user-data-dir={home}/user", f"--screenshot={shot}",
-                        "--window-size=760,760", "--virtual-time-budget=6000", page.resolve().as_uri()], check=True, capture_output=True)
+                        "--window-size=760,760", "--virtual-time-budget=6000", page.resolve().as_uri()],
+                       check=True, capture_output=True)
         image = cv2.imread(str(shot))
     return cv2.resize(image, (HIGH, HIGH), interpolation=cv2.INTER_AREA)
 
