@@ -6,6 +6,7 @@ import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
+from gsac.stages.frame_names import name_frames
 from gsac.stages.keypoints.frame import ARRAYS, Frame
 from gsac.stages.keypoints.mediapipe import Mediapipe
 from gsac.stages.keypoints.simcc import Wholebody
@@ -61,14 +62,3 @@ def say(job: Job, clip: Clip, frames: list[Frame], at_edge: list[bool]) -> None:
             job.warn(f"The {side} hand was never seen; its fingers stay at rest.")
     if not any(f.score[FACE].any() for f in frames):
         job.warn("The face was never seen from the front; it stays without expression.")
-
-
-def name_frames(mask: np.ndarray) -> str:
-    """`frame 3` or `12 of 60 frames (0-3, 17, 40-46)`; long lists are cut."""
-    index = np.flatnonzero(mask)
-    if len(index) == 1:
-        return f"frame {index[0]}"
-    runs = np.split(index, np.flatnonzero(np.diff(index) > 1) + 1)
-    words = [str(r[0]) if len(r) == 1 else f"{r[0]}-{r[-1]}" for r in runs]
-    more = ", ..." if len(words) > 8 else ""
-    return f"{len(index)} of {len(mask)} frames ({', '.join(words[:8])}{more})"

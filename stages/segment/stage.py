@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
 from gsac.stages.contract import Job, StageError
+from gsac.stages.frame_names import name_frames
 from gsac.stages.segment.edge import soften
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.network import PoseMask, SelfieMask, person_region
@@ -35,30 +36,29 @@ def run(job: Job) -> None:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
     given = (frames / "plate.png").exists()
     (job.out / "alpha").mkdir()
-    absent, other_scene = [], []
+    absent, other_scene = np.zeros((2, len(paths)), bool)
     for t, path in enumerate(paths):
         image = read_frame(path)
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
         region = person_region(xy, score)
         if region is None:
-            absent.append(t)
+            absent[t] = True
             alpha = np.zeros(image.shape[:2], np.float32)
         else:
             alpha, plate_fits = segment_frame(image, network(image, region), xy, score, plate, job.config.iterations)
             if given and not plate_fits:
-                other_scene.append(t)
+                other_scene[t] = True
             if not (alpha > 0.5).any():
                 raise StageError(f"frame {t} ({path.name}): the mask is empty although a person was found there; "
                                  "look at the frame, and remove it or try segment.method=selfie")
         write_alpha(job.out / "alpha" / f"{path.stem}.exr", alpha)
         job.progress(t + 1, len(paths), "frames")
-    if len(absent) == len(paths):
+    if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
-    if absent:
-        job.warn(f"Frames {', '.join(map(str, absent))} show no person; their masks are empty.")
-    if other_scene:
-        job.warn(f"The plate does not show the scene of frames {', '.join(map(str, other_scene))} (did the camera "
-                 "move?); it is not used there.")
+    if absent.any():
+        job.warn(f"No person is in {name_frames(absent)}; the mask there is empty.")
+    if other_scene.any():
+        job.warn(f"The plate does not show the scene of {name_frames(other_scene)} (did the camera move?); it is not used there.")
 
 
 def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,

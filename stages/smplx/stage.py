@@ -6,6 +6,7 @@ import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
+from gsac.stages.frame_names import name_frames
 from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
 from gsac.stages.smplx.mimic import mimic
 from gsac.stages.smplx.silhouette import read_outline
@@ -62,17 +63,11 @@ def warn(job: Job, fit, seen: np.ndarray, params, clip: Clip) -> None:
     for note in fit.notes:
         job.warn(note)
     if not seen.all():
-        job.warn(f"Frames {listed(~seen)} show no person; their pose is interpolated")
+        job.warn(f"No person is in {name_frames(~seen)}; the pose there is interpolated.")
     poor = np.nan_to_num(fit.iou, nan=1.0) < POOR_IOU
     if (poor & seen).any():
-        job.warn(f"In frames {listed(poor & seen)} the body covers the silhouette badly (IoU below {POOR_IOU})")
+        job.warn(f"The body covers the silhouette badly (IoU below {POOR_IOU}) in {name_frames(poor & seen)}.")
     if not clip.focal_px and not job.config.focal_px:
-        job.warn(f"The clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it)")
+        job.warn(f"The clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it).")
     if job.config.height_m is None:
-        job.warn("One camera cannot see scale; the person's height comes from the shape prior (set smplx.height_m)")
-
-
-def listed(which: np.ndarray) -> str:
-    """Frame numbers of a mask, shortened."""
-    numbers = [str(i) for i in np.nonzero(which)[0]]
-    return ", ".join(numbers[:12]) + (f" and {len(numbers) - 12} more" if len(numbers) > 12 else "")
+        job.warn("One camera cannot see scale; the person's height comes from the shape prior (set smplx.height_m).")

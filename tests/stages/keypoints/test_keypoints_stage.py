@@ -12,7 +12,7 @@ from gsac.stages.contract import BadInput, Job
 from gsac.stages.keypoints import STAGE
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.frame import Frame
-from gsac.stages.keypoints.stage import name_frames, run, say, touches_edge
+from gsac.stages.keypoints.stage import run, say, touches_edge
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
 SQUATS, TRUTH = FOOTAGE / "squats" / "pose_squats.mp4", FOOTAGE / "truth-a" / "clip.mp4"
@@ -99,12 +99,6 @@ def test_touching_the_edge_is_seen_at_feet_and_at_the_crown():
     frame = seen()
     frame.pose33[[2, 5]], frame.pose33[[9, 10]] = (50, 14, 1), (50, 24, 1)
     assert touches_edge(frame, 100, 200)
-
-
-def test_long_lists_of_frames_are_cut():
-    assert name_frames(np.arange(5) == 3) == "frame 3"
-    assert name_frames(np.isin(np.arange(50), [1, 2, 3, 7])) == "4 of 50 frames (1-3, 7)"
-    assert name_frames(np.arange(50) % 2 == 0).endswith("12, 14, ...)")
 
 
 @pytest.mark.footage
