@@ -1,26 +1,62 @@
-"""Where a detector's key points lie on the body: measured on truth clips, kept with the fit.
+"""Where a detector's key points lie on the body, and how that changes with the turn: measured on truth clips, kept with the fit.
 
+    for seed in 11 12 41 42 43 44: python -m gsac.benchmarks.turntable CLIPS/$seed --seed $seed; gsac run CLIPS/$seed/clip.mp4 ...
     python -m gsac.benchmarks.detector_offsets RUN TRUTH [RUN TRUTH ...] --out stages/smplx/offsets/mediapipe.npz
 
 RUN is a run's folder (keypoints/keypoints.npz), TRUTH the clip's truth.npz. A detector's hip is not the body's hip: for every point
 one constant offset (3,) m in the frame of the joint that carries it most is found by robust least squares over all frames and
-clips. Left and right share their offset, mirrored.
+clips. What is left is laid out over the body's yaw: harmonics for each point, x and y as a share of the person's height, and the
+spread of the rest. Left and right share everything, mirrored.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import Body
-from gsac.avatar.wholebody import BODY_NAMES, FEET_NAMES, INDEX, LEFT_HAND, RIGHT_HAND
+from gsac.avatar.wholebody import BODY_NAMES, FACE, FEET_NAMES, INDEX, LEFT_HAND, RIGHT_HAND
+from gsac.stages.smplx.detector import HARMONICS, UNKNOWN, harmonics, yaw_of
+from gsac.stages.smplx.fit import Sightings
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")
 RIDGE = 2.0
 """Pull of an offset to zero, in sightings of 1 px at 1 m."""
+HABIT_RIDGE = 2.0
+"""Pull of a habit's harmonics to zero, in sightings; the highest twice."""
+LEAST_SPREAD = 0.002
+FEW = 20
+"""Sightings below which nothing is said of a point."""
+
+
+@dataclass
+class Sight:
+    """One clip: what the detector saw, and what was there."""
+
+    xy: np.ndarray  # (T, 133, 2) px
+    seen: np.ndarray  # (T, 133) bool
+    height: float  # px, of the person as the fit measures it
+    points: np.ndarray  # (T, 133, 3) m, the body's own points, camera frame
+    turn: np.ndarray  # (T, 55, 3, 3) of the joints to the camera frame
+    focal: float
+    center: np.ndarray  # (2,) px
+
+    @classmethod
+    def read(cls, body: Body, run: Path, truth: Path) -> Sight:
+        seen, z = read_arrays(run / "keypoints" / "keypoints.npz"), read_arrays(truth)
+        pose = np.concatenate([z[name] for name in POSE], 1).reshape(-1, 55, 3)
+        score = seen["score"]
+        height = Sightings(seen["xy"], score, score, seen["world"], None, 0, 0, None).person_height
+        return cls(seen["xy"].astype(np.float64), score > 0.5, height, body.keypoints(z["vertices"].astype(np.float32)),
+                   world_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"])
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """points: (..., 3). (..., 2) px."""
+        return self.focal * points[..., :2] / points[..., 2:] + self.center
 
 
 def carrier(body: Body) -> np.ndarray:
@@ -48,28 +84,21 @@ def world_rotations(body: Body, pose: np.ndarray) -> np.ndarray:
     return world
 
 
-def measure(body: Body, clips: list[tuple[Path, Path]]) -> tuple[np.ndarray, np.ndarray]:
+def measure_offsets(body: Body, clips: list[Sight]) -> tuple[np.ndarray, np.ndarray]:
     """Offsets (133, 3) m in the carrying joint's T-pose axes, and the median px distance before and after (133, 2)."""
     joint, other = carrier(body), mirror()
     rows: list[list] = [[] for _ in range(133)]
-    for run, truth in clips:
-        seen = read_arrays(run / "keypoints" / "keypoints.npz")
-        z = np.load(truth, allow_pickle=False)
-        pose = np.concatenate([z[name] for name in POSE], 1).reshape(-1, 55, 3)
-        points = body.keypoints(z["vertices"].astype(np.float32))
-        turn = world_rotations(body, pose)
-        focal, center = float(np.ravel(z["focal"])[0]), z["center"]
+    for clip in clips:
         for p in np.nonzero(joint >= 0)[0]:
-            for t in np.nonzero(seen["score"][:, p] > 0.5)[0]:
-                x = points[t, p]
-                slope = np.array([[focal / x[2], 0, -focal * x[0] / x[2] ** 2], [0, focal / x[2], -focal * x[1] / x[2] ** 2]])
-                away = seen["xy"][t, p] - (focal * x[:2] / x[2] + center)
-                rows[p].append((slope @ turn[t, joint[p]], away))
+            for t in np.nonzero(clip.seen[:, p])[0]:
+                x, f = clip.points[t, p], clip.focal
+                slope = np.array([[f / x[2], 0, -f * x[0] / x[2] ** 2], [0, f / x[2], -f * x[1] / x[2] ** 2]])
+                rows[p].append((slope @ clip.turn[t, joint[p]], clip.xy[t, p] - clip.project(x)))
     flip = np.array([-1.0, 1, 1])
     offsets, quality = np.zeros((133, 3)), np.full((133, 2), np.nan)
     for p in np.nonzero(joint >= 0)[0]:
         both = rows[p] + [(j * flip, a) for j, a in rows[other[p]]] if other[p] != p else rows[p]
-        if len(both) < 20:
+        if len(both) < FEW:
             continue
         jacobian, away = np.stack([j for j, _ in both]), np.stack([a for _, a in both])
         offset = np.zeros(3)
@@ -83,17 +112,48 @@ def measure(body: Body, clips: list[tuple[Path, Path]]) -> tuple[np.ndarray, np.
     return offsets, quality
 
 
+def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Habit (133, 2 H + 1, 2) and spread (133,) of what the offsets (133, 3) leave; none of the face, not fitted by them."""
+    joint, other = carrier(body), mirror()
+    habit, spread = np.zeros((133, 2 * HARMONICS + 1, 2)), np.full(133, UNKNOWN)
+    pull = HABIT_RIDGE * np.diag([1e-9, *([1.0] * (HARMONICS - 1) + [2.0]) * 2])
+    left = []
+    for clip in clips:
+        moved = clip.points + np.einsum("tpab,pb->tpa", clip.turn[:, joint], offsets)
+        use = (clip.seen & (joint >= 0))[..., None]
+        left.append((clip.xy - clip.project(np.where(use, moved, 1.0))) / np.where(use, clip.height, np.nan))
+    yaws = [yaw_of(clip.turn[:, 0]) for clip in clips]
+    for p in np.setdiff1d(np.nonzero(joint >= 0)[0], np.arange(FACE.start, FACE.stop)):
+        basis = np.concatenate([harmonics(sign * yaw) for yaw in yaws for sign in (1, -1)])
+        value = np.concatenate([x for e in left for x in (e[:, p], e[:, other[p]] * [-1, 1])])
+        known = np.isfinite(value).all(1)
+        if known.sum() < FEW:
+            continue
+        basis, value, weight = basis[known], value[known], np.ones(known.sum())
+        for _ in range(6):
+            heavy = basis * weight[:, None]
+            habit[p] = np.linalg.solve(basis.T @ heavy + pull, heavy.T @ value)
+            rest = np.linalg.norm(value - basis @ habit[p], axis=1)
+            weight = 1 / (1 + (rest / (3 * np.median(rest) + 1e-9)) ** 2) ** 2
+        spread[p] = max(np.sqrt(np.average(rest**2, weights=weight) / 2), LEAST_SPREAD)
+    return habit, spread
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("paths", nargs="+", type=Path, help="RUN TRUTH pairs")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     body = Body.load()
-    offsets, quality = measure(body, list(zip(options.paths[::2], options.paths[1::2], strict=True)))
-    write_arrays(options.out, offsets=offsets.astype(np.float32), model=np.array(body.digest))
+    clips = [Sight.read(body, *pair) for pair in zip(options.paths[::2], options.paths[1::2], strict=True)]
+    offsets, quality = measure_offsets(body, clips)
+    habit, spread = measure_habits(body, clips, offsets)
+    write_arrays(options.out, offsets=offsets.astype(np.float32), habit=habit.astype(np.float32),
+                 spread=spread.astype(np.float32), model=np.array(body.digest))
     for name in (*BODY_NAMES, *FEET_NAMES, "left_hand_wrist", "left_hand_middle1", "left_hand_middle4"):
         i = INDEX[name]
-        print(f"{name:18} {quality[i, 0]:6.1f} -> {quality[i, 1]:5.1f} px   {np.round(1e3 * offsets[i])} mm")
+        print(f"{name:18} {quality[i, 0]:6.1f} -> {quality[i, 1]:5.1f} px   {np.round(1e3 * offsets[i])} mm   "
+              f"habit {np.round(1e3 * np.linalg.norm(habit[i], axis=-1), 1)}, rest {1e3 * spread[i]:.1f} of 1000")
 
 
 if __name__ == "__main__":

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from gsac.avatar import rotation
-from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
 from gsac.stages.smplx import start
 from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector import Detector, yaw_of
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.problem import Observations, Problem, State
@@ -21,14 +20,10 @@ from gsac.stages.smplx.solver import levenberg_marquardt
 HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
 """Hand points that no finger joint moves: they turn the wrist."""
 BODY_POINTS = np.array([*range(23), *HAND_ROOTS])
-OFFSETS = {"mediapipe": "offsets/mediapipe.npz"}
-"""Detector -> what was measured of it."""
 FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(hand.start, hand.stop)])
 HIPS = (INDEX["left_hip"], INDEX["right_hip"])
-DETECTOR_SPREAD = 0.006
-"""Spread of a good key point as a share of the person's height in pixels."""
-FACE_SPREAD = 1.5
-"""Eyes, ears and nose: the detector means other places than the body's points."""
+TOGETHER = 2.0
+"""What a detector gets wrong it gets wrong in many frames together: its spreads count so many times."""
 DEPTH_SPREAD = 0.08
 """Metres; the detector's depth decides which way a limb points."""
 DEPTH_TRUST = 0.4
@@ -91,39 +86,31 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps."""
     center = np.array([sightings.width / 2, sightings.height / 2])
     focal, spread = focal_prior(sightings, config)
-    offsets = detector_offsets(body, sightings.detector)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], offsets[BODY_POINTS])
-    seen = observations(sightings, BODY_POINTS, center, (focal, spread), config, outlines)
+    detector = Detector.measured(sightings.detector, body)
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
+    seen = observations(sightings, detector, BODY_POINTS, center, (focal, spread), config, outlines)
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0)
     state = starting_state(body, sightings, focal, center)
     seen.depth *= scale_of_world(problem, state, sightings)
     seen.repeats = repeats(state.local[:, 0])
+    take_off_habits(seen, sightings, detector, BODY_POINTS, state)
     free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1, bool)
     trunk_only = free.copy()
     trunk_only[3:-3] = True
     state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, 6)
+    take_off_habits(seen, sightings, detector, BODY_POINTS, state)
     state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, 3 * config.iterations)
     steps, iou = trace.steps + more.steps, np.full(len(sightings.xy), np.nan)
     problem.outline_weight, seen.depth_spread = config.silhouette, DEPTH_TRUST
     for r in range(config.rounds if config.silhouette > 0 else 0):
         progress(r, config.rounds + 1, "rounds")
+        take_off_habits(seen, sightings, detector, BODY_POINTS, state)
         iou = renew_outlines(problem, state, sightings)
         state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, config.iterations)
         steps += more.steps
-    state, more = fit_fingers(body, sightings, problem, state, config)
+    state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     return Fit(state, joint_spread(problem, state), iou, reprojection(problem, state), steps + more.steps)
-
-
-def detector_offsets(body: Body, detector: str) -> np.ndarray:
-    """(133, 3) m: where the detector's points lie against the body's own; zeros for a detector or body not measured.
-
-    `benchmarks/detector_offsets.py` measures them on truth clips.
-    """
-    measured = read_arrays(Path(__file__).parent / OFFSETS[detector]) if detector in OFFSETS else None
-    if measured is None or str(measured["model"]) != body.digest:
-        return np.zeros((133, 3))
-    return measured["offsets"].astype(np.float64)
 
 
 def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
@@ -134,20 +121,31 @@ def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float
     return FOCAL_GUESS * max(sightings.width, sightings.height), FOCAL_SPREAD
 
 
-def observations(sightings: Sightings, points: np.ndarray, center: np.ndarray, focal: tuple[float, float],
+def observations(sightings: Sightings, detector: Detector, points: np.ndarray, center: np.ndarray, focal: tuple[float, float],
                  config: SmplxConfig, outlines: list[Outline]) -> Observations:
-    """The chosen points with their spreads: the detector's own, never below what a detector can know."""
+    """The chosen points with their spreads: what the detector gets wrong, and more where it or `handgap` is unsure."""
     height = sightings.person_height
-    floor = np.full(133, DETECTOR_SPREAD * height)
-    floor[:5] *= FACE_SPREAD
-    spread = np.sqrt(sightings.sigma**2 + floor**2) / np.sqrt(np.clip(sightings.score, 0.2, 1))
+    usual = TOGETHER * height * detector.spread
+    unsure = np.sqrt(np.maximum(sightings.sigma**2 - sightings.sigma.min(0) ** 2, 0))
+    spread = np.hypot(usual, unsure) / np.sqrt(np.clip(sightings.score, 0.2, 1))
     spread = np.where(sightings.seen, spread, np.inf)[:, points]
-    depth = np.where(sightings.seen, sightings.world[..., 2], np.nan)[:, points]
-    depth = depth - sightings.world[:, HIPS, 2].mean(1)[:, None]
-    depth[:, len([p for p in points if p < 23]):] = np.nan
-    return Observations(sightings.xy[:, points].astype(np.float64), spread.astype(np.float64), depth.astype(np.float64),
+    return Observations(sightings.xy[:, points].astype(np.float64), spread.astype(np.float64), depths(sightings)[:, points],
                         DEPTH_SPREAD, center, sightings.seconds, focal,
                         (config.height_m, 0.003) if config.height_m else ADULT_HEIGHT, 1.0, outlines, OUTLINE_SPREAD * height)
+
+
+def depths(sightings: Sightings) -> np.ndarray:
+    """(T, 133) m against the middle of the hips, as the detector scales it; NaN where it says nothing, and of hands and face."""
+    depth = np.where(sightings.seen, sightings.world[..., 2], np.nan).astype(np.float64)
+    depth -= sightings.world[:, HIPS, 2].mean(1)[:, None]
+    depth[:, 23:] = np.nan
+    return depth
+
+
+def take_off_habits(seen: Observations, sightings: Sightings, detector: Detector, points: np.ndarray, state: State) -> None:
+    """Frees the points of what the detector adds to a body turned as the state is."""
+    error = detector.error(yaw_of(state.local[:, 0]))[:, points]
+    seen.xy = sightings.xy[:, points] - error * sightings.person_height
 
 
 def starting_state(body: Body, sightings: Sightings, focal: float, center: np.ndarray) -> State:
@@ -174,8 +172,7 @@ def starting_state(body: Body, sightings: Sightings, focal: float, center: np.nd
 
 def repeats(turns: np.ndarray) -> float:
     """turns: (T, 3, 3) of the body. Frames for each different view, in yaw."""
-    yaw = np.arctan2(turns[:, 0, 2], -turns[:, 2, 2])
-    return len(turns) / len(np.unique(np.floor(yaw / VIEW)))
+    return len(turns) / len(np.unique(np.floor(yaw_of(turns) / VIEW)))
 
 
 def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> float:
@@ -206,12 +203,11 @@ def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.n
     return iou
 
 
-def fit_fingers(body: Body, sightings: Sightings, problem: Problem, state: State, config: SmplxConfig):
+def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, state: State, config: SmplxConfig):
     """Bends the fingers on the fitted wrists; nothing else moves."""
-    offsets = detector_offsets(body, sightings.detector)
-    pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS], offsets[FINGER_POINTS])
-    seen = observations(sightings, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, problem.seen.outlines)
-    seen.depth[:] = np.nan
+    body = problem.body
+    pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS], detector.offsets[FINGER_POINTS])
+    seen = observations(sightings, detector, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, [])
     fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, 0.0)
     state = State(state.local.copy(), state.transl, state.betas, state.log_focal)
     state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)

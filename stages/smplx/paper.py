@@ -15,12 +15,12 @@ import numpy as np
 import torch
 from gsac.avatar.body import Body
 from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector import Detector
 from gsac.stages.smplx.fit import (
     BODY_POINTS,
     HIPS,
     Fit,
     Sightings,
-    detector_offsets,
     focal_prior,
     joint_spread,
     observations,
@@ -108,8 +108,9 @@ def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass,
 
 def spread_of(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
     """(T, 55) m, read off the same normal equations as `lm`'s at this state."""
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector_offsets(body, sightings.detector)[BODY_POINTS])
-    seen = observations(sightings, BODY_POINTS, center, focal_prior(sightings, config), config, [])
+    detector = Detector.measured(sightings.detector, body)
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
+    seen = observations(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
     return joint_spread(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0), state)
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
-from gsac.stages.smplx.fit import Sightings, detector_offsets
+from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.fit import Sightings
 from gsac.stages.smplx.head import Head, HeadTerms, visible
 from gsac.stages.smplx.kinematics import Kinematics, Points, matrices, rotation_vectors, six_of
 from gsac.stages.smplx.prior import BODY_JOINTS
@@ -73,7 +74,7 @@ class Objective:
 
     def __init__(self, body: Body, sightings: Sightings, start: State, center: np.ndarray):
         self.kinematics = Kinematics(body)
-        offsets = detector_offsets(body, sightings.detector)
+        offsets = Detector.measured(sightings.detector, body).offsets
         self.known = np.flatnonzero(body.known_keypoints)
         self.points = Points(body, body.keypoint_matrix[self.known], offsets[self.known])
         self.mesh = Points(body, sparse.eye_array(len(body.v_template), format="csr")[::MESH_STEP])

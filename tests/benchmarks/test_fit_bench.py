@@ -57,4 +57,4 @@ def test_a_folder_that_is_no_truth_clip_is_refused_by_name(tmp_path):
 
 
 def test_clips_that_measured_the_detector_are_not_what_is_reported():
-    assert not set(bench.parser().parse_args([]).seeds) & {11, 12}
+    assert not set(bench.parser().parse_args([]).seeds) & {11, 12, 41, 42, 43, 44}

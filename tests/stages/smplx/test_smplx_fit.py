@@ -11,6 +11,7 @@ from gsac.avatar.zbuffer import silhouette
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.smplx import STAGE
 from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector import Detector
 from gsac.stages.smplx.fit import BODY_POINTS, HIPS, Sightings, fit_clip, observations, to_params
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS
@@ -117,8 +118,8 @@ def test_the_body_never_faces_the_wrong_way(body, tmp_path):
 def test_derivatives_agree_with_finite_differences(body, tmp_path):
     truth = turning_person(body, 3)
     outlines = outlines_of(body, truth, tmp_path)
-    seen = observations(sightings_of(body, truth, 2.0), BODY_POINTS, np.array([WIDTH / 2, HEIGHT / 2]), (FOCAL, 0.1),
-                        SmplxConfig(height_m=1.8), outlines)
+    seen = observations(sightings_of(body, truth, 2.0), Detector.measured("", body), BODY_POINTS,
+                        np.array([WIDTH / 2, HEIGHT / 2]), (FOCAL, 0.1), SmplxConfig(height_m=1.8), outlines)
     pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
     rng = np.random.default_rng(0)
     state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
