@@ -15,6 +15,9 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""Threads of small matrices wait for each other where the machine is busy; the stages allow themselves one as well."""
+
 DAG = """stages:
   cut:
     cmd: gsac stage cut

@@ -9,6 +9,7 @@ from gsac.stages.contract import Job, StageError
 from gsac.stages.handgap.fill import fill_gaps
 from gsac.stages.handgap.find import SIDES, find_missing, runs
 from gsac.stages.handgap.sigma import detection_sigma, person_height
+from threadpoolctl import threadpool_limits
 
 FILLED_SCORE = 0.5
 """Score of a filled point that is as sure as a detection; it falls as sigma grows."""
@@ -29,7 +30,8 @@ def run(job: Job) -> None:
     found = find_missing(xy, score, times, job.config)
     filled, drift = np.zeros(score.shape, bool), np.zeros(score.shape)
     if times is not None:
-        xy, filled, drift = fill_gaps(xy, score, keypoints["world"].astype(np.float64), found, times, job.config)
+        with threadpool_limits(1, "blas"):  # small matrices: threads cost more than they give, ten times more on a busy machine
+            xy, filled, drift = fill_gaps(xy, score, keypoints["world"].astype(np.float64), found, times, job.config)
 
     unseen = filled.copy()
     for i, side in enumerate(SIDES):
