@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import base64
+import json
 import zlib
 from pathlib import Path
+
+from gsac.avatar.motion import names
 
 HERE = Path(__file__).parent
 PAGE, STYLE = "viewer/page.html", "viewer/style.css"
 SCRIPTS = ("viewer/gsac.js", "viewer/math.js", "viewer/skin.js", "viewer/bind.js", "viewer/sort.js", "viewer/draw.js",
-           "viewer/camera.js", "viewer/ui.js")
+           "viewer/camera.js", "viewer/quat.js", "viewer/source.js", "viewer/names.js", "viewer/bvh.js", "viewer/gltf.js",
+           "viewer/retarget.js", "viewer/files.js", "viewer/rate.js", "viewer/viewer.js", "viewer/xr.js", "viewer/drawer.js",
+           "viewer/ui.js")
 """Plain scripts, in the order in which they lean on each other. Whole names, so that the cache sees these files."""
 
 
@@ -17,7 +22,8 @@ def page_bytes(container: bytes) -> bytes:
     """container: the bytes of avatar.gsac. The same bytes give the same page."""
     packed = base64.b64encode(zlib.compress(container, 9)).decode()
     page = (HERE / PAGE).read_text()
-    scripts = "\n".join(f"// {name}\n{(HERE / name).read_text()}" for name in SCRIPTS)
+    joint_names = json.dumps({"noise": names.NOISE, "sides": names.SIDES, "rules": names.RULES}, separators=(",", ":"))
+    scripts = "\n".join([f"const JOINT_NAMES = {joint_names};", *(f"// {name}\n{(HERE / name).read_text()}" for name in SCRIPTS)])
     for mark, text in (("STYLE", (HERE / STYLE).read_text()), ("SCRIPTS", scripts), ("AVATAR", packed)):
         before, found, after = page.partition(f"<!--{mark}-->")
         if not found:

@@ -5,13 +5,18 @@ class OrbitCamera {
     this.fov = 30;
     // Share of the picture's height that controls cover at the bottom; the figure stands above it.
     this.covered = 0;
+    // How far the figure has walked from where it was framed, m; the camera goes along.
+    this.walked = [0, 0, 0];
     this.view = new Float32Array(12);
+    this.yaw = 0;
+    // By hand or by the address: then a new size of the page does not frame the figure again.
+    this.moved = false;
   }
 
-  // Puts a box, m, into the picture, seen from the front; aspect: width over height.
+  // Puts a box, m, into the picture; aspect: width over height.
   frame(low, high, aspect) {
-    this.yaw = 0;
     this.pitch = 4;
+    this.moved = false;
     this.target = low.map((l, i) => (l + high[i]) / 2);
     const tall = (high[1] - low[1]) * 0.57 / (1 - this.covered), wide = (high[0] - low[0]) * 0.58 / aspect;
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
@@ -21,6 +26,13 @@ class OrbitCamera {
     return height / 2 / Math.tan(this.fov * Math.PI / 360);
   }
 
+  // What the painter draws with, for a picture of width x height px.
+  eye(width, height) {
+    this.update();
+    const focal = this.focal(height);
+    return { view: this.view, focal: [focal, focal], centre: [0, -this.covered * height / 2], box: [0, 0, width, height] };
+  }
+
   // Fills this.view: 3x4, row by row, world to camera.
   update() {
     const y = this.yaw * Math.PI / 180, p = this.pitch * Math.PI / 180;
@@ -28,7 +40,7 @@ class OrbitCamera {
     const right = [Math.cos(y), 0, -Math.sin(y)], forward = back.map((v) => -v);
     const down = [forward[1] * right[2] - forward[2] * right[1], forward[2] * right[0] - forward[0] * right[2],
       forward[0] * right[1] - forward[1] * right[0]];
-    const eye = this.target.map((t, i) => t + this.distance * back[i]);
+    const eye = this.target.map((t, i) => t + this.walked[i] + this.distance * back[i]);
     [right, down, forward].forEach((axis, r) => {
       this.view.set(axis, r * 4);
       this.view[r * 4 + 3] = -(axis[0] * eye[0] + axis[1] * eye[1] + axis[2] * eye[2]);
@@ -76,11 +88,13 @@ class OrbitCamera {
         this.turn(dx, dy);
       }
       fingers.set(e.pointerId, [e.clientX, e.clientY]);
+      this.moved = true;
       onMove();
     });
     element.addEventListener("wheel", (e) => {
       e.preventDefault();
       this.zoom(Math.exp(Math.sign(e.deltaY) * Math.min(Math.abs(e.deltaY), 100) * 0.0015));
+      this.moved = true;
       onMove();
     }, { passive: false });
   }

@@ -11,8 +11,8 @@ uniform sampler2D colours;
 uniform usampler2D order;
 uniform vec4 view[3];
 uniform vec2 size;
-uniform float focal;
-uniform float rise;
+uniform vec2 focal;
+uniform vec2 centre;
 uniform vec3 blend;
 out vec4 colour;
 out vec2 sigmas;
@@ -33,8 +33,8 @@ void main() {
 
   mat3 world = mat3(d0.w, d1.x, d1.y, d1.x, d1.z, d1.w, d1.y, d1.w, d2.x);
   vec2 tangent = clamp(c.xy / c.z, -WIDE * size / (2.0 * focal), WIDE * size / (2.0 * focal));
-  vec3 row0 = (view[0].xyz - tangent.x * view[2].xyz) * (focal / c.z);
-  vec3 row1 = (view[1].xyz - tangent.y * view[2].xyz) * (focal / c.z);
+  vec3 row0 = (view[0].xyz - tangent.x * view[2].xyz) * (focal.x / c.z);
+  vec3 row1 = (view[1].xyz - tangent.y * view[2].xyz) * (focal.y / c.z);
   vec3 side0 = world * row0;
   float xx = dot(row0, side0) + blend.x, xy = dot(row1, side0), yy = dot(row1, world * row1) + blend.x;
 
@@ -44,7 +44,7 @@ void main() {
   float reach = sqrt(2.0 * log(colour.a / blend.z)) + 1e-3;
   sigmas = reach * vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
   vec2 offset = sigmas.x * sqrt(large) * axis + sigmas.y * sqrt(small) * vec2(-axis.y, axis.x);
-  vec2 pixel = focal * c.xy / c.z + offset - vec2(0, rise);
+  vec2 pixel = focal * c.xy / c.z + offset + centre;
   gl_Position = vec4(2.0 * pixel / size * vec2(1, -1), 0, 1);
 }`;
 
@@ -65,8 +65,8 @@ const FLOOR_VERTEX = `#version 300 es
 precision highp float;
 uniform vec4 view[3];
 uniform vec2 size;
-uniform float focal;
-uniform float rise;
+uniform vec2 focal;
+uniform vec2 centre;
 uniform vec4 disc;
 out vec2 place;
 
@@ -74,7 +74,7 @@ void main() {
   place = vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
   vec4 p = vec4(disc.x + place.x * disc.w, disc.y, disc.z + place.y * disc.w, 1);
   vec3 c = vec3(dot(view[0], p), dot(view[1], p), dot(view[2], p));
-  gl_Position = vec4(2.0 * (focal * c.xy - vec2(0, rise) * c.z) / size * vec2(1, -1), 0, c.z);
+  gl_Position = vec4(2.0 * (focal * c.xy + centre * c.z) / size * vec2(1, -1), 0, c.z);
 }`;
 
 const FLOOR_FRAGMENT = `#version 300 es
@@ -155,23 +155,32 @@ class Painter {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, format, type, data);
   }
 
-  // background: rgb in 0..1; shadow: {x, y, z, radius} on the floor, or null.
-  draw(camera, background, shadow) {
-    const { gl, canvas, binding, sort } = this, width = canvas.width, height = canvas.height;
-    camera.update();
-    sort.update(binding.data, camera.view);
+  // Sorts and uploads the gaussians; view: 3x4 row by row, of the eye or of the middle between two.
+  prepare(view) {
+    const { gl, binding, sort } = this;
+    sort.update(binding.data, view);
     this.fill(this.gaussians, Binding.PER_ROW * 3, binding.rows, gl.RGBA, gl.FLOAT, binding.data);
     this.fill(this.order, DepthSort.PER_ROW, sort.order.length / DepthSort.PER_ROW, gl.RED_INTEGER, gl.UNSIGNED_INT, sort.order);
-    gl.viewport(0, 0, width, height);
-    gl.clearColor(background[0], background[1], background[2], 1);
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    if (shadow && camera.pitch > 0) {
-      this.use(this.floor, camera, width, height);
+  }
+
+  // background: rgba in 0..1.
+  clear(background) {
+    this.gl.clearColor(...background);
+    this.gl.clear(this.gl.COLOR_BUFFER_BIT);
+  }
+
+  // eye: {view, focal, centre, box}: 3x4 row by row; px; px from the box's middle to the axis; x, y, width, height in px.
+  // shadow: {x, y, z, radius} on the floor, or null.
+  paint(eye, shadow) {
+    const { gl, binding } = this;
+    gl.viewport(...eye.box);
+    if (shadow) {
+      this.use(this.floor, eye);
       gl.uniform4f(this.floor.places.disc, shadow.x, shadow.y, shadow.z, shadow.radius);
       gl.uniform1f(this.floor.places.strength, 0.4);
       gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     }
-    this.use(this.splats, camera, width, height);
+    this.use(this.splats, eye);
     const places = this.splats.places;
     gl.uniform3fv(places.blend, this.blend);
     [[this.gaussians, places.gaussians], [this.colours, places.colours], [this.order, places.order]].forEach(([texture, place], unit) => {
@@ -183,12 +192,12 @@ class Painter {
     gl.drawElements(gl.TRIANGLES, binding.count * 6, gl.UNSIGNED_INT, 0);
   }
 
-  use(program, camera, width, height) {
-    const gl = this.gl;
+  use(program, eye) {
+    const { gl } = this, { places } = program;
     gl.useProgram(program.program);
-    gl.uniform4fv(program.places.view, camera.view);
-    gl.uniform2f(program.places.size, width, height);
-    gl.uniform1f(program.places.focal, camera.focal(height));
-    gl.uniform1f(program.places.rise, camera.covered * height / 2);
+    gl.uniform4fv(places.view, eye.view);
+    gl.uniform2f(places.size, eye.box[2], eye.box[3]);
+    gl.uniform2fv(places.focal, eye.focal);
+    gl.uniform2fv(places.centre, eye.centre);
   }
 }

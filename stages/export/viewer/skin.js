@@ -38,6 +38,15 @@ class Pose {
     for (let i = 0; i < 3; i++) this.transl[i] = clip.transl[k0 * 3 + i] * (1 - t) + clip.transl[k1 * 3 + i] * t;
   }
 
+  // A rotation on top of a joint's own; x, y, z: axis-angle, rad.
+  turn(joint, x, y, z) {
+    const q = this.quats, o = joint * 4, ax = q[o], ay = q[o + 1], az = q[o + 2], aw = q[o + 3];
+    quatFromAxisAngle(this.b, 0, x, y, z);
+    const [bx, by, bz, bw] = this.b;
+    q[o] = aw * bx + ax * bw + ay * bz - az * by; q[o + 1] = aw * by - ax * bz + ay * bw + az * bx;
+    q[o + 2] = aw * bz + ax * by - ay * bx + az * bw; q[o + 3] = aw * bw - ax * bx - ay * by - az * bz;
+  }
+
   // From another pose towards this one.
   fadeFrom(other, t) {
     for (let q = 0; q < this.quats.length; q += 4) quatMix(this.quats, q, other.quats, q, this.quats, q, t);

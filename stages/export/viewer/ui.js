@@ -1,10 +1,8 @@
 // The page: opens the avatar inside it, plays it, and listens to the buttons and to the address.
 // Address: #pose=T|A or #clip=NAME, t=SECONDS, yaw, pitch, dist, fov (degrees, m), target=x,y,z, bg=rrggbb,
-// expression=NAME:WEIGHT, turntable, still (one frame, no controls, no floor).
+// expression=NAME:WEIGHT,..., joints=NAME:x,y,z;... (axis-angle, degrees), turntable, still (one frame, no controls, no floor).
 
-const FADE_S = 0.35;
-const BACKGROUND = "#2b303b";
-const MAX_PIXEL_RATIO = 2;
+const NOTE_MS = 9000;
 
 async function inlinedAvatar() {
   if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old: it cannot unpack the avatar");
@@ -13,181 +11,126 @@ async function inlinedAvatar() {
   return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
 }
 
-class Viewer {
-  constructor(avatar) {
-    this.avatar = avatar;
-    this.pose = new Pose(avatar);
-    this.before = new Pose(avatar);
-    this.skin = new Skin(avatar);
-    this.binding = new Binding(avatar);
-    this.sort = new DepthSort(this.binding.count);
-    this.canvas = document.getElementById("stage");
-    this.painter = new Painter(this.canvas, avatar, this.binding, this.sort);
-    this.camera = new OrbitCamera();
-    [this.low, this.high] = bounds(avatar.vertices);
-    this.expression = {};
-    this.playing = { pose: "T" };
-    this.clock = 0;
-    this.fade = 1;
-    this.turntable = false;
-    this.still = false;
-    this.background = BACKGROUND;
-    this.frames = [];
-  }
+const find = (id) => document.getElementById(id);
 
-  play(what) {
-    this.before.copy(this.pose);
-    this.playing = what;
-    this.clock = 0;
-    this.fade = 0;
-    markPressed(what);
-  }
-
-  // seconds: since the last frame.
-  step(seconds) {
-    this.clock += seconds;
-    this.fade = Math.min(1, this.fade + seconds / FADE_S);
-    if (this.playing.clip) this.pose.clip(this.playing.clip, this.clock);
-    else this.pose.still(this.playing.pose);
-    if (this.fade < 1) this.pose.fadeFrom(this.before, this.fade * this.fade * (3 - 2 * this.fade));
-    this.skin.update(this.pose, this.expression);
-    this.binding.update(this.skin.vertices);
-  }
-
-  draw() {
-    this.resize();
-    const [x, , z] = this.low.map((low, i) => (low + this.high[i]) / 2);
-    const shadow = { x, y: this.low[1], z, radius: 0.3 * (this.high[1] - this.low[1]) };
-    this.painter.draw(this.camera, colour(this.background), this.still ? null : shadow);
-  }
-
-  resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, MAX_PIXEL_RATIO);
-    const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
-    const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-    const panel = this.still ? 0 : window.innerHeight - document.getElementById("panel").offsetTop;
-    this.camera.covered = Math.min(0.5, panel / window.innerHeight);
-  }
-
-  run() {
-    let last = null;
-    const frame = (now) => {
-      if (this.still) {
-        last = null;
-      } else {
-        const seconds = last === null ? 0 : Math.min((now - last) / 1000, 0.25);
-        if (this.turntable) this.camera.yaw += seconds * 30;
-        this.step(seconds);
-        this.draw();
-        this.count(now);
-        last = now;
-      }
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
-  }
-
-  count(now) {
-    this.frames.push(now);
-    while (this.frames[0] < now - 1000) this.frames.shift();
-    if (this.frames.length < 2) return;
-    const rate = 1000 * (this.frames.length - 1) / (now - this.frames[0]);
-    document.getElementById("fps").textContent = `${rate.toFixed(rate < 10 ? 1 : 0)} fps · ${this.binding.count.toLocaleString("en")} gaussians`;
-  }
-
-  // words: the part of the address after #.
-  follow(words) {
-    const asked = new URLSearchParams(words), number = (name, fallback) => Number.parseFloat(asked.get(name) ?? fallback);
-    this.still = asked.has("still");
-    document.body.classList.toggle("bare", this.still);
-    if (/^[0-9a-f]{6}$/i.test(asked.get("bg") ?? "")) this.background = `#${asked.get("bg")}`;
-    this.turntable = asked.has("turntable");
-    this.expression = {};
-    if (asked.has("expression")) {
-      const [name, weight] = asked.get("expression").split(":");
-      this.expression[name] = Number.parseFloat(weight ?? "1");
+class Controls {
+  constructor(viewer) {
+    this.viewer = viewer;
+    for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
+    for (const pose of Object.keys(viewer.avatar.poses).sort()) this.addButton(`${pose}-pose`, { pose });
+    this.onClick("turntable", () => { viewer.turntable = !viewer.turntable; });
+    this.onClick("pause", () => { viewer.paused = !viewer.paused; });
+    this.onClick("reset", () => {
+      viewer.camera.yaw = 0;
+      viewer.frame();
+    });
+    this.onClick("open", () => find("file").click());
+    this.onClick("picture", () => this.savePicture());
+    find("background").addEventListener("input", (e) => { viewer.background = e.target.value; });
+    find("time").addEventListener("input", (e) => viewer.seek(Number(e.target.value) * viewer.length));
+    find("file").addEventListener("change", async (e) => {
+      await this.open([...e.target.files]);
+      e.target.value = "";
+    });
+    listenForDrops(find("drop"), (files) => this.open(files));
+    viewer.camera.listen(viewer.canvas, () => {
+      viewer.turntable = false;
+      this.show();
+    });
+    viewer.onRate = (rate) => this.showRate(rate);
+    this.drawers = { joints: jointSliders(viewer, find("joint-rows")), faces: faceSliders(viewer, find("face-rows")) };
+    for (const name of Object.keys(this.drawers)) {
+      this.onClick(`show-${name}`, () => this.openDrawer(find(name).hidden ? name : null));
+      this.onClick(`zero-${name}`, () => {
+        if (name === "joints") viewer.turned = {};
+        else viewer.expression = {};
+      });
     }
-    const first = Object.keys(this.avatar.clips)[0];
-    const playing = Object.hasOwn(this.avatar.clips, asked.get("clip")) ? { clip: asked.get("clip") }
-      : Object.hasOwn(this.avatar.poses, asked.get("pose")) ? { pose: asked.get("pose") }
-        : first ? { clip: first } : { pose: "T" };
-    this.play(playing);
-    this.fade = 1;
-    this.clock = number("t", 0);
-    this.step(0);
-    this.camera.fov = number("fov", 30);
-    this.frame();
-    this.camera.yaw = number("yaw", this.camera.yaw);
-    this.camera.pitch = number("pitch", this.camera.pitch);
-    this.camera.distance = number("dist", this.camera.distance);
-    if (asked.has("target")) this.camera.target = asked.get("target").split(",").map(Number);
-    this.draw();
+    find("show-faces").hidden = viewer.avatar.expressions.length === 0;
   }
 
-  // The whole figure as it stands, from the front.
-  frame() {
-    this.resize();
-    this.camera.frame(...bounds(this.skin.vertices), this.canvas.width / this.canvas.height);
+  onClick(id, act) {
+    find(id).addEventListener("click", () => {
+      act();
+      this.show();
+    });
   }
-}
 
-function bounds(vertices) {
-  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  vertices.forEach((x, i) => {
-    low[i % 3] = Math.min(low[i % 3], x);
-    high[i % 3] = Math.max(high[i % 3], x);
-  });
-  return [low, high];
-}
-
-function colour(hex) {
-  return [1, 3, 5].map((i) => Number.parseInt(hex.slice(i, i + 2), 16) / 255);
-}
-
-function markPressed(playing) {
-  for (const button of document.querySelectorAll("#poses button")) {
-    button.setAttribute("aria-pressed", String(button.dataset.pose === playing.pose && button.dataset.clip === playing.clip));
-  }
-}
-
-// Returns what makes the controls show the viewer's state.
-function addControls(viewer) {
-  const find = (id) => document.getElementById(id);
-  const button = (text, what) => {
+  addButton(text, what) {
     const element = document.createElement("button");
     element.textContent = text;
     Object.assign(element.dataset, what);
-    element.addEventListener("click", () => viewer.play(what));
+    element.addEventListener("click", () => {
+      this.viewer.play(what);
+      this.show();
+    });
     find("poses").append(element);
-  };
-  for (const clip of Object.keys(viewer.avatar.clips)) button(clip[0].toUpperCase() + clip.slice(1), { clip });
-  for (const pose of Object.keys(viewer.avatar.poses).sort()) button(`${pose}-pose`, { pose });
-  const showTurntable = () => find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
-  find("turntable").addEventListener("click", () => {
-    viewer.turntable = !viewer.turntable;
-    showTurntable();
-  });
-  find("reset").addEventListener("click", () => viewer.frame());
-  find("background").addEventListener("input", (e) => { viewer.background = e.target.value; });
-  for (const name of viewer.avatar.expressions) find("expression").append(new Option(name));
-  find("faces").hidden = viewer.avatar.expressions.length === 0;
-  const express = () => { viewer.expression = { [find("expression").value]: Number(find("weight").value) }; };
-  find("weight").addEventListener("input", express);
-  find("expression").addEventListener("change", express);
-  viewer.camera.listen(viewer.canvas, () => {
-    viewer.turntable = false;
-    showTurntable();
-  });
-  return () => {
-    showTurntable();
-    markPressed(viewer.playing);
+  }
+
+  openDrawer(name) {
+    for (const other of Object.keys(this.drawers)) {
+      find(other).hidden = other !== name;
+      find(`show-${other}`).setAttribute("aria-pressed", String(other === name));
+    }
+  }
+
+  // Motion files from the user; what is wrong with one is said on the page.
+  async open(files) {
+    try {
+      const added = await addMotions(this.viewer.avatar, files);
+      for (const clip of added) this.addButton(clip, { clip });
+      this.viewer.play({ clip: added[0] });
+      this.note(`${added.join(", ")}: put on this avatar`);
+    } catch (error) {
+      if (!(error instanceof MotionError)) throw error;
+      this.note(error.message);
+    }
+    this.show();
+  }
+
+  savePicture() {
+    const { viewer } = this, link = document.createElement("a");
+    viewer.draw();
+    link.download = `avatar ${viewer.playing.clip ?? `${viewer.playing.pose}-pose`}.png`;
+    viewer.canvas.toBlob((blob) => {
+      link.href = URL.createObjectURL(blob);
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    }, "image/png");
+  }
+
+  note(text) {
+    find("note").textContent = text;
+    find("note").hidden = false;
+    clearTimeout(this.noteTimer);
+    this.noteTimer = setTimeout(() => { find("note").hidden = true; }, NOTE_MS);
+  }
+
+  showRate({ fps, p95 }) {
+    const { viewer } = this, count = viewer.binding.count.toLocaleString("en");
+    find("fps").textContent = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms · ${count} gaussians`;
+    if (viewer.length) {
+      if (document.activeElement !== find("time") || !viewer.paused) find("time").value = viewer.clock / viewer.length;
+      find("clock").textContent = `${viewer.clock.toFixed(1)} / ${viewer.length.toFixed(1)} s`;
+    }
+  }
+
+  // The controls as the viewer's state has them.
+  show() {
+    const { viewer } = this, { playing } = viewer;
+    for (const button of document.querySelectorAll("#poses button")) {
+      button.setAttribute("aria-pressed", String(button.dataset.pose === playing.pose && button.dataset.clip === playing.clip));
+    }
+    find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
+    find("timeline").hidden = !viewer.length;
+    find("pause").textContent = viewer.paused ? "Play" : "Pause";
     find("background").value = viewer.background;
-  };
+    Object.values(this.drawers).forEach((showSliders) => showSliders());
+  }
 }
 
 function tell(error) {
-  const box = document.getElementById("message");
+  const box = find("message");
   box.textContent = `The avatar cannot be shown: ${error.message}`;
   box.hidden = false;
   console.error(error);
@@ -196,16 +139,17 @@ function tell(error) {
 async function main() {
   const viewer = new Viewer(readAvatar(await inlinedAvatar()));
   window.gsac = viewer;
-  const showState = addControls(viewer);
+  const controls = new Controls(viewer);
   const follow = () => {
     viewer.follow(location.hash.slice(1));
-    showState();
+    controls.show();
   };
   follow();
   window.addEventListener("hashchange", follow);
   viewer.canvas.addEventListener("webglcontextlost", () => {
     tell(new Error("the graphics driver stopped; please reload the page"));
   });
+  await offerHeadset(viewer, find("tools"), (text) => controls.note(text));
   viewer.run();
   document.documentElement.dataset.ready = "yes";
 }

@@ -144,8 +144,8 @@ def test_on_a_phone_the_controls_are_inside_the_screen_and_below_the_feet(page):
     page.resize(390, 844, 2, True)
     page.run("location.hash = 'pose=A&x'")
     page.until("!gsac.still && gsac.playing.pose === 'A' && gsac.canvas.width === 780")
-    boxes = page.run("[...document.querySelectorAll('button, select, input')].map((e) => e.getBoundingClientRect())"
-                     ".map((r) => [r.left, r.top, r.right, r.bottom])")
+    boxes = page.run("[...document.querySelectorAll('button, select, input')].filter((e) => e.offsetParent)"
+                     ".map((e) => e.getBoundingClientRect()).map((r) => [r.left, r.top, r.right, r.bottom])")
     left, top, right, bottom = np.array(boxes).T
     assert left.min() >= 0 and right.max() <= 390 and bottom.max() <= 844
     view = np.array(page.run("Array.from(gsac.camera.view)")).reshape(3, 4)

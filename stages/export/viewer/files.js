@@ -1,0 +1,58 @@
+// Motion files that are dropped on the page or chosen: each becomes a clip of the avatar, and the first plays.
+
+const MOST_BYTES = 128 * 2 ** 20;
+const READERS = { bvh: bvhMotions, glb: readGltf, gltf: readGltf, vrma: readGltf };
+
+function bvhMotions(bytes, where) {
+  return [{ name: where.replace(/\.[^.]*$/, ""), source: readBvh(new TextDecoder().decode(bytes), where) }];
+}
+
+// files: File[]. Adds clips to the avatar and returns their names; throws MotionError.
+async function addMotions(avatar, files) {
+  const kind = (file) => file.name.split(".").at(-1).toLowerCase(), motions = files.filter((file) => Object.hasOwn(READERS, kind(file)));
+  if (!motions.length) {
+    const names = files.map((file) => file.name).join(", ") || "nothing";
+    throw new MotionError(`${names}: a motion is read from .bvh, .glb and .gltf`);
+  }
+  const bytes = {};
+  for (const file of files) {
+    if (file.size > MOST_BYTES) throw new MotionError(`${file.name}: it has ${file.size} bytes; at most ${MOST_BYTES} are read`);
+    bytes[file.name] = new Uint8Array(await file.arrayBuffer().catch((error) => {
+      throw new MotionError(`${file.name}: the browser could not read it (${error.name})`);
+    }));
+  }
+  const added = [];
+  for (const file of motions) {
+    for (const { name, source } of READERS[kind(file)](bytes[file.name], file.name, bytes)) {
+      const clip = retarget(source, avatar, file.name), label = freeName(avatar.clips, name.slice(0, 40));
+      avatar.clips[label] = clip;
+      added.push(label);
+    }
+  }
+  return added;
+}
+
+function freeName(clips, name) {
+  let label = name;
+  for (let k = 2; Object.hasOwn(clips, label); k++) label = `${name} ${k}`;
+  return label;
+}
+
+// Listens for files that are dragged over the page; onFiles is called with those dropped.
+function listenForDrops(sign, onFiles) {
+  const carriesFiles = (e) => [...(e.dataTransfer?.types ?? [])].includes("Files");
+  document.addEventListener("dragover", (e) => {
+    if (!carriesFiles(e)) return;
+    e.preventDefault();
+    sign.hidden = false;
+  });
+  document.addEventListener("dragleave", (e) => {
+    if (!e.relatedTarget) sign.hidden = true;
+  });
+  document.addEventListener("drop", (e) => {
+    if (!carriesFiles(e)) return;
+    e.preventDefault();
+    sign.hidden = true;
+    onFiles([...e.dataTransfer.files]);
+  });
+}

@@ -1,0 +1,70 @@
+// Quaternions [x, y, z, w] and vectors [x, y, z] as small arrays of doubles: what reading and retargeting a motion needs.
+
+const Quat = {
+  // First b, then a.
+  multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
+    return [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+      aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz];
+  },
+
+  inverse([x, y, z, w]) {
+    return [-x, -y, -z, w];
+  },
+
+  rotate([x, y, z, w], v) {
+    const t = Vec.cross([x, y, z], v).map((c) => 2 * c), u = Vec.cross([x, y, z], t);
+    return v.map((c, i) => c + w * t[i] + u[i]);
+  },
+
+  // The smallest turn of direction a to direction b, of any length; opposite: about a normal of a.
+  between(a, b) {
+    a = Vec.unit(a);
+    b = Vec.unit(b);
+    const w = 1 + Vec.dot(a, b);
+    if (w >= 1e-9) return Quat.unit([...Vec.cross(a, b), w]);
+    const small = a.map(Math.abs), least = small.indexOf(Math.min(...small));
+    return [...Vec.unit(Vec.cross(a, [0, 1, 2].map((i) => Number(i === least)))), 0];
+  },
+
+  about(axis, angle) {
+    return [...axis.map((c) => c * Math.sin(angle / 2)), Math.cos(angle / 2)];
+  },
+
+  unit(q) {
+    const n = Math.hypot(...q) || 1;
+    return q.map((c) => c / n);
+  },
+
+  // a turned towards b by t along the shorter arc.
+  mix(a, b, t) {
+    const u = a.reduce((sum, c, i) => sum + c * b[i], 0) < 0 ? -t : t;
+    return Quat.unit(a.map((c, i) => (1 - t) * c + u * b[i]));
+  },
+
+  // The rotation that takes the axes to the orthonormal x, y, z.
+  fromColumns(x, y, z) {
+    const trace = x[0] + y[1] + z[2];
+    if (trace > 0) return Quat.unit([y[2] - z[1], z[0] - x[2], x[1] - y[0], 1 + trace]);
+    if (x[0] >= y[1] && x[0] >= z[2]) return Quat.unit([1 + x[0] - y[1] - z[2], x[1] + y[0], z[0] + x[2], y[2] - z[1]]);
+    if (y[1] >= z[2]) return Quat.unit([x[1] + y[0], 1 + y[1] - x[0] - z[2], y[2] + z[1], z[0] - x[2]]);
+    return Quat.unit([z[0] + x[2], y[2] + z[1], 1 + z[2] - x[0] - y[1], x[1] - y[0]]);
+  },
+
+  toAxisAngle(q) {
+    const [x, y, z, w] = q[3] < 0 ? q.map((c) => -c) : q, s = Math.hypot(x, y, z);
+    const factor = s > 1e-12 ? 2 * Math.atan2(s, w) / s : 2;
+    return [x * factor, y * factor, z * factor];
+  },
+};
+
+const Vec = {
+  dot: (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
+  cross: (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]],
+  add: (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]],
+  minus: (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]],
+  times: (a, s) => [a[0] * s, a[1] * s, a[2] * s],
+  length: (a) => Math.hypot(a[0], a[1], a[2]),
+  unit: (a) => Vec.times(a, 1 / Math.max(Vec.length(a), 1e-12)),
+  // What is left of a across the unit axis.
+  across: (a, axis) => Vec.minus(a, Vec.times(axis, Vec.dot(a, axis))),
+};

@@ -1,0 +1,25 @@
+// How smoothly the page draws: frames a second over the last second, and the frame time that 95 of 100 frames stay below.
+
+class FrameRate {
+  constructor() {
+    this.times = [];
+    this.told = 0;
+  }
+
+  // now: ms. Returns {fps, p95}, ms, a few times a second, else null.
+  frame(now) {
+    const { times } = this;
+    times.push(now);
+    if (times.length > FrameRate.KEPT) times.shift();
+    if (times.length < 3 || now - this.told < 250) return null;
+    this.told = now;
+    const recent = times.findIndex((t) => t > now - 1000), first = Math.min(Math.max(recent - 1, 0), times.length - 2);
+    const lengths = times.slice(1).map((t, i) => t - times[i]).sort((a, b) => a - b);
+    return { fps: 1000 * (times.length - 1 - first) / (now - times[first]), p95: lengths[Math.ceil(0.95 * lengths.length) - 1] };
+  }
+
+  reset() {
+    this.times.length = 0;
+  }
+}
+FrameRate.KEPT = 300;

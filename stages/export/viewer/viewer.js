@@ -1,0 +1,188 @@
+// The avatar on the canvas: what it plays, how it is turned by hand, what its face does, and the picture of that.
+
+const FADE_S = 0.35;
+const FOLLOW_S = 0.6;
+const BACKGROUND = "#2b303b";
+const MAX_PIXEL_RATIO = 2;
+
+class Viewer {
+  constructor(avatar) {
+    this.avatar = avatar;
+    this.pose = new Pose(avatar);
+    this.before = new Pose(avatar);
+    this.skin = new Skin(avatar);
+    this.binding = new Binding(avatar);
+    this.sort = new DepthSort(this.binding.count);
+    this.canvas = document.getElementById("stage");
+    this.painter = new Painter(this.canvas, avatar, this.binding, this.sort);
+    this.camera = new OrbitCamera();
+    [this.low, this.high] = bounds(avatar.vertices);
+    this.rate = new FrameRate();
+    this.expression = {};
+    // Joint -> axis-angle, degrees, on top of what is played.
+    this.turned = {};
+    this.playing = { pose: "T" };
+    this.clock = 0;
+    this.fade = 1;
+    this.paused = false;
+    this.turntable = false;
+    this.still = false;
+    this.background = BACKGROUND;
+    this.session = null;
+    // Called with {fps, p95} a few times a second.
+    this.onRate = () => {};
+  }
+
+  play(what) {
+    this.before.copy(this.pose);
+    this.playing = what;
+    this.clock = 0;
+    this.fade = 0;
+    this.paused = false;
+  }
+
+  // Seconds of the clip that plays; 0 for a still pose.
+  get length() {
+    const clip = this.avatar.clips[this.playing.clip];
+    return clip ? (clip.loop ? clip.keys : clip.keys - 1) / clip.fps : 0;
+  }
+
+  // To a place in the clip, s.
+  seek(seconds) {
+    this.clock = seconds;
+    this.fade = 1;
+  }
+
+  // seconds: since the last frame.
+  step(seconds) {
+    if (!this.paused) this.clock += seconds;
+    this.fade = Math.min(1, this.fade + seconds / FADE_S);
+    if (this.playing.clip) {
+      const { length } = this;
+      if (this.clock > length && length > 0) {
+        if (!this.avatar.clips[this.playing.clip].loop) {
+          this.before.copy(this.pose);
+          this.fade = 0;
+        }
+        this.clock %= length;
+      }
+      this.pose.clip(this.playing.clip, this.clock);
+    } else {
+      this.pose.still(this.playing.pose);
+    }
+    if (this.fade < 1) this.pose.fadeFrom(this.before, this.fade * this.fade * (3 - 2 * this.fade));
+    for (const [joint, degrees] of Object.entries(this.turned)) {
+      this.pose.turn(this.avatar.names.indexOf(joint), ...degrees.map((d) => d * Math.PI / 180));
+    }
+    const share = 1 - Math.exp(-seconds / FOLLOW_S), { walked } = this.camera;
+    for (const i of [0, 2]) walked[i] += share * (this.pose.transl[i] - walked[i]);
+    this.skin.update(this.pose, this.expression);
+    this.binding.update(this.skin.vertices);
+  }
+
+  get shadow() {
+    const [x, , z] = this.low.map((low, i) => (low + this.high[i]) / 2), { transl } = this.pose;
+    return { x: x + transl[0], y: this.low[1], z: z + transl[2], radius: 0.3 * (this.high[1] - this.low[1]) };
+  }
+
+  draw() {
+    if (this.resize() && !this.camera.moved) this.frame();
+    const eye = this.camera.eye(this.canvas.width, this.canvas.height);
+    this.painter.prepare(eye.view);
+    this.painter.clear([...colour(this.background), 1]);
+    this.painter.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
+  }
+
+  // Returns whether the canvas has another size than before.
+  resize() {
+    const ratio = Math.min(window.devicePixelRatio || 1, MAX_PIXEL_RATIO);
+    const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
+    const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
+    const other = this.canvas.width !== width || this.canvas.height !== height;
+    if (other) Object.assign(this.canvas, { width, height });
+    const panel = this.still ? 0 : window.innerHeight - document.getElementById("panel").offsetTop;
+    this.camera.covered = Math.min(0.5, panel / window.innerHeight);
+    return other;
+  }
+
+  // Draws from now on; the headset has its own rhythm (xr.js).
+  run() {
+    let last = null;
+    const frame = (now) => {
+      if (this.still || this.session) {
+        last = null;
+        this.rate.reset();
+      } else {
+        const seconds = last === null ? 0 : Math.min((now - last) / 1000, 0.25);
+        if (this.turntable) this.camera.yaw += seconds * 30;
+        this.step(seconds);
+        this.draw();
+        this.tick(now);
+        last = now;
+      }
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  tick(now) {
+    const rate = this.rate.frame(now);
+    if (rate) this.onRate(rate);
+  }
+
+  // words: the part of the address after #.
+  follow(words) {
+    const asked = new URLSearchParams(words), number = (name, fallback) => Number.parseFloat(asked.get(name) ?? fallback);
+    this.still = asked.has("still");
+    document.body.classList.toggle("bare", this.still);
+    if (/^[0-9a-f]{6}$/i.test(asked.get("bg") ?? "")) this.background = `#${asked.get("bg")}`;
+    this.turntable = asked.has("turntable");
+    this.expression = {};
+    for (const part of (asked.get("expression") ?? "").split(",").filter(Boolean)) {
+      const [name, weight] = part.split(":");
+      this.expression[name] = Number.parseFloat(weight ?? "1");
+    }
+    this.turned = {};
+    for (const part of (asked.get("joints") ?? "").split(";").filter(Boolean)) {
+      const [joint, degrees] = part.split(":"), values = (degrees ?? "").split(",").map(Number);
+      if (this.avatar.names.includes(joint) && values.length === 3 && values.every(Number.isFinite)) this.turned[joint] = values;
+    }
+    const first = Object.keys(this.avatar.clips)[0];
+    const playing = Object.hasOwn(this.avatar.clips, asked.get("clip")) ? { clip: asked.get("clip") }
+      : Object.hasOwn(this.avatar.poses, asked.get("pose")) ? { pose: asked.get("pose") }
+        : first ? { clip: first } : { pose: "T" };
+    this.play(playing);
+    this.seek(number("t", 0));
+    this.camera.walked.fill(0);
+    this.step(0);
+    this.camera.fov = number("fov", 30);
+    this.frame();
+    this.camera.moved = ["pitch", "dist", "target"].some((name) => asked.has(name));
+    this.camera.yaw = number("yaw", 0);
+    this.camera.pitch = number("pitch", this.camera.pitch);
+    this.camera.distance = number("dist", this.camera.distance);
+    if (asked.has("target")) this.camera.target = asked.get("target").split(",").map(Number);
+    this.draw();
+  }
+
+  // The whole figure as it stands.
+  frame() {
+    this.resize();
+    const { walked } = this.camera, [low, high] = bounds(this.skin.vertices);
+    for (const i of [0, 2]) walked[i] = this.pose.transl[i];
+    this.camera.frame(low.map((x, i) => x - walked[i]), high.map((x, i) => x - walked[i]), this.canvas.width / this.canvas.height);
+  }
+}
+
+function bounds(vertices) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  vertices.forEach((x, i) => {
+    low[i % 3] = Math.min(low[i % 3], x);
+    high[i % 3] = Math.max(high[i % 3], x);
+  });
+  return [low, high];
+}
+
+function colour(hex) {
+  return [1, 3, 5].map((i) => Number.parseInt(hex.slice(i, i + 2), 16) / 255);
+}

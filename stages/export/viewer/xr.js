@@ -1,0 +1,76 @@
+// A headset or a phone's AR, where the device offers one: the avatar stands 1.6 m in front, each eye its own picture,
+// one sort for both from the middle of the head.
+
+const XR_MODES = [["immersive-vr", "VR"], ["immersive-ar", "AR"]];
+const XR_DISTANCE = 1.6;
+
+// Adds a button for each mode that the device has.
+async function offerHeadset(viewer, place, tell) {
+  if (!navigator.xr) return;
+  for (const [mode, label] of XR_MODES) {
+    if (!await navigator.xr.isSessionSupported(mode).catch(() => false)) continue;
+    const button = document.createElement("button");
+    Object.assign(button, { textContent: label, id: `xr-${label.toLowerCase()}` });
+    button.addEventListener("click", () => {
+      if (viewer.session) viewer.session.end();
+      else enter(viewer, mode, button).catch((error) => tell(`${label} did not start: ${error.message}`));
+    });
+    place.append(button);
+  }
+}
+
+async function enter(viewer, mode, button) {
+  const session = await navigator.xr.requestSession(mode, { optionalFeatures: ["local-floor"] }), { gl } = viewer.painter;
+  session.addEventListener("end", () => {
+    viewer.session = null;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    button.setAttribute("aria-pressed", "false");
+  });
+  try {
+    await gl.makeXRCompatible();
+    const layer = new XRWebGLLayer(session, gl, { antialias: false, depth: false, alpha: true });
+    await session.updateRenderState({ baseLayer: layer });
+    // Without a floor the origin is the head, and the eyes are taken to be this high above it.
+    let height = 0;
+    const space = await session.requestReferenceSpace("local-floor").catch(() => {
+      height = 1.5;
+      return session.requestReferenceSpace("local");
+    });
+    viewer.session = session;
+    button.setAttribute("aria-pressed", "true");
+    const stand = [-(viewer.low[0] + viewer.high[0]) / 2, -viewer.low[1] - height, -XR_DISTANCE];
+    const background = mode === "immersive-ar" ? [0, 0, 0, 0] : [...colour(viewer.background), 1];
+    let last = null;
+    const frame = (now, xrFrame) => {
+      session.requestAnimationFrame(frame);
+      viewer.step(last === null ? 0 : Math.min((now - last) / 1000, 0.25));
+      viewer.tick(now);
+      last = now;
+      const seen = xrFrame.getViewerPose(space);
+      if (!seen) return;
+      gl.bindFramebuffer(gl.FRAMEBUFFER, layer.framebuffer);
+      viewer.painter.prepare(viewRows(seen.transform.inverse.matrix, stand));
+      viewer.painter.clear(background);
+      for (const view of seen.views) viewer.painter.paint(eyeOf(view, layer.getViewport(view), stand), viewer.shadow);
+    };
+    session.requestAnimationFrame(frame);
+  } catch (error) {
+    await session.end();
+    throw error;
+  }
+}
+
+// 3x4 row by row, OpenCV axes, of a column-major OpenGL view matrix; stand: the avatar's place in the room, m.
+function viewRows(m, stand) {
+  const rows = new Float32Array(12);
+  [1, -1, -1].forEach((sign, r) => {
+    for (let c = 0; c < 3; c++) rows[r * 4 + c] = sign * m[c * 4 + r];
+    rows[r * 4 + 3] = sign * (m[12 + r] + m[r] * stand[0] + m[4 + r] * stand[1] + m[8 + r] * stand[2]);
+  });
+  return rows;
+}
+
+function eyeOf({ projectionMatrix: p, transform }, { x, y, width, height }, stand) {
+  return { view: viewRows(transform.inverse.matrix, stand), focal: [p[0] * width / 2, p[5] * height / 2],
+    centre: [-p[8] * width / 2, p[9] * height / 2], box: [x, y, width, height] };
+}
