@@ -24,12 +24,24 @@ def compile_csharp(sources, out, *options):
     return out
 
 
-def run(program, *args, heap="256m"):
+def run(program, *args, heap="256m", collector=""):
     """Standard output; heap: what the program may allocate before it is ended with an error."""
-    done = subprocess.run(["mono", str(program), *map(str, args)], capture_output=True, text=True,
-                          env=os.environ | {"MONO_GC_PARAMS": f"max-heap-size={heap}"})
+    done = subprocess.run(["mono", "--debug", str(program), *map(str, args)], capture_output=True, text=True,
+                          env=os.environ | {"MONO_GC_PARAMS": f"max-heap-size={heap}{collector}"})
     assert done.returncode == 0, (done.stdout[-2000:], done.stderr[-2000:])
     return done.stdout
+
+
+def compile_package(package, out):
+    """The package over the stubs of Unity, Runtime without the editor's, as Unity does. Returns the tests' program."""
+    stubs, editor = sorted((HERE / "stubs").glob("*.cs")), HERE / "stubs" / "UnityEditor.cs"
+    compile_csharp([s for s in stubs if s != editor], out / "UnityEngine.dll")
+    options = [f"-r:{out / 'UnityEngine.dll'}"]
+    compile_csharp(sorted((package / "Runtime").rglob("*.cs")), out / "Gsac.dll", *options)
+    compile_csharp([editor], out / "UnityEditor.dll", *options)
+    options += [f"-r:{out / 'UnityEditor.dll'}", f"-r:{out / 'Gsac.dll'}"]
+    compile_csharp(sorted((package / "Editor").rglob("*.cs")), out / "Gsac.Editor.dll", *options)
+    return compile_csharp(sorted((HERE / "programs").glob("[DP]*.cs")), out / "Play.exe", *options, f"-r:{out / 'Gsac.Editor.dll'}")
 
 
 def arrays(path):

@@ -1,0 +1,49 @@
+using System.IO;
+using UnityEditor.AssetImporters;
+using UnityEngine;
+
+namespace Gsac
+{
+    /// <summary>A .gsac file in the project becomes a prefab: skeleton, Humanoid Avatar, mesh, components.</summary>
+    [ScriptedImporter(1, "gsac")]
+    public sealed class GsacImporter : ScriptedImporter
+    {
+        public override void OnImportAsset(AssetImportContext context)
+        {
+            byte[] bytes = File.ReadAllBytes(context.assetPath);
+            GsacData data;
+            try
+            {
+                data = GsacData.Read(bytes).Mirror();
+            }
+            catch (GsacException e)
+            {
+                context.LogImportError(context.assetPath + ": " + e.Message);
+                return;
+            }
+            var asset = ScriptableObject.CreateInstance<GsacAsset>();
+            asset.name = "Data";
+            asset.Bytes = bytes;
+
+            var root = new GameObject(Path.GetFileNameWithoutExtension(context.assetPath));
+            Transform[] joints = GsacSkeleton.Joints(data, root.transform);
+            Mesh mesh = GsacMesh.Build(data);
+            GsacMesh.Attach(mesh, root.transform, joints);
+            Avatar humanoid = GsacHumanoid.Build(data, root, joints);
+            if (!humanoid.isValid || !humanoid.isHuman)
+            {
+                context.LogImportWarning(context.assetPath + ": Unity takes the skeleton not as Humanoid; scripted poses work, Humanoid clips do not");
+            }
+            var animator = root.AddComponent<Animator>();
+            animator.avatar = humanoid;
+            // GsacAvatar brings its GsacRenderer
+            root.AddComponent<GsacAvatar>().Use(asset);
+
+            context.AddObjectToAsset("prefab", root);
+            context.AddObjectToAsset("data", asset);
+            context.AddObjectToAsset("mesh", mesh);
+            context.AddObjectToAsset("humanoid", humanoid);
+            context.SetMainObject(root);
+        }
+    }
+}

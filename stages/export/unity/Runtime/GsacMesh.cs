@@ -1,0 +1,58 @@
+using UnityEngine;
+using UnityEngine.Rendering;
+
+namespace Gsac
+{
+    /// <summary>The body under the gaussians as a skinned Unity mesh, for shadows, colliders and own tools.</summary>
+    public static class GsacMesh
+    {
+        public static Mesh Build(GsacData data)
+        {
+            var vertices = new Vector3[data.VertexCount];
+            var weights = new BoneWeight[data.VertexCount];
+            for (int v = 0; v < vertices.Length; v++)
+            {
+                vertices[v] = new Vector3(data.Vertices[v * 3], data.Vertices[v * 3 + 1], data.Vertices[v * 3 + 2]);
+                int[] i = data.SkinIndex;
+                float[] w = data.SkinWeight;
+                weights[v] = new BoneWeight
+                {
+                    boneIndex0 = i[v * 4], boneIndex1 = i[v * 4 + 1], boneIndex2 = i[v * 4 + 2], boneIndex3 = i[v * 4 + 3],
+                    weight0 = w[v * 4], weight1 = w[v * 4 + 1], weight2 = w[v * 4 + 2], weight3 = w[v * 4 + 3],
+                };
+            }
+            // Unity takes clockwise faces for the front. Only here: the gaussians' binding keeps the order of the file.
+            var triangles = new int[data.Faces.Length];
+            for (int f = 0; f < triangles.Length; f += 3)
+            {
+                triangles[f] = data.Faces[f];
+                triangles[f + 1] = data.Faces[f + 2];
+                triangles[f + 2] = data.Faces[f + 1];
+            }
+            var binds = new Matrix4x4[data.JointCount];
+            for (int j = 0; j < binds.Length; j++) binds[j] = Matrix4x4.Translate(-GsacSkeleton.Place(data, j));
+            var mesh = new Mesh { name = "Body", indexFormat = vertices.Length > 65535 ? IndexFormat.UInt32 : IndexFormat.UInt16 };
+            mesh.vertices = vertices;
+            mesh.triangles = triangles;
+            mesh.boneWeights = weights;
+            mesh.bindposes = binds;
+            mesh.RecalculateNormals();
+            mesh.RecalculateBounds();
+            return mesh;
+        }
+
+        /// <summary>A renderer of the mesh on a child of `root`, switched off: give it a material and switch it on where it is wanted.</summary>
+        public static SkinnedMeshRenderer Attach(Mesh mesh, Transform root, Transform[] joints)
+        {
+            var holder = new GameObject("Body");
+            holder.transform.SetParent(root, false);
+            var body = holder.AddComponent<SkinnedMeshRenderer>();
+            body.sharedMesh = mesh;
+            body.bones = joints;
+            body.rootBone = joints[0];
+            body.shadowCastingMode = ShadowCastingMode.ShadowsOnly;
+            body.enabled = false;
+            return body;
+        }
+    }
+}

@@ -1,0 +1,110 @@
+using System;
+using System.Collections.Generic;
+using UnityEngine;
+
+namespace Gsac
+{
+    /// <summary>One avatar's data and the buffers that never change, shared by all its instances in the scene.</summary>
+    public sealed class GsacModel
+    {
+        /// <summary>Buffers of one level of detail.</summary>
+        public sealed class Level
+        {
+            public GsacSort Sort;
+            public int Count;
+            public GraphicsBuffer Corners;
+            public GraphicsBuffer Local;
+            public GraphicsBuffer Colours;
+        }
+
+        static readonly Dictionary<object, GsacModel> Shared = new Dictionary<object, GsacModel>();
+
+        public readonly GsacData Data;
+        public readonly GsacExtent Extent;
+        public GraphicsBuffer Rest { get; private set; }
+        public GraphicsBuffer Skin { get; private set; }
+        public GraphicsBuffer Moves { get; private set; }
+        public GraphicsBuffer Quads { get; private set; }
+        public Level[] Levels { get; private set; }
+
+        readonly object source;
+        int users;
+
+        GsacModel(object source, byte[] bytes)
+        {
+            this.source = source;
+            Data = GsacData.Read(bytes).Mirror();
+            Extent = new GsacExtent(Data);
+        }
+
+        /// <summary>source: what the bytes come from; instances with the same one share. Throws GsacException.</summary>
+        public static GsacModel Acquire(object source, byte[] bytes)
+        {
+            GsacModel model;
+            if (!Shared.TryGetValue(source, out model))
+            {
+                model = new GsacModel(source, bytes);
+                Shared[source] = model;
+            }
+            model.users++;
+            return model;
+        }
+
+        public void Release()
+        {
+            if (--users > 0) return;
+            Shared.Remove(source);
+            if (Rest == null) return;
+            Rest.Dispose();
+            Skin.Dispose();
+            Moves.Dispose();
+            Quads.Dispose();
+            foreach (Level level in Levels)
+            {
+                level.Corners.Dispose();
+                level.Local.Dispose();
+                level.Colours.Dispose();
+            }
+            Rest = null;
+        }
+
+        /// <summary>Puts the buffers on the GPU, once.</summary>
+        public void Upload()
+        {
+            if (Rest != null) return;
+            int[] first;
+            float[] moves = GsacPacking.Moves(Data, out first);
+            Rest = Structured(GsacPacking.Rest(Data), 4);
+            Moves = Structured(moves, 4);
+            Skin = Structured(GsacPacking.Skin(Data, first), 4);
+            Levels = new Level[Data.Levels.Length];
+            int most = 0;
+            for (int i = 0; i < Levels.Length; i++)
+            {
+                GsacLevel level = Data.Levels[i];
+                most = Math.Max(most, level.Count);
+                Levels[i] = new Level
+                {
+                    Count = level.Count, Sort = new GsacSort(level.Count), Corners = Structured(GsacPacking.Corners(Data, level), 4),
+                    Local = Structured(GsacPacking.Local(level), 4), Colours = Structured(GsacPacking.Colours(level), 4),
+                };
+            }
+            uint[] quads = GsacPacking.Quads(Math.Max(most, 1));
+            Quads = new GraphicsBuffer(GraphicsBuffer.Target.Index, quads.Length, 4);
+            Quads.SetData(quads);
+        }
+
+        /// <summary>width: numbers of four bytes an element. Unity knows no empty buffer.</summary>
+        static GraphicsBuffer Structured(Array numbers, int width)
+        {
+            var buffer = Empty(numbers.Length / width, width);
+            if (numbers.Length > 0) buffer.SetData(numbers);
+            return buffer;
+        }
+
+        public static GraphicsBuffer Empty(int count, int width)
+        {
+            return new GraphicsBuffer(GraphicsBuffer.Target.Structured, Math.Max(count, 1), width * 4);
+        }
+    }
+}

@@ -1,0 +1,127 @@
+using System;
+using System.Net;
+using System.Net.Sockets;
+using System.Threading;
+using UnityEngine;
+
+namespace Gsac
+{
+    /// <summary>
+    /// Poses and expressions that come live over UDP, one JSON message a datagram (GsacPoseMessage), smoothed. Listens to
+    /// this machine only, unless `Any Address` is on. Whatever is not a message is counted and left.
+    /// </summary>
+    [AddComponentMenu("Gsac/Gsac Pose Stream")]
+    [DefaultExecutionOrder(8000)]
+    [RequireComponent(typeof(GsacAvatar))]
+    public sealed class GsacPoseStream : MonoBehaviour
+    {
+        const int LargestDatagram = 65536;
+        const int TimeoutMs = 200;
+
+        [SerializeField] int port = 9000;
+        [SerializeField, Tooltip("Listen to other machines too.")] bool anyAddress = false;
+        [SerializeField, Tooltip("s: time constant of the smoothing; 0 for none.")] float smoothing = 0.06f;
+
+        readonly object padlock = new object();
+        readonly byte[] datagram = new byte[LargestDatagram];
+        GsacAvatar avatar;
+        GsacPoseMessage message;
+        GsacPose incoming;
+        float[] incomingWeights;
+        Socket socket;
+        Thread thread;
+        volatile bool listening;
+        bool fresh;
+
+        /// <summary>Messages understood, and datagrams that were none.</summary>
+        public int Received { get; private set; }
+        public int Refused { get; private set; }
+
+        public float Smoothing
+        {
+            get { return smoothing; }
+            set { smoothing = value; }
+        }
+
+        public int Port
+        {
+            get { return port; }
+            set { port = value; }
+        }
+
+        void OnEnable()
+        {
+            avatar = GetComponent<GsacAvatar>();
+            GsacData data = avatar.Data;
+            message = new GsacPoseMessage(data);
+            incoming = new GsacPose(data.JointCount);
+            incomingWeights = new float[data.Expressions.Length];
+            socket = new Socket(AddressFamily.InterNetwork, SocketType.Dgram, ProtocolType.Udp) { ReceiveTimeout = TimeoutMs };
+            try
+            {
+                socket.Bind(new IPEndPoint(anyAddress ? IPAddress.Any : IPAddress.Loopback, port));
+            }
+            catch (SocketException e)
+            {
+                Debug.LogError(name + ": UDP port " + port + " cannot be opened (" + e.Message + "); choose another in Gsac Pose Stream", this);
+                socket.Close();
+                socket = null;
+                return;
+            }
+            listening = true;
+            thread = new Thread(Listen) { IsBackground = true, Name = "Gsac pose stream" };
+            thread.Start();
+        }
+
+        void OnDisable()
+        {
+            listening = false;
+            if (socket == null) return;
+            socket.Close();
+            thread.Join();
+            socket = null;
+        }
+
+        void Listen()
+        {
+            while (listening)
+            {
+                int length;
+                try
+                {
+                    length = socket.Receive(datagram);
+                }
+                catch (SocketException e)
+                {
+                    if (e.SocketErrorCode == SocketError.TimedOut || e.SocketErrorCode == SocketError.WouldBlock
+                        || e.SocketErrorCode == SocketError.ConnectionReset || e.SocketErrorCode == SocketError.MessageSize) continue;
+                    return;
+                }
+                catch (ObjectDisposedException)
+                {
+                    return;
+                }
+                lock (padlock)
+                {
+                    bool good = message.Read(datagram, length, incoming, incomingWeights);
+                    fresh |= good;
+                    if (good) Received++;
+                    else Refused++;
+                }
+            }
+        }
+
+        void LateUpdate()
+        {
+            lock (padlock)
+            {
+                if (!fresh) return;
+                if (avatar.Source != GsacSource.Script) avatar.Source = GsacSource.Script;
+                avatar.Pose.Approach(incoming, Time.deltaTime, smoothing);
+                float stay = smoothing > 0 ? Mathf.Exp(-Time.deltaTime / smoothing) : 0;
+                float[] weights = avatar.Weights;
+                for (int e = 0; e < weights.Length; e++) weights[e] = incomingWeights[e] + (weights[e] - incomingWeights[e]) * stay;
+            }
+        }
+    }
+}

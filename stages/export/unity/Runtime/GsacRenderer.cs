@@ -1,0 +1,202 @@
+using System;
+using System.Collections.Generic;
+using UnityEngine;
+
+namespace Gsac
+{
+    /// <summary>
+    /// Draws a GsacAvatar, in every render pipeline: per frame skin and bind, per camera sort and one indexed draw among
+    /// the transparent things. All on the GPU: nothing is read back, nothing is allocated after the first frame.
+    /// </summary>
+    [AddComponentMenu("Gsac/Gsac Renderer")]
+    [DisallowMultipleComponent]
+    [DefaultExecutionOrder(10000)]
+    [ExecuteAlways]
+    public sealed class GsacRenderer : MonoBehaviour
+    {
+        const int ThreadsPerGroup = 64;
+        static readonly int VertexCountId = Shader.PropertyToID("GsacVertexCount");
+        static readonly int SplatCountId = Shader.PropertyToID("GsacSplatCount");
+        static readonly int RestId = Shader.PropertyToID("GsacRest");
+        static readonly int SkinId = Shader.PropertyToID("GsacSkin");
+        static readonly int MovesId = Shader.PropertyToID("GsacMoves");
+        static readonly int WeightsId = Shader.PropertyToID("GsacWeights");
+        static readonly int BonesId = Shader.PropertyToID("GsacBones");
+        static readonly int PosedId = Shader.PropertyToID("GsacPosed");
+        static readonly int CornersId = Shader.PropertyToID("GsacCorners");
+        static readonly int LocalId = Shader.PropertyToID("GsacLocal");
+        static readonly int SplatsId = Shader.PropertyToID("GsacSplats");
+
+        /// <summary>Cameras beyond those of the scene; the editor adds its scene views.</summary>
+        public static readonly List<Camera> ExtraCameras = new List<Camera>();
+
+        static Camera[] cameras = new Camera[8];
+
+        [SerializeField, Tooltip("m: nearer than this the finest level of detail is drawn; each doubling takes the next, where the file has more.")]
+        float finestWithin = 4;
+
+        readonly List<GsacView> views = new List<GsacView>();
+        GsacAvatar avatar;
+        GsacModel model;
+        ComputeShader kernels;
+        int skinKernel, bindKernel;
+        Material material;
+        GraphicsBuffer bones, weights, posed, splats;
+        Vector4[] boneRows;
+        string trouble;
+
+        /// <summary>m: where an avatar with several levels of detail begins to use coarser ones.</summary>
+        public float FinestWithin
+        {
+            get { return finestWithin; }
+            set { finestWithin = value; }
+        }
+
+        void OnEnable()
+        {
+            trouble = null;
+        }
+
+        void OnDisable()
+        {
+            Drop();
+        }
+
+        void Drop()
+        {
+            foreach (GsacView view in views) view.Dispose();
+            views.Clear();
+            model = null;
+            if (bones == null) return;
+            bones.Dispose();
+            weights.Dispose();
+            posed.Dispose();
+            splats.Dispose();
+            bones = null;
+        }
+
+        void LateUpdate()
+        {
+            if (avatar == null) avatar = GetComponent<GsacAvatar>();
+            if (avatar == null || !avatar.CanOpen || trouble != null) return;
+            try
+            {
+                if (!Ready()) return;
+            }
+            catch (GsacException e)
+            {
+                Complain(e.Message);
+                return;
+            }
+            int count = Cameras();
+            if (count == 0) return;
+            GsacModel.Level level = model.Levels[Level(count)];
+            if (level.Count == 0) return;
+            Bind(level);
+            float low, high;
+            for (int i = 0; i < count; i++)
+            {
+                if ((cameras[i].cullingMask & (1 << gameObject.layer)) == 0) continue;
+                GsacView view = View(cameras[i]);
+                if (view.Depths(transform, boneRows, model, out low, out high)) view.Draw(kernels, splats, level, model, transform, low, high);
+            }
+        }
+
+        /// <summary>Buffers of the avatar that is there now. False where this device cannot draw it.</summary>
+        bool Ready()
+        {
+            if (model != null && ReferenceEquals(model, avatar.Model)) return true;
+            if (!SystemInfo.supportsComputeShaders || SystemInfo.maxComputeBufferInputsVertex < 3)
+            {
+                Complain("this graphics API (" + SystemInfo.graphicsDeviceType + ") has no compute shaders or no buffers in vertex shaders;"
+                         + " use Direct3D 11 or 12, Vulkan or Metal");
+                return false;
+            }
+            Drop();
+            model = avatar.Model;
+            model.Upload();
+            int V = model.Data.VertexCount, most = 1;
+            foreach (GsacModel.Level level in model.Levels) most = Math.Max(most, level.Count);
+            bones = GsacModel.Empty(model.Data.JointCount * 3, 4);
+            weights = GsacModel.Empty(model.Data.Expressions.Length, 1);
+            posed = GsacModel.Empty(V, 4);
+            splats = GsacModel.Empty(most * 3, 4);
+            boneRows = new Vector4[model.Data.JointCount * 3];
+            kernels = Resources.Load<ComputeShader>("Gsac/Gsac");
+            skinKernel = kernels.FindKernel("Skin");
+            bindKernel = kernels.FindKernel("Bind");
+            if (material == null) material = new Material(Resources.Load<Shader>("Gsac/GsacSplats")) { hideFlags = HideFlags.HideAndDontSave };
+            return true;
+        }
+
+        void Complain(string what)
+        {
+            trouble = what;
+            Debug.LogError(name + ": the avatar cannot be drawn: " + what, this);
+        }
+
+        void Bind(GsacModel.Level level)
+        {
+            GsacSkeleton.Bones(model.Data, transform, avatar.Joints, boneRows);
+            avatar.CollectWeights();
+            bones.SetData(boneRows);
+            if (avatar.DrawnWeights.Length > 0) weights.SetData(avatar.DrawnWeights);
+            kernels.SetInt(VertexCountId, model.Data.VertexCount);
+            kernels.SetInt(SplatCountId, level.Count);
+            kernels.SetBuffer(skinKernel, RestId, model.Rest);
+            kernels.SetBuffer(skinKernel, SkinId, model.Skin);
+            kernels.SetBuffer(skinKernel, MovesId, model.Moves);
+            kernels.SetBuffer(skinKernel, WeightsId, weights);
+            kernels.SetBuffer(skinKernel, BonesId, bones);
+            kernels.SetBuffer(skinKernel, PosedId, posed);
+            kernels.Dispatch(skinKernel, Groups(model.Data.VertexCount), 1, 1);
+            kernels.SetBuffer(bindKernel, CornersId, level.Corners);
+            kernels.SetBuffer(bindKernel, LocalId, level.Local);
+            kernels.SetBuffer(bindKernel, PosedId, posed);
+            kernels.SetBuffer(bindKernel, SplatsId, splats);
+            kernels.Dispatch(bindKernel, Groups(level.Count), 1, 1);
+        }
+
+        public static int Groups(int count)
+        {
+            return (count + ThreadsPerGroup - 1) / ThreadsPerGroup;
+        }
+
+        /// <summary>Fills `cameras` with those that are on; returns how many.</summary>
+        static int Cameras()
+        {
+            int most = Camera.allCamerasCount + ExtraCameras.Count;
+            if (cameras.Length < most) cameras = new Camera[most * 2];
+            int count = Camera.GetAllCameras(cameras);
+            for (int i = 0; i < ExtraCameras.Count; i++)
+            {
+                if (ExtraCameras[i] != null) cameras[count++] = ExtraCameras[i];
+            }
+            return count;
+        }
+
+        /// <summary>Level of detail for the nearest camera.</summary>
+        int Level(int count)
+        {
+            float nearest = float.MaxValue;
+            for (int i = 0; i < count; i++) nearest = Math.Min(nearest, Vector3.Distance(cameras[i].transform.position, transform.position));
+            int level = 0;
+            for (float within = finestWithin; level + 1 < model.Levels.Length && nearest > within; within *= 2) level++;
+            return level;
+        }
+
+        GsacView View(Camera camera)
+        {
+            for (int i = views.Count - 1; i >= 0; i--)
+            {
+                if (views[i].Camera == camera) return views[i];
+                if (views[i].Camera != null) continue;
+                views[i].Dispose();
+                views.RemoveAt(i);
+            }
+            var view = new GsacView(camera, material);
+            views.Add(view);
+            return view;
+        }
+    }
+}

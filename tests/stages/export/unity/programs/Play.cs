@@ -1,0 +1,350 @@
+using System;
+using System.Collections.Generic;
+using System.Globalization;
+using System.IO;
+using System.Net;
+using System.Net.Sockets;
+using System.Text;
+using Gsac;
+using UnityEngine;
+using UnityEditor.AssetImporters;
+
+/// <summary>Plays the package's scripts over the stubs of Unity and tells what they did.</summary>
+public static class Play
+{
+    public static int Main(string[] args)
+    {
+        CultureInfo.DefaultThreadCurrentCulture = CultureInfo.CurrentCulture = new CultureInfo("de-DE"); // commas for points
+        switch (args[0])
+        {
+            case "frame": Frame(args[1], args[2], args[3]); break;
+            case "pose": Pose(args[1], args[2], args[3]); break;
+            case "garbage": Garbage(args[1]); break;
+            case "stream": Stream(args[1], int.Parse(args[2])); break;
+            case "messages": Messages(args[1], args[2], args[3]); break;
+            case "benchmark": Benchmark(args[1], args[2]); break;
+            case "import": Import(args[1]); break;
+            case "levels": Levels(args[1]); break;
+            case "life": Life(args[1]); break;
+            default: return 2;
+        }
+        return 0;
+    }
+
+    static float[] Numbers(string path)
+    {
+        string[] words = File.ReadAllText(path).Split(new[] { ' ', '\n' }, StringSplitOptions.RemoveEmptyEntries);
+        return Array.ConvertAll(words, w => float.Parse(w, CultureInfo.InvariantCulture));
+    }
+
+    static T[] Part<T>(T[] all, int from, int count)
+    {
+        var part = new T[count];
+        Array.Copy(all, from, part, 0, count);
+        return part;
+    }
+
+    /// <summary>numbers: 165 of SMPL-X's pose, 3 of transl, the weights.</summary>
+    static GsacAvatar Posed(string file, float[] numbers)
+    {
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        avatar.SetSmplx(Part(numbers, 0, 3), Part(numbers, 3, 63), Part(numbers, 75, 45), Part(numbers, 120, 45), Part(numbers, 66, 3),
+                        Part(numbers, 69, 3), Part(numbers, 72, 3));
+        avatar.Pose.SetSmplxTransl(numbers[165], numbers[166], numbers[167]);
+        for (int e = 0; e < avatar.Data.Expressions.Length; e++) avatar.SetExpression(avatar.Data.Expressions[e], numbers[168 + e]);
+        avatar.SkipFade();
+        return avatar;
+    }
+
+    /// <summary>One frame: every buffer, dispatch and draw, to be run on a GPU by the test.</summary>
+    static void Frame(string file, string numbers, string path)
+    {
+        GsacAvatar avatar = Posed(file, Numbers(numbers));
+        avatar.transform.localPosition = new Vector3(0.4f, 0.1f, -0.7f);
+        avatar.transform.localRotation = Quaternion.Euler(5, 40, -3);
+        avatar.transform.localScale = new Vector3(1.2f, 1.2f, 1.2f);
+        Camera camera = Player.AddCamera("eye");
+        camera.transform.SetPositionAndRotation(new Vector3(1.5f, 1.6f, 2.5f), Quaternion.Euler(12, 215, 2));
+        string[] names = { "GsacVertexCount", "GsacSplatCount", "GsacKeyCount", "GsacIndexBits", "GsacSortStage", "GsacSortStride" };
+        string[] buffers = { "GsacRest", "GsacSkin", "GsacMoves", "GsacWeights", "GsacBones", "GsacPosed", "GsacCorners", "GsacLocal", "GsacSplats", "GsacKeys" };
+        using (var dump = new Dump(path))
+        {
+            var written = new HashSet<string>();
+            var steps = new List<float>();
+            Player.OnDispatch = (shader, kernel, groups) =>
+            {
+                steps.Add(kernel);
+                steps.Add(groups);
+                foreach (string name in names) steps.Add(Player.Value(shader, Shader.PropertyToID(name)).x);
+                Vector4 range = Player.Value(shader, Shader.PropertyToID("GsacDepthRange")), row = Player.Value(shader, Shader.PropertyToID("GsacDepthRow"));
+                steps.AddRange(new[] { range.x, range.y, row.x, row.y, row.z, row.w });
+                foreach (string name in buffers)
+                {
+                    GraphicsBuffer buffer = Player.Buffer(shader, kernel, Shader.PropertyToID(name));
+                    if (buffer != null && written.Add(name)) dump.Put(name, Player.Words(buffer));
+                }
+            };
+            Player.OnDraw = (asked, indices, count) =>
+            {
+                MaterialPropertyBlock block = asked.matProps;
+                var rows = new List<float>();
+                foreach (string name in new[] { "GsacModel0", "GsacModel1", "GsacModel2", "GsacBlend" })
+                {
+                    Vector4 v = Player.Value(block, Shader.PropertyToID(name));
+                    rows.AddRange(new[] { v.x, v.y, v.z, v.w });
+                }
+                rows.Add(Player.Value(block, Shader.PropertyToID("GsacIndexBits")).x);
+                Bounds b = asked.worldBounds;
+                rows.AddRange(new[] { b.center.x, b.center.y, b.center.z, b.size.x, b.size.y, b.size.z, count });
+                dump.Put("draw", rows.ToArray());
+                dump.Put("GsacColours", Player.Words(Player.Buffer(block, Shader.PropertyToID("GsacColours"))));
+                dump.Put("indices", Player.Words(indices));
+                Vector3 at = camera.transform.position, ahead = camera.transform.forward;
+                dump.Put("camera", new[] { at.x, at.y, at.z, ahead.x, ahead.y, ahead.z });
+            };
+            Player.Frame(new[] { avatar.gameObject })();
+            dump.Put("steps", steps.ToArray());
+        }
+    }
+
+    /// <summary>Joint transforms and the weights that are drawn.</summary>
+    static void Pose(string file, string numbers, string path)
+    {
+        GsacAvatar avatar = Posed(file, Numbers(numbers));
+        Player.Frame(new[] { avatar.gameObject })();
+        avatar.CollectWeights();
+        using (var dump = new Dump(path))
+        {
+            var rows = new Vector4[avatar.Data.JointCount * 3];
+            GsacSkeleton.Bones(avatar.Data, avatar.transform, avatar.Joints, rows);
+            var flat = new List<float>();
+            foreach (Vector4 r in rows) flat.AddRange(new[] { r.x, r.y, r.z, r.w });
+            dump.Put("bones", flat.ToArray());
+            dump.Put("weights", avatar.DrawnWeights);
+            foreach (KeyValuePair<string, GsacClip> clip in avatar.Data.Clips)
+            {
+                var pose = new GsacPose(avatar.Data.JointCount);
+                pose.Sample(clip.Value, 1.23f);
+                dump.Put("clip." + clip.Key, pose.Rotation);
+                dump.Put("transl." + clip.Key, pose.Transl);
+            }
+        }
+    }
+
+    /// <summary>Garbage collections while many frames go by, in every source, with a moving camera and live messages.</summary>
+    static void Garbage(string file)
+    {
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        Camera camera = Player.AddCamera("eye");
+        Player.AddCamera("second eye").transform.SetPositionAndRotation(new Vector3(0, 1, 9), Quaternion.Euler(0, 180, 0));
+        int draws = 0;
+        Player.OnDraw = (asked, indices, count) => draws++;
+        Action frame = Player.Frame(new[] { avatar.gameObject });
+        var message = new GsacPoseMessage(avatar.Data);
+        byte[] text = Encoding.UTF8.GetBytes("{\"joints\":{\"left_elbow\":[0.1,-1.25e-1,0]},\"expression\":{\"jawOpen\":0.5},\"other\":[1,{\"a\":\"b\"}]}");
+        foreach (GsacSource source in new[] { GsacSource.Animator, GsacSource.Script, GsacSource.Clip })
+        {
+            avatar.Source = source;
+            int understood = 0;
+            for (int i = 0; i < 200; i++) frame();
+            int before = GC.CollectionCount(0);
+            draws = 0;
+            for (int i = 0; i < 6000; i++)
+            {
+                camera.transform.SetPositionAndRotation(new Vector3(0, 1, 3 + i * 1e-4f), Quaternion.Euler(0, 180, 0));
+                if (message.Read(text, text.Length, avatar.Pose, avatar.Weights)) understood++;
+                frame();
+            }
+            Console.WriteLine(source + " " + draws + " " + understood + " " + (GC.CollectionCount(0) - before));
+        }
+        // what this would show if a frame made one small object
+        int first = GC.CollectionCount(0);
+        for (int i = 0; i < 6000; i++) Kept = new object[4];
+        Console.WriteLine("control " + (GC.CollectionCount(0) - first));
+    }
+
+    public static object Kept;
+
+    /// <summary>Gaussians drawn near and far.</summary>
+    static void Levels(string file)
+    {
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        Camera camera = Player.AddCamera("eye");
+        Player.OnDraw = (asked, indices, count) => Console.WriteLine(count / 6);
+        foreach (float away in new[] { 3f, 30f })
+        {
+            camera.transform.SetPositionAndRotation(new Vector3(0, 1, away), Quaternion.Euler(0, 180, 0));
+            Player.Frame(new[] { avatar.gameObject })();
+        }
+    }
+
+    /// <summary>A datagram through the real socket: how far the elbow got, frame by frame.</summary>
+    static void Stream(string file, int port)
+    {
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        var holder = avatar.gameObject;
+        var stream = new GameObject("none").AddComponent<Probe>();
+        stream.Attach(holder, port);
+        var sender = new UdpClient();
+        string[] words = { "not a message", "{\"joints\":{\"left_elbow\":[0,-1.5,0]},\"expression\":{\"jawOpen\":0.8}}" };
+        foreach (string word in words)
+        {
+            byte[] raw = Encoding.UTF8.GetBytes(word);
+            sender.Send(raw, raw.Length, new IPEndPoint(IPAddress.Loopback, port));
+        }
+        for (int i = 0; i < 200 && stream.Stream.Received + stream.Stream.Refused < 2; i++) System.Threading.Thread.Sleep(10);
+        Console.WriteLine(stream.Stream.Received + " " + stream.Stream.Refused);
+        Action frame = Player.Frame(new[] { holder });
+        int elbow = avatar.Data.Joint("left_elbow"), jaw = Array.IndexOf(avatar.Data.Expressions, "jawOpen");
+        for (int i = 0; i < 40; i++)
+        {
+            frame();
+            float[] r = avatar.Pose.Rotation;
+            double degrees = 2 * Math.Atan2(r[elbow * 4 + 1], r[elbow * 4 + 3]) * 180 / Math.PI;
+            Console.WriteLine(degrees.ToString(CultureInfo.InvariantCulture) + " " + avatar.Weights[jaw].ToString(CultureInfo.InvariantCulture));
+        }
+        Player.Call(stream.Stream, "OnDisable");
+    }
+
+    /// <summary>Adds a stream whose port is set before it is enabled.</summary>
+    sealed class Probe : MonoBehaviour
+    {
+        public GsacPoseStream Stream;
+
+        public void Attach(GameObject to, int port)
+        {
+            Stream = to.AddComponent<GsacPoseStream>();
+            Player.Call(Stream, "OnDisable");
+            Stream.Port = port;
+            Player.Call(Stream, "OnEnable");
+        }
+    }
+
+    /// <summary>Each file of a folder as a message: whether it was taken, and what the pose became.</summary>
+    static void Messages(string file, string folder, string path)
+    {
+        GsacData data = GsacData.Read(File.ReadAllBytes(file)).Mirror();
+        var message = new GsacPoseMessage(data);
+        using (var dump = new Dump(path))
+        {
+            foreach (string name in Directory.GetFiles(folder))
+            {
+                var pose = new GsacPose(data.JointCount);
+                var weights = new float[data.Expressions.Length];
+                byte[] raw = File.ReadAllBytes(name);
+                bool taken = message.Read(raw, raw.Length, pose, weights);
+                Console.WriteLine(Path.GetFileName(name) + " " + taken);
+                dump.Put(Path.GetFileName(name) + ".rotation", pose.Rotation);
+                dump.Put(Path.GetFileName(name) + ".transl", pose.Transl);
+                dump.Put(Path.GetFileName(name) + ".weights", weights);
+            }
+        }
+    }
+
+    /// <summary>The benchmark scene at 100 frames a second, every fortieth frame 50 ms long.</summary>
+    static void Benchmark(string file, string folder)
+    {
+        Player.SetDataPath(folder);
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        Player.AddCamera("eye").transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
+        var benchmark = new GameObject("benchmark").AddComponent<GsacBenchmark>();
+        Player.SetField(benchmark, "avatar", avatar);
+        Player.SetField(benchmark, "duration", 20f);
+        Player.Call(benchmark, "OnEnable");
+        Action frame = Player.Frame(new[] { avatar.gameObject, benchmark.gameObject });
+        var poses = new HashSet<float>();
+        int elbow = avatar.Data.Joint("left_shoulder");
+        for (int i = 0; i < 10000 && benchmark.ResultFile == null; i++)
+        {
+            Player.SetDeltaTime(i % 40 == 39 ? 0.05f : 0.01f);
+            frame();
+            poses.Add(avatar.Joints[elbow].localRotation.z);
+        }
+        Console.WriteLine(benchmark.ResultFile);
+        Console.WriteLine(poses.Count);
+    }
+
+    /// <summary>What the importer makes of a file.</summary>
+    static void Import(string file)
+    {
+        var context = new AssetImportContext { assetPath = file };
+        new GsacImporter().OnImportAsset(context);
+        foreach (string word in context.Words) Console.WriteLine(word);
+        var root = context.mainObject as GameObject;
+        if (root == null) return;
+        Console.WriteLine(root.name + ": " + string.Join(" ", context.Added.Keys));
+        foreach (Transform t in root.transform.GetComponentsInChildren<Transform>(true))
+        {
+            Vector3 p = t.position;
+            Console.WriteLine("joint " + t.name + " " + (t.parent == null ? "-" : t.parent.name) + " "
+                + string.Format(CultureInfo.InvariantCulture, "{0} {1} {2}", p.x, p.y, p.z));
+        }
+        foreach (HumanBone bone in Player.Description((Avatar)context.Added["humanoid"]).human) Console.WriteLine("human " + bone.boneName + "," + bone.humanName);
+        Console.WriteLine("skeleton " + Player.Description((Avatar)context.Added["humanoid"]).skeleton.Length);
+        var mesh = (Mesh)context.Added["mesh"];
+        double volume = 0;
+        for (int f = 0; f < mesh.triangles.Length; f += 3)
+        {
+            Vector3 a = mesh.vertices[mesh.triangles[f]], b = mesh.vertices[mesh.triangles[f + 1]], c = mesh.vertices[mesh.triangles[f + 2]];
+            volume += (a.x * (b.y * c.z - b.z * c.y) + a.y * (b.z * c.x - b.x * c.z) + a.z * (b.x * c.y - b.y * c.x)) / 6;
+        }
+        Console.WriteLine("volume " + volume.ToString(CultureInfo.InvariantCulture));
+        // the prefab draws: its asset is read again and its joints are found, not made anew
+        Player.AddCamera("eye").transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
+        int draws = 0;
+        Player.OnDraw = (asked, indices, count) => draws++;
+        Player.SetPlaying(false);
+        Player.Frame(new[] { root })();
+        Console.WriteLine("draws " + draws + " transforms " + root.transform.GetComponentsInChildren<Transform>(true).Length);
+    }
+
+    /// <summary>Two instances, another avatar, the end: buffers and words.</summary>
+    static void Life(string file)
+    {
+        byte[] bytes = File.ReadAllBytes(file);
+        Camera camera = Player.AddCamera("eye");
+        camera.transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
+        int draws = 0;
+        Player.OnDraw = (asked, indices, count) => draws++;
+        var both = new[] { GsacLoader.Load(bytes, "one").gameObject, GsacLoader.Load(bytes, "two").gameObject };
+        Player.Frame(both)();
+        int two = Player.BuffersAlive;
+        Console.WriteLine("draws " + draws);
+        var avatar = both[0].GetComponent<GsacAvatar>();
+        avatar.Use((byte[])bytes.Clone());
+        Player.Frame(both)();
+        Console.WriteLine("draws " + draws + ", more buffers " + (Player.BuffersAlive > two) + ", transforms "
+                          + avatar.GetComponentsInChildren<Transform>(true).Length);
+        camera.transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 0, 0));
+        Player.Frame(both)();
+        Console.WriteLine("draws " + draws + " looking away");
+        foreach (GameObject o in both)
+        {
+            Player.Call(o.GetComponent<GsacRenderer>(), "OnDisable");
+            Player.Call(o.GetComponent<GsacAvatar>(), "OnDisable");
+        }
+        Console.WriteLine("buffers " + Player.BuffersAlive);
+        foreach (Action wrong in new Action[]
+        {
+            () => avatar.SetJoint("tail", new Vector3()), () => avatar.SetExpression("sneeze", 1), () => avatar.ShowPose("X"),
+            () => avatar.PlayClip("fly"), () => avatar.SetSmplx(new float[4], null), () => avatar.SetSmplx(new float[3], new float[600]),
+            () => GsacLoader.Load(new byte[10], "bad"), () => new GameObject("empty").AddComponent<GsacAvatar>().TPose(),
+        })
+        {
+            try
+            {
+                wrong();
+                Console.WriteLine("nothing was said");
+            }
+            catch (Exception e)
+            {
+                Console.WriteLine(e.GetType().Name + ": " + e.Message);
+            }
+        }
+        Player.SetComputeShaders(false);
+        GsacAvatar lame = GsacLoader.Load(bytes, "lame");
+        Player.Frame(new[] { lame.gameObject })();
+        Player.Frame(new[] { lame.gameObject })();
+        Console.WriteLine(Player.Errors.Count + " " + Player.Errors[0]);
+    }
+}

@@ -1,0 +1,194 @@
+// Stands for Unity's graphics: nothing is drawn, what was asked for is remembered. API.md: pages and versions.
+using System;
+using System.Collections.Generic;
+using UnityEngine.Rendering;
+
+namespace UnityEngine
+{
+    public enum MeshTopology { Triangles }
+    public enum ColorSpace { Gamma, Linear }
+
+    public sealed class Shader : Object
+    {
+        static readonly List<string> Names = new List<string>();
+        public static int PropertyToID(string name)
+        {
+            int id = Names.IndexOf(name);
+            if (id >= 0) return id;
+            Names.Add(name);
+            return Names.Count - 1;
+        }
+        internal static string NameOf(int id) { return Names[id]; }
+    }
+
+    public sealed class Material : Object
+    {
+        public Material(Shader shader) { }
+    }
+
+    public sealed class GraphicsBuffer : IDisposable
+    {
+        public enum Target { Structured = 16, Index = 2 }
+        internal static int Alive;
+        internal readonly uint[] Words;
+        public int count { get; private set; }
+        public GraphicsBuffer(Target target, int count, int stride)
+        {
+            if (count <= 0 || stride <= 0 || stride % 4 != 0) throw new ArgumentException("a buffer of " + count + " x " + stride + " bytes");
+            this.count = count;
+            Words = new uint[count * stride / 4];
+            Alive++;
+        }
+        public void SetData(Array data)
+        {
+            if (data is Vector4[])
+            {
+                var rows = (Vector4[])data;
+                for (int i = 0; i < rows.Length; i++)
+                {
+                    Words[i * 4] = Bits(rows[i].x);
+                    Words[i * 4 + 1] = Bits(rows[i].y);
+                    Words[i * 4 + 2] = Bits(rows[i].z);
+                    Words[i * 4 + 3] = Bits(rows[i].w);
+                }
+            }
+            else Buffer.BlockCopy(data, 0, Words, 0, data.Length * 4);
+        }
+        static uint Bits(float x)
+        {
+            return new FloatBits { Real = x }.Whole;
+        }
+        [System.Runtime.InteropServices.StructLayout(System.Runtime.InteropServices.LayoutKind.Explicit)]
+        struct FloatBits
+        {
+            [System.Runtime.InteropServices.FieldOffset(0)] public float Real;
+            [System.Runtime.InteropServices.FieldOffset(0)] public uint Whole;
+        }
+        public void Dispose() { Alive--; }
+    }
+
+    public sealed class ComputeShader : Object
+    {
+        internal static readonly string[] Kernels = { "Skin", "Bind", "Keys", "SortBlocks", "SortAcross", "SortMerge" };
+        // by property, and by property and kernel
+        internal readonly Vector4[] Values = new Vector4[64];
+        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[6, 64];
+        public int FindKernel(string name)
+        {
+            int kernel = Array.IndexOf(Kernels, name);
+            if (kernel < 0) throw new ArgumentException(name);
+            return kernel;
+        }
+        public void SetInt(int nameID, int val) { Values[nameID] = new Vector4(val, 0, 0, 0); }
+        public void SetVector(int nameID, Vector4 val) { Values[nameID] = val; }
+        public void SetBuffer(int kernelIndex, int nameID, GraphicsBuffer buffer) { Buffers[kernelIndex, nameID] = buffer; }
+        public void Dispatch(int kernelIndex, int x, int y, int z) { if (Player.OnDispatch != null) Player.OnDispatch(this, kernelIndex, x); }
+    }
+
+    public sealed class MaterialPropertyBlock
+    {
+        internal readonly Vector4[] Values = new Vector4[64];
+        internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[64];
+        public void SetVector(int nameID, Vector4 value) { Values[nameID] = value; }
+        public void SetInteger(int nameID, int value) { Values[nameID] = new Vector4(value, 0, 0, 0); }
+        public void SetBuffer(int nameID, GraphicsBuffer value) { Buffers[nameID] = value; }
+    }
+
+    public struct RenderParams
+    {
+        public RenderParams(Material mat) : this() { }
+        public Camera camera { get; set; }
+        public Bounds worldBounds { get; set; }
+        public MaterialPropertyBlock matProps { get; set; }
+        public int layer { get; set; }
+        public ShadowCastingMode shadowCastingMode { get; set; }
+        public bool receiveShadows { get; set; }
+    }
+
+    public static class Graphics
+    {
+        public static void RenderPrimitivesIndexed(in RenderParams rparams, MeshTopology topology, GraphicsBuffer indexBuffer, int indexCount,
+                                                   int startIndex = 0, int instanceCount = 1)
+        {
+            if (Player.OnDraw != null) Player.OnDraw(rparams, indexBuffer, indexCount);
+        }
+    }
+
+    public sealed class Camera : Behaviour
+    {
+        internal static readonly List<Camera> All = new List<Camera>();
+        public int cullingMask { get; set; } = -1;
+        public static int allCamerasCount { get { return All.Count; } }
+        public static int GetAllCameras(Camera[] cameras)
+        {
+            All.CopyTo(cameras);
+            return All.Count;
+        }
+    }
+
+    public struct BoneWeight
+    {
+        public int boneIndex0 { get; set; }
+        public int boneIndex1 { get; set; }
+        public int boneIndex2 { get; set; }
+        public int boneIndex3 { get; set; }
+        public float weight0 { get; set; }
+        public float weight1 { get; set; }
+        public float weight2 { get; set; }
+        public float weight3 { get; set; }
+    }
+
+    public sealed class Mesh : Object
+    {
+        public IndexFormat indexFormat { get; set; }
+        public Vector3[] vertices { get; set; }
+        public int[] triangles { get; set; }
+        public BoneWeight[] boneWeights { get; set; }
+        public Matrix4x4[] bindposes { get; set; }
+        public void RecalculateNormals() { }
+        public void RecalculateBounds() { }
+    }
+
+    public class Renderer : Component
+    {
+        public bool enabled { get; set; }
+        public ShadowCastingMode shadowCastingMode { get; set; }
+    }
+
+    public sealed class SkinnedMeshRenderer : Renderer
+    {
+        public Mesh sharedMesh { get; set; }
+        public Transform[] bones { get; set; }
+        public Transform rootBone { get; set; }
+    }
+
+    public static class QualitySettings
+    {
+        public static int vSyncCount { get; set; }
+        public static ColorSpace activeColorSpace { get { return ColorSpace.Linear; } }
+    }
+
+    public static class Screen
+    {
+        public static int width { get { return 640; } }
+        public static int height { get { return 480; } }
+    }
+
+    public static class SystemInfo
+    {
+        public static bool supportsComputeShaders { get; internal set; } = true;
+        public static int maxComputeBufferInputsVertex { get { return 8; } }
+        public static GraphicsDeviceType graphicsDeviceType { get { return GraphicsDeviceType.Vulkan; } }
+        public static string graphicsDeviceName { get { return "stub \"GPU\""; } }
+        public static string deviceModel { get { return "stub"; } }
+        public static string processorType { get { return "stub"; } }
+        public static string operatingSystem { get { return "stub"; } }
+    }
+}
+
+namespace UnityEngine.Rendering
+{
+    public enum GraphicsDeviceType { Vulkan }
+    public enum IndexFormat { UInt16, UInt32 }
+    public enum ShadowCastingMode { Off, ShadowsOnly = 3 }
+}

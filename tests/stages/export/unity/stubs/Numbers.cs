@@ -1,0 +1,148 @@
+// Stands for the part of UnityEngine that computes, so that the package's C# runs without Unity. API.md: pages and versions.
+using System;
+
+namespace UnityEngine
+{
+    public static class Mathf
+    {
+        public static float Sqrt(float x) { return (float)Math.Sqrt(x); }
+        public static float Exp(float x) { return (float)Math.Exp(x); }
+        public static float Clamp(float x, float low, float high) { return Math.Min(Math.Max(x, low), high); }
+        public static float DeltaAngle(float from, float to) { return (float)(to - from - 360 * Math.Floor((to - from + 180) / 360)); }
+    }
+
+    public struct Vector2
+    {
+        public float x, y;
+    }
+
+    public struct Vector3
+    {
+        public float x, y, z;
+        public Vector3(float x, float y, float z) { this.x = x; this.y = y; this.z = z; }
+        public static Vector3 zero { get { return new Vector3(); } }
+        public static Vector3 forward { get { return new Vector3(0, 0, 1); } }
+        public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
+        public static Vector3 operator -(Vector3 a, Vector3 b) { return new Vector3(a.x - b.x, a.y - b.y, a.z - b.z); }
+        public static Vector3 operator -(Vector3 a) { return new Vector3(-a.x, -a.y, -a.z); }
+        public static Vector3 operator *(Vector3 a, float s) { return new Vector3(a.x * s, a.y * s, a.z * s); }
+        public static Vector3 Min(Vector3 a, Vector3 b) { return new Vector3(Math.Min(a.x, b.x), Math.Min(a.y, b.y), Math.Min(a.z, b.z)); }
+        public static Vector3 Max(Vector3 a, Vector3 b) { return new Vector3(Math.Max(a.x, b.x), Math.Max(a.y, b.y), Math.Max(a.z, b.z)); }
+        public static float Distance(Vector3 a, Vector3 b)
+        {
+            Vector3 d = a - b;
+            return Mathf.Sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+        }
+    }
+
+    public struct Vector4
+    {
+        public float x, y, z, w;
+        public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+    }
+
+    public struct Rect
+    {
+        public Rect(float x, float y, float width, float height) { }
+    }
+
+    public struct Bounds
+    {
+        public Vector3 center, size;
+        public Bounds(Vector3 center, Vector3 size) { this.center = center; this.size = size; }
+    }
+
+    public struct Quaternion
+    {
+        public float x, y, z, w;
+        public Quaternion(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+        public static Quaternion identity { get { return new Quaternion(0, 0, 0, 1); } }
+        public Vector3 eulerAngles { get { return Vector3.zero; } }
+
+        // Unity turns about z, then x, then y
+        public static Quaternion Euler(float x, float y, float z)
+        {
+            return About(0, 1, 0, y) * About(1, 0, 0, x) * About(0, 0, 1, z);
+        }
+
+        static Quaternion About(float x, float y, float z, float degrees)
+        {
+            double half = degrees * Math.PI / 360;
+            float s = (float)Math.Sin(half);
+            return new Quaternion(x * s, y * s, z * s, (float)Math.Cos(half));
+        }
+
+        public static Quaternion operator *(Quaternion a, Quaternion b)
+        {
+            return new Quaternion(a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+                                  a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z);
+        }
+
+        public static Vector3 operator *(Quaternion q, Vector3 v)
+        {
+            return Matrix4x4.TRS(Vector3.zero, q, new Vector3(1, 1, 1)).MultiplyPoint3x4(v);
+        }
+    }
+
+    public struct Matrix4x4
+    {
+        public float m00, m01, m02, m03, m10, m11, m12, m13, m20, m21, m22, m23;
+
+        public static Matrix4x4 identity { get { return TRS(Vector3.zero, Quaternion.identity, new Vector3(1, 1, 1)); } }
+        public static Matrix4x4 Translate(Vector3 t) { return TRS(t, Quaternion.identity, new Vector3(1, 1, 1)); }
+
+        public static Matrix4x4 TRS(Vector3 t, Quaternion q, Vector3 s)
+        {
+            return new Matrix4x4
+            {
+                m00 = (1 - 2 * (q.y * q.y + q.z * q.z)) * s.x, m01 = 2 * (q.x * q.y - q.w * q.z) * s.y, m02 = 2 * (q.x * q.z + q.w * q.y) * s.z,
+                m10 = 2 * (q.x * q.y + q.w * q.z) * s.x, m11 = (1 - 2 * (q.x * q.x + q.z * q.z)) * s.y, m12 = 2 * (q.y * q.z - q.w * q.x) * s.z,
+                m20 = 2 * (q.x * q.z - q.w * q.y) * s.x, m21 = 2 * (q.y * q.z + q.w * q.x) * s.y, m22 = (1 - 2 * (q.x * q.x + q.y * q.y)) * s.z,
+                m03 = t.x, m13 = t.y, m23 = t.z,
+            };
+        }
+
+        public Vector4 GetRow(int r)
+        {
+            return r == 0 ? new Vector4(m00, m01, m02, m03) : r == 1 ? new Vector4(m10, m11, m12, m13)
+                : r == 2 ? new Vector4(m20, m21, m22, m23) : new Vector4(0, 0, 0, 1);
+        }
+
+        public Vector3 MultiplyPoint3x4(Vector3 p)
+        {
+            return new Vector3(m00 * p.x + m01 * p.y + m02 * p.z + m03, m10 * p.x + m11 * p.y + m12 * p.z + m13,
+                               m20 * p.x + m21 * p.y + m22 * p.z + m23);
+        }
+
+        public static Matrix4x4 operator *(Matrix4x4 a, Matrix4x4 b)
+        {
+            return new Matrix4x4
+            {
+                m00 = a.m00 * b.m00 + a.m01 * b.m10 + a.m02 * b.m20, m01 = a.m00 * b.m01 + a.m01 * b.m11 + a.m02 * b.m21,
+                m02 = a.m00 * b.m02 + a.m01 * b.m12 + a.m02 * b.m22, m03 = a.m00 * b.m03 + a.m01 * b.m13 + a.m02 * b.m23 + a.m03,
+                m10 = a.m10 * b.m00 + a.m11 * b.m10 + a.m12 * b.m20, m11 = a.m10 * b.m01 + a.m11 * b.m11 + a.m12 * b.m21,
+                m12 = a.m10 * b.m02 + a.m11 * b.m12 + a.m12 * b.m22, m13 = a.m10 * b.m03 + a.m11 * b.m13 + a.m12 * b.m23 + a.m13,
+                m20 = a.m20 * b.m00 + a.m21 * b.m10 + a.m22 * b.m20, m21 = a.m20 * b.m01 + a.m21 * b.m11 + a.m22 * b.m21,
+                m22 = a.m20 * b.m02 + a.m21 * b.m12 + a.m22 * b.m22, m23 = a.m20 * b.m03 + a.m21 * b.m13 + a.m22 * b.m23 + a.m23,
+            };
+        }
+
+        // for the stub of Transform: inverse of an affine matrix
+        internal Matrix4x4 Inverted()
+        {
+            double a = m00, b = m01, c = m02, d = m10, e = m11, f = m12, g = m20, h = m21, i = m22;
+            double s = 1 / (a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g));
+            var n = new Matrix4x4
+            {
+                m00 = (float)((e * i - f * h) * s), m01 = (float)((c * h - b * i) * s), m02 = (float)((b * f - c * e) * s),
+                m10 = (float)((f * g - d * i) * s), m11 = (float)((a * i - c * g) * s), m12 = (float)((c * d - a * f) * s),
+                m20 = (float)((d * h - e * g) * s), m21 = (float)((b * g - a * h) * s), m22 = (float)((a * e - b * d) * s),
+            };
+            Vector3 t = n.MultiplyPoint3x4(new Vector3(m03, m13, m23));
+            n.m03 = -t.x;
+            n.m13 = -t.y;
+            n.m23 = -t.z;
+            return n;
+        }
+    }
+}

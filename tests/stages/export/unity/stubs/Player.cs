@@ -1,0 +1,74 @@
+// Not Unity's: plays the part of its main loop for the tests.
+using System;
+using System.Collections.Generic;
+using System.Reflection;
+
+namespace UnityEngine
+{
+    public static class Player
+    {
+        /// <summary>What is called at each dispatch (shader, kernel, groups) and draw (parameters, indices, how many).</summary>
+        public static Action<ComputeShader, int, int> OnDispatch;
+        public static Action<RenderParams, GraphicsBuffer, int> OnDraw;
+
+        public static void Call(Component on, string message)
+        {
+            MethodInfo method = Method(on, message);
+            if (method != null) method.Invoke(on, null);
+        }
+
+        static MethodInfo Method(Component on, string message)
+        {
+            return on.GetType().GetMethod(message, BindingFlags.Instance | BindingFlags.NonPublic | BindingFlags.Public, null, Type.EmptyTypes, null);
+        }
+
+        /// <summary>A frame of these components as one call, in their execution order.</summary>
+        public static Action Frame(GameObject[] objects)
+        {
+            Action all = () => { };
+            foreach (string message in new[] { "Update", "LateUpdate" })
+            {
+                var ordered = new List<KeyValuePair<int, Action>>();
+                foreach (GameObject o in objects)
+                {
+                    foreach (Component c in o.Components)
+                    {
+                        MethodInfo method = Method(c, message);
+                        if (method == null) continue;
+                        var order = (DefaultExecutionOrder)Attribute.GetCustomAttribute(c.GetType(), typeof(DefaultExecutionOrder));
+                        ordered.Add(new KeyValuePair<int, Action>(order == null ? 0 : order.order, (Action)Delegate.CreateDelegate(typeof(Action), c, method)));
+                    }
+                }
+                ordered.Sort((a, b) => a.Key.CompareTo(b.Key));
+                foreach (KeyValuePair<int, Action> pair in ordered) all += pair.Value;
+            }
+            return all;
+        }
+
+        public static string PropertyName(int id) { return Shader.NameOf(id); }
+        public static string KernelName(int kernel) { return ComputeShader.Kernels[kernel]; }
+        public static uint[] Words(GraphicsBuffer buffer) { return buffer.Words; }
+        public static Vector4 Value(ComputeShader shader, int id) { return shader.Values[id]; }
+        public static GraphicsBuffer Buffer(ComputeShader shader, int kernel, int id) { return shader.Buffers[kernel, id]; }
+        public static Vector4 Value(MaterialPropertyBlock block, int id) { return block.Values[id]; }
+        public static GraphicsBuffer Buffer(MaterialPropertyBlock block, int id) { return block.Buffers[id]; }
+        public static int BuffersAlive { get { return GraphicsBuffer.Alive; } }
+        public static List<string> Errors { get { return Debug.Errors; } }
+        public static HumanDescription Description(Avatar avatar) { return avatar.Description; }
+        public static void SetDeltaTime(float seconds) { Time.deltaTime = seconds; }
+        public static void SetDataPath(string folder) { Application.persistentDataPath = folder; }
+        public static void SetPlaying(bool playing) { Application.isPlaying = playing; }
+        public static void SetComputeShaders(bool there) { SystemInfo.supportsComputeShaders = there; }
+        public static Camera AddCamera(string name)
+        {
+            var camera = new GameObject(name).AddComponent<Camera>();
+            Camera.All.Add(camera);
+            return camera;
+        }
+        public static void SetField(Component on, string field, object value)
+        {
+            on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);
+        }
+        public static TextAsset Text(byte[] bytes) { return new TextAsset { bytes = bytes }; }
+    }
+}

@@ -1,0 +1,96 @@
+// Stands for Unity's editor, compiled apart: the package's Runtime must do without it. API.md: pages and versions.
+using System;
+using System.Collections.Generic;
+
+namespace UnityEditor
+{
+    using UnityEngine;
+
+    public enum MessageType { Error = 3 }
+
+    public class Editor : ScriptableObject
+    {
+        public UnityEngine.Object target { get; set; }
+        public virtual void OnInspectorGUI() { }
+        public bool DrawDefaultInspector() { return false; }
+    }
+
+    public static class EditorGUI
+    {
+        public static void BeginChangeCheck() { }
+        public static bool EndChangeCheck() { return false; }
+    }
+
+    public static class EditorGUILayout
+    {
+        public static void Space() { }
+        public static void LabelField(string label, GUIStyle style, params GUILayoutOption[] options) { }
+        public static Rect BeginHorizontal(params GUILayoutOption[] options) { return new Rect(); }
+        public static void EndHorizontal() { }
+        public static int Popup(string label, int selectedIndex, string[] displayedOptions, params GUILayoutOption[] options) { return selectedIndex; }
+        public static float Slider(string label, float value, float leftValue, float rightValue, params GUILayoutOption[] options) { return value; }
+        public static void HelpBox(string message, MessageType type) { }
+    }
+
+    public static class EditorStyles
+    {
+        public static GUIStyle boldLabel { get { return null; } }
+    }
+
+    public static class EditorUtility
+    {
+        public static bool IsPersistent(UnityEngine.Object target) { return false; }
+    }
+
+    public static class EditorApplication
+    {
+        public static void QueuePlayerLoopUpdate() { }
+    }
+
+    public static class Undo
+    {
+        public static void RecordObject(UnityEngine.Object objectToUndo, string name) { }
+        public static void RecordObjects(UnityEngine.Object[] objectsToUndo, string name) { }
+    }
+
+    public class SceneView : ScriptableObject
+    {
+        public static event Action<SceneView> duringSceneGui;
+        public Camera camera { get; set; }
+        public void Draw() { duringSceneGui(this); }
+    }
+
+    [AttributeUsage(AttributeTargets.Class)] public sealed class CustomEditor : Attribute { public CustomEditor(Type inspectedType) { } }
+    [AttributeUsage(AttributeTargets.Class)] public sealed class InitializeOnLoadAttribute : Attribute { }
+}
+
+namespace UnityEditor.AssetImporters
+{
+    using UnityEngine;
+
+    public abstract class AssetImporter : UnityEngine.Object
+    {
+    }
+
+    public abstract class ScriptedImporter : AssetImporter
+    {
+        public abstract void OnImportAsset(AssetImportContext ctx);
+    }
+
+    public class AssetImportContext
+    {
+        public readonly Dictionary<string, UnityEngine.Object> Added = new Dictionary<string, UnityEngine.Object>();
+        public readonly List<string> Words = new List<string>();
+        public string assetPath { get; set; }
+        public UnityEngine.Object mainObject { get; private set; }
+        public void AddObjectToAsset(string identifier, UnityEngine.Object obj) { Added.Add(identifier, obj); }
+        public void SetMainObject(UnityEngine.Object obj) { mainObject = obj; }
+        public void LogImportError(string msg) { Words.Add("error: " + msg); }
+        public void LogImportWarning(string msg) { Words.Add("warning: " + msg); }
+    }
+
+    [AttributeUsage(AttributeTargets.Class)] public sealed class ScriptedImporterAttribute : Attribute
+    {
+        public ScriptedImporterAttribute(int version, string ext) { }
+    }
+}

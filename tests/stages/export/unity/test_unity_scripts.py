@@ -1,0 +1,311 @@
+"""The C# of the Unity package, compiled by mcs over stubs of Unity and run under Mono; its dispatches on a software GPU."""
+
+import json
+import random
+import re
+import socket
+
+import numpy as np
+import pytest
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.skinning import joint_transforms, skin
+from gsac.stages.export.container import pack, unpack
+from gsac.stages.export.rigged import RiggedAvatar
+from scipy.spatial.transform import Rotation
+
+MIRROR = np.diag([-1.0, 1, 1])
+KERNELS = ("Skin", "Bind", "Keys", "SortBlocks", "SortAcross", "SortMerge")
+KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
+
+
+@pytest.fixture(scope="session")
+def play(mono, package, tmp_path_factory):
+    """Runs a command of programs/Play.cs."""
+    exe = mono.compile_package(package, tmp_path_factory.mktemp("scripts"))
+    return lambda *args, **options: mono.run(exe, *args, **options)
+
+
+@pytest.fixture(scope="module")
+def files(figure, exported, tmp_path_factory):
+    """figure.gsac: the small figure; person.gsac: an exported person; numbers: a pose and weights for each."""
+    folder = tmp_path_factory.mktemp("files")
+    rng = np.random.default_rng(2)
+    (folder / "figure.gsac").write_bytes(figure.to_bytes())
+    (folder / "person.gsac").write_bytes((exported / "avatar.gsac").read_bytes())
+    for name, count in (("figure", 2), ("person", 52)):
+        pose, transl = rng.normal(size=165) * .3, rng.normal(size=3) * .2
+        np.savetxt(folder / f"{name}.txt", np.concatenate([pose, transl, rng.random(count) * .6]).astype(np.float32)[None], "%.9g")
+    return folder
+
+
+def given(files, name):
+    """avatar, pose (55, 3), transl, weights with the jaw's share."""
+    avatar = RiggedAvatar.read(files / f"{name}.gsac")
+    numbers = np.loadtxt(files / f"{name}.txt").astype(np.float32)
+    pose = numbers[:165].reshape(55, 3)
+    return avatar, pose, numbers[165:168], numbers[168:] + avatar.jaw_actions @ pose[22]
+
+
+def unity_bones(avatar, pose, transl):
+    """(55, 3, 4): rest -> posed, mirrored, the floor at 0."""
+    bones = joint_transforms(pose[None].astype(np.float64), avatar.joints, avatar.parents)[0]
+    bones[:, :, 3] += transl
+    bones = MIRROR @ bones @ np.diag([-1.0, 1, 1, 1])
+    bones[:, 1, 3] -= avatar.ground
+    return bones
+
+
+@pytest.mark.parametrize("name", ["figure", "person"])
+def test_smplx_arrays_give_the_bones_and_weights_of_the_trainers_body(play, mono, files, tmp_path, name):
+    play("pose", files / f"{name}.gsac", files / f"{name}.txt", tmp_path / "pose")
+    got = mono.arrays(tmp_path / "pose")
+    avatar, pose, transl, weights = given(files, name)
+    np.testing.assert_allclose(got["bones"].reshape(-1, 3, 4), unity_bones(avatar, pose, transl), atol=2e-6)
+    np.testing.assert_allclose(got["weights"], weights, atol=1e-5)
+    assert abs(avatar.jaw_actions @ pose[22]).max() > .05, "the jaw adds something"
+
+
+def test_clips_are_sampled_between_keys_and_go_round(play, mono, files, tmp_path):
+    play("pose", files / "figure.gsac", files / "figure.txt", tmp_path / "pose")
+    got = mono.arrays(tmp_path / "pose")
+    avatar = RiggedAvatar.read(files / "figure.gsac")
+    for name, key in KEYS.items():
+        clip, k, t = avatar.clips[name], int(key), key % 1
+        after = (k + 1) % len(clip.rotation)
+        truth = np.tile([0.0, 0, 0, 1], (55, 1))
+        for n, joint in enumerate(clip.joints):
+            a, b = (Rotation.from_rotvec(clip.rotation[i, n]).as_quat() for i in (k, after))
+            mixed = (1 - t) * a + t * b * np.sign(a @ b)
+            truth[avatar.joint_names.index(joint)] = mixed / np.linalg.norm(mixed) * (1, -1, -1, 1)
+        quat = got[f"clip.{name}"].reshape(55, 4)
+        np.testing.assert_allclose(quat * np.sign((quat * truth).sum(1, keepdims=True)), truth, atol=2e-5)
+        transl = clip.transl[k] * (1 - t) + clip.transl[after] * t
+        np.testing.assert_allclose(got[f"transl.{name}"], transl * (-1, 1, 1), atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def frame(play, mono, files, gpu, kernels, tmp_path_factory):
+    """What the scripts asked of the GPU for one frame of the person, done there: (their arrays, gpu)."""
+    path = tmp_path_factory.mktemp("frame") / "frame"
+    play("frame", files / "person.gsac", files / "person.txt", path)
+    asked = mono.arrays(path)
+    for name, array in asked.items():
+        if name.startswith("Gsac"):
+            gpu.put(name, array)
+    jobs = []
+    for row in asked["steps"].reshape(-1, 14):
+        names = ("GsacVertexCount", "GsacSplatCount", "GsacKeyCount", "GsacIndexBits", "GsacSortStage", "GsacSortStride")
+        parameters = dict(zip(names, map(int, row[2:8]), strict=True)) | {"GsacDepthRange": row[8:10], "GsacDepthRow": row[10:14]}
+        jobs.append((kernels[KERNELS[int(row[0])]], parameters, int(row[1])))
+    gpu.run(jobs)
+    return asked, {name: gpu.get(name) for name in ("GsacPosed", "GsacSplats")} | {"GsacKeys": gpu.get("GsacKeys", np.uint32)}
+
+
+@pytest.fixture(scope="module")
+def truth(files):
+    """(vertices, bound gaussians) of that frame in the avatar's own space, canonical axes turned to Unity's."""
+    avatar, pose, transl, weights = given(files, "person")
+    rest = avatar.vertices.copy()
+    for e, w in enumerate(weights):
+        span = slice(avatar.expression_start[e], avatar.expression_start[e + 1])
+        rest[avatar.expression_vertex[span]] += w * avatar.expression_delta[span]
+    bones = joint_transforms(pose[None], avatar.joints, avatar.parents)[0]
+    vertices = skin(rest, bones, avatar.skin_index, avatar.skin_weight) + transl - (0, avatar.ground, 0)
+    g = avatar.gaussians
+    return vertices @ MIRROR, bind(face_frames(vertices, avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+
+
+def test_a_frame_of_the_scripts_skins_as_the_trainer_does(frame, truth):
+    assert abs(frame[1]["GsacPosed"].reshape(-1, 4)[:, :3] - truth[0]).max() < 1e-5
+
+
+def test_a_frame_of_the_scripts_binds_as_the_trainer_does_though_mirrored(frame, truth):
+    bound = truth[1]
+    splats = frame[1]["GsacSplats"].reshape(-1, 12)
+    assert abs(splats[:, :3] - bound.means @ MIRROR).max() < 2e-5
+    half = MIRROR @ bound.rotations * bound.scales[:, None]
+    covariance = half @ half.transpose(0, 2, 1)
+    error = abs(splats[:, [3, 6, 7, 6, 4, 8, 7, 8, 5]].reshape(-1, 3, 3) - covariance).max((1, 2)) / bound.scales.max(1) ** 2
+    assert np.quantile(error, .99) < 2e-4 and error.max() < 5e-2, "posed in float32: a sliver's normal is as uncertain as its area"
+
+
+def test_a_frame_of_the_scripts_sorts_from_far_to_near_for_the_camera(frame):
+    asked, got = frame
+    draw, place, ahead = asked["draw"], asked["camera"][:3], asked["camera"][3:]
+    model, bits = draw[:12].reshape(3, 4), int(draw[16])
+    means = got["GsacSplats"].reshape(-1, 12)[:, :3]
+    world = means @ model[:, :3].T + model[:, 3]
+    depth = (world - place) @ ahead
+    low, per_metre = asked["steps"].reshape(-1, 14)[-1, 8:10]
+    assert low <= depth.min() and depth.max() <= low + 1 / per_metre, "no depth falls out of the keys' range"
+    order = got["GsacKeys"][:len(means)] & ((1 << bits) - 1)
+    assert sorted(order) == list(range(len(means)))
+    assert (np.diff(depth[order]) <= 1 / per_metre / (2.0 ** (32 - bits) - 1) * 1.01 + 2e-6).all()
+    centre, size = draw[17:20], draw[20:23]
+    assert (abs(world - centre) <= size / 2).all(), "the bounds that Unity culls by hold every gaussian"
+
+
+def test_the_draw_is_two_triangles_a_gaussian_with_the_files_blending_made_linear(frame, files):
+    asked, _ = frame
+    N = len(RiggedAvatar.read(files / "person.gsac").gaussians["face"])
+    assert int(asked["draw"][-1]) == 6 * N
+    np.testing.assert_allclose(asked["draw"][12:16], [.3, .999, 1 / 255, 1], rtol=1e-6)
+    corners = asked["indices"].view(np.uint32)[:6 * N].reshape(N, 6)
+    np.testing.assert_array_equal(corners, np.arange(N)[:, None] * 4 + [0, 1, 2, 2, 1, 3])
+
+
+def test_what_is_uploaded_is_what_the_kernels_were_tested_with(frame, files, packing):
+    asked, _ = frame
+    packed = packing.packed(RiggedAvatar.read(files / "person.gsac"))
+    flips = {"GsacRest": (-1, 1, 1, 1), "GsacMoves": (-1, 1, 1, 1), "GsacLocal": (1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1)}
+    for name, array in packed.items():
+        got = asked[name].view(array.dtype).reshape(len(array), -1)
+        np.testing.assert_allclose(got, array.reshape(len(array), -1) * flips.get(name, 1), rtol=1e-6, atol=1e-9, err_msg=name)
+
+
+def test_6000_frames_of_each_source_collect_no_garbage(play, files):
+    lines = play("garbage", files / "figure.gsac", collector=",nursery-size=128k").split("\n")
+    assert int(lines[3].split()[1]) > 0, "the control: one small object a frame is seen"
+    assert lines[:3] == [f"{source} 12000 6000 0" for source in ("Animator", "Script", "Clip")]
+
+
+def test_a_pose_stream_is_taken_from_the_network_and_smoothed(play, files):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    lines = play("stream", files / "figure.gsac", port).splitlines()
+    assert lines[0] == "1 1", "one message understood, one datagram refused"
+    degrees, weight = np.array([line.split() for line in lines[1:]], float).T
+    assert 5 < degrees[0] < 40 and (np.diff(degrees) > 0).all(), "softly"
+    assert abs(degrees[-1] - np.degrees(1.5)) < .1 and abs(weight[-1] - .8) < 1e-3
+
+
+def test_pose_messages_are_read_in_every_form_and_nonsense_leaves_the_pose(play, mono, files, tmp_path):
+    rng = np.random.default_rng(4)
+    body, hand, orient = rng.normal(size=63), rng.normal(size=45), np.array([3.0, .2, -.1])
+    good = {
+        "arrays": {"body_pose": list(body), "left_hand_pose": list(hand), "transl": [1, 2, 3], "who": {"a": [None, True]}},
+        "names": {"joints": {"head": [.1, .2, .3], "tail": [9]}, "expression": {"jawOpen": .25, "sneeze": 1}},
+        "row": {"expression": [.1, .2]}, "empty": {},
+        "camera": {"global_orient": list(orient), "transl": [.1, .2, 3], "camera": True}}
+    bad = {"b_number": "{\"transl\": [1, 2, \"3\"]}", "b_short": "{\"body_pose\": [1, 2]}", "b_end": "{\"transl\": [1, 2, 3]",
+           "b_huge": "{\"transl\": [1e9, 0, 0]}", "b_nan": "{\"transl\": [NaN, 0, 0]}", "b_after": "{} x", "b_nothing": "",
+           "b_deep": "{\"x\": " + "[" * 60000, "b_text": "{\"x", "b_slash": "{\"x\\",
+           "b_long": "{\"transl\": [" + "9" * 60000 + ",0,0]}"}
+    folder = tmp_path / "messages"
+    folder.mkdir()
+    for name, message in good.items():
+        (folder / name).write_text(json.dumps(message))
+    for name, message in bad.items():
+        (folder / name).write_text(message)
+    damage = random.Random(1)
+    for n in range(300):
+        raw = bytearray(json.dumps(good["arrays"]).encode())
+        for _ in range(3):
+            raw[damage.randrange(len(raw))] = damage.randrange(256)
+        (folder / f"f_{n}").write_bytes(bytes(raw[:damage.randrange(len(raw))] if n % 3 else raw))
+    words = dict(line.split() for line in play("messages", files / "figure.gsac", folder, tmp_path / "out").splitlines())
+    got = mono.arrays(tmp_path / "out")
+    assert [n for n in good if words[n] != "True"] == [] and [n for n in bad if words[n] != "False"] == []
+    for name, word in words.items():
+        assert np.isfinite(got[f"{name}.rotation"]).all()
+        if word == "False":
+            np.testing.assert_array_equal(got[f"{name}.rotation"].reshape(-1, 4), np.tile([0, 0, 0, 1], (55, 1)))
+            assert not got[f"{name}.weights"].any()
+
+    def turns(name):
+        return Rotation.from_quat(got[f"{name}.rotation"].reshape(-1, 4)).as_matrix()
+
+    def smplx(vector):
+        return MIRROR @ Rotation.from_rotvec(vector).as_matrix() @ MIRROR
+
+    np.testing.assert_allclose(turns("arrays")[1:22], [smplx(v) for v in body.reshape(-1, 3)], atol=1e-5)
+    np.testing.assert_allclose(turns("arrays")[25:40], [smplx(v) for v in hand.reshape(-1, 3)], atol=1e-5)
+    np.testing.assert_allclose(got["arrays.transl"], [-1, 2, 3])
+    np.testing.assert_allclose(turns("names")[15], smplx([.1, .2, .3]), atol=1e-5)
+    np.testing.assert_allclose(got["names.weights"], [.25, 0])
+    np.testing.assert_allclose(got["row.weights"], [.1, .2])
+    avatar, upright = RiggedAvatar.read(files / "figure.gsac"), np.diag([1.0, -1, -1])
+    np.testing.assert_allclose(turns("camera")[0], MIRROR @ upright @ Rotation.from_rotvec(orient).as_matrix() @ MIRROR, atol=1e-5)
+    pelvis = avatar.joints[0]
+    np.testing.assert_allclose(got["camera.transl"], MIRROR @ (upright @ (pelvis + [.1, .2, 3]) - pelvis), atol=1e-5)
+
+
+def test_the_benchmark_shows_three_poses_and_writes_the_percentiles(play, files, tmp_path):
+    lines = play("benchmark", files / "figure.gsac", tmp_path).splitlines()
+    result = json.loads((tmp_path / lines[0]).read_text())
+    assert lines[1] == "3"
+    assert abs(result["seconds"] - 20) < .1 and abs(result["frames"] - 20 / .011) < 5
+    assert abs(result["median_ms"] - 10) < .02 and abs(result["p95_ms"] - 10) < .02 and abs(result["p99_ms"] - 50) < .02
+    assert abs(result["mean_fps"] - 1 / .011) < .5
+    assert abs(sum(result["fps_each_second"]) - result["frames"]) <= 100 and 18 <= len(result["fps_each_second"]) <= 21
+    assert result["gpu"] == 'stub "GPU"' and result["gaussians"] == len(RiggedAvatar.read(files / "figure.gsac").gaussians["face"])
+
+
+def test_the_importer_makes_a_prefab_with_a_whole_human_skeleton(play, files, figure):
+    lines = play("import", files / "figure.gsac").splitlines()
+    assert lines[0] == "figure: prefab data mesh humanoid"
+    joints = {w[1]: (w[2], np.array(w[3:], float)) for w in map(str.split, lines) if w[0] == "joint"}
+    for j, name in enumerate(figure.joint_names):
+        parent, place = joints[name]
+        assert parent == ("figure" if j == 0 else figure.joint_names[figure.parents[j]])
+        np.testing.assert_allclose(place, figure.joints[j] * (-1, 1, 1) - (0, figure.ground, 0), atol=1e-5)
+    human = dict(line[6:].split(",") for line in lines if line.startswith("human "))
+    assert len(human) == len(set(human.values())) == 55
+    assert human["left_wrist"] == "LeftHand" and human["spine3"] == "UpperChest"
+    assert human["right_pinky2"] == "Right Little Intermediate"
+    assert "skeleton 56" in lines
+    volume = float(next(line for line in lines if line.startswith("volume")).split()[1])
+    corners = figure.vertices[figure.faces].astype(float)
+    outwards = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert volume == pytest.approx(outwards, rel=1e-3), "drawn faces look outwards after the mirroring too"
+    assert lines[-1] == "draws 1 transforms 57", "an imported prefab is drawn in edit mode and gains no second skeleton"
+
+
+def test_the_importer_says_what_is_wrong_with_a_file(play, files, tmp_path):
+    path = tmp_path / "cut.gsac"
+    path.write_bytes((files / "figure.gsac").read_bytes()[:1000])
+    said = play("import", path)
+    assert said.startswith("error: ") and "cut.gsac" in said and "truncated" in said
+
+
+def test_instances_share_buffers_a_new_avatar_replaces_an_old_and_all_is_given_back(play, files):
+    lines = play("life", files / "figure.gsac").splitlines()
+    assert lines[:4] == ["draws 2", "draws 4, more buffers True, transforms 56", "draws 4 looking away", "buffers 0"]
+
+
+def test_wrong_calls_name_the_avatar_and_the_word(play, files):
+    lines = play("life", files / "figure.gsac").splitlines()[4:]
+    assert lines[:4] == [f"ArgumentException: one has no {what}" for what in
+                         ("joint `tail`", "expression `sneeze`", "pose `X`", "clip `fly`")]
+    assert "4 numbers" in lines[4] and "600 numbers" in lines[5] and "not_gsac" in lines[6] and "`Asset`" in lines[7]
+    assert lines[8].startswith("1 lame: the avatar cannot be drawn"), "said once, not each frame"
+
+
+def test_a_coarser_level_is_drawn_from_afar(play, files, tmp_path):
+    data = (files / "figure.gsac").read_bytes()
+    head, blocks = unpack(data)
+    scales = {name: entry["scale"] for name, entry in head.pop("blocks").items() if "scale" in entry}
+    stored = {name: np.rint(a / scales[name]).astype({"gaussian.opacity": np.uint16, "skin.weight": np.uint16}.get(name, np.int16))
+              if name in scales else a for name, a in blocks.items()}
+    coarse = {f"coarse.{name[9:]}": a[::3] for name, a in stored.items() if name.startswith("gaussian.")}
+    scales |= {name: scales[f"gaussian.{name[7:]}"] for name in coarse if f"gaussian.{name[7:]}" in scales}
+    N, few = len(stored["gaussian.face"]), len(coarse["coarse.face"])
+    head["levels"] = [{"prefix": "gaussian", "count": N}, {"prefix": "coarse", "count": few}]
+    path = tmp_path / "levels.gsac"
+    path.write_bytes(pack(head, stored | coarse, scales))
+    assert play("levels", path).split() == [str(N), str(few)]
+
+
+def test_every_stub_of_unity_has_its_page_and_first_version_and_none_is_newer_than_the_package_asks_for(package):
+    folder = package.parents[2] / "tests" / "stages" / "export" / "unity" / "stubs"
+    declared = set()
+    for path in folder.glob("*.cs"):
+        if path.name != "Player.cs":
+            declared |= set(re.findall(r"public (?:static |sealed |abstract )*(?:class|struct|enum) (\w+)", path.read_text()))
+    rows = [line.strip("| ").split(" | ") for line in (folder / "API.md").read_text().splitlines() if line.startswith("| `")]
+    assert {row[0].strip("`") for row in rows} == declared
+    for name, page, first, members in rows:
+        assert page.startswith("https://docs.unity3d.com/ScriptReference/"), name
+        for version in [first, *re.findall(r"\((\d+\.\d+)\)", members)]:
+            assert tuple(map(int, version.split("."))) <= (2021, 3), f"{name} is from {version}"
