@@ -198,7 +198,7 @@ def heldout_sheet(results: Results) -> Sheet:
     if not frames:
         raise AbsentError("No frame was held out, so nothing is compared.")
     rows = rows_of(results)
-    chosen = {frames[i] for i in spread(len(frames), HELDOUT - 1)}
+    chosen = {frames[i] for i in spread(len(frames), HELDOUT if len(frames) <= HELDOUT else HELDOUT - 1)}
     judged = [(rows[f]["psnr_fg"], f) for f in frames if number(rows.get(f, {}).get("psnr_fg")) is not None]
     worst = min(judged)[1] if judged else None
     triples = {stem: [read_frame(folder / f"{stem}_{kind}.png") for kind in ("truth", "render", "error")]

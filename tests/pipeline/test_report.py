@@ -191,6 +191,16 @@ def test_the_worst_held_out_frame_is_named(whole):
     assert "Aligning the pose to a held-out frame gains 2.4 dB" in page.text("head")
 
 
+@pytest.mark.parametrize(("held", "shown"), [(8, 8), (20, 8)])
+def test_every_held_out_frame_is_shown_where_eight_are_enough(copied, held, shown):
+    folder = copied / "train/heldout"
+    for frame in range(held):
+        for kind in ("truth", "render", "error"):
+            if frame != 4:
+                shutil.copy(folder / f"000004_{kind}.png", folder / f"{frame:06d}_{kind}.png")
+    assert len(page_of(copied).images("heldout")) == shown
+
+
 def test_files_are_linked_with_their_sizes(whole):
     page = Page(whole / "report.html")
     links = {a["href"] for t, a in page.tags if t == "a" and not a["href"].startswith("#")}
