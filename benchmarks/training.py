@@ -62,7 +62,8 @@ def train(case: Case, folder: Path, **values) -> dict:
 def _train(inputs: dict[str, Path], folder: Path, values: dict) -> float:
     from gsac.stages.train.stage import run
 
-    run(Job(inputs, folder, make_config(STAGE, values)))
+    config = make_config(STAGE, values)
+    run(Job(inputs, folder, config, device="cuda" if config.device == "cuda" else "cpu"))
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 

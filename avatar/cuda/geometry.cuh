@@ -7,7 +7,7 @@ constexpr int TILE = 16, PIXELS = TILE * TILE, SEGMENT = 128, HEAVY = 256;
 struct Now {
     Frame frame;
     Plan plan;
-    float background[3];
+    float background[3], gain[3];
     int columns, rows, go;
 };
 
@@ -41,7 +41,10 @@ extern "C" __global__ void __launch_bounds__(256) skin(Scene s) {
         Now &now = s.now[b];
         now.frame = frame;
         now.plan = plan;
-        for (int c = 0; c < 3; ++c) now.background[c] = s.background[3 * (state.step * s.batch + b) + c];
+        for (int c = 0; c < 3; ++c) {
+            now.background[c] = s.background[3 * (state.step * s.batch + b) + c];
+            now.gain[c] = s.gain[3 * frame.pose + c];
+        }
         now.columns = (frame.width + TILE - 1) / TILE;
         now.rows = (frame.height + TILE - 1) / TILE;
         now.go = 1;
@@ -115,7 +118,10 @@ FORMULA Posed posed(const Scene &s, int b, int i) {
     float4 q = ((const float4 *)s.quat)[i];
     g.turn = turn_of(q.x, q.y, q.z, q.w);
     g.mu = vec(s.mu + 3 * i);
-    for (int c = 0; c < 3; ++c) g.log_scale[c] = s.log_scale[3 * i + c];
+    for (int c = 0; c < 3; ++c) {
+        g.log_scale[c] = s.log_scale[3 * i + c];
+        if (s.scale_limit > 0) g.log_scale[c] = log_scale_of(g.log_scale[c], s.scale_limit);
+    }
     g.opacity = 1 / (1 + __expf(-s.logit[i]));
     g.bound = bind(g.face, g.turn, g.mu, g.log_scale);
     return g;

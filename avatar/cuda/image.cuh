@@ -28,11 +28,11 @@ FORMULA Place place_of(const Scene &s, int tile) {
 }
 
 struct Pixel {
-    float3 image, target;
+    float3 render, image, target;
     float alpha, mask;
 };
 
-// Render and target over the batch's background; a tile without gaussians was not rendered.
+// Render, in the frame's exposure, and target over the batch's background; a tile without gaussians was not rendered.
 FORMULA Pixel pixel_of(const Scene &s, const Place &p, int x, int y) {
     const Now &now = s.now[p.b];
     const float byte = 1 / 255.0f;
@@ -44,11 +44,16 @@ FORMULA Pixel pixel_of(const Scene &s, const Place &p, int x, int y) {
     out.alpha = render.w;
     out.mask = true_pixel.w * byte;
     float clear = 1 - out.alpha, clear_target = 1 - out.mask;
-    out.image = {render.x + clear * now.background[0], render.y + clear * now.background[1], render.z + clear * now.background[2]};
+    out.render = {render.x, render.y, render.z};
+    out.image = {now.gain[0] * render.x + clear * now.background[0], now.gain[1] * render.y + clear * now.background[1],
+                 now.gain[2] * render.z + clear * now.background[2]};
     out.target = {true_pixel.x * byte + clear_target * now.background[0], true_pixel.y * byte + clear_target * now.background[1],
                   true_pixel.z * byte + clear_target * now.background[2]};
     return out;
 }
+
+// Weight of a channel of a pixel in the mean that the losses are.
+FORMULA float share_of(const Scene &s, const Place &p) { return 1 / (3 * (s.area > 0 ? s.area : float(p.width) * p.height)); }
 
 // Sum over the block, at thread 0.
 FORMULA float sum_block(float v, float *scratch) {
@@ -72,6 +77,13 @@ FORMULA void load_row(const float *from, float *to) {
     }
 }
 
+// Strength of the grey image's edge at a place in shared memory.
+FORMULA float edge(float (*v)[WIDE * PITCH], int at) {
+    float across = grey(v[0][at + 1] - v[0][at - 1], v[1][at + 1] - v[1][at - 1], v[2][at + 1] - v[2][at - 1]);
+    float down = grey(v[0][at + PITCH] - v[0][at - PITCH], v[1][at + PITCH] - v[1][at - PITCH], v[2][at + PITCH] - v[2][at - PITCH]);
+    return strength(across, down);
+}
+
 // (blocks). The tile's share of the loss, and SSIM's slopes by the window means: dS/dmx, dS/dq, dS/dp for three channels.
 extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
     __shared__ __align__(16) float image[3][WIDE * PITCH], target[3][WIDE * PITCH], blurred[4][3][WIDE * BLURRED];
@@ -80,8 +92,8 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
     int tid = threadIdx.x, total = s.state->near;
     for (int item = blockIdx.x; item < total; item += gridDim.x) {
         const Place p = place_of(s, s.near[item]);
-        const float share = 1.0f / (3.0f * p.width * p.height);
-        float loss = 0;
+        const float share = share_of(s, p);
+        float loss = 0, shown = 0, masked = 0, both = 0;
         __syncthreads();
         for (int e = tid; e < WIDE * WIDE; e += PIXELS) {
             int r = e / WIDE, c = e % WIDE, x = p.left + c - REACH, y = p.top + r - REACH;
@@ -92,6 +104,9 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
                     float dx = pixel.image.x - pixel.target.x, dy = pixel.image.y - pixel.target.y;
                     float dz = pixel.image.z - pixel.target.z, da = pixel.alpha - pixel.mask;
                     loss += share * (dx * dx + dy * dy + dz * dz) + 3 * share * s.mask * da * da;
+                    shown += pixel.alpha;
+                    masked += pixel.mask;
+                    both += pixel.alpha * pixel.mask;
                 }
             }
             int to = r * PITCH + c;
@@ -164,19 +179,36 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
                 }
             }
         }
+        if (s.edges > 0) {
+            int r = tid / TILE, c = tid % TILE, x = p.left + c, y = p.top + r;
+            if (x > 0 && y > 0 && x < p.width - 1 && y < p.height - 1) {
+                int at = (r + REACH) * PITCH + c + REACH;
+                float own = edge(image, at), real = edge(target, at);
+                loss += 3 * share * s.edges * fabsf(own - real);
+            }
+        }
         loss = sum_block(loss, scratch);
         if (tid == 0) s.tile_loss[p.tile] = loss;
+        if (s.dice_weight > 0) {
+            float *to = s.overlap + 3 * p.tile, sums[3] = {shown, masked, both};
+            for (int k = 0; k < 3; ++k) {
+                __syncthreads();
+                float sum = sum_block(sums[k], scratch);
+                if (tid == 0) to[k] = sum;
+            }
+        }
     }
 }
 
 // (blocks). Gradient of the loss by the render's premultiplied colour and alpha, on the tiles that gaussians reach.
 extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
     __shared__ __align__(16) float slope[9][WIDE * PITCH], blurred[9][WIDE * BLURRED];
+    __shared__ float scratch[8];
     if (halted(s)) return;
     int tid = threadIdx.x, heavy = s.state->heavy, total = heavy + s.state->light;
     for (int item = blockIdx.x; item < total; item += gridDim.x) {
         const Place p = place_of(s, item < heavy ? s.heavy[item] : s.light[item - heavy]);
-        const float share = 1.0f / (3.0f * p.width * p.height);
+        const float share = share_of(s, p);
         int r = tid / TILE, c = tid % TILE, x = p.left + c, y = p.top + r;
         bool inside = x < p.width && y < p.height;
         Pixel pixel = {};
@@ -213,6 +245,34 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
                 sobel[k] = 2 * s.sobel * share * (a[-19] + 2 * a[-1] + a[17] - a[-17] - 2 * a[1] - a[19] + v[-19] + 2 * v[-18] + v[-17]
                                                   - v[17] - 2 * v[18] - v[19]) / 4;
             }
+        }
+        if (s.edges > 0) {
+            // grey render and target with two pixels around the tile, the slopes by their differences with one
+            float *own = slope[0], *real = slope[1], *across = slope[2], *down = slope[3];
+            __syncthreads();
+            for (int e = tid; e < 20 * 20; e += PIXELS) {
+                int ex = p.left + e % 20 - 2, ey = p.top + e / 20 - 2;
+                Pixel other = {};
+                if (ex >= 0 && ey >= 0 && ex < p.width && ey < p.height) other = pixel_of(s, p, ex, ey);
+                own[e] = grey(other.image.x, other.image.y, other.image.z);
+                real[e] = grey(other.target.x, other.target.y, other.target.z);
+            }
+            __syncthreads();
+            for (int e = tid; e < 18 * 18; e += PIXELS) {
+                int ex = p.left + e % 18 - 1, ey = p.top + e / 18 - 1, at = (e / 18 + 1) * 20 + e % 18 + 1;
+                float gx = own[at + 1] - own[at - 1], gy = own[at + 20] - own[at - 20];
+                float tx = real[at + 1] - real[at - 1], ty = real[at + 20] - real[at - 20];
+                bool counted = ex > 0 && ey > 0 && ex < p.width - 1 && ey < p.height - 1;
+                float factor = counted ? strength_slope(strength(gx, gy), strength(tx, ty), 3 * share * s.edges) : 0;
+                across[e] = factor * gx;
+                down[e] = factor * gy;
+            }
+            __syncthreads();
+            int at = (r + 1) * 18 + c + 1;
+            float slope_grey = across[at - 1] - across[at + 1] + down[at - 18] - down[at + 18];
+            sobel[0] += 0.299f * slope_grey;
+            sobel[1] += 0.587f * slope_grey;
+            sobel[2] += 0.114f * slope_grey;
         }
         if (s.ssim > 0) {
             __syncthreads();
@@ -254,16 +314,24 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
                 grad[k] = -s.ssim * share * (slope[k][tid] + 2 * slope[3 + k][tid] * image[k] + slope[6 + k][tid] * target[k]);
             __syncthreads();
         }
-        if (!inside) continue;
         const Now &now = s.now[p.b];
         float4 out = {0, 0, 0, 6 * share * s.mask * (pixel.alpha - pixel.mask)};
+        if (s.dice_weight > 0) out.w += s.dice[3 * p.b] * (1 - pixel.mask) - s.dice[3 * p.b + 1];
         for (int k = 0; k < 3; ++k) {
             grad[k] += 2 * share * (image[k] - target[k]) + sobel[k];
             out.w -= grad[k] * now.background[k];
         }
-        out.x = grad[0];
-        out.y = grad[1];
-        out.z = grad[2];
-        ((float4 *)s.grad_image)[size_t(p.b) * s.max_pixels + y * p.width + x] = out;
+        out.x = now.gain[0] * grad[0];
+        out.y = now.gain[1] * grad[1];
+        out.z = now.gain[2] * grad[2];
+        if (inside) ((float4 *)s.grad_image)[size_t(p.b) * s.max_pixels + y * p.width + x] = out;
+        if (s.gain_part) {
+            const float render[3] = {pixel.render.x, pixel.render.y, pixel.render.z};
+            for (int k = 0; k < 3; ++k) {
+                __syncthreads();
+                float sum = sum_block(inside ? grad[k] * render[k] : 0, scratch);
+                if (tid == 0) s.gain_part[3 * p.tile + k] = sum;
+            }
+        }
     }
 }

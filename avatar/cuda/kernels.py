@@ -9,10 +9,10 @@ from pathlib import Path
 
 from gsac.avatar.cuda.scene import declarations
 
-SOURCES = ("formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "update.cuh", "offsets.cuh")
+SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "update.cuh", "offsets.cuh", "shape.cuh",
+           "paper.cuh")
 KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "image_gradient", "blend_backward", "gaussian_step",
-           "gather", "joint_step", "offset_step")
-"""In the order of a step."""
+           "gather", "joint_step", "offset_step", "shape_gradient", "shape_step", "dice", "neighbourhood", "nearest", "paper_step")
 OPTIONS = ("--std=c++17", "--extra-device-vectorization")
 
 

@@ -44,6 +44,10 @@ class Recipe:
     """m of a step of the body's displacement at rest, falls to a tenth over its share of the steps; 0 learns none."""
     offset_share: float = 0.6
     """Part of the steps that move it; then `CudaTrainer.replace` takes the gaussians that it was folded into."""
+    beta_rate: float = 0.0
+    """Adam rate of the betas, which all frames share; 0 learns none."""
+    gain_rate: float = 0.0
+    """Step of each frame's gain per colour channel at the start, falls to a tenth; 0 learns none."""
     smoothness: float = 30.0
     """lambda of the displacement's smoothing."""
     hand_share: float = 0.1
@@ -51,7 +55,7 @@ class Recipe:
 
     @classmethod
     def of(cls, config, **more) -> Recipe:
-        """From a `TrainConfig`: the fields that both have, `more` on top. It knows no exposure: refuse that before."""
+        """From a `TrainConfig`: the fields that both have, `more` on top."""
         given = {f.name: getattr(config, f.name, None) for f in fields(cls)}
         return cls(**({name: value for name, value in given.items() if value is not None} | more))
 
@@ -85,4 +89,5 @@ def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
                             ("place_pull", recipe.place_pull if recipe.mu_rate else 0.0, 0.01)):
         rates[name] = rate * end**done
     rates["offset"] = np.where(done < recipe.offset_share, recipe.offset_rate * 0.1 ** (done / max(recipe.offset_share, 1e-9)), 0)
+    rates["betas"], rates["gain"] = recipe.beta_rate, recipe.gain_rate * 0.1**done
     return Drawn(order, background, rates)

@@ -13,12 +13,12 @@ FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT,
 """pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: which vertices at rest and which pose it shows."""
 
 PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
-        "place_pull": FLOAT, "offset": FLOAT}
+        "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT}
 """Of one step: size of the images, Adam rates, the share of its way that a gaussian is pulled back, m of an offset's step."""
 
 STATE = {name: INT for name in (
     "step", "stop", "overflow", "needed", "most", "pairs", "listed", "checkpoints", "heavy", "light", "near", "segments",
-    "blend_ticket", "back_ticket", "frames_done", "barrier", "peak")} | {"joints_done": INT * MOST_BATCH}
+    "blend_ticket", "back_ticket", "frames_done", "shape_done", "barrier", "peak")} | {"joints_done": INT * MOST_BATCH}
 """Counters on the device. overflow: the lists were too short, nothing moves until they are longer; needed: how long."""
 
 POINTERS = {
@@ -38,12 +38,19 @@ POINTERS = {
     "checkpoint": "float", "image": "float", "grad_image": "float", "slopes": "float", "tile_loss": "float", "losses": "float",
     "near_start": "int", "near_vertex": "int", "offset_share": "float", "offset": "float", "grad_rest": "float",
     "gathered": "float", "offset_first": "float", "offset_second": "float", "solve_step": "float",
+    "shape": "float", "joint_shape": "float", "betas": "double", "beta_first": "double", "beta_second": "double",
+    "beta_part": "float", "beta_move": "float", "grad_joints": "float",
+    "gain": "float", "gain_part": "float", "overlap": "float", "dice": "float",
+    "nearest_gaussian": "int", "near_of_start": "int", "near_of": "int",
+    "rest_frame": "float", "place": "float", "hood": "float", "pulled": "float", "hits": "int",
     "grad_out": "float", "pose_grad_out": "double",
 }
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
            "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
-           "most_near": INT, "spare": INT}
+           "most_near": INT, "beta_count": INT, "area": FLOAT, "half_width": FLOAT, "half_height": FLOAT, "edges": FLOAT,
+           "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT}
+"""area: pixels that a frame's losses are a mean over, 0: its own; the last eight are recipe `paper`'s (paper.cuh)."""
 
 
 def _struct(name: str, fields: dict) -> type[ctypes.Structure]:

@@ -10,7 +10,7 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda.device import Buffer, Device
 from gsac.avatar.cuda.lists import children, joint_levels, joints_of, neighbours, vertices_of
-from gsac.avatar.cuda.recipe import Recipe, draw
+from gsac.avatar.cuda.recipe import Drawn, Recipe, draw
 from gsac.avatar.cuda.scene import FRAME, POINTERS, Scene, State
 from gsac.avatar.gaussians import Gaussians
 
@@ -36,6 +36,10 @@ class BodyArrays(NamedTuple):
     """(V, 4), rows sum to one."""
     faces: np.ndarray
     """(F, 3)."""
+    shape: np.ndarray | None = None
+    """(V, 3, B) m by beta, where betas are learned."""
+    joint_shape: np.ndarray | None = None
+    """(55, 3, B), likewise of the joints."""
 
 
 class Shot(NamedTuple):
@@ -60,7 +64,7 @@ class CudaTrainer:
         self.seconds = 0.0
         """On the device, by its own clock, in all calls of `train`."""
         self._clock = self.device.event(), self.device.event()
-        drawn = draw(recipe, self.frames, len(levels))
+        drawn = self.plan(levels)
         self.batch, self.order, self.rates = drawn.order.shape[1], drawn.order, drawn.rates
         self._numbers(levels)
         self._upload_shots(levels)
@@ -69,15 +73,26 @@ class CudaTrainer:
         self._upload("background", drawn.background, np.float32)
         self._upload_body(pose, transl)
         self._upload_gaussians(gaussians)
+        self._empty("losses", (recipe.steps, self.batch), np.float32).fill(0)
+        self._empty("state", ctypes.sizeof(State), np.uint8).fill(0)
         self._scratch()
         self._lists(pair_room or max(65536, 6 * self.count * self.batch))
+
+    def plan(self, levels: list[list[Shot]]) -> Drawn:
+        """The steps' frames, backgrounds and rates."""
+        return draw(self.recipe, self.frames, len(levels))
 
     def train(self, steps: int) -> None:
         """So many steps more, as far as the recipe goes; lists that prove too short are made longer and nothing is lost."""
         stop = min(self.state().step + steps, self.recipe.steps)
-        self._set_state(stop=stop)
         begin, end = self._clock
         self.device.mark(begin)
+        self._advance(stop)
+        self.device.mark(end)
+        self.seconds += self.device.milliseconds(begin, end) / 1e3
+
+    def _advance(self, stop: int) -> None:
+        self._set_state(stop=stop)
         while (left := stop - self.state().step) > 0:
             if self._graph is None:
                 self._graph = self.device.graph(lambda: [self.step() for _ in range(REPLAY)])
@@ -87,8 +102,6 @@ class CudaTrainer:
             state = self.state()
             if state.overflow:
                 self._lists(state.needed * 3 // 2)
-        self.device.mark(end)
-        self.seconds += self.device.milliseconds(begin, end) / 1e3
 
     def step(self) -> None:
         """Launches one step's kernels; no more than `stop` are carried out."""
@@ -112,16 +125,28 @@ class CudaTrainer:
         both = self.buffers["pose"].read()
         return both[:, :JOINTS].copy(), both[:, JOINTS].copy()
 
+    def betas(self) -> np.ndarray:
+        """(B,) float64, what has been learned on top of the body's betas; empty where none are learned."""
+        return self.buffers["betas"].read() if self.recipe.beta_rate else np.zeros(0)
+
+    def gains(self) -> np.ndarray:
+        """(T, 3) of the frames' colour channels; 1 where none are learned."""
+        return self.buffers["gain"].read()
+
     def offset(self) -> np.ndarray:
-        """(V, 3) m, the displacement of the vertices at rest that the gaussians now ride on."""
-        return self.buffers["offset"].read()
+        """(V, 3) m, the displacement of the vertices at rest that the gaussians now ride on, the betas' left out."""
+        return self.buffers["offset"].read() - self._shaped()
+
+    def _shaped(self) -> np.ndarray | float:
+        """(V, 3) m, what the learned betas do to the vertices at rest."""
+        return (self.body.shape @ self.betas()).astype(np.float32) if self.recipe.beta_rate else 0.0
 
     def replace(self, gaussians: Gaussians) -> None:
         """From here on these places, rotations and sizes (`stages.train.offsets.fold`) on the plain body."""
         for name in ("mu", "quat", "log_scale"):
             self.buffers[name].write(getattr(gaussians, name))
         self.buffers["start"].write(gaussians.mu)
-        self.buffers["offset"].fill(0)
+        self.buffers["offset"].write(np.zeros((self.scene.vertex_count, 3), np.float32) + self._shaped())
 
     def losses(self) -> np.ndarray:
         """(steps done, batch)."""
@@ -188,7 +213,6 @@ class CudaTrainer:
         self.scene.levels = int(level.max()) + 1
         child_start, child = children(body.parents)
         joint_start, joint_vertex, joint_weight = joints_of(body.skin_index, body.skin_weight, JOINTS)
-        vertex_start, vertex_item = vertices_of(body.faces, self.face, body.rest.shape[1])
         both = np.concatenate([np.asarray(pose, np.float64), np.asarray(transl, np.float64)[:, None]], 1)
         share = np.full(JOINTS + 1, self.recipe.hand_share)
         share[BODY], share[JAW_EYES], share[JOINTS] = 1, 0, 1
@@ -196,8 +220,7 @@ class CudaTrainer:
                 ("rest", body.rest, np.float32), ("joints", body.joints, np.float32), ("parents", body.parents, np.int32),
                 ("joint_level", level, np.int32), ("child_start", child_start, np.int32), ("child", child, np.int32),
                 ("skin_index", body.skin_index, np.int32), ("skin_weight", body.skin_weight, np.float32),
-                ("corner", np.asarray(body.faces)[self.face], np.int32), ("vertex_start", vertex_start, np.int32),
-                ("vertex_item", vertex_item, np.int32), ("joint_start", joint_start, np.int32),
+                ("joint_start", joint_start, np.int32),
                 ("joint_vertex", joint_vertex, np.int32), ("joint_weight", joint_weight, np.float32), ("pose", both, np.float64),
                 ("fit", both, np.float64), ("pose_share", share, np.float64)):
             self._upload(name, array, kind)
@@ -213,6 +236,18 @@ class CudaTrainer:
         for name in ("pose_first", "pose_second"):
             self._empty(name, both.shape, np.float64).fill(0)
         self._empty("pose_steps", self.frames, np.int32).fill(0)
+        self._upload("gain", np.ones((self.frames, 3)), np.float32)
+        if self.recipe.beta_rate:
+            self._upload_shape()
+
+    def _upload_shape(self) -> None:
+        """Directions of the betas, one after the other."""
+        shape, joint_shape = (np.moveaxis(a, 2, 0) for a in (self.body.shape, self.body.joint_shape))
+        self.scene.beta_count = len(shape)
+        self._upload("shape", shape, np.float32)
+        self._upload("joint_shape", joint_shape, np.float32)
+        for name in ("betas", "beta_first", "beta_second"):
+            self._empty(name, len(shape), np.float64).fill(0)
 
     def _upload_gaussians(self, gaussians: Gaussians) -> None:
         opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
@@ -221,11 +256,12 @@ class CudaTrainer:
                             ("rgb", gaussians.rgb), ("logit", np.log(opacity / (1 - opacity))), ("start", gaussians.mu),
                             ("face_scale", scale)):
             self._upload(name, array, np.float32)
+        start, item = vertices_of(self.body.faces, self.face, self.scene.vertex_count)
+        for name, array in (("corner", np.asarray(self.body.faces)[self.face]), ("vertex_start", start), ("vertex_item", item)):
+            self._upload(name, array, np.int32)
         for name in ("first", "second"):
             self._empty(name, (14, self.count), np.float32).fill(0)
         self._empty("seen", self.count, np.int32).fill(0)
-        self._empty("losses", (self.recipe.steps, self.batch), np.float32).fill(0)
-        self._empty("state", ctypes.sizeof(State), np.uint8).fill(0)
 
     def _scratch(self) -> None:
         batch, n, v = self.batch, self.count, self.scene.vertex_count
@@ -248,6 +284,14 @@ class CudaTrainer:
         self._empty("near_flag", tiles, np.uint8)
         self._empty("now", batch * NOW, np.uint8)
         self.scratch = [*shapes, *integers, "box", "near_flag", "now"]
+        if self.recipe.beta_rate:
+            betas = self.scene.beta_count
+            for name, shape in (("grad_joints", (batch, JOINTS, 3)), ("beta_part", (-(-v // 256), betas)), ("beta_move", betas)):
+                self._empty(name, shape, np.float32)
+                self.scratch.append(name)
+        if self.recipe.gain_rate:
+            self._empty("gain_part", (tiles, 3), np.float32)
+            self.scratch.append("gain_part")
         p = self.device.processors
         self.grids = {
             "skin": ((-(-v // 256), batch), 256), "project": ((-(-n // 128), batch), 128),
@@ -258,6 +302,8 @@ class CudaTrainer:
             "joint_step": ((JOINTS + 1, batch), 512)}
         if self.recipe.offset_rate:
             self.grids["offset_step"] = ((-(-v // 256), 1), 256)
+        if self.recipe.beta_rate:
+            self.grids |= {"shape_gradient": ((-(-v // 256), 1), 256), "shape_step": ((-(-v // 256), 1), 256)}
 
     def _lists(self, room: int) -> None:
         """Room for so many (tile, gaussian) pairs of a batch, and for what hangs on them."""

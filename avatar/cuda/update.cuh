@@ -1,12 +1,14 @@
 // From moments to moved gaussians and poses.
 
-// (blocks of gaussians). Sums a gaussian's moments over tiles and frames of the batch in a fixed order, then Adam.
-extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
-    if (halted(s)) return;
-    int i = blockIdx.x * 128 + threadIdx.x;
-    if (i >= s.count) return;
-    const Plan plan = s.now[0].plan;
-    float g_mu[3] = {}, g_quat[4] = {}, g_log_scale[3] = {}, g_rgb[3] = {}, g_logit = 0;
+struct Slopes {
+    float mu[3], quat[4], log_scale[3], rgb[3], logit;
+};
+
+// Gradient of a gaussian: its moments summed over tiles and frames of the batch in a fixed order. Leaves those of its corners.
+FORMULA Slopes slopes_of(const Scene &s, int i) {
+    Slopes g = {};
+    float pulled = 0, share = 1.0f / s.batch;
+    int hits = 0;
     for (int b = 0; b < s.batch; ++b) {
         int at = b * s.count + i;
         ushort4 box = ((const ushort4 *)s.box)[at];
@@ -21,43 +23,56 @@ extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
         for (int k = 0; k < tiles; ++k, from += 9)
 #pragma unroll
             for (int c = 0; c < 9; ++c) m[c] += from[c];
-        Posed g = posed(s, b, i);
-        Splat<float> splat = project(g.lens, g.bound, g.opacity);
-        Bound<float> bound = project_backward(g.lens, g.bound, splat, m);
-        BindGradient<float> grad = bind_backward(g.face, g.turn, g.mu, g.log_scale, bound);
+        Posed own = posed(s, b, i);
+        Splat<float> splat = project(own.lens, own.bound, own.opacity);
+        Bound<float> bound = project_backward(own.lens, own.bound, splat, m);
+        BindGradient<float> grad = bind_backward(own.face, own.turn, own.mu, own.log_scale, bound);
         for (int c = 0; c < 3; ++c) {
             corners[3 * c] = grad.corner[c].x;
             corners[3 * c + 1] = grad.corner[c].y;
             corners[3 * c + 2] = grad.corner[c].z;
-            g_log_scale[c] += grad.log_scale[c];
-            g_rgb[c] += m[6 + c];
+            g.log_scale[c] += share * grad.log_scale[c];
+            g.rgb[c] += share * m[6 + c];
         }
-        g_mu[0] += grad.mu.x;
-        g_mu[1] += grad.mu.y;
-        g_mu[2] += grad.mu.z;
-        for (int c = 0; c < 4; ++c) g_quat[c] += grad.quat[c];
-        g_logit += m[0] * (1 - g.opacity);  // dL/do = m / o, do/dlogit = o (1 - o)
+        g.mu[0] += share * grad.mu.x;
+        g.mu[1] += share * grad.mu.y;
+        g.mu[2] += share * grad.mu.z;
+        for (int c = 0; c < 4; ++c) g.quat[c] += share * grad.quat[c];
+        g.logit += share * m[0] * (1 - own.opacity);  // dL/do = m / o, do/dlogit = o (1 - o)
+        if (s.pulled) {
+            float x = 2 * splat.ha * m[1] + splat.b * m[2], y = splat.b * m[1] + 2 * splat.hc * m[2];
+            x *= s.half_width;
+            y *= s.half_height;
+            pulled += share * sqrtf(x * x + y * y);
+            hits += 1;
+        }
     }
-    float share = 1.0f / s.batch;
-    for (int c = 0; c < 3; ++c) {
-        g_mu[c] *= share;
-        g_log_scale[c] *= share;
-        g_rgb[c] *= share;
+    if (s.pulled) {
+        s.pulled[i] += pulled;
+        s.hits[i] += hits;
     }
-    for (int c = 0; c < 4; ++c) g_quat[c] *= share;
-    g_logit *= share;
     if (s.grad_out) {
         float *out = s.grad_out + 14 * size_t(i);
         for (int c = 0; c < 3; ++c) {
-            out[c] = g_mu[c];
-            out[7 + c] = g_log_scale[c];
-            out[10 + c] = g_rgb[c];
+            out[c] = g.mu[c];
+            out[7 + c] = g.log_scale[c];
+            out[10 + c] = g.rgb[c];
         }
-        for (int c = 0; c < 4; ++c) out[3 + c] = g_quat[c];
-        out[13] = g_logit;
+        for (int c = 0; c < 4; ++c) out[3 + c] = g.quat[c];
+        out[13] = g.logit;
     }
+    return g;
+}
+
+// (blocks of gaussians). Adam and limits of recipe `fast`.
+extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
+    if (halted(s)) return;
+    int i = blockIdx.x * 128 + threadIdx.x;
+    if (i >= s.count) return;
+    const Plan plan = s.now[0].plan;
+    Slopes g = slopes_of(s, i);
     int n = s.seen[i];
-    if (g_rgb[0] != 0 || g_rgb[1] != 0 || g_rgb[2] != 0) s.seen[i] = ++n;
+    if (g.rgb[0] != 0 || g.rgb[1] != 0 || g.rgb[2] != 0) s.seen[i] = ++n;
     // moments of Adam by number, so that a warp's loads lie together
     float mu[3], quat[4], log_scale[3], rgb[3], logit = s.logit[i], first[14], second[14];
     for (int c = 0; c < 14; ++c) {
@@ -70,11 +85,11 @@ extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
         rgb[c] = s.rgb[3 * i + c];
     }
     for (int c = 0; c < 4; ++c) quat[c] = s.quat[4 * i + c];
-    adam_row(mu, g_mu, first, second, 3, n, plan.mu);
-    adam_row(quat, g_quat, first + 3, second + 3, 4, n, plan.quat);
-    adam_row(log_scale, g_log_scale, first + 7, second + 7, 3, n, plan.log_scale);
-    adam_row(rgb, g_rgb, first + 10, second + 10, 3, n, plan.rgb);
-    adam_row(&logit, &g_logit, first + 13, second + 13, 1, n, plan.opacity);
+    adam_row(mu, g.mu, first, second, 3, n, plan.mu);
+    adam_row(quat, g.quat, first + 3, second + 3, 4, n, plan.quat);
+    adam_row(log_scale, g.log_scale, first + 7, second + 7, 3, n, plan.log_scale);
+    adam_row(rgb, g.rgb, first + 10, second + 10, 3, n, plan.rgb);
+    adam_row(&logit, &g.logit, first + 13, second + 13, 1, n, plan.opacity);
     float start[3] = {s.start[3 * i], s.start[3 * i + 1], s.start[3 * i + 2]};
     Bounds<float> bounds = {s.needle, s.largest, s.reach};
     limit(mu, quat, log_scale, rgb, logit, start, s.face_scale[i], bounds, plan.place_pull);
@@ -92,7 +107,7 @@ extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
 }
 
 // (blocks of vertices, batch). A vertex's gradient: the corners of the gaussians on its faces, in their order; the same at rest
-// where offsets are learned.
+// where offsets or betas are learned.
 extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
     if (halted(s)) return;
     int b = blockIdx.y, v = blockIdx.x * 128 + threadIdx.x;
@@ -111,7 +126,7 @@ extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
     to[0] = x;
     to[1] = y;
     to[2] = z;
-    if (s.now[b].plan.offset == 0) return;
+    if (s.now[b].plan.offset == 0 && s.beta_count == 0) return;
     Vec<float> at_rest = {0, 0, 0};
     for (int k = 0; k < 4; ++k) {
         float w = s.skin_weight[4 * v + k];
@@ -161,9 +176,15 @@ FORMULA void pose_step(const Scene &s, int b) {
             float *G = grad[j];
             for (int e = child_begin; e < child_end; ++e)
                 for (int c = 0; c < 12; ++c) G[c] += up[child[e]][c];
+            const float *P = transform[p < 0 ? 0 : p], *L = local[j];
+            if (s.beta_count)
+                for (int k = 0; k < 3; ++k) {
+                    float g = p < 0 ? G[4 * k + 3] : 0;
+                    for (int i = 0; i < 3; ++i) g += ((p < 0 ? 0 : P[4 * i + k]) - transform[j][4 * i + k]) * G[4 * i + 3];
+                    s.grad_joints[(b * 55 + j) * 3 + k] = g;
+                }
             for (int i = 0; i < 3; ++i)
                 for (int k = 0; k < 3; ++k) G[4 * i + k] -= G[4 * i + 3] * J[k];
-            const float *P = transform[p < 0 ? 0 : p], *L = local[j];
             for (int i = 0; i < 3; ++i)
                 for (int k = 0; k < 3; ++k)
                     g_local[3 * i + k] = p < 0 ? G[4 * i + k] : P[i] * G[k] + P[4 + i] * G[4 + k] + P[8 + i] * G[8 + k];
@@ -193,6 +214,21 @@ FORMULA void pose_step(const Scene &s, int b) {
     if (tid == 0) s.pose_steps[now.frame.pose] += 1;
 }
 
+// One step of the gains of a frame's channels against the sign of their gradients; the whole block.
+FORMULA void gain_step(const Scene &s, int b, float *scratch) {
+    const Now &now = s.now[b];
+    int tiles = now.columns * now.rows;
+    for (int k = 0; k < 3; ++k) {
+        float sum = 0;
+        for (int t = threadIdx.x; t < tiles; t += blockDim.x)
+            if (s.tile_count[b * s.max_tiles + t]) sum += s.gain_part[3 * (b * s.max_tiles + t) + k];
+        __syncthreads();
+        sum = sum_block(sum, scratch);
+        if (threadIdx.x > 0 || sum == 0) continue;
+        s.gain[3 * now.frame.pose + k] = fminf(fmaxf(now.gain[k] - copysignf(now.plan.gain, sum), 0.5f), 2.0f);
+    }
+}
+
 // (55 joints and one for the loss, batch). Gradient of each joint's transform, and the frame's loss; the last block of a frame
 // takes the gradient to the pose, the last of the batch ends the step.
 extern "C" __global__ void __launch_bounds__(512) joint_step(Scene s) {
@@ -209,7 +245,9 @@ extern "C" __global__ void __launch_bounds__(512) joint_step(Scene s) {
         for (int t = tid; t < tiles; t += 512)
             if (s.near_flag[b * s.max_tiles + t]) loss += s.tile_loss[b * s.max_tiles + t];
         loss = sum_block(loss, scratch);
+        if (s.dice_weight > 0) loss += s.dice[3 * b + 2];
         if (tid == 0) s.losses[state.step * s.batch + b] = loss;
+        if (s.gain_part) gain_step(s, b, scratch);
     } else {
         const float *rest = s.rest + 3 * size_t(now.frame.rest) * s.vertex_count;
         const float *grad = s.grad_vertices + 3 * size_t(b) * s.vertex_count;

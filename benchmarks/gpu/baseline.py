@@ -1,49 +1,153 @@
-"""The same loop in torch and gsplat: skinning, binding, gsplat's rasteriser, L2 + SSIM + Sobel + mask, Adam with learned poses."""
+"""The same loop in torch and gsplat: skinning, binding, gsplat's rasteriser, L2 + SSIM + Sobel + mask, Adam with learned poses.
+
+It moves no surface out and limits no gaussians, which it would pay for in more launches.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import torch
 from gsac.avatar.cuda.lists import joint_levels
-from gsac.avatar.cuda.recipe import Recipe
+from gsac.avatar.cuda.recipe import Recipe, draw
+from gsac.avatar.cuda.trainer import BodyArrays, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.benchmarks.gpu.figure import Figure
+from gsac.stages.train import fast
+from gsac.stages.train.cuda import body_arrays
+from gsac.stages.train.poses import BODY, HAND_SHARE, JAW_EYES
+from gsac.stages.train.task import Fit, Task
 from torch.nn import functional
+
+RATES = {"mu": "mu_rate", "quat": "quat_rate", "log_scale": "scale_rate", "rgb": "rgb_rate", "opacity": "opacity_rate",
+         "pose": "pose_rate"}
+"""The optimiser's groups, and the names of their rates in `Recipe`."""
+
+
+def tensor(array, dtype=torch.float32) -> torch.Tensor:
+    return torch.as_tensor(np.ascontiguousarray(array), dtype=dtype, device="cuda")
 
 
 def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compiled: bool, steps: int = 60,
                      warm: int = 20) -> float:
     """One frame a step, by device events; compiled: skinning + binding and the losses through torch.compile."""
-    from gsplat import rasterization
+    loop = Loop(figure.body, figure.pose, figure.transl, gaussians, recipe, compiled)
+    shots = on_device(figure.shots)
+    begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+    for step in range(warm + steps):
+        if step == warm:
+            torch.cuda.synchronize()
+            begin.record()
+        loss = loop.step(shots[step % len(shots)], step % len(shots), torch.rand(3, device="cuda"))
+    end.record()
+    torch.cuda.synchronize()
+    if not torch.isfinite(loss):
+        raise RuntimeError("the baseline's loss is not finite")
+    return begin.elapsed_time(end) / steps / 1e3
 
-    body = figure.body
-    device = torch.device("cuda")
 
-    def tensor(array, dtype=torch.float32):
-        return torch.as_tensor(np.ascontiguousarray(array), dtype=dtype, device=device)
+def fit(task: Task) -> Fit:
+    """Recipe fast as the stage knows recipes, eager: frames, sizes, backgrounds and rates as on the GPU."""
+    fine, coarse = fast.crops(task)
+    recipe, gaussians = Recipe.of(task.config), fast.start(task, coarse, task.config.gaussians)
+    levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]
+    poses = task.poses
+    loop = Loop(body_arrays(task, False), poses.pose[task.trained], poses.transl[task.trained], gaussians, recipe)
+    plan = draw(recipe, len(task.trained), 2)
+    backgrounds, seconds, done = tensor(plan.background[:, 0]), 0.0, 0
+    begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+    for mark in [*(m for m in task.marks(recipe.steps) if m < recipe.steps), recipe.steps]:
+        begin.record()
+        for step in range(done, mark):
+            t = int(plan.order[step, 0])
+            loss = loop.step(levels[plan.rates["level"][step]][t], t, backgrounds[step], plan.rates[step])
+        end.record()
+        torch.cuda.synchronize()
+        seconds += begin.elapsed_time(end) / 1e3
+        poses.pose[task.trained], poses.transl[task.trained] = loop.poses()
+        task.checkpoint(mark, recipe.steps, float(loss), loop.gaussians, seconds)
+        done = mark
+    return Fit(*fast.Trainer(loop.gaussians(), task, settled=True).recoloured(coarse))
 
+
+def on_device(shots: list[Shot]) -> list[tuple]:
+    """Pixels, lens (1, 3, 3), width and height of each."""
+    out = []
+    for shot in shots:
+        c = shot.camera
+        lens = tensor([[c.focal[0], 0, c.center[0]], [0, c.focal[1], c.center[1]], [0, 0, 1]])[None]
+        out.append((tensor(shot.pixels, torch.uint8), lens, c.width, c.height))
+    return out
+
+
+class Loop:
+    """Values, poses and optimiser on the GPU, and one step."""
+
+    def __init__(self, body: BodyArrays, pose: np.ndarray, transl: np.ndarray, gaussians: Gaussians, recipe: Recipe,
+                 compiled: bool = False):
+        from gsplat import rasterization
+
+        self.rasterization, self.face = rasterization, gaussians.face
+        self.eye = torch.eye(4, device="cuda")[None]
+        self.geometry, self.loss = geometry_of(body, gaussians.face), loss_of(recipe)
+        if compiled:
+            self.geometry, self.loss = torch.compile(self.geometry), torch.compile(self.loss)
+        opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
+        given = (gaussians.mu, gaussians.quat, gaussians.log_scale, gaussians.rgb, np.log(opacity / (1 - opacity)))
+        self.values = [tensor(a).requires_grad_() for a in given]
+        self.fitted = tensor(np.concatenate([pose, transl[:, None]], 1))
+        # each frame's way from the fit has an Adam state of its own; its share makes fingers slow and holds jaw and eyes
+        self.moved = [torch.zeros_like(p).requires_grad_() for p in self.fitted]
+        self.share = torch.full((56, 1), HAND_SHARE, device="cuda")
+        self.share[BODY], self.share[JAW_EYES], self.share[55] = 1, 0, 1
+        groups = [{"params": p, "lr": getattr(recipe, rate)}
+                  for p, rate in zip([*([v] for v in self.values), self.moved], RATES.values(), strict=True)]
+        self.optimiser = torch.optim.Adam(groups, betas=(0.9, 0.99), fused=True)
+
+    def step(self, shot: tuple, t: int, background: torch.Tensor, rates: np.ndarray | None = None) -> torch.Tensor:
+        """One step on frame t; rates: of this step (`recipe.draw`). Returns the loss, still on the device."""
+        if rates is not None:
+            for group, name in zip(self.optimiser.param_groups, RATES, strict=True):
+                group["lr"] = float(rates[name])
+        pixels, lens, width, height = shot
+        mu, quat, log_scale, rgb, opacity = self.values
+        means, covars = self.geometry(self.fitted[t] + self.share * self.moved[t], mu, quat, log_scale)
+        drawn, alpha, _ = self.rasterization(means, None, None, opacity.sigmoid(), rgb, self.eye, lens, width, height,
+                                             packed=False, covars=covars)
+        loss = self.loss(drawn[0], alpha[0], pixels, background)
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        self.optimiser.step()
+        return loss.detach()
+
+    def gaussians(self) -> Gaussians:
+        mu, quat, log_scale, rgb, logit = (v.detach().cpu().numpy() for v in self.values)
+        return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), 1 / (1 + np.exp(-logit)))
+
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Pose (T, 55, 3) and translation (T, 3)."""
+        both = (self.fitted + self.share * torch.stack(self.moved)).detach().cpu().numpy()
+        return both[:, :55], both[:, 55]
+
+
+def geometry_of(body: BodyArrays, face: np.ndarray) -> Callable:
+    """(pose and translation (56, 3), mu, quat, log_scale) -> means (N, 3), covariances (N, 3, 3), on the first rest shape."""
     rest, joints = tensor(body.rest[0]), tensor(body.joints)
     parents = np.asarray(body.parents)
     levels = joint_levels(parents)
     skin_index, skin_weight = tensor(body.skin_index, torch.long), tensor(body.skin_weight)
-    corner = tensor(np.asarray(body.faces)[gaussians.face], torch.long)
-    pixels = torch.stack([tensor(shot.pixels, torch.uint8) for shot in figure.shots])
-    camera = figure.shots[0].camera
-    lens = tensor([[camera.focal[0], 0, camera.center[0]], [0, camera.focal[1], camera.center[1]], [0, 0, 1]])[None]
-    eye = torch.eye(4, device=device)[None]
-    window = torch.exp(-torch.arange(-5, 6, device=device) ** 2 / (2 * 1.5**2))
-    window = window / window.sum()
-    sobel = tensor(np.outer([1, 2, 1], [-1, 0, 1]) / 4)
-    filters = torch.stack([sobel, sobel.T])[:, None].repeat(3, 1, 1, 1)
+    corner = tensor(np.asarray(body.faces)[face], torch.long)
     by_level = [tensor(np.flatnonzero(levels == k), torch.long) for k in range(levels.max() + 1)]
     above = [tensor(parents[np.flatnonzero(levels == k)], torch.long) for k in range(levels.max() + 1)]
 
-    def geometry(pose, transl, mu, quat, log_scale):
+    def geometry(placed, mu, quat, log_scale):
+        pose, transl = placed[:55], placed[55]
         t = pose.norm(dim=1).clamp(min=1e-8)[:, None, None]
         x, y, z = (pose / t[:, 0]).unbind(1)
         zero = torch.zeros_like(x)
         k = torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], 1).reshape(-1, 3, 3)
-        local = torch.eye(3, device=device) + t.sin() * k + (1 - t.cos()) * k @ k
+        local = torch.eye(3, device="cuda") + t.sin() * k + (1 - t.cos()) * k @ k
         turn, place = torch.zeros_like(local), torch.zeros_like(joints)
         turn = turn.index_copy(0, by_level[0], local[by_level[0]])
         place = place.index_copy(0, by_level[0], joints[by_level[0]])
@@ -67,47 +171,33 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
         means = size[:, None] * (axes @ mu[..., None])[..., 0] + (v0 + v1 + v2) / 3
         return means, half @ half.transpose(1, 2)
 
+    return geometry
+
+
+def loss_of(recipe: Recipe) -> Callable:
+    """(rgb (h, w, 3) premultiplied, alpha (h, w, 1), pixels (h, w, 4) uint8, background (3,)) -> loss."""
+    window = torch.exp(-torch.arange(-5, 6, device="cuda") ** 2 / (2 * 1.5**2))
+    window = window / window.sum()
+    sobel = tensor(np.outer([1, 2, 1], [-1, 0, 1]) / 4)
+    filters = torch.stack([sobel, sobel.T])[:, None].repeat(3, 1, 1, 1)
+
     def blur(images):
         flat = images.reshape(-1, 1, *images.shape[-2:])
         flat = functional.conv2d(flat, window.view(1, 1, 1, 11), padding=(0, 5))
         flat = functional.conv2d(flat, window.view(1, 1, 11, 1), padding=(5, 0))
         return flat.reshape(images.shape)
 
-    def loss_of(rgb, alpha, shot, background):
-        truth = shot.float() / 255
+    def loss(rgb, alpha, pixels, background):
+        truth = pixels.float() / 255
         image = (rgb + (1 - alpha) * background).permute(2, 0, 1)
         target = (truth[..., :3] + (1 - truth[..., 3:]) * background).permute(2, 0, 1)
         mx, my, q, p = blur(torch.stack([image, target, image**2 + target**2, image * target]))
         squares, product = mx * mx + my * my, mx * my
         similarity = (2 * product + 1e-4) * (2 * (p - product) + 9e-4) / ((squares + 1e-4) * (q - squares + 9e-4))
-        edges = functional.conv2d((image - target)[None], filters, padding=1, groups=3)
-        return (functional.mse_loss(image, target) + recipe.ssim * (1 - similarity.mean()) + recipe.sobel * 2 * (edges**2).mean()
-                + recipe.mask * ((alpha[..., 0] - truth[..., 3]) ** 2).mean())
+        out = (functional.mse_loss(image, target) + recipe.ssim * (1 - similarity.mean())
+               + recipe.mask * ((alpha[..., 0] - truth[..., 3]) ** 2).mean())
+        if recipe.sobel:
+            out = out + recipe.sobel * 2 * (functional.conv2d((image - target)[None], filters, padding=1, groups=3) ** 2).mean()
+        return out
 
-    if compiled:
-        geometry, loss_of = torch.compile(geometry), torch.compile(loss_of)
-    logit = np.log(gaussians.opacity / (1 - gaussians.opacity))
-    values = [tensor(a).requires_grad_() for a in (gaussians.mu, gaussians.quat, gaussians.log_scale, gaussians.rgb, logit)]
-    poses, transls = tensor(figure.pose).requires_grad_(), tensor(figure.transl).requires_grad_()
-    rates = (recipe.mu_rate, recipe.quat_rate, recipe.scale_rate, recipe.rgb_rate, recipe.opacity_rate)
-    groups = [{"params": [v], "lr": rate} for v, rate in zip(values, rates, strict=True)]
-    optimiser = torch.optim.Adam([*groups, {"params": [poses, transls], "lr": recipe.pose_rate}], betas=(0.9, 0.99), fused=True)
-    begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
-    for step in range(warm + steps):
-        if step == warm:
-            torch.cuda.synchronize()
-            begin.record()
-        t = step % len(figure.shots)
-        mu, quat, log_scale, rgb, opacity = values
-        means, covars = geometry(poses[t], transls[t], mu, quat, log_scale)
-        drawn, alpha, _ = rasterization(means, None, None, opacity.sigmoid(), rgb, eye, lens, camera.width, camera.height,
-                                        packed=False, covars=covars)
-        loss = loss_of(drawn[0], alpha[0], pixels[t], torch.rand(3, device=device))
-        optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        optimiser.step()
-    end.record()
-    torch.cuda.synchronize()
-    if not torch.isfinite(loss):
-        raise RuntimeError("the baseline's loss is not finite")
-    return begin.elapsed_time(end) / steps / 1e3
+    return loss

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from gsac.benchmarks import training
 
@@ -22,16 +23,20 @@ def parser() -> argparse.ArgumentParser:
                      help="steps of recipe fast, one training each (default: 400 1600 3200)")
     out.add_argument("--paper-steps", type=int, default=3000, metavar="STEPS", help="steps of recipe paper (default: 3000)")
     out.add_argument("--repeats", type=int, default=1, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 1)")
+    out.add_argument("--gpu-curve", type=Path, metavar="CSV",
+                     help="curve.csv of `python -m gsac.benchmarks.gpu.curve`, drawn beside the CPU's curves of the same clips")
     return out
 
 
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
+    from gsac.benchmarks.gpu import curve
     from gsac.benchmarks.speed_accuracy import chart, table
     from gsac.benchmarks.speed_accuracy.trial import trial
     from gsac.pipeline.events import PlainReporter
 
     say = PlainReporter(sys.stderr)
+    on_gpu = curve.read(options.gpu_curve) if options.gpu_curve else []
     options.out.mkdir(parents=True, exist_ok=True)
     trials = []
     for case in training.cases(options, say):
@@ -47,5 +52,5 @@ def main(argv: list[str] | None = None) -> int:
     print(words)
     (options.out / "speed_accuracy.txt").write_text(words + "\n")
     table.write_csv(trials, options.out / "speed_accuracy.csv")
-    chart.draw(trials, options.out)
+    chart.draw(trials, options.out, on_gpu)
     return 0

@@ -73,8 +73,8 @@ class TrainConfig:
             raise BadInput(f"train.recipe is {self.recipe!r}; choices: {', '.join(RECIPES)}")
         if self.device not in DEVICES:
             raise BadInput(f"train.device is {self.device!r}; choices: {', '.join(DEVICES)}")
-        if self.device == "cuda" and self.exposure:
-            raise BadInput("train.exposure is learned on the CPU only; set train.device to cpu, or train.exposure to false")
+        if self.recipe == "paper" and self.exposure:
+            raise BadInput("train.exposure is learned by recipe fast only; set train.recipe to fast, or train.exposure to false")
         if isinstance(self.gaussians, str) and self.gaussians != AUTO:
             raise BadInput(f"train.gaussians is {self.gaussians!r}; give a number, or {AUTO}")
         if self.gaussians != AUTO and self.gaussians < 100:

@@ -26,24 +26,35 @@ def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[i
     """As `fast.train`. Raises StageError where the GPU fails, or naming the step and the quantity that is not finite."""
     fine, coarse = fast.crops(task)
     gaussians = fast.start(task, coarse, count)
-    recipe = Recipe.of(task.config, offset_rate=fast.OFFSET_RATE)
+    recipe = Recipe.of(task.config, offset_rate=fast.OFFSET_RATE, gain_rate=gain_rate(task))
     with training(task, [coarse, fine], gaussians, recipe) as trainer:
         follow(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
         body = trainer.body
         trainer.replace(fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces))
         follow(trainer, task, recipe.steps)
         hand_back(trainer, task)
-        gaussians = finite(trainer.gaussians(), recipe.steps)
-    return fast.Trainer(gaussians, task, settled=True), fine, coarse
+        return settled(trainer, task), fine, coarse
 
 
 def refit(task: Task, gaussians: Gaussians, views: dict[int, View]) -> fast.Trainer:
     """As `ladder.refit`."""
-    recipe = Recipe.of(task.config, steps=ladder.REFIT, begin=ladder.REFIT_FROM, coarse_share=0.0, pose_rate=0.0)
+    recipe = Recipe.of(task.config, steps=ladder.REFIT, begin=ladder.REFIT_FROM, coarse_share=0.0, pose_rate=0.0,
+                       gain_rate=gain_rate(task))
     with training(task, [views], gaussians, recipe) as trainer:
         trainer.train(recipe.steps)
-        gaussians = finite(trainer.gaussians(), recipe.steps)
-    return fast.Trainer(gaussians, task, settled=True)
+        return settled(trainer, task)
+
+
+def gain_rate(task: Task) -> float:
+    return fast.GAIN_RATE if task.config.exposure else 0.0
+
+
+def settled(trainer: CudaTrainer, task: Task) -> fast.Trainer:
+    """A CPU trainer with the gaussians and gains as they stand on the GPU."""
+    kept = fast.Trainer(finite(trainer.gaussians(), trainer.recipe.steps), task, settled=True)
+    if trainer.recipe.gain_rate:
+        kept.gains = dict(zip(task.trained.tolist(), trainer.gains().astype(np.float64), strict=True))
+    return kept
 
 
 @contextmanager
@@ -54,7 +65,8 @@ def training(task: Task, levels: list[dict[int, View]], gaussians: Gaussians, re
     try:
         shots = [[Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained] for views in levels]
         poses = task.poses
-        trainer = kind(body_arrays(task), shots, poses.pose[task.trained], poses.transl[task.trained], gaussians, recipe)
+        trainer = kind(body_arrays(task, recipe.beta_rate > 0), shots, poses.pose[task.trained], poses.transl[task.trained],
+                       gaussians, recipe)
         yield trainer
     except (DeviceError, CompileError) as error:
         raise StageError(f"train on the GPU: {error}; or set train.device to cpu") from error
@@ -63,8 +75,8 @@ def training(task: Task, levels: list[dict[int, View]], gaussians: Gaussians, re
             trainer.close()
 
 
-def body_arrays(task: Task) -> BodyArrays:
-    """The body as the trained frames wear it; the first frame's rest comes first."""
+def body_arrays(task: Task, betas: bool) -> BodyArrays:
+    """The body as the trained frames wear it, the first frame's rest first; betas: whether they are to be learned."""
     body, rests, rest_of, known = task.poses.body, [], [], {}
     for t in task.trained:
         vertices, joints = task.poses.rest(int(t))
@@ -72,8 +84,12 @@ def body_arrays(task: Task) -> BodyArrays:
         if at == len(rests):
             rests.append(vertices)
         rest_of.append(at)
-    return BodyArrays(np.stack(rests), np.array(rest_of), joints, np.asarray(body.parents), body.skin_index, body.skin_weight,
-                      np.asarray(body.faces))
+    arrays = BodyArrays(np.stack(rests), np.array(rest_of), joints, np.asarray(body.parents), body.skin_index, body.skin_weight,
+                        np.asarray(body.faces))
+    if not betas:
+        return arrays
+    shape = body.shapedirs[:, :, :len(task.poses.betas)]
+    return arrays._replace(shape=shape, joint_shape=np.tensordot(body.J_regressor, shape, 1))
 
 
 def follow(trainer: CudaTrainer, task: Task, until: int) -> None:
@@ -93,9 +109,13 @@ def follow(trainer: CudaTrainer, task: Task, until: int) -> None:
 
 
 def hand_back(trainer: CudaTrainer, task: Task) -> None:
-    """The poses of the task as they stand on the GPU."""
-    task.poses.pose[task.trained], task.poses.transl[task.trained] = trainer.poses()
-    task.poses.offset = trainer.offset()
+    """Poses, and the body's shape where it is learned, as they stand on the GPU."""
+    poses = task.poses
+    poses.pose[task.trained], poses.transl[task.trained] = trainer.poses()
+    poses.offset = trainer.offset()
+    if trainer.recipe.beta_rate:
+        poses.betas = np.array(poses.params.betas, np.float64) + trainer.betas()
+        poses.rests.clear()
 
 
 def finite(gaussians: Gaussians, step: int) -> Gaussians:

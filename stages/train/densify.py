@@ -19,6 +19,11 @@ SMALL = 0.005
 SHRINK, SHIFT = 1.6, 0.2
 
 
+def due(step: int) -> bool:
+    """Whether gaussians are added after this step, from 0."""
+    return FIRST < step < LAST and step % EVERY == PHASE
+
+
 class Densifier:
     """Sums of gradient lengths since the last event."""
 
@@ -35,7 +40,7 @@ class Densifier:
 
     def after(self, step: int, trainer, rng: np.random.Generator) -> None:
         """Grows the trainer's gaussians where the step is an event. New ones start with empty Adam moments."""
-        if not (FIRST < step < LAST and step % EVERY == PHASE):
+        if not due(step):
             return
         chosen = np.flatnonzero(self.length / np.maximum(self.hits, 1) >= THRESHOLD)
         trainer.append(chosen, children(trainer.values, chosen, rng))

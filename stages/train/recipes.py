@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from gsac.stages.train import cuda, fast, ladder, paper
+from gsac.stages.train import cuda, fast, ladder, paper, paper_cuda
 from gsac.stages.train.config import AUTO
 from gsac.stages.train.task import Fit, Loop, Task
 
@@ -16,5 +16,5 @@ RECIPES = {
     ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit)),
     ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit)),
     ("paper", "cpu"): paper.fit,
-    ("paper", "cuda"): paper.fit,
+    ("paper", "cuda"): paper_cuda.fit,
 }

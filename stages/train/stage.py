@@ -28,7 +28,7 @@ TRAIN_SAMPLE = 8
 
 def run(job: Job) -> None:
     config = job.config
-    check_device(config, job.device)
+    check_device(job.device)
     clip = Clip.read(job.inputs["split/clip.json"])
     params = BodyParams.read(job.inputs["smplx/body.npz"])
     frames = job.inputs["split/frames"]
@@ -56,12 +56,10 @@ def run(job: Job) -> None:
     run.write()
 
 
-def check_device(config, device: str) -> None:
-    """Raises BadInput where the parameters cannot be met on the device of the job."""
+def check_device(device: str) -> None:
+    """Raises BadInput where the device of the job cannot be used."""
     if device == "cuda" and (why := why_not()):
         raise BadInput(f"train is to run on cuda, but {why}; or set train.device to cpu")
-    if device == "cuda" and config.exposure:
-        raise BadInput("train.exposure is learned on the CPU only; set train.device to cpu, or train.exposure to false")
 
 
 def due(step: int, steps: int, times: int) -> bool:

@@ -1,5 +1,6 @@
 // The kernels' formulas over arrays, float64, for test_formulas.py.
 #include "formulas.cuh"
+#include "paper_formulas.cuh"
 
 typedef Vec<double> V;
 static V vec(const double *p) { return {p[0], p[1], p[2]}; }
@@ -107,6 +108,66 @@ void turn_all(int n, const double *pose, double *matrices, const double *grad, d
 void adam_all(int n, int size, double *value, const double *grad, double *first, double *second, const long long *count, double rate) {
     for (int i = 0; i < n; ++i)
         adam_row(value + size * i, grad + size * i, first + size * i, second + size * i, size, int(count[i]), rate);
+}
+
+// Recipe `paper`: logits of scales to their logarithms and slopes; gradient of the neighbours' deviations, each in one column.
+void scale_all(int n, const double *logit, double largest, double *log_scale, double *slope) {
+    for (int i = 0; i < n; ++i) {
+        log_scale[i] = log_scale_of(logit[i], largest);
+        slope[i] = log_scale_slope(logit[i]);
+    }
+}
+
+void spread_all(int n, int columns, const double *values, const long long *index, double weight, double *grad) {
+    for (int i = 0; i < n; ++i)
+        for (int c = 0; c < columns; ++c) {
+            double own[NEAREST], mean, slope;
+            for (int k = 0; k < NEAREST; ++k) own[k] = values[index[NEAREST * i + k] * columns + c];
+            spread(own, weight, mean, slope);
+            for (int k = 0; k < NEAREST; ++k) grad[index[NEAREST * i + k] * columns + c] += slope * (own[k] - mean);
+        }
+}
+
+double edges_all(int height, int width, const double *image, const double *target, double weight, double *grad) {
+    double loss = 0;
+    auto at = [&](const double *from, int x, int y) {
+        const double *p = from + 3 * (y * width + x);
+        return grey(p[0], p[1], p[2]);
+    };
+    auto add = [&](int x, int y, double g) {
+        const double part[3] = {grey(1.0, 0.0, 0.0), grey(0.0, 1.0, 0.0), grey(0.0, 0.0, 1.0)};
+        for (int c = 0; c < 3; ++c) grad[3 * (y * width + x) + c] += g * part[c];
+    };
+    for (int y = 1; y < height - 1; ++y)
+        for (int x = 1; x < width - 1; ++x) {
+            double across = at(image, x + 1, y) - at(image, x - 1, y), down = at(image, x, y + 1) - at(image, x, y - 1);
+            double own = strength(across, down);
+            double real = strength(at(target, x + 1, y) - at(target, x - 1, y), at(target, x, y + 1) - at(target, x, y - 1));
+            double slope = strength_slope(own, real, weight);
+            loss += weight * fabs(own - real);
+            add(x + 1, y, slope * across);
+            add(x - 1, y, -slope * across);
+            add(x, y + 1, slope * down);
+            add(x, y - 1, -slope * down);
+        }
+    return loss;
+}
+
+double dice_all(int n, const double *alpha, const double *mask, double outside, double weight, double *grad) {
+    double shown = 0, masked = 0, both = 0;
+    for (int i = 0; i < n; ++i) {
+        shown += alpha[i];
+        masked += mask[i];
+        both += alpha[i] * mask[i];
+    }
+    Dice found = dice_of(n + outside, shown, masked, both, weight);
+    for (int i = 0; i < n; ++i) grad[i] = found.by_clear * (1 - mask[i]) - found.everywhere;
+    return found.value;
+}
+
+void adam_dense(int n, double *value, const double *grad, double *first, double *second, int steps, double rate) {
+    double begun = rate / (1 - pow(0.9, steps)), unbias = 1 / (1 - pow(0.999, steps));
+    for (int i = 0; i < n; ++i) adam_value(value[i], grad[i], first[i], second[i], begun, unbias);
 }
 
 void limit_all(int n, double *mu, double *quat, double *log_scale, double *rgb, double *logit, const double *start,

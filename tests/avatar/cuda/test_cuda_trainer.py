@@ -220,16 +220,17 @@ def test_many_gaussians_on_one_tile_are_sorted_beyond_the_fast_path(figure):
 
 
 @gpu
-def test_a_whole_training_follows_the_recipe_of_the_cpu(figure):
+@pytest.mark.parametrize("exposure", [False, True])
+def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     from dataclasses import replace
     from types import SimpleNamespace
 
     from gsac.avatar.body import Body, BodyParams
-    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.avatar.cuda.trainer import CudaTrainer, Shot
     from gsac.benchmarks.gpu.check import relative
     from gsac.benchmarks.gpu.figure import start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast import OFFSET_RATE, OFFSET_SHARE, Trainer
+    from gsac.stages.train.fast import GAIN_RATE, OFFSET_RATE, OFFSET_SHARE, Trainer
     from gsac.stages.train.offsets import fold
     from gsac.stages.train.poses import Poses
     from gsac.stages.train.views import View
@@ -238,11 +239,14 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure):
     still.pose[:, 22] = 0  # a jaw that turns would ask for expressions, which the figure does not wear
     body, steps = Body.load(), 80
     camera = figure.shots[0].camera
+    if exposure:
+        dim = np.array([0.9, 0.7, 0.8, 1])
+        still.shots = [Shot(np.uint8(s.pixels * dim), camera) if t % 2 else s for t, s in enumerate(figure.shots)]
     params = BodyParams.from_pose(still.pose, still.transl, np.zeros(body.num_betas), np.zeros((4, len(body.expression_names))),
                                   camera.focal, camera.center)
-    task = SimpleNamespace(config=TrainConfig(steps=steps), poses=Poses(body, params), trained=np.arange(4))
+    task = SimpleNamespace(config=TrainConfig(steps=steps, exposure=exposure), poses=Poses(body, params), trained=np.arange(4))
     cpu = Trainer(start(still.body, 2000), task)
-    recipe = Recipe.of(task.config, offset_rate=OFFSET_RATE, offset_share=OFFSET_SHARE)
+    recipe = Recipe.of(task.config, offset_rate=OFFSET_RATE, offset_share=OFFSET_SHARE, gain_rate=exposure * GAIN_RATE)
     cuda = CudaTrainer(still.body, [still.shots], task.poses.pose, task.poses.transl, start(still.body, 2000), recipe)
     backgrounds, losses = cuda.buffers["background"].read()[:, 0], []
     for step in range(steps):
@@ -256,8 +260,15 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure):
     cuda.train(steps)
     got, ours, theirs = cuda.losses()[:, 0], cuda.gaussians(), cpu.gaussians()
     pose, transl = cuda.poses()
+    gains = cuda.gains()
     cuda.close()
     np.testing.assert_allclose(got, losses, rtol=0.02)
+    if exposure:
+        expected = np.array([cpu.gains[t] for t in range(4)])
+        assert np.abs(expected - 1).max() > 5 * GAIN_RATE
+        assert np.abs(gains - expected).max() < 2.5 * GAIN_RATE
+    else:
+        assert (gains == 1).all()
     assert relative(ours.rgb, theirs.rgb) < 0.02 and relative(ours.mu, theirs.mu) < 0.05
     moved = task.poses.pose - task.poses.fit_pose
     assert relative(pose - task.poses.fit_pose, moved) < 0.2 and relative(transl, task.poses.transl) < 1e-3

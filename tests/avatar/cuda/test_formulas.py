@@ -11,6 +11,9 @@ from gsac.avatar import binding, skinning
 from gsac.avatar.camera import Camera
 from gsac.avatar.raster import render, render_backward
 from gsac.stages.train import kernels
+from gsac.stages.train.densify import LARGEST
+from gsac.stages.train.neighbours import K, Neighbours
+from gsac.stages.train.paper_losses import dice, sobel_magnitude
 
 HERE = Path(__file__).parent
 SOURCES = Path(binding.__file__).parent / "cuda"
@@ -31,7 +34,9 @@ def host(tmp_path_factory):
     def call(name, *arguments):
         plain = [a.ctypes.data_as(ctypes.c_void_p) if isinstance(a, np.ndarray) else
                  ctypes.c_double(a) if isinstance(a, float) else a for a in arguments]
-        getattr(loaded, name)(*plain)
+        function = getattr(loaded, name)
+        function.restype = ctypes.c_double
+        return function(*plain)
     return call
 
 
@@ -119,3 +124,48 @@ def test_adam_and_limits_are_those_of_the_cpu_path(host):
     kernels.limit(*theirs, start, face_scale, 4.0, 0.05, 0.08, 1e-3)
     for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
+
+
+def test_scales_of_recipe_paper_and_their_slope_are_those_of_the_cpu_path(host):
+    logit = np.random.default_rng(5).normal(-2, 3, 60)
+    got, slope = np.empty(60), np.empty(60)
+    host("scale_all", 60, logit, LARGEST, got, slope)
+    np.testing.assert_allclose(got, np.log(LARGEST) - np.log1p(np.exp(-logit)), rtol=1e-12)
+    np.testing.assert_allclose(slope, 1 / (1 + np.exp(logit)), rtol=1e-12)
+
+
+def test_likeness_of_neighbours_is_that_of_the_cpu_path(host):
+    rng = np.random.default_rng(6)
+    values, around = rng.normal(size=(40, 4)), Neighbours()
+    around.distances(rng.normal(size=(40, 3)), 1.0, 0)
+    values[around.index[7]] = values[7]  # no deviation, no slope
+    got = np.zeros_like(values)
+    host("spread_all", 40, 4, values, np.ascontiguousarray(around.index, np.int64), 0.3 / values.size, got)
+    expected = around.spread(values, 0.3)
+    assert around.index.shape == (40, K) and np.linalg.norm(expected) > 0
+    np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-15)
+
+
+def test_edges_and_dice_of_recipe_paper_are_those_of_the_cpu_path(host):
+    rng = np.random.default_rng(7)
+    image, target = rng.random((12, 9, 3)), rng.random((12, 9, 3))
+    image[:5, :4] = target[:5, :4]  # equal strengths have no slope
+    got, expected = np.zeros_like(image), np.zeros_like(image)
+    loss = host("edges_all", 12, 9, image, target, 0.7, got)
+    assert abs(loss - sobel_magnitude(image, target, 0.7, expected)) < 1e-6 * loss
+    assert np.linalg.norm(got - expected) < 1e-6 * np.linalg.norm(expected)
+    pixels = rng.integers(0, 256, (12, 9, 4), dtype=np.uint8)
+    alpha, got, expected = rng.random((12, 9)), np.empty((12, 9)), np.zeros((12, 9))
+    loss = host("dice_all", 108, alpha, pixels[..., 3] / 255, 50.0, 0.1, got)
+    assert abs(loss - dice(alpha, pixels, 50, 0.1, expected)) < 1e-7
+    assert np.linalg.norm(got - expected) < 1e-6 * np.linalg.norm(expected)
+
+
+def test_adam_of_recipe_paper_is_that_of_the_cpu_path(host):
+    rng = np.random.default_rng(8)
+    arrays = [rng.normal(size=(30, 3)), rng.normal(size=(30, 3)), rng.normal(size=(30, 3)), rng.random((30, 3))]
+    ours, theirs = [a.copy() for a in arrays], [a.copy() for a in arrays]
+    host("adam_dense", 90, *ours, 9, 5e-3)
+    kernels.adam(*theirs, 9, 5e-3)
+    for a, b in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-12)

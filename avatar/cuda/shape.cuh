@@ -1,0 +1,55 @@
+// The body's shape (betas), which all frames share: gradient by its directions, Adam, and the body moved on.
+
+// (blocks of vertices), after the step's pose update. The last block takes the step.
+extern "C" __global__ void __launch_bounds__(256) shape_gradient(Scene s) {
+    __shared__ float scratch[8];
+    __shared__ int last;
+    if (halted(s)) return;
+    State &state = *s.state;
+    int tid = threadIdx.x, v = blockIdx.x * 256 + tid;
+    Vec<float> rest = {0, 0, 0};
+    float joint = 0;
+    for (int b = 0; b < s.batch; ++b) {
+        if (v < s.vertex_count) rest = rest + vec(s.grad_rest + 3 * (size_t(b) * s.vertex_count + v));
+        if (blockIdx.x == 0 && tid < 165) joint += s.grad_joints[b * 165 + tid];
+    }
+    for (int k = 0; k < s.beta_count; ++k) {
+        float sum = 0;
+        if (v < s.vertex_count) sum = dot(rest, vec(s.shape + 3 * (size_t(k) * s.vertex_count + v)));
+        if (blockIdx.x == 0 && tid < 165) sum += joint * s.joint_shape[k * 165 + tid];
+        __syncthreads();
+        sum = sum_block(sum, scratch);
+        if (tid == 0) s.beta_part[blockIdx.x * s.beta_count + k] = sum;
+    }
+    __threadfence();
+    __syncthreads();
+    if (tid == 0) last = atomicAdd(&state.shape_done, 1) == int(gridDim.x) - 1;
+    __syncthreads();
+    if (!last) return;
+    __threadfence();
+    if (tid == 0) state.shape_done = 0;
+    if (tid >= s.beta_count) return;
+    double g = 0, n = state.step;
+    for (unsigned k = 0; k < gridDim.x; ++k) g += __ldcg(s.beta_part + k * s.beta_count + tid);
+    g /= s.batch;
+    double first = s.beta_first[tid] += 0.1 * (g - s.beta_first[tid]);
+    double second = s.beta_second[tid] += 0.01 * (g * g - s.beta_second[tid]);
+    double move = -s.now[0].plan.betas * (first / (1 - pow(0.9, n))) / (sqrt(second / (1 - pow(0.99, n))) + 1e-12);
+    s.betas[tid] += move;
+    s.beta_move[tid] = float(move);
+}
+
+// (blocks of vertices). The move of the betas, on the displacement of the vertices and on the joints.
+extern "C" __global__ void __launch_bounds__(256) shape_step(Scene s) {
+    if (halted(s)) return;
+    int v = blockIdx.x * 256 + threadIdx.x;
+    if (v < s.vertex_count) {
+        Vec<float> move = {0, 0, 0};
+        for (int k = 0; k < s.beta_count; ++k) move = move + vec(s.shape + 3 * (size_t(k) * s.vertex_count + v)) * s.beta_move[k];
+        s.offset[3 * v] += move.x;
+        s.offset[3 * v + 1] += move.y;
+        s.offset[3 * v + 2] += move.z;
+    }
+    if (blockIdx.x == 0 && threadIdx.x < 165)
+        for (int k = 0; k < s.beta_count; ++k) s.joints[threadIdx.x] += s.joint_shape[k * 165 + threadIdx.x] * s.beta_move[k];
+}

@@ -1,0 +1,153 @@
+"""python -m gsac.benchmarks.gpu.curve --run DIR: held-out quality against seconds on the GPU, both recipes, one process each.
+
+Writes curve.csv, a row for each checkpoint, which `gsac bench speed-accuracy --gpu-curve FILE` draws beside the CPU's curves, and
+curve.json, what was measured where. GPU seconds are device time from the first step's kernels to the last's, waits in between
+counted; wall seconds are those of the whole fit: first colours, upload, steps, read back. Judging is in neither.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import multiprocessing
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from gsac.avatar.cuda import why_not
+from gsac.benchmarks import training
+from gsac.stages.contract import BadInput, Job, make_config
+from gsac.stages.train import STAGE
+
+CHECKPOINTS = 40
+TORCH = "torch + gsplat"
+COLUMNS = ("clip", "recipe", "device", "steps", "seed", "n_gaussians", "gpu_seconds", "wall_seconds", "psnr_fg")
+
+
+@dataclass
+class Curve:
+    clip: str
+    recipe: str
+    device: str
+    """`cuda`, or `TORCH`."""
+    steps: int
+    n_gaussians: int
+    points: list[tuple[float, float]]
+    """Seconds on the GPU and held-out psnr_fg, dB."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.gpu.curve", description=__doc__.splitlines()[0])
+    parser.add_argument("--run", type=Path, action="append", required=True, metavar="DIR", help="folder of a finished `gsac run`")
+    parser.add_argument("--out", type=Path, default=Path("bench-gpu"), metavar="DIR")
+    parser.add_argument("--budgets", type=int, nargs="+", default=[400, 1600], metavar="STEPS", help="steps of recipe fast")
+    parser.add_argument("--torch-steps", type=int, default=400, metavar="STEPS",
+                        help="steps of recipe fast in torch + gsplat, where that is installed; 0: none")
+    options = parser.parse_args()
+    if why := why_not():
+        raise SystemExit(f"benchmarks.gpu.curve: {why}")
+    options.out.mkdir(parents=True, exist_ok=True)
+    rows, found = [], []
+    for folder in options.run:
+        case = training.of_run(folder)
+        ends = {}
+        for recipe, steps in [*(("fast", n) for n in options.budgets), ("paper", None)]:
+            metrics = training.train(case, options.out / f"{case.name}_{recipe}{steps or ''}", recipe=recipe, device="cuda",
+                                     curve=CHECKPOINTS, **({"steps": steps} if steps else {}))
+            ends[recipe, metrics["steps"]] = metrics
+            rows += rows_of(case.name, "cuda", metrics)
+        if options.torch_steps and gsplat_is_here():
+            metrics = _train_in_torch(case, options.out / f"{case.name}_torch", options.torch_steps)
+            rows += rows_of(case.name, TORCH, metrics)
+            ends[TORCH, metrics["steps"]] = metrics
+        found.append(summary(case.name, ends))
+        print("\n".join(words(found[-1])), flush=True)
+    write(rows, options.out / "curve.csv")
+    (options.out / "curve.json").write_text(json.dumps({"device": device_name(), "clips": found}, indent=1) + "\n")
+
+
+def rows_of(clip: str, device: str, metrics: dict) -> list[tuple]:
+    """A row for each checkpoint that was judged, the end last. Raises BadInput where no frame is held out."""
+    def row(at: dict) -> tuple:
+        return (clip, metrics["recipe"], device, metrics["steps"], metrics["seed"], at["n_gaussians"], at["gpu_seconds"],
+                at["seconds"], at["psnr_fg"])
+
+    if metrics["psnr_fg"] is None:
+        raise BadInput(f"{clip}: no frame is held out, there is no quality to draw")
+    return [*(row(at) for at in metrics["curve"] if "psnr_fg" in at), row(metrics)]
+
+
+def summary(clip: str, ends: dict) -> dict:
+    """What the trainings say together: their ends, and when recipe fast is first as good as paper at its end."""
+    out = {"clip": clip, "trainings": [
+        {"recipe": recipe, "steps": steps} | {k: m[k] for k in ("gpu_seconds", "seconds", "psnr_fg", "psnr_fg_ttpo", "n_gaussians")}
+        for (recipe, steps), m in ends.items()]}
+    goal = next(m["psnr_fg"] for (recipe, _), m in ends.items() if recipe == "paper")
+    reached = [at["gpu_seconds"] for (recipe, _), m in ends.items() if recipe == "fast"
+               for at in m["curve"] if at.get("psnr_fg", -1) >= goal]
+    return out | {"paper_psnr_fg": goal, "fast_reaches_it_gpu_seconds": min(reached, default=None)}
+
+
+def words(found: dict) -> list[str]:
+    lines = [f"{found['clip']}: {t['recipe']}, {t['steps']} steps: {t['gpu_seconds']:.3f} s on the GPU, {t['seconds']:.2f} in all, "
+             f"{t['psnr_fg']:.2f} dB (pose moved to the image: {t['psnr_fg_ttpo']:.2f}), {t['n_gaussians']} gaussians"
+             for t in found["trainings"]]
+    first = found["fast_reaches_it_gpu_seconds"]
+    return [*lines, f"{found['clip']}: fast is at paper's {found['paper_psnr_fg']:.2f} dB after "
+                    + (f"{first:.3f} s on the GPU" if first is not None else "no time: it never gets there")]
+
+
+def write(rows: list[tuple], path: Path) -> None:
+    with open(path, "w", newline="") as f:
+        csv.writer(f).writerows([COLUMNS, *rows])
+
+
+def read(path: Path) -> list[Curve]:
+    """The trainings of a curve.csv. Raises BadInput naming what it lacks."""
+    with open(path, newline="") as f:
+        rows = list(csv.DictReader(f))
+    if not rows or (missing := set(COLUMNS) - set(rows[0])):
+        raise BadInput(f"{path}: " + (f"there is no column {', '.join(sorted(missing))}" if rows else "there is no row")
+                       + "; give the curve.csv of `python -m gsac.benchmarks.gpu.curve`")
+    out: dict[tuple, Curve] = {}
+    for row in rows:
+        key = tuple(row[name] for name in ("clip", "recipe", "device", "steps", "seed"))
+        curve = out.setdefault(key, Curve(*key[:3], int(row["steps"]), 0, []))
+        curve.n_gaussians = int(row["n_gaussians"])
+        curve.points.append((float(row["gpu_seconds"]), float(row["psnr_fg"])))
+    return list(out.values())
+
+
+def device_name() -> str:
+    from gsac.avatar.cuda.device import Device
+
+    return Device().name
+
+
+def gsplat_is_here() -> bool:
+    from importlib.util import find_spec
+
+    return find_spec("torch") is not None and find_spec("gsplat") is not None
+
+
+def _train_in_torch(case: training.Case, folder: Path, steps: int) -> dict:
+    """As `training.train`; the same stage, its steps done by torch and gsplat."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        pool.apply(_in_torch, (case.inputs, folder, steps))
+    return json.loads((folder / "metrics.json").read_text())
+
+
+def _in_torch(inputs: dict[str, Path], folder: Path, steps: int) -> None:
+    from gsac.benchmarks.gpu import baseline
+    from gsac.stages.train import recipes, stage
+
+    recipes.RECIPES["fast", "cuda"] = baseline.fit
+    config = make_config(STAGE, {"device": "cuda", "steps": steps, "curve": CHECKPOINTS})
+    stage.run(Job(inputs, folder, config, device="cuda"))
+
+
+if __name__ == "__main__":
+    main()
