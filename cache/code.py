@@ -24,8 +24,9 @@ from gsac.cache.root import default_root
 from gsac.cache.syntax import read_source
 
 FIRST_PARTY = "gsac"
-FILE_SUFFIXES = tuple(f".{s}" for s in "npz npy json cu cuh c h cpp cs js css html jinja glsl wgsl".split())
-MEMO_KIND = f"module 2 python {sys.version_info.major}.{sys.version_info.minor}"
+FILE_SUFFIXES = tuple(f".{s}" for s in (
+    "npz npy json cu cuh c h cpp cs js css html jinja glsl wgsl hlsl compute shader asmdef unity md".split()))
+MEMO_KIND = f"module 3 python {sys.version_info.major}.{sys.version_info.minor}"
 """To be raised when `syntax` reads sources otherwise, so that what was remembered before is not taken for its word."""
 
 

@@ -5,9 +5,10 @@ gives  avatar.gsac: everything in one container (docs/gsac-format.md)
        avatar.ply: standard 3DGS, posed, metres, 3DGS axes
        avatar.glb: skinned animated mesh, and the gaussians with KHR_gaussian_splatting
        viewer.html: one page that opens from disk
+       unity: the Unity package with this person, as a folder, a tarball and a .unitypackage
 """
 
-from gsac.avatar.artifacts import check_file
+from gsac.avatar.artifacts import check_file, check_folder
 from gsac.stages.contract import Output, Stage
 from gsac.stages.export.config import ExportConfig
 
@@ -19,6 +20,7 @@ STAGE = Stage(
         Output("avatar.ply", check_file),
         Output("avatar.glb", check_file),
         Output("viewer.html", check_file),
+        Output("unity", check_folder),
     ),
     config=ExportConfig,
     packages=("numpy", "scipy"),

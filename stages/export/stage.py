@@ -16,6 +16,7 @@ from gsac.stages.export.motion import add_motion
 from gsac.stages.export.page import page_bytes
 from gsac.stages.export.ply import ply_bytes
 from gsac.stages.export.rigged import RiggedAvatar
+from gsac.stages.export.unity_package import write_unity
 from scipy.spatial.transform import Rotation
 
 MOVED = 1e-4
@@ -46,9 +47,11 @@ def run(job: Job) -> None:
         "viewer.html": lambda: page_bytes(container),
     }
     for done, (name, make) in enumerate(files.items()):
-        job.progress(done, len(files), "files")
+        job.progress(done, len(files) + 1, "files")
         (job.out / name).write_bytes(make())
-    job.progress(len(files), len(files), "files")
+    (job.out / "unity").mkdir()
+    write_unity(job.out / "unity", container, version("gsac"))
+    job.progress(len(files) + 1, len(files) + 1, "files")
 
 
 def rigged(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar:

@@ -1,0 +1,138 @@
+"""`unity/`: the Unity package with the person in it, as a folder and a tarball for the Package Manager and as `.unitypackage`.
+
+The same input gives the same bytes. A scene names another file of the package by `{guid:PATH}`, which is filled in here.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import re
+import tarfile
+from pathlib import Path, PurePosixPath
+
+from gsac.stages.export.unity_meta import PACKAGE, file_meta, folder_meta, guid
+
+HERE = Path(__file__).parent / "unity"
+SOURCES = (
+    "unity/README.md",
+    "unity/Demo/Benchmark.unity",
+    "unity/Demo/Demo.unity",
+    "unity/Editor/Gsac.Editor.asmdef",
+    "unity/Editor/GsacAvatarEditor.cs",
+    "unity/Editor/GsacImporter.cs",
+    "unity/Editor/GsacSceneViews.cs",
+    "unity/Runtime/Core/GsacContainer.cs",
+    "unity/Runtime/Core/GsacData.cs",
+    "unity/Runtime/Core/GsacException.cs",
+    "unity/Runtime/Core/GsacExtent.cs",
+    "unity/Runtime/Core/GsacJson.cs",
+    "unity/Runtime/Core/GsacPacking.cs",
+    "unity/Runtime/Core/GsacPose.cs",
+    "unity/Runtime/Core/GsacPoseMessage.cs",
+    "unity/Runtime/Core/GsacReader.cs",
+    "unity/Runtime/Core/GsacSort.cs",
+    "unity/Runtime/Core/GsacTimes.cs",
+    "unity/Runtime/Gsac.asmdef",
+    "unity/Runtime/GsacAsset.cs",
+    "unity/Runtime/GsacAvatar.cs",
+    "unity/Runtime/GsacBenchmark.cs",
+    "unity/Runtime/GsacDemo.cs",
+    "unity/Runtime/GsacHumanoid.cs",
+    "unity/Runtime/GsacLoader.cs",
+    "unity/Runtime/GsacMesh.cs",
+    "unity/Runtime/GsacModel.cs",
+    "unity/Runtime/GsacPoseStream.cs",
+    "unity/Runtime/GsacRenderer.cs",
+    "unity/Runtime/GsacSkeleton.cs",
+    "unity/Runtime/GsacView.cs",
+    "unity/Runtime/Resources/Gsac/Gsac.compute",
+    "unity/Runtime/Resources/Gsac/GsacCore.hlsl",
+    "unity/Runtime/Resources/Gsac/GsacDraw.hlsl",
+    "unity/Runtime/Resources/Gsac/GsacPass.hlsl",
+    "unity/Runtime/Resources/Gsac/GsacSplats.shader",
+)
+"""What every package holds. Whole names, so that the cache sees these files."""
+
+AVATAR = "Demo/Avatar.bytes"
+SAMPLES = "Samples~"
+"""Unity's name for a folder that the Package Manager copies into a project at the user's wish."""
+INSTALLED = "Assets/Gsac"
+"""Where the .unitypackage puts itself."""
+
+
+def write_unity(folder: Path, container: bytes, version: str) -> None:
+    """Writes the three forms and the README into an empty folder; container: the bytes of avatar.gsac."""
+    files = package_files(container)
+    upm = {_in_upm(path): content for path, content in files.items()}
+    upm["package.json"] = _manifest(version)
+    upm |= {f"{path}.meta": file_meta(_guid_path(path)).encode() for path in list(upm)}
+    upm |= {f"{path}.meta": folder_meta(_guid_path(path)).encode() for path in _folders(upm) if path != SAMPLES}
+    for path, content in upm.items():
+        place = folder / PACKAGE / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(content)
+    (folder / f"{PACKAGE}-{version}.tgz").write_bytes(_tar({f"package/{path}": content for path, content in upm.items()}))
+    (folder / "gsac-avatar.unitypackage").write_bytes(_tar(_unitypackage(files)))
+    (folder / "README.md").write_bytes(files["README.md"])
+
+
+def package_files(container: bytes) -> dict[str, bytes]:
+    """Path in the package -> content, GUIDs filled in."""
+    files = {AVATAR: container}
+    for name in SOURCES:
+        path = name.removeprefix("unity/")
+        content = (HERE / path).read_bytes()
+        if path.endswith(".unity"):
+            content = re.sub(r"\{guid:([^}]+)\}", lambda found: guid(found[1]), content.decode()).encode()
+        files[path] = content
+    return dict(sorted(files.items()))
+
+
+def _in_upm(path: str) -> str:
+    return f"{SAMPLES}/{path}" if path.startswith("Demo/") else path
+
+
+def _guid_path(path: str) -> str:
+    """The demo keeps its GUIDs wherever it lies."""
+    return path.removeprefix(f"{SAMPLES}/")
+
+
+def _folders(paths: dict[str, bytes]) -> list[str]:
+    return sorted({str(parent) for path in paths for parent in PurePosixPath(path).parents} - {"."})
+
+
+def _manifest(version: str) -> bytes:
+    return json.dumps({
+        "name": PACKAGE, "version": version, "displayName": "GSAC Avatar", "unity": "2021.3",
+        "description": "Animatable Gaussian avatars: import a .gsac file, animate it as a Humanoid, in any render pipeline.",
+        "keywords": ["gaussian splatting", "avatar", "humanoid"],
+        "dependencies": {"com.unity.modules.animation": "1.0.0", "com.unity.modules.imgui": "1.0.0"},
+        "samples": [{"displayName": "Demo", "path": f"{SAMPLES}/Demo",
+                     "description": "This person with buttons for poses, clips and expressions; and the benchmark scene."}],
+    }, indent=2).encode() + b"\n"
+
+
+def _unitypackage(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Entries of Unity's own archive: GUID/asset, GUID/asset.meta, GUID/pathname."""
+    entries = {}
+    for path in ["", *_folders(files)]:
+        entries[f"{guid(path)}/asset.meta"] = folder_meta(path).encode()
+        entries[f"{guid(path)}/pathname"] = f"{INSTALLED}/{path}".rstrip("/").encode()
+    for path, content in files.items():
+        entries[f"{guid(path)}/asset"] = content
+        entries[f"{guid(path)}/asset.meta"] = file_meta(path).encode()
+        entries[f"{guid(path)}/pathname"] = f"{INSTALLED}/{path}".encode()
+    return entries
+
+
+def _tar(files: dict[str, bytes]) -> bytes:
+    """A .tar.gz without times and owners."""
+    raw = io.BytesIO()
+    with tarfile.open(fileobj=raw, mode="w", format=tarfile.USTAR_FORMAT) as tar:
+        for path, content in sorted(files.items()):
+            entry = tarfile.TarInfo(path)
+            entry.size, entry.mode = len(content), 0o644
+            tar.addfile(entry, io.BytesIO(content))
+    return gzip.compress(raw.getvalue(), 6, mtime=0)
