@@ -27,9 +27,10 @@ namespace Gsac
 
             var root = new GameObject(Path.GetFileNameWithoutExtension(context.assetPath));
             Transform[] joints = GsacSkeleton.Joints(data, root.transform);
+            // the skeleton's transforms are all that Unity may find when it makes the Avatar
+            Avatar humanoid = GsacHumanoid.Build(data, root, joints);
             Mesh mesh = GsacMesh.Build(data);
             GsacMesh.Attach(mesh, root.transform, joints);
-            Avatar humanoid = GsacHumanoid.Build(data, root, joints);
             if (!humanoid.isValid || !humanoid.isHuman)
             {
                 context.LogImportWarning(context.assetPath + ": Unity takes the skeleton not as Humanoid; scripted poses work, Humanoid clips do not");

@@ -76,3 +76,53 @@ def package():
 def programs_folder():
     """Folder of the tests' own C# programs."""
     return HERE / "programs"
+
+
+@pytest.fixture(scope="session")
+def play(mono, package, tmp_path_factory):
+    """Runs a command of programs/Play.cs."""
+    exe = mono.compile_package(package, tmp_path_factory.mktemp("scripts"))
+    return lambda *args, **options: mono.run(exe, *args, **options)
+
+
+@pytest.fixture(scope="session")
+def files(figure, exported, tmp_path_factory):
+    """figure.gsac: the small figure; person.gsac: an exported person; numbers: a pose and weights for each."""
+    import numpy as np
+
+    folder = tmp_path_factory.mktemp("files")
+    rng = np.random.default_rng(2)
+    (folder / "figure.gsac").write_bytes(figure.to_bytes())
+    (folder / "person.gsac").write_bytes((exported / "avatar.gsac").read_bytes())
+    for name, count in (("figure", 2), ("person", 52)):
+        pose, transl = rng.normal(size=165) * .3, rng.normal(size=3) * .2
+        np.savetxt(folder / f"{name}.txt", np.concatenate([pose, transl, rng.random(count) * .6]).astype(np.float32)[None], "%.9g")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def passes(hlsl, shaders, tmp_path_factory):
+    """Render pipeline -> (vertex, fragment) of the package's shader."""
+    folder = tmp_path_factory.mktemp("passes")
+    out = {}
+    for pipeline, text in hlsl.shader_passes(shaders / "GsacSplats.shader").items():
+        source = folder / f"pass{pipeline}.hlsl"
+        source.write_text(text)
+        out[pipeline] = [hlsl.Program(hlsl.compile_hlsl(source, entry, stage, folder, [shaders, hlsl.SHIMS]), entry)
+                         for entry, stage in (("Vertex", "vert"), ("Fragment", "frag"))]
+    return out
+
+
+@pytest.fixture(scope="session")
+def given(files):
+    """name -> avatar, pose (55, 3), transl, weights with the jaw's share, as the numbers of `files` say."""
+    import numpy as np
+    from gsac.stages.export.rigged import RiggedAvatar
+
+    def read(name):
+        avatar = RiggedAvatar.read(files / f"{name}.gsac")
+        numbers = np.loadtxt(files / f"{name}.txt").astype(np.float32)
+        pose = numbers[:165].reshape(55, 3)
+        return avatar, pose, numbers[165:168], numbers[168:] + avatar.jaw_actions @ pose[22]
+
+    return read

@@ -186,3 +186,13 @@ class Painting:
             {"texture": self.target}, {"bytes_per_row": self.width * 8, "rows_per_image": self.height},
             (self.width, self.height, 1))
         return np.frombuffer(raw, np.float16).reshape(self.height, self.width, 4).astype(np.float32)
+
+
+def projection(camera, flipped=False):
+    """4x4 for an eye with y up and -z ahead; flipped: y down in clip space, as Unity has it when it draws to a texture."""
+    fx, fy = (2 * f / s for f, s in zip(camera.focal, (camera.width, camera.height), strict=True))
+    shift_x, shift_y = 1 - 2 * camera.center[0] / camera.width, 2 * camera.center[1] / camera.height - 1
+    p = np.array([[fx, 0, shift_x, 0], [0, fy, shift_y, 0], [0, 0, -1.0, -.02], [0, 0, -1, 0]])
+    if flipped:
+        p[1] *= -1
+    return p

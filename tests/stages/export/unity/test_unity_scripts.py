@@ -1,4 +1,4 @@
-"""The C# of the Unity package, compiled by mcs over stubs of Unity and run under Mono; its dispatches on a software GPU."""
+"""The C# of the Unity package, compiled by mcs over stubs of Unity and run under Mono."""
 
 import json
 import random
@@ -7,43 +7,13 @@ import socket
 
 import numpy as np
 import pytest
-from gsac.avatar.binding import bind, face_frames
-from gsac.avatar.skinning import joint_transforms, skin
+from gsac.avatar.skinning import joint_transforms
 from gsac.stages.export.container import pack, unpack
 from gsac.stages.export.rigged import RiggedAvatar
 from scipy.spatial.transform import Rotation
 
 MIRROR = np.diag([-1.0, 1, 1])
-KERNELS = ("Skin", "Bind", "Keys", "SortBlocks", "SortAcross", "SortMerge")
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
-
-
-@pytest.fixture(scope="session")
-def play(mono, package, tmp_path_factory):
-    """Runs a command of programs/Play.cs."""
-    exe = mono.compile_package(package, tmp_path_factory.mktemp("scripts"))
-    return lambda *args, **options: mono.run(exe, *args, **options)
-
-
-@pytest.fixture(scope="module")
-def files(figure, exported, tmp_path_factory):
-    """figure.gsac: the small figure; person.gsac: an exported person; numbers: a pose and weights for each."""
-    folder = tmp_path_factory.mktemp("files")
-    rng = np.random.default_rng(2)
-    (folder / "figure.gsac").write_bytes(figure.to_bytes())
-    (folder / "person.gsac").write_bytes((exported / "avatar.gsac").read_bytes())
-    for name, count in (("figure", 2), ("person", 52)):
-        pose, transl = rng.normal(size=165) * .3, rng.normal(size=3) * .2
-        np.savetxt(folder / f"{name}.txt", np.concatenate([pose, transl, rng.random(count) * .6]).astype(np.float32)[None], "%.9g")
-    return folder
-
-
-def given(files, name):
-    """avatar, pose (55, 3), transl, weights with the jaw's share."""
-    avatar = RiggedAvatar.read(files / f"{name}.gsac")
-    numbers = np.loadtxt(files / f"{name}.txt").astype(np.float32)
-    pose = numbers[:165].reshape(55, 3)
-    return avatar, pose, numbers[165:168], numbers[168:] + avatar.jaw_actions @ pose[22]
 
 
 def unity_bones(avatar, pose, transl):
@@ -56,10 +26,10 @@ def unity_bones(avatar, pose, transl):
 
 
 @pytest.mark.parametrize("name", ["figure", "person"])
-def test_smplx_arrays_give_the_bones_and_weights_of_the_trainers_body(play, mono, files, tmp_path, name):
+def test_smplx_arrays_give_the_bones_and_weights_of_the_trainers_body(play, mono, files, given, tmp_path, name):
     play("pose", files / f"{name}.gsac", files / f"{name}.txt", tmp_path / "pose")
     got = mono.arrays(tmp_path / "pose")
-    avatar, pose, transl, weights = given(files, name)
+    avatar, pose, transl, weights = given(name)
     np.testing.assert_allclose(got["bones"].reshape(-1, 3, 4), unity_bones(avatar, pose, transl), atol=2e-6)
     np.testing.assert_allclose(got["weights"], weights, atol=1e-5)
     assert abs(avatar.jaw_actions @ pose[22]).max() > .05, "the jaw adds something"
@@ -81,86 +51,6 @@ def test_clips_are_sampled_between_keys_and_go_round(play, mono, files, tmp_path
         np.testing.assert_allclose(quat * np.sign((quat * truth).sum(1, keepdims=True)), truth, atol=2e-5)
         transl = clip.transl[k] * (1 - t) + clip.transl[after] * t
         np.testing.assert_allclose(got[f"transl.{name}"], transl * (-1, 1, 1), atol=1e-5)
-
-
-@pytest.fixture(scope="module")
-def frame(play, mono, files, gpu, kernels, tmp_path_factory):
-    """What the scripts asked of the GPU for one frame of the person, done there: (their arrays, gpu)."""
-    path = tmp_path_factory.mktemp("frame") / "frame"
-    play("frame", files / "person.gsac", files / "person.txt", path)
-    asked = mono.arrays(path)
-    for name, array in asked.items():
-        if name.startswith("Gsac"):
-            gpu.put(name, array)
-    jobs = []
-    for row in asked["steps"].reshape(-1, 14):
-        names = ("GsacVertexCount", "GsacSplatCount", "GsacKeyCount", "GsacIndexBits", "GsacSortStage", "GsacSortStride")
-        parameters = dict(zip(names, map(int, row[2:8]), strict=True)) | {"GsacDepthRange": row[8:10], "GsacDepthRow": row[10:14]}
-        jobs.append((kernels[KERNELS[int(row[0])]], parameters, int(row[1])))
-    gpu.run(jobs)
-    return asked, {name: gpu.get(name) for name in ("GsacPosed", "GsacSplats")} | {"GsacKeys": gpu.get("GsacKeys", np.uint32)}
-
-
-@pytest.fixture(scope="module")
-def truth(files):
-    """(vertices, bound gaussians) of that frame in the avatar's own space, canonical axes turned to Unity's."""
-    avatar, pose, transl, weights = given(files, "person")
-    rest = avatar.vertices.copy()
-    for e, w in enumerate(weights):
-        span = slice(avatar.expression_start[e], avatar.expression_start[e + 1])
-        rest[avatar.expression_vertex[span]] += w * avatar.expression_delta[span]
-    bones = joint_transforms(pose[None], avatar.joints, avatar.parents)[0]
-    vertices = skin(rest, bones, avatar.skin_index, avatar.skin_weight) + transl - (0, avatar.ground, 0)
-    g = avatar.gaussians
-    return vertices @ MIRROR, bind(face_frames(vertices, avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
-
-
-def test_a_frame_of_the_scripts_skins_as_the_trainer_does(frame, truth):
-    assert abs(frame[1]["GsacPosed"].reshape(-1, 4)[:, :3] - truth[0]).max() < 1e-5
-
-
-def test_a_frame_of_the_scripts_binds_as_the_trainer_does_though_mirrored(frame, truth):
-    bound = truth[1]
-    splats = frame[1]["GsacSplats"].reshape(-1, 12)
-    assert abs(splats[:, :3] - bound.means @ MIRROR).max() < 2e-5
-    half = MIRROR @ bound.rotations * bound.scales[:, None]
-    covariance = half @ half.transpose(0, 2, 1)
-    error = abs(splats[:, [3, 6, 7, 6, 4, 8, 7, 8, 5]].reshape(-1, 3, 3) - covariance).max((1, 2)) / bound.scales.max(1) ** 2
-    assert np.quantile(error, .99) < 2e-4 and error.max() < 5e-2, "posed in float32: a sliver's normal is as uncertain as its area"
-
-
-def test_a_frame_of_the_scripts_sorts_from_far_to_near_for_the_camera(frame):
-    asked, got = frame
-    draw, place, ahead = asked["draw"], asked["camera"][:3], asked["camera"][3:]
-    model, bits = draw[:12].reshape(3, 4), int(draw[16])
-    means = got["GsacSplats"].reshape(-1, 12)[:, :3]
-    world = means @ model[:, :3].T + model[:, 3]
-    depth = (world - place) @ ahead
-    low, per_metre = asked["steps"].reshape(-1, 14)[-1, 8:10]
-    assert low <= depth.min() and depth.max() <= low + 1 / per_metre, "no depth falls out of the keys' range"
-    order = got["GsacKeys"][:len(means)] & ((1 << bits) - 1)
-    assert sorted(order) == list(range(len(means)))
-    assert (np.diff(depth[order]) <= 1 / per_metre / (2.0 ** (32 - bits) - 1) * 1.01 + 2e-6).all()
-    centre, size = draw[17:20], draw[20:23]
-    assert (abs(world - centre) <= size / 2).all(), "the bounds that Unity culls by hold every gaussian"
-
-
-def test_the_draw_is_two_triangles_a_gaussian_with_the_files_blending_made_linear(frame, files):
-    asked, _ = frame
-    N = len(RiggedAvatar.read(files / "person.gsac").gaussians["face"])
-    assert int(asked["draw"][-1]) == 6 * N
-    np.testing.assert_allclose(asked["draw"][12:16], [.3, .999, 1 / 255, 1], rtol=1e-6)
-    corners = asked["indices"].view(np.uint32)[:6 * N].reshape(N, 6)
-    np.testing.assert_array_equal(corners, np.arange(N)[:, None] * 4 + [0, 1, 2, 2, 1, 3])
-
-
-def test_what_is_uploaded_is_what_the_kernels_were_tested_with(frame, files, packing):
-    asked, _ = frame
-    packed = packing.packed(RiggedAvatar.read(files / "person.gsac"))
-    flips = {"GsacRest": (-1, 1, 1, 1), "GsacMoves": (-1, 1, 1, 1), "GsacLocal": (1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1)}
-    for name, array in packed.items():
-        got = asked[name].view(array.dtype).reshape(len(array), -1)
-        np.testing.assert_allclose(got, array.reshape(len(array), -1) * flips.get(name, 1), rtol=1e-6, atol=1e-9, err_msg=name)
 
 
 def test_6000_frames_of_each_source_collect_no_garbage(play, files):
@@ -260,6 +150,16 @@ def test_the_importer_makes_a_prefab_with_a_whole_human_skeleton(play, files, fi
     outwards = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
     assert volume == pytest.approx(outwards, rel=1e-3), "drawn faces look outwards after the mirroring too"
     assert lines[-1] == "draws 1 transforms 57", "an imported prefab is drawn in edit mode and gains no second skeleton"
+
+
+def test_the_inspectors_buttons_and_sliders_pose_in_edit_mode_and_a_scene_view_is_drawn(play, files):
+    lines = [line.split() for line in play("inspector", files / "figure.gsac").splitlines()]
+    half = .87 / 2
+    a_pose = [0, 0, np.sin(half), np.cos(half)]
+    assert [line[0] for line in lines] == ["shoulder", "shoulder", "elbow", "weight", "draws"]
+    turns = np.array([line[1:] for line in lines[:3]], float)
+    np.testing.assert_allclose(turns, [a_pose, a_pose, [0, .5, 0, .75 ** .5]], atol=1e-6)
+    assert lines[3][1] == "0.75" and lines[4][1] == "1"
 
 
 def test_the_importer_says_what_is_wrong_with_a_file(play, files, tmp_path):

@@ -12,21 +12,8 @@ PIPELINES = ["", "UniversalPipeline", "HDRenderPipeline"]
 SIZE = 256
 
 
-@pytest.fixture(scope="module")
-def programs(hlsl, shaders, tmp_path_factory):
-    """Pipeline -> (vertex, fragment)."""
-    folder = tmp_path_factory.mktemp("passes")
-    out = {}
-    for pipeline, text in hlsl.shader_passes(shaders / "GsacSplats.shader").items():
-        source = folder / f"pass{pipeline}.hlsl"
-        source.write_text(text)
-        out[pipeline] = [hlsl.Program(hlsl.compile_hlsl(source, entry, stage, folder, [shaders, hlsl.SHIMS]), entry)
-                         for entry, stage in (("Vertex", "vert"), ("Fragment", "frag"))]
-    return out
-
-
-def test_every_render_pipeline_has_a_pass_that_compiles(programs):
-    assert sorted(programs) == sorted(PIPELINES)
+def test_every_render_pipeline_has_a_pass_that_compiles(passes):
+    assert sorted(passes) == sorted(PIPELINES)
 
 
 @pytest.fixture(scope="module")
@@ -51,17 +38,7 @@ def scene(exported, packing):
             "truth": np.concatenate([truth.rgb, truth.alpha[..., None]], 2)}
 
 
-def projection(camera, flipped):
-    """4x4 for an eye with y up and -z ahead; flipped: y down in clip space, as Unity has it when it draws to a texture."""
-    fx, fy = (2 * f / s for f, s in zip(camera.focal, (camera.width, camera.height), strict=True))
-    shift_x, shift_y = 1 - 2 * camera.center[0] / camera.width, 2 * camera.center[1] / camera.height - 1
-    p = np.array([[fx, 0, shift_x, 0], [0, fy, shift_y, 0], [0, 0, -1.0, -.02], [0, 0, -1, 0]])
-    if flipped:
-        p[1] *= -1
-    return p
-
-
-def picture(gpu, hlsl, packing, programs, scene, pipeline, flipped=False, linear=0):
+def picture(gpu, hlsl, packing, passes, scene, pipeline, flipped=False, linear=0):
     g, bound = scene["avatar"].gaussians, scene["bound"]
     N = len(g["face"])
     half = bound.rotations * bound.scales[:, None]
@@ -77,30 +54,30 @@ def picture(gpu, hlsl, packing, programs, scene, pipeline, flipped=False, linear
     if pipeline == "HDRenderPipeline":
         view[:3, 3] = 0
     screen = np.array([SIZE, SIZE, 0, 0])
-    parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(scene["camera"], flipped).T,
+    parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": hlsl.projection(scene["camera"], flipped).T,
                   "_ScreenParams": screen, "_ScaledScreenParams": screen, "_ScreenSize": screen,
                   "_WorldSpaceCameraPos": [*eye, 0], "GsacBlend": np.array([.3, .999, 1 / 255, linear]), "GsacIndexBits": 13,
                   **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
-    return hlsl.Painting(gpu, *programs[pipeline], SIZE, SIZE, N).draw(parameters)
+    return hlsl.Painting(gpu, *passes[pipeline], SIZE, SIZE, N).draw(parameters)
 
 
 @pytest.mark.parametrize("pipeline", PIPELINES)
-def test_the_picture_is_the_trainers_at_55_db(gpu, hlsl, packing, programs, scene, pipeline):
-    got = picture(gpu, hlsl, packing, programs, scene, pipeline)
+def test_the_picture_is_the_trainers_at_55_db(gpu, hlsl, packing, passes, scene, pipeline):
+    got = picture(gpu, hlsl, packing, passes, scene, pipeline)
     assert (scene["truth"][..., 3] > .5).mean() > .05, "the figure is in the picture"
     mse = ((got - scene["truth"]) ** 2).mean()
     print(f"{pipeline or 'built-in'}: PSNR {-10 * np.log10(mse):.1f} dB, max {abs(got - scene['truth']).max():.4f}")
     assert -10 * np.log10(mse) > 55
 
 
-def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, hlsl, packing, programs, scene):
-    got = picture(gpu, hlsl, packing, programs, scene, "", flipped=True)[::-1]
+def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, hlsl, packing, passes, scene):
+    got = picture(gpu, hlsl, packing, passes, scene, "", flipped=True)[::-1]
     assert -10 * np.log10(((got - scene["truth"]) ** 2).mean()) > 55
 
 
-def test_in_a_linear_project_an_opaque_colour_is_the_display_colour_made_linear(gpu, hlsl, packing, programs, scene):
+def test_in_a_linear_project_an_opaque_colour_is_the_display_colour_made_linear(gpu, hlsl, packing, passes, scene):
     one = scene | {"bound": type(scene["bound"])(*(a[:1] for a in scene["bound"])), "avatar": _first(scene["avatar"])}
-    got = picture(gpu, hlsl, packing, programs, one, "", linear=1)
+    got = picture(gpu, hlsl, packing, passes, one, "", linear=1)
     peak = got.reshape(-1, 4)[got[..., 3].argmax()]
     rgb = one["avatar"].gaussians["rgb"][0].astype(np.float64)
     linear = np.where(rgb > .04045, ((rgb + .055) / 1.055) ** 2.4, rgb / 12.92)

@@ -25,6 +25,7 @@ public static class Play
             case "benchmark": Benchmark(args[1], args[2]); break;
             case "import": Import(args[1]); break;
             case "levels": Levels(args[1]); break;
+            case "inspector": Inspector(args[1]); break;
             case "life": Life(args[1]); break;
             default: return 2;
         }
@@ -99,8 +100,9 @@ public static class Play
                 dump.Put("draw", rows.ToArray());
                 dump.Put("GsacColours", Player.Words(Player.Buffer(block, Shader.PropertyToID("GsacColours"))));
                 dump.Put("indices", Player.Words(indices));
-                Vector3 at = camera.transform.position, ahead = camera.transform.forward;
-                dump.Put("camera", new[] { at.x, at.y, at.z, ahead.x, ahead.y, ahead.z });
+                // right, up, ahead, place, as columns
+                Matrix4x4 m = camera.transform.localToWorldMatrix;
+                dump.Put("camera", new[] { m.m00, m.m01, m.m02, m.m03, m.m10, m.m11, m.m12, m.m13, m.m20, m.m21, m.m22, m.m23 });
             };
             Player.Frame(new[] { avatar.gameObject })();
             dump.Put("steps", steps.ToArray());
@@ -164,6 +166,47 @@ public static class Play
     }
 
     public static object Kept;
+
+    /// <summary>The inspector's buttons and sliders on an imported prefab in edit mode, and a scene view that is turned.</summary>
+    static void Inspector(string file)
+    {
+        var context = new AssetImportContext { assetPath = file };
+        new GsacImporter().OnImportAsset(context);
+        var avatar = ((GameObject)context.mainObject).GetComponent<GsacAvatar>();
+        Player.SetPlaying(false);
+        var inspector = new GsacAvatarEditor { target = avatar };
+        int elbow = avatar.Data.Joint("left_elbow"), shoulder = avatar.Data.Joint("left_shoulder");
+        Player.Pressed = "A-pose";
+        inspector.OnInspectorGUI();
+        Player.Pressed = null;
+        Say("shoulder", avatar.Joints[shoulder].localRotation);
+        Player.Slides["Joint"] = elbow;
+        inspector.OnInspectorGUI();
+        Player.Slides["y"] = 60;
+        Player.Slides["weight"] = 0.75f;
+        inspector.OnInspectorGUI();
+        Say("shoulder", avatar.Joints[shoulder].localRotation);
+        Say("elbow", avatar.Joints[elbow].localRotation);
+        Console.WriteLine("weight " + avatar.Weights[0].ToString(CultureInfo.InvariantCulture));
+        var empty = new GameObject("empty").AddComponent<GsacAvatar>();
+        new GsacAvatarEditor { target = empty }.OnInspectorGUI();
+
+        System.Runtime.CompilerServices.RuntimeHelpers.RunClassConstructor(typeof(GsacImporter).Assembly.GetType("Gsac.GsacSceneViews").TypeHandle);
+        var eye = new GameObject("scene view").AddComponent<Camera>();
+        eye.transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
+        var view = new UnityEditor.SceneView { camera = eye };
+        view.Draw();
+        view.Draw();
+        int draws = 0;
+        Player.OnDraw = (asked, indices, count) => draws++;
+        Player.Frame(new[] { avatar.gameObject })();
+        Console.WriteLine("draws " + draws);
+    }
+
+    static void Say(string what, Quaternion q)
+    {
+        Console.WriteLine(what + string.Format(CultureInfo.InvariantCulture, " {0} {1} {2} {3}", q.x, q.y, q.z, q.w));
+    }
 
     /// <summary>Gaussians drawn near and far.</summary>
     static void Levels(string file)

@@ -16,7 +16,7 @@ namespace UnityEngine
     public static class GUILayout
     {
         public static void Label(string text, params GUILayoutOption[] options) { }
-        public static bool Button(string text, params GUILayoutOption[] options) { return false; }
+        public static bool Button(string text, params GUILayoutOption[] options) { return text == Player.Pressed; }
         public static float HorizontalSlider(float value, float leftValue, float rightValue, params GUILayoutOption[] options) { return value; }
         public static void BeginArea(Rect screenRect) { }
         public static void EndArea() { }

@@ -11,6 +11,10 @@ namespace UnityEngine
         public static Action<ComputeShader, int, int> OnDispatch;
         public static Action<RenderParams, GraphicsBuffer, int> OnDraw;
 
+        /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
+        public static string Pressed;
+        public static readonly Dictionary<string, float> Slides = new Dictionary<string, float>();
+
         public static void Call(Component on, string message)
         {
             MethodInfo method = Method(on, message);

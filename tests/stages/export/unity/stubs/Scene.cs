@@ -127,6 +127,12 @@ namespace UnityEngine
             parent = to;
             if (to != null) to.Children.Add(this);
         }
+        public int GetSiblingIndex() { return parent == null ? 0 : parent.Children.IndexOf(this); }
+        public void SetSiblingIndex(int index)
+        {
+            parent.Children.Remove(this);
+            parent.Children.Insert(index, this);
+        }
         public void SetPositionAndRotation(Vector3 position, Quaternion rotation)
         {
             if (parent != null) throw new NotImplementedException();

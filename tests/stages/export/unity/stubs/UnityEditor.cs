@@ -17,8 +17,9 @@ namespace UnityEditor
 
     public static class EditorGUI
     {
-        public static void BeginChangeCheck() { }
-        public static bool EndChangeCheck() { return false; }
+        internal static bool Changed;
+        public static void BeginChangeCheck() { Changed = false; }
+        public static bool EndChangeCheck() { return Changed; }
     }
 
     public static class EditorGUILayout
@@ -27,8 +28,17 @@ namespace UnityEditor
         public static void LabelField(string label, GUIStyle style, params GUILayoutOption[] options) { }
         public static Rect BeginHorizontal(params GUILayoutOption[] options) { return new Rect(); }
         public static void EndHorizontal() { }
-        public static int Popup(string label, int selectedIndex, string[] displayedOptions, params GUILayoutOption[] options) { return selectedIndex; }
-        public static float Slider(string label, float value, float leftValue, float rightValue, params GUILayoutOption[] options) { return value; }
+        public static int Popup(string label, int selectedIndex, string[] displayedOptions, params GUILayoutOption[] options)
+        {
+            return (int)Slider(label, selectedIndex, 0, displayedOptions.Length - 1);
+        }
+        public static float Slider(string label, float value, float leftValue, float rightValue, params GUILayoutOption[] options)
+        {
+            float moved;
+            if (!Player.Slides.TryGetValue(label, out moved)) return value;
+            EditorGUI.Changed |= moved != value;
+            return moved;
+        }
         public static void HelpBox(string message, MessageType type) { }
     }
 
