@@ -3,7 +3,9 @@
 takes  split/clip.json, train/avatar.npz, train/body.npz
 gives  avatar.gsac: everything in one container (docs/gsac-format.md)
        avatar.ply: standard 3DGS, posed, metres, 3DGS axes
+       avatar.spz: the same, packed
        avatar.glb: skinned animated mesh, and the gaussians with KHR_gaussian_splatting
+       avatar.fbx: skinned animated mesh with expressions, without gaussians
        viewer.html: one page that opens from disk
        unity: the Unity package with this person, as a folder, a tarball and a .unitypackage
 """
@@ -18,7 +20,9 @@ STAGE = Stage(
     outputs=(
         Output("avatar.gsac", check_file),
         Output("avatar.ply", check_file),
+        Output("avatar.spz", check_file),
         Output("avatar.glb", check_file),
+        Output("avatar.fbx", check_file),
         Output("viewer.html", check_file),
         Output("unity", check_folder),
     ),

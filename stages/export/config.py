@@ -16,7 +16,7 @@ class ExportConfig:
     body_model: str = OPEN
     """Which body; the same as smplx.body_model."""
     ply_pose: str = "a"
-    """Pose of avatar.ply: a (arms half down) or t (arms out)."""
+    """Pose of avatar.ply and avatar.spz: a (arms half down) or t (arms out)."""
     ply_pad_sh: bool = False
     """Write the 45 zero f_rest values that older PLY importers ask for (248 bytes a gaussian instead of 68)."""
     animations: str = "wave,walk"

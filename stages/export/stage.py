@@ -11,11 +11,13 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
+from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.motion import add_motion
 from gsac.stages.export.page import page_bytes
 from gsac.stages.export.ply import ply_bytes
 from gsac.stages.export.rigged import RiggedAvatar
+from gsac.stages.export.spz import spz_bytes
 from gsac.stages.export.unity_package import write_unity
 from scipy.spatial.transform import Rotation
 
@@ -39,11 +41,15 @@ def run(job: Job) -> None:
     add_motion(avatar, job.config.clip_names())
 
     container = avatar.to_bytes()
+    pose = avatar.pose(job.config.ply_pose.upper())
+    splats = (*posed_gaussians(avatar, pose), avatar.gaussians["rgb"], avatar.gaussians["opacity"])
+    rest = posed_gaussians(avatar, avatar.pose("T"))
     files = {
         "avatar.gsac": lambda: container,
-        "avatar.ply": lambda: ply_bytes(*posed_gaussians(avatar, avatar.pose(job.config.ply_pose.upper())),
-                                        avatar.gaussians["rgb"], avatar.gaussians["opacity"], job.config.ply_pad_sh),
-        "avatar.glb": lambda: glb_bytes(avatar, *posed_gaussians(avatar, avatar.pose("T"))),
+        "avatar.ply": lambda: ply_bytes(*splats, job.config.ply_pad_sh),
+        "avatar.spz": lambda: spz_bytes(*splats),
+        "avatar.glb": lambda: glb_bytes(avatar, *rest),
+        "avatar.fbx": lambda: avatar_fbx(avatar, rest[0]),
         "viewer.html": lambda: page_bytes(container),
     }
     for done, (name, make) in enumerate(files.items()):

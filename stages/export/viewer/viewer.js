@@ -93,15 +93,16 @@ class Viewer {
     this.painter.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
   }
 
-  // Returns whether the canvas has another size than before.
+  // Returns whether the room for the figure has another size than before.
   resize() {
     const ratio = Math.min(window.devicePixelRatio || 1, MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
-    const other = this.canvas.width !== width || this.canvas.height !== height;
-    if (other) Object.assign(this.canvas, { width, height });
     const panel = this.still ? 0 : window.innerHeight - document.getElementById("panel").offsetTop;
-    this.camera.covered = Math.min(0.5, panel / window.innerHeight);
+    const covered = Math.min(0.5, panel / window.innerHeight), same = this.canvas.width === width && this.canvas.height === height;
+    const other = !same || Math.abs(covered - this.camera.covered) > 0.01;
+    if (!same) Object.assign(this.canvas, { width, height });
+    this.camera.covered = covered;
     return other;
   }
 

@@ -1,5 +1,8 @@
 """A small asymmetric figure with the 55 joints: a tube around each bone, gaussians on every face, the left hand red."""
 
+import shutil
+import subprocess
+
 import numpy as np
 import pytest
 from gsac.stages.export.motion import add_motion
@@ -142,3 +145,22 @@ def exported(person, tmp_path_factory):
     out = tmp_path_factory.mktemp("exported")
     run(Job(person, out, ExportConfig()))
     return out
+
+
+@pytest.fixture(scope="session")
+def node_package(tmp_path_factory):
+    """name@version -> a folder where node finds that package; skips where npm or the package index is absent."""
+    folders = {}
+
+    def folder(package):
+        if not shutil.which("npm"):
+            pytest.skip("needs npm (Debian package npm)")
+        if package not in folders:
+            where = tmp_path_factory.mktemp("node")
+            install = ["npm", "install", "--silent", "--no-audit", "--no-fund", package]
+            folders[package] = where if subprocess.run(install, cwd=where, capture_output=True).returncode == 0 else None
+        if folders[package] is None:
+            pytest.skip(f"npm could not install {package}")
+        return folders[package]
+
+    return folder
