@@ -103,7 +103,7 @@ def _setup(screen, z, faces, f, width, height, near):
     return ax, ay, bx, by, cx, cy, area, swapped, x0, x1, y0, y1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _rasterise(screen, z, faces, width, height, near):
     face_id = np.full((height, width), -1, np.int32)
     bary = np.zeros((height, width, 3), np.float32)
@@ -139,7 +139,7 @@ def _rasterise(screen, z, faces, width, height, near):
     return face_id, bary, depth
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _silhouette(screen, z, faces, width, height, near):
     mask = np.zeros((height, width), np.bool_)
     for f in range(len(faces)):
@@ -161,7 +161,7 @@ def _silhouette(screen, z, faces, width, height, near):
     return mask
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _interpolate(attributes, faces, face_id, bary):
     height, width = face_id.shape
     channels = attributes.shape[1]

@@ -22,7 +22,7 @@ class SmplxConfig:
     """The person's height; fixes the scale that one camera cannot see. None leaves it to the shape prior."""
     focal_px: float | None = None
     """Focal length when the clip does not carry it; None estimates it."""
-    rounds: int = 3
+    rounds: int = 2
     """How often the silhouette's correspondences are renewed."""
     iterations: int = 8
     """Levenberg-Marquardt steps a round, at most."""

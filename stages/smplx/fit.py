@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,8 +35,12 @@ ADULT_HEIGHT = (1.72, 0.02)
 FOCAL_GUESS = 0.95
 """Focal length when nothing is known, as a share of the picture's longer side: between a phone's main lens and a tele."""
 FOCAL_SPREAD = 0.15
+START_STEPS = 4
+"""Steps in which the body only turns and moves as a whole, before anything bends."""
 VIEW = np.radians(30)
 """Yaw that makes another view of the person."""
+THREADS = 2
+"""Drawing the body lets go of Python; more than two mostly wait for what does not."""
 POSED_AT_ONCE = 64
 """Frames whose vertices are held in memory together."""
 
@@ -97,7 +102,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1, bool)
     trunk_only = free.copy()
     trunk_only[3:-3] = True
-    state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, 6)
+    state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, START_STEPS)
     take_off_habits(seen, sightings, detector, BODY_POINTS, state)
     state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, 3 * config.iterations)
     steps, iou = trace.steps + more.steps, np.full(len(sightings.xy), np.nan)
@@ -179,7 +184,7 @@ def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> floa
     """How much larger the body is than the detector's metric points, by trunk and thigh lengths."""
     bones = [(5, 11), (6, 12), (11, 13), (12, 14), (5, 7), (6, 8)]
     chain = problem.skeleton.pose(state.local[:1], state.betas)
-    x = positions(chain, [problem.pairs], state.betas)[0]
+    x = positions(chain, problem.pairs, state.betas)[0]
     ratios = []
     for a, b in bones:
         length = np.linalg.norm(sightings.world[:, a] - sightings.world[:, b], axis=-1)
@@ -193,13 +198,17 @@ def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.n
     params = to_params(problem.body, state, problem.seen.center)
     camera = params.camera(sightings.width, sightings.height)
     iou = np.full(len(state.local), np.nan)
-    for first in range(0, len(iou), POSED_AT_ONCE):
-        frames = range(first, min(first + POSED_AT_ONCE, len(iou)))
-        for t, vertices in zip(frames, problem.body.posed(params, list(frames))[0], strict=True):
-            outline, problem.outline_pairs[t] = problem.seen.outlines[t], None
-            if outline.area > 0:
-                points, iou[t] = outline_points(problem.body, vertices, camera, outline, t)
-                problem.outline_pairs[t] = points if points.count else None
+
+    def renew(t: int, vertices: np.ndarray) -> None:
+        outline, problem.outline_pairs[t] = problem.seen.outlines[t], None
+        if outline.area > 0:
+            points, iou[t] = outline_points(problem.body, vertices, camera, outline, t)
+            problem.outline_pairs[t] = points if points.count else None
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        for first in range(0, len(iou), POSED_AT_ONCE):
+            frames = range(first, min(first + POSED_AT_ONCE, len(iou)))
+            list(pool.map(renew, frames, problem.body.posed(params, list(frames))[0]))
     return iou
 
 

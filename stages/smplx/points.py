@@ -103,38 +103,40 @@ class Chain:
         return Chain(self.world[t: t + 1], self.place[t: t + 1], self.shift[t: t + 1], self.shift_dirs[t: t + 1])
 
 
-def positions(chain: Chain, pairs: list[Pairs], betas: np.ndarray) -> list[np.ndarray]:
-    """Points (P_t, 3) of every frame, without transl; pairs: one set for each frame."""
-    return [_positions(q.start, q.joint, q.mass, q.moment + q.moment_dirs @ betas, chain.world[t], chain.shift[t])
-            for t, q in enumerate(pairs)]
+def positions(chain: Chain, pairs: Pairs, betas: np.ndarray) -> np.ndarray:
+    """(T, P, 3) the same points in every frame, without transl."""
+    return _positions(pairs.start, pairs.joint, pairs.mass, pairs.moment + pairs.moment_dirs @ betas, chain.world, chain.shift)
 
 
-def pulled_back(skeleton: Skeleton, chain: Chain, t: int, pairs: Pairs, betas: np.ndarray, covectors: np.ndarray) -> np.ndarray:
-    """Rows of the Jacobian of frame t: how g . x moves with the unknowns, for R covectors g of every point.
+def pulled_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, betas: np.ndarray, covectors: np.ndarray) -> np.ndarray:
+    """Rows of the Jacobian: how g . x moves with the unknowns of its frame, for R covectors g of every point.
 
-    covectors: (P, R, 3). Returns (P R, 3 A + 3 + B): joint steps, transl, betas.
+    covectors: (T, P, R, 3). Returns (T, P, R, 3 A + 3 + B): joint steps, transl, betas.
     """
     moment = pairs.moment + pairs.moment_dirs @ betas
-    rows = _pulled_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
-                        chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries, covectors)
-    return rows.reshape(-1, rows.shape[2])
+    rows = np.zeros((*covectors.shape[:3], 3 * len(skeleton.active) + 3 + len(betas)))
+    for t, g in enumerate(covectors):
+        _pulled_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
+                     chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries, g, rows[t])
+    return rows
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _positions(start, joint, mass, moment, world, shift):
-    x = np.zeros((len(start) - 1, 3))
-    for p in range(len(x)):
-        for m in range(start[p], start[p + 1]):
-            g, k = world[joint[m]], joint[m]
-            for c in range(3):
-                x[p, c] += g[c, 0] * moment[m, 0] + g[c, 1] * moment[m, 1] + g[c, 2] * moment[m, 2] + mass[m] * shift[k, c]
+    x = np.zeros((len(world), len(start) - 1, 3))
+    for t in range(len(world)):
+        for p in range(x.shape[1]):
+            for m in range(start[p], start[p + 1]):
+                g, k = world[t, joint[m]], joint[m]
+                for c in range(3):
+                    x[t, p, c] += (g[c, 0] * moment[m, 0] + g[c, 1] * moment[m, 1] + g[c, 2] * moment[m, 2]
+                                   + mass[m] * shift[t, k, c])
     return x
 
 
-@njit(cache=True)
-def _pulled_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors):
+@njit(cache=True, nogil=True)
+def _pulled_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors, rows):
     points, joints, size = len(start) - 1, len(active), moment_dirs.shape[2]
-    rows = np.zeros((points, covectors.shape[1], 3 * joints + 3 + size))
     arm = np.zeros((joints, 3))
     by_betas = np.zeros((3, size))
     for p in range(points):
@@ -167,4 +169,3 @@ def _pulled_back(start, joint, mass, moment, moment_dirs, world, place, shift, s
                 rows[p, r, 3 * joints + c] = v[c]
             for b in range(size):
                 rows[p, r, 3 * joints + 3 + b] = v[0] * by_betas[0, b] + v[1] * by_betas[1, b] + v[2] * by_betas[2, b]
-    return rows

@@ -86,20 +86,21 @@ class Problem:
         return State(local, state.transl + step[:, -3:], state.betas + shared[:-1], state.log_focal + float(shared[-1]))
 
     def project(self, state: State, x: np.ndarray) -> np.ndarray:
-        return np.exp(state.log_focal) * x[:, :2] / np.maximum(x[:, 2:], 0.05) + self.seen.center
+        return np.exp(state.log_focal) * x[..., :2] / np.maximum(x[..., 2:], 0.05) + self.seen.center
 
     def cost(self, state: State) -> float:
         chain = self.skeleton.pose(state.local, state.betas)
         total = 0.0
-        for t, x in enumerate(self.points(chain, state)):
-            total += robust(self._point_residual(t, self.project(state, x)), ROBUST)[0].sum()
-            total += robust(self._depth_residual(t, x), ROBUST)[0].sum()
+        x = self.points(chain, state)
+        total += robust(self._point_residual(self.project(state, x)), ROBUST)[0].sum()
+        total += robust(self._depth_residual(x), ROBUST)[0].sum()
         for t, x in self.outline_points(chain, state):
             distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
             scaled = np.where(inside, distance / self.seen.outline_spread, 0)
             total += self._outline_share(len(x)) * robust(scaled, OUTLINE_ROBUST)[0].sum()
-        total += (self._prior_residual(state) ** 2).sum() + (self._limit_residual(state)[0] ** 2).sum()
-        total += sum((r**2).sum() for r in self._temporal_residuals(state))
+        vector = rotation.log(state.local[:, self.active])
+        total += (self._prior_residual(vector) ** 2).sum() + (self._limit_residual(vector)[0] ** 2).sum()
+        total += sum((r**2).sum() for r in self._temporal_residuals(state, self._turns(state)[0]))
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
     def linearise(self, state: State) -> System:
@@ -113,60 +114,60 @@ class Problem:
         """Normal equations of what each frame shows by itself, and of the pose prior."""
         system = System.zeros(len(state.local), self.size, len(state.betas) + 1)
         chain = self.skeleton.pose(state.local, state.betas)
-        for t, x in enumerate(self.points(chain, state)):
-            self._add_points(system, state, chain, t, x)
+        self._add_points(system, state, chain)
         for t, x in self.outline_points(chain, state):
             self._add_outline(system, state, chain, t, x)
         self._add_prior(system, state)
         return system
 
-    def points(self, chain: Chain, state: State) -> list[np.ndarray]:
-        """(P, 3) key points of every frame, camera frame."""
-        frames = positions(chain, [self.pairs] * len(state.local), state.betas)
-        return [x + move for x, move in zip(frames, state.transl, strict=True)]
+    def points(self, chain: Chain, state: State) -> np.ndarray:
+        """(T, P, 3) key points, camera frame."""
+        return positions(chain, self.pairs, state.betas) + state.transl[:, None]
 
     def outline_points(self, chain: Chain, state: State) -> Iterator[tuple[int, np.ndarray]]:
         """Frame and its outline points (P, 3), of the frames that have any."""
         if self.outline_weight > 0:
             for t, pairs in enumerate(self.outline_pairs):
                 if pairs is not None:
-                    yield t, positions(chain.frame(t), [pairs], state.betas)[0] + state.transl[t]
+                    yield t, positions(chain.frame(t), pairs, state.betas)[0] + state.transl[t]
 
-    def _add_points(self, system: System, state: State, chain: Chain, t: int, x: np.ndarray) -> None:
+    def _add_points(self, system: System, state: State, chain: Chain) -> None:
         """Key points and their depths: two rows and one row a point."""
+        x = self.points(chain, state)
         uv = self.project(state, x)
-        residual = self._point_residual(t, uv)
+        residual = self._point_residual(uv)
         shrink = robust(residual, ROBUST)[1]
-        weight = shrink / self.seen.spread[t][:, None]  # zero where a point was not seen
-        depth = self._depth_residual(t, x)
-        depth_shrink = np.where(np.isfinite(self.seen.depth[t]), robust(depth, ROBUST)[1], 0)
-        covectors = np.concatenate([self._projection_slope(state, x), np.broadcast_to([0, 0, 1.0], (len(x), 1, 3))], 1)
-        rows = pulled_back(self.skeleton, chain, t, self.pairs, state.betas, covectors).reshape(len(x), 3, -1)
-        rows[:, 2] -= rows[list(self.hips), 2].mean(0)
-        scale = np.concatenate([weight, depth_shrink[:, None] / self.seen.depth_spread], 1)
-        focal = np.concatenate([uv - self.seen.center, np.zeros((len(x), 1))], 1)
-        jacobian = np.concatenate([rows, focal[:, :, None]], 2) * scale[:, :, None]
-        values = np.concatenate([residual * shrink, (depth * depth_shrink)[:, None]], 1)
-        use = scale.ravel() > 0
-        system.add(t, jacobian.reshape(len(use), -1)[use], values.ravel()[use])
+        weight = shrink / self.seen.spread[..., None]  # zero where a point was not seen
+        depth = self._depth_residual(x)
+        depth_shrink = np.where(np.isfinite(self.seen.depth), robust(depth, ROBUST)[1], 0)
+        covectors = np.zeros((*x.shape[:2], 3, 3))
+        covectors[..., :2, :], covectors[..., 2, 2] = self._projection_slope(state, x), 1
+        scale = np.concatenate([weight, (depth_shrink / self.seen.depth_spread)[..., None]], 2)
+        rows = pulled_back(self.skeleton, chain, self.pairs, state.betas, covectors)
+        rows[:, :, 2] -= rows[:, list(self.hips), 2].mean(1, keepdims=True)
+        jacobian = np.zeros((*rows.shape[:3], rows.shape[3] + 1))
+        jacobian[..., :-1], jacobian[..., :2, -1] = rows, uv - self.seen.center
+        jacobian *= scale[..., None]
+        values = np.concatenate([residual * shrink, (depth * depth_shrink)[..., None]], 2)
+        system.add(slice(None), jacobian.reshape(len(x), -1, jacobian.shape[-1]), values.reshape(len(x), -1))
 
     def _projection_slope(self, state: State, x: np.ndarray) -> np.ndarray:
-        """(P, 2, 3) pixels by camera-frame metres."""
-        f, z = np.exp(state.log_focal), np.maximum(x[:, 2], 0.05)
-        out = np.zeros((len(x), 2, 3))
-        out[:, 0, 0] = out[:, 1, 1] = f / z
-        out[:, 0, 2], out[:, 1, 2] = -f * x[:, 0] / z**2, -f * x[:, 1] / z**2
+        """(..., 2, 3) pixels by camera-frame metres."""
+        f, z = np.exp(state.log_focal), np.maximum(x[..., 2], 0.05)
+        out = np.zeros((*x.shape[:-1], 2, 3))
+        out[..., 0, 0] = out[..., 1, 1] = f / z
+        out[..., 0, 2], out[..., 1, 2] = -f * x[..., 0] / z**2, -f * x[..., 1] / z**2
         return out
 
-    def _point_residual(self, t: int, uv: np.ndarray) -> np.ndarray:
-        """(P, 2) in spreads; 0 where a point was not seen."""
-        known = np.isfinite(self.seen.spread[t])
-        return np.where(known[:, None], (uv - np.nan_to_num(self.seen.xy[t])) / self.seen.spread[t][:, None], 0)
+    def _point_residual(self, uv: np.ndarray) -> np.ndarray:
+        """(T, P, 2) in spreads; 0 where a point was not seen."""
+        known = np.isfinite(self.seen.spread)[..., None]
+        return np.where(known, (uv - np.nan_to_num(self.seen.xy)) / self.seen.spread[..., None], 0)
 
-    def _depth_residual(self, t: int, x: np.ndarray) -> np.ndarray:
-        """(P,) depth against the middle of the hips, in spreads; 0 where unknown."""
-        model = x[:, 2] - x[list(self.hips), 2].mean()
-        return np.nan_to_num((model - self.seen.depth[t]) / self.seen.depth_spread)
+    def _depth_residual(self, x: np.ndarray) -> np.ndarray:
+        """(T, P) depth against the middle of the hips, in spreads; 0 where unknown."""
+        model = x[..., 2] - x[:, list(self.hips), 2].mean(1, keepdims=True)
+        return np.nan_to_num((model - self.seen.depth) / self.seen.depth_spread)
 
     def _outline_share(self, count: int) -> float:
         """Weight of one outline point: neighbours along an edge are not independent sightings."""
@@ -179,32 +180,32 @@ class Problem:
         shrink = robust(residual, OUTLINE_ROBUST)[1] * np.sqrt(self._outline_share(len(x)))
         weight = np.where(inside, shrink / self.seen.outline_spread, 0)
         along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x)) * weight[:, None]  # (P, 3)
-        rows = pulled_back(self.skeleton, chain, t, self.outline_pairs[t], state.betas, along[:, None])
+        rows = pulled_back(self.skeleton, chain.frame(t), self.outline_pairs[t], state.betas, along[None, :, None])[0, :, 0]
         focal = ((uv - self.seen.center) * direction).sum(1) * weight
-        system.add(t, np.concatenate([rows, focal[:, None]], 1), residual * shrink)
+        system.add(slice(t, t + 1), np.concatenate([rows, focal[:, None]], 1)[None], (residual * shrink)[None])
 
-    def _prior_residual(self, state: State) -> np.ndarray:
-        return (rotation.log(state.local[:, self.active]) - self.mean) / self.spread  # (T, A, 3)
+    def _prior_residual(self, vector: np.ndarray) -> np.ndarray:
+        """vector: (T, A, 3) rotation vectors of the active joints. Returns (T, A, 3)."""
+        return (vector - self.mean) / self.spread
 
-    def _limit_residual(self, state: State) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
+    def _limit_residual(self, vector: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
         """(T, L) how far hinges bend back, in spreads, and the limits that concern active joints."""
         where = {int(j): i for i, j in enumerate(self.active)}
         limits = [(where[j], axis, sign) for j, axis, sign in prior.LIMITS if j in where]
         if not limits:
-            return np.zeros((len(state.local), 0)), limits
-        vector = rotation.log(state.local[:, self.active])
+            return np.zeros((len(vector), 0)), limits
         return np.stack([np.minimum(0, sign * vector[:, i, axis]) / prior.LIMIT_SPREAD for i, axis, sign in limits], 1), limits
 
     def _add_prior(self, system: System, state: State) -> None:
         vector = rotation.log(state.local[:, self.active])
         slope = rotation.log_derivative(vector) / self.spread[:, :, None]  # (T, A, 3, 3)
-        residual = self._prior_residual(state)
+        residual = self._prior_residual(vector)
         for i in range(len(self.active)):
             block = slice(3 * i, 3 * i + 3)
             j = slope[:, i]
             system.band[:, block, block] += j.transpose(0, 2, 1) @ j
             system.gradient[:, block] += np.einsum("tab,ta->tb", j, residual[:, i])
-        over, limits = self._limit_residual(state)
+        over, limits = self._limit_residual(vector)
         for k, (i, axis, sign) in enumerate(limits):
             row = np.where(over[:, k, None] < 0, sign * rotation.log_derivative(vector[:, i])[:, axis] / prior.LIMIT_SPREAD, 0)
             block = slice(3 * i, 3 * i + 3)
@@ -217,12 +218,15 @@ class Problem:
         relative = local[:-1].swapaxes(-1, -2) @ local[1:]
         return rotation.log(relative), relative
 
-    def _temporal_residuals(self, state: State) -> list[np.ndarray]:
-        """Speed of the joints, their acceleration and that of the body, in spreads; empty for photos."""
+    def _temporal_residuals(self, state: State, vector: np.ndarray) -> list[np.ndarray]:
+        """Speed of the joints, their acceleration and that of the body, in spreads; empty for photos.
+
+        vector: (T - 1, A, 3) turn of each joint from frame to frame.
+        """
         if self.seen.seconds is None or len(state.local) < 3 or self.smoothness == 0:
             return []
         gap = np.diff(self.seen.seconds)[:, None, None]
-        turn = self._turns(state)[0] / gap
+        turn = vector / gap
         span = 0.5 * (gap[1:] + gap[:-1])
         moved = np.diff(state.transl, axis=0)[:, None] / gap
         scale = np.sqrt(self.smoothness)
@@ -231,14 +235,14 @@ class Problem:
                 scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / prior.TRANSL_ACCELERATION]
 
     def _add_temporal(self, system: System, state: State) -> None:
-        residuals = self._temporal_residuals(state)
+        vector, relative = self._turns(state)
+        residuals = self._temporal_residuals(state, vector)
         if not residuals:
             return
         speed, acceleration, transl = residuals
         n, scale = self.size, np.sqrt(self.smoothness)
         gap = np.diff(self.seen.seconds)
         span = 0.5 * (gap[1:] + gap[:-1])
-        vector, relative = self._turns(state)
         slope = rotation.log_derivative(vector)  # by the later frame's step
         back = -slope @ relative.swapaxes(-1, -2)  # by the earlier frame's
         for i in range(len(self.active)):

@@ -27,15 +27,16 @@ class System:
         return cls(np.zeros((frames, size, 3 * size)), np.zeros((frames, size, shared)), np.zeros((shared, shared)),
                    np.zeros((frames, size)), np.zeros(shared))
 
-    def add(self, t: int, jacobian: np.ndarray, residual: np.ndarray) -> None:
-        """Rows (R, n + s) and residuals (R,) of one frame."""
+    def add(self, frames: slice, jacobian: np.ndarray, residual: np.ndarray) -> None:
+        """Rows (F, R, n + s) and residuals (F, R) of F frames."""
         n = self.gradient.shape[1]
-        square, slope = jacobian.T @ jacobian, jacobian.T @ residual
-        self.band[t, :, :n] += square[:n, :n]
-        self.arrow[t] += square[:n, n:]
-        self.shared += square[n:, n:]
-        self.gradient[t] += slope[:n]
-        self.shared_gradient += slope[n:]
+        across = jacobian.swapaxes(1, 2)
+        square, slope = across @ jacobian, (across @ residual[..., None])[..., 0]
+        self.band[frames, :, :n] += square[:, :n, :n]
+        self.arrow[frames] += square[:, :n, n:]
+        self.shared += square[:, n:, n:].sum(0)
+        self.gradient[frames] += slope[:, :n]
+        self.shared_gradient += slope[:, n:].sum(0)
 
     def add_shared(self, jacobian: np.ndarray, residual: np.ndarray) -> None:
         """Rows (R, s) on the shared unknowns alone."""
@@ -108,14 +109,14 @@ class Trace:
 
 
 def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callable, frozen: np.ndarray,
-                        frozen_shared: np.ndarray, iterations: int, tolerance: float = 1e-3) -> tuple[object, Trace]:
+                        frozen_shared: np.ndarray, iterations: int, tolerance: float = 3e-3) -> tuple[object, Trace]:
     """Minimises `cost(state)`; `linearise(state)` gives a System, `move(state, step, shared)` a new state.
 
     Stops after `iterations` accepted or refused steps, or when a step lowers the cost by less than `tolerance` of it.
     """
-    damping, trace = 1e-3, Trace([cost(state)])
-    system = linearise(state)
+    damping, trace, system = 1e-3, Trace([cost(state)]), None
     for _ in range(iterations):
+        system = system or linearise(state)
         try:
             step, shared = system.solve(damping, frozen, frozen_shared)
         except LinAlgError:
@@ -130,7 +131,7 @@ def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callab
             trace.costs.append(value)
             if gain < tolerance:
                 break
-            system = linearise(state)
+            system = None
         else:
             damping *= 8
             if damping > 1e6:

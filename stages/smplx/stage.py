@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
-from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
+from gsac.stages.smplx.fit import THREADS, Sightings, fit_clip, to_params
 from gsac.stages.smplx.mimic import mimic
 from gsac.stages.smplx.silhouette import read_outline
 from threadpoolctl import threadpool_limits
@@ -39,7 +41,8 @@ def run(job: Job) -> None:
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
-    outlines = [read_outline(p) for p in frame_paths(job.inputs["segment/alpha"])]
+    with ThreadPoolExecutor(THREADS) as pool:
+        outlines = list(pool.map(read_outline, frame_paths(job.inputs["segment/alpha"])))
     if len(outlines) != len(sightings.xy):
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give

@@ -127,7 +127,7 @@ def test_derivatives_agree_with_finite_differences(body, tmp_path):
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0)
     camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
     chain = problem.skeleton.pose(state.local, state.betas)
-    x = positions(chain, [pairs], state.betas)[0] + state.transl[0]
+    x = positions(chain, pairs, state.betas)[0] + state.transl[0]
     vertices, _ = body.posed(to_params(body, state, problem.seen.center), [0])
     assert np.allclose(x, body.keypoints(vertices)[0][BODY_POINTS], atol=2e-3)
     for t, outline in enumerate(outlines):
