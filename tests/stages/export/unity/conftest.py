@@ -102,13 +102,14 @@ def files(figure, exported, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def passes(hlsl, shaders, tmp_path_factory):
-    """Render pipeline -> (vertex, fragment) of the package's shader."""
+    """Render pipeline -> (vertex, fragment) of the package's shader; `stereo`: the built-in one's for two eyes at once."""
     folder = tmp_path_factory.mktemp("passes")
-    out = {}
-    for pipeline, text in hlsl.shader_passes(shaders / "GsacSplats.shader").items():
+    out, texts = {}, hlsl.shader_passes(shaders / "GsacSplats.shader")
+    stand_ins = dict.fromkeys(texts, hlsl.SHIMS) | {"stereo": HERE / "stereo"}
+    for pipeline, text in (texts | {"stereo": texts[""]}).items():
         source = folder / f"pass{pipeline}.hlsl"
         source.write_text(text)
-        out[pipeline] = [hlsl.Program(hlsl.compile_hlsl(source, entry, stage, folder, [shaders, hlsl.SHIMS]), entry)
+        out[pipeline] = [hlsl.Program(hlsl.compile_hlsl(source, entry, stage, folder, [shaders, stand_ins[pipeline]]), entry)
                          for entry, stage in (("Vertex", "vert"), ("Fragment", "frag"))]
     return out
 

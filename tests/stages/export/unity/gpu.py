@@ -169,18 +169,18 @@ class Painting:
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(count, dtype=np.uint32)[:, None]
         self.index = gpu.device.create_buffer_with_data(data=np.ascontiguousarray(corners), usage=wgpu.BufferUsage.INDEX)
 
-    def encode(self, encoder, parameters, timestamps=None):
+    def encode(self, encoder, parameters, timestamps=None, instance=0):
         attachment = {"view": self.target.create_view(), "clear_value": (0, 0, 0, 0), "load_op": "clear", "store_op": "store"}
         work = encoder.begin_render_pass(color_attachments=[attachment], timestamp_writes=timestamps)
         work.set_pipeline(self.pipeline)
         work.set_bind_group(0, self.gpu.group(self.layout, self.vertex, self.vertex.uniform(parameters)))
         work.set_index_buffer(self.index, "uint32")
-        work.draw_indexed(self.count * 6)
+        work.draw_indexed(self.count * 6, 1, 0, 0, instance)
         work.end()
 
-    def draw(self, parameters):
+    def draw(self, parameters, instance=0):
         encoder = self.gpu.device.create_command_encoder()
-        self.encode(encoder, parameters)
+        self.encode(encoder, parameters, instance=instance)
         self.gpu.device.queue.submit([encoder.finish()])
         raw = self.gpu.device.queue.read_texture(
             {"texture": self.target}, {"bytes_per_row": self.width * 8, "rows_per_image": self.height},

@@ -162,6 +162,20 @@ def test_the_inspectors_buttons_and_sliders_pose_in_edit_mode_and_a_scene_view_i
     assert lines[3][1] == "0.75" and lines[4][1] == "1"
 
 
+def test_the_demo_scene_plays_from_its_file_and_its_buttons_pose_and_turn(play, files, figure):
+    lines = [line.rsplit(" ", 4) for line in play("demo", files / "figure.gsac").splitlines()]
+    turned = {line[0]: np.array(line[1:], float) for line in lines[:5]}
+    half = .87 / 2
+    np.testing.assert_allclose(turned["T-pose"], [0, 0, 0, 1], atol=1e-6)
+    np.testing.assert_allclose(turned["A-pose"], [0, 0, -np.sin(half), np.cos(half)], atol=1e-6)
+    assert abs(turned["start"][3]) < .95 and abs(turned["walk"][3]) < .95, "clips play"
+    before, after = (np.array(" ".join(line).split()[1:], float) - (0, .9, 0) for line in lines[5:7])
+    assert before[2] > 3 and abs(before[0]) < 1e-3, "the camera sees the person's front"
+    assert np.linalg.norm(after) == pytest.approx(np.linalg.norm(before) * np.exp(-.15), rel=1e-4)
+    assert np.arctan2(after[0], after[2]) == pytest.approx(np.radians(27), abs=1e-3)
+    assert " ".join(lines[7]) == "draws 301"
+
+
 def test_the_importer_says_what_is_wrong_with_a_file(play, files, tmp_path):
     path = tmp_path / "cut.gsac"
     path.write_bytes((files / "figure.gsac").read_bytes()[:1000])

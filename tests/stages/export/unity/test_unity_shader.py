@@ -13,7 +13,7 @@ SIZE = 256
 
 
 def test_every_render_pipeline_has_a_pass_that_compiles(passes):
-    assert sorted(passes) == sorted(PIPELINES)
+    assert sorted(passes) == sorted([*PIPELINES, "stereo"])
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +73,19 @@ def test_the_picture_is_the_trainers_at_55_db(gpu, hlsl, packing, passes, scene,
 def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, hlsl, packing, passes, scene):
     got = picture(gpu, hlsl, packing, passes, scene, "", flipped=True)[::-1]
     assert -10 * np.log10(((got - scene["truth"]) ** 2).mean()) > 55
+
+
+def test_each_eye_of_a_headset_is_drawn_by_its_own_matrices_in_one_pass(gpu, hlsl, packing, passes, scene):
+    shifted = scene | {"view": scene["view"] + [[0, 0, 0, .25], [0, 0, 0, 0], [0, 0, 0, 0]]}
+    alone = [picture(gpu, hlsl, packing, passes, s, "") for s in (shifted, scene)]  # the last leaves the buffers
+    assert abs(alone[0] - alone[1]).max() > .3, "the eyes see different things"
+    views = [np.vstack([s["view"], [0, 0, 0, 1]]).T for s in (shifted, scene)]
+    parameters = {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [hlsl.projection(scene["camera"]).T] * 2,
+                  "_ScreenParams": [SIZE, SIZE, 0, 0], "GsacBlend": [.3, .999, 1 / 255, 0], "GsacIndexBits": 13,
+                  **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
+    painting = hlsl.Painting(gpu, *passes["stereo"], SIZE, SIZE, len(scene["bound"].means))
+    for eye in (0, 1):
+        assert abs(painting.draw(parameters, instance=eye) - alone[eye]).max() < 1e-3
 
 
 def test_in_a_linear_project_an_opaque_colour_is_the_display_colour_made_linear(gpu, hlsl, packing, passes, scene):

@@ -26,6 +26,7 @@ public static class Play
             case "import": Import(args[1]); break;
             case "levels": Levels(args[1]); break;
             case "inspector": Inspector(args[1]); break;
+            case "demo": Demo(args[1]); break;
             case "life": Life(args[1]); break;
             default: return 2;
         }
@@ -200,6 +201,41 @@ public static class Play
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
         Player.Frame(new[] { avatar.gameObject })();
+        Console.WriteLine("draws " + draws);
+    }
+
+    /// <summary>The demo scene as its file describes it, opened and played; the user presses buttons, drags and turns the wheel.</summary>
+    static void Demo(string file)
+    {
+        Camera eye = Player.AddCamera("Main Camera");
+        var person = new GameObject("Avatar");
+        var avatar = person.AddComponent<GsacAvatar>();
+        Player.SetField(avatar, "bytes", Player.Text(File.ReadAllBytes(file)));
+        var holder = new GameObject("Demo");
+        var demo = holder.AddComponent<GsacDemo>();
+        Player.SetField(demo, "avatar", avatar);
+        Player.SetField(demo, "eye", eye);
+        int draws = 0;
+        Player.OnDraw = (asked, indices, count) => draws++;
+        Player.Call(demo, "Start");
+        Action frame = Player.Frame(new[] { person, holder });
+        int shoulder = avatar.Data.Joint("right_shoulder");
+        foreach (string button in new[] { null, "T-pose", "walk", "A-pose", "next expression" })
+        {
+            Player.Pressed = button;
+            Player.Call(demo, "OnGUI");
+            for (int i = 0; i < 60; i++) frame();
+            Say(button ?? "start", avatar.Joints[shoulder].localRotation);
+        }
+        Player.Pressed = null;
+        Vector3 before = eye.transform.position;
+        Player.Mouse(EventType.MouseDrag, 500, 90, 0);
+        Player.Call(demo, "OnGUI");
+        Player.Mouse(EventType.ScrollWheel, 500, 0, -3);
+        Player.Call(demo, "OnGUI");
+        frame();
+        Vector3 after = eye.transform.position;
+        foreach (Vector3 p in new[] { before, after }) Console.WriteLine(string.Format(CultureInfo.InvariantCulture, "eye {0} {1} {2}", p.x, p.y, p.z));
         Console.WriteLine("draws " + draws);
     }
 

@@ -15,6 +15,11 @@ namespace UnityEngine
         public static string Pressed;
         public static readonly Dictionary<string, float> Slides = new Dictionary<string, float>();
 
+        public static void Mouse(EventType type, float x, float deltaX, float deltaY)
+        {
+            Event.current = new Event { type = type, mousePosition = new Vector2 { x = x }, delta = new Vector2 { x = deltaX, y = deltaY } };
+        }
+
         public static void Call(Component on, string message)
         {
             MethodInfo method = Method(on, message);
