@@ -10,10 +10,11 @@ namespace Gsac
     {
         public override void OnImportAsset(AssetImportContext context)
         {
-            byte[] bytes = File.ReadAllBytes(context.assetPath);
+            byte[] bytes;
             GsacData data;
             try
             {
+                bytes = GsacData.Load(context.assetPath);
                 data = GsacData.Read(bytes).Mirror();
             }
             catch (GsacException e)

@@ -1,3 +1,4 @@
+using System.Collections.Generic;
 using UnityEditor;
 using UnityEngine;
 
@@ -7,6 +8,8 @@ namespace Gsac
     [InitializeOnLoad]
     static class GsacSceneViews
     {
+        static readonly Dictionary<Camera, Matrix4x4> Seen = new Dictionary<Camera, Matrix4x4>();
+
         static GsacSceneViews()
         {
             SceneView.duringSceneGui += Watch;
@@ -20,10 +23,11 @@ namespace Gsac
             {
                 if (GsacRenderer.ExtraCameras[i] == null) GsacRenderer.ExtraCameras.RemoveAt(i);
             }
-            bool known = GsacRenderer.ExtraCameras.Contains(camera);
-            if (!known) GsacRenderer.ExtraCameras.Add(camera);
-            if (Application.isPlaying || (known && !camera.transform.hasChanged)) return;
-            camera.transform.hasChanged = false;
+            if (!GsacRenderer.ExtraCameras.Contains(camera)) GsacRenderer.ExtraCameras.Add(camera);
+            // an update draws the view again: only where it moved, or it would never rest
+            Matrix4x4 before, now = camera.transform.localToWorldMatrix;
+            if (Application.isPlaying || (Seen.TryGetValue(camera, out before) && before.Equals(now))) return;
+            Seen[camera] = now;
             EditorApplication.QueuePlayerLoopUpdate();
         }
     }

@@ -78,7 +78,7 @@ namespace Gsac
         void LateUpdate()
         {
             if (avatar == null) avatar = GetComponent<GsacAvatar>();
-            if (avatar == null || !avatar.CanOpen || trouble != null) return;
+            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null) return;
             try
             {
                 if (!Ready()) return;

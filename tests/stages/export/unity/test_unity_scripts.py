@@ -159,7 +159,8 @@ def test_the_inspectors_buttons_and_sliders_pose_in_edit_mode_and_a_scene_view_i
     assert [line[0] for line in lines] == ["shoulder", "shoulder", "elbow", "weight", "draws"]
     turns = np.array([line[1:] for line in lines[:3]], float)
     np.testing.assert_allclose(turns, [a_pose, a_pose, [0, .5, 0, .75 ** .5]], atol=1e-6)
-    assert lines[3][1] == "0.75" and lines[4][1] == "1"
+    assert lines[3][1] == "0.75"
+    assert lines[4] == "draws 1 updates 1 2".split(), "drawn anew when the view moved, not at rest, nor when the avatar is off"
 
 
 def test_the_demo_scene_plays_from_its_file_and_its_buttons_pose_and_turn(play, files, figure):
@@ -181,6 +182,9 @@ def test_the_importer_says_what_is_wrong_with_a_file(play, files, tmp_path):
     path.write_bytes((files / "figure.gsac").read_bytes()[:1000])
     said = play("import", path)
     assert said.startswith("error: ") and "cut.gsac" in said and "truncated" in said
+    with open(path, "wb") as f:
+        f.truncate((256 << 20) + 1)
+    assert "oversized" in play("import", path, heap="32m"), "before it is read"
 
 
 def test_instances_share_buffers_a_new_avatar_replaces_an_old_and_all_is_given_back(play, files):

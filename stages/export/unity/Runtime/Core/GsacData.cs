@@ -66,6 +66,17 @@ namespace Gsac
             return System.Array.IndexOf(JointNames, name);
         }
 
+        /// <summary>Reads a file; one that is too large is refused before it is read. Throws GsacException, IOException.</summary>
+        public static byte[] Load(string path)
+        {
+            long size = new System.IO.FileInfo(path).Length;
+            if (size > GsacContainer.MaxFile)
+            {
+                throw new GsacException(GsacFault.Oversized, size + " bytes are there, " + GsacContainer.MaxFile + " are accepted");
+            }
+            return System.IO.File.ReadAllBytes(path);
+        }
+
         /// <summary>Reads a .gsac file's bytes. Throws GsacException.</summary>
         public static GsacData Read(byte[] bytes)
         {

@@ -196,12 +196,20 @@ public static class Play
         var eye = new GameObject("scene view").AddComponent<Camera>();
         eye.transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
         var view = new UnityEditor.SceneView { camera = eye };
+        int asked0 = Player.UpdatesAsked;
         view.Draw();
+        view.Draw();
+        int still = Player.UpdatesAsked - asked0;
+        eye.transform.SetPositionAndRotation(new Vector3(0, 1, 5), Quaternion.Euler(0, 180, 0));
         view.Draw();
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
-        Player.Frame(new[] { avatar.gameObject })();
-        Console.WriteLine("draws " + draws);
+        Action frame = Player.Frame(new[] { avatar.gameObject });
+        frame();
+        avatar.enabled = false;
+        Player.Call(avatar, "OnDisable");
+        frame();
+        Console.WriteLine("draws " + draws + " updates " + still + " " + (Player.UpdatesAsked - asked0));
     }
 
     /// <summary>The demo scene as its file describes it, opened and played; the user presses buttons, drags and turns the wheel.</summary>

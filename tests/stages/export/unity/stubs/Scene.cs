@@ -43,6 +43,7 @@ namespace UnityEngine
     public class Behaviour : Component
     {
         public bool enabled { get; set; } = true;
+        public bool isActiveAndEnabled { get { return enabled; } }
     }
 
     public class MonoBehaviour : Behaviour
@@ -89,7 +90,6 @@ namespace UnityEngine
         Vector3 place, scale = new Vector3(1, 1, 1);
         Quaternion turn = Quaternion.identity;
         public Transform parent { get; private set; }
-        public bool hasChanged { get; set; }
         public int childCount { get { return Children.Count; } }
         public Vector3 localPosition { get { return place; } set { place = value; } }
         public Quaternion localRotation { get { return turn; } set { turn = value; } }

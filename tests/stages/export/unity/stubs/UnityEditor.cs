@@ -54,7 +54,7 @@ namespace UnityEditor
 
     public static class EditorApplication
     {
-        public static void QueuePlayerLoopUpdate() { }
+        public static void QueuePlayerLoopUpdate() { Player.UpdatesAsked++; }
     }
 
     public static class Undo
