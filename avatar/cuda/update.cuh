@@ -71,6 +71,7 @@ extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
     if (i >= s.count) return;
     const Plan plan = s.now[0].plan;
     Slopes g = slopes_of(s, i);
+    if (plan.mu + plan.quat + plan.log_scale + plan.rgb + plan.opacity == 0) return;  // only poses move: the limits wait too
     int n = s.seen[i];
     if (g.rgb[0] != 0 || g.rgb[1] != 0 || g.rgb[2] != 0) s.seen[i] = ++n;
     // moments of Adam by number, so that a warp's loads lie together

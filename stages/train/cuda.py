@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
+from gsac.avatar.cuda.align import Aligner, AlignRecipe
 from gsac.avatar.cuda.device import DeviceError
 from gsac.avatar.cuda.kernels import CompileError
 from gsac.avatar.cuda.recipe import Recipe
@@ -17,9 +18,11 @@ from gsac.avatar.cuda.trainer import BodyArrays, CudaTrainer, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import StageError
 from gsac.stages.train import fast, ladder
+from gsac.stages.train.evaluate import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.offsets import fold
+from gsac.stages.train.poses import Poses
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, person_crop
 
 
 def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[int, View]]:
@@ -27,7 +30,7 @@ def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[i
     fine, coarse = fast.crops(task)
     gaussians = fast.start(task, coarse, count)
     recipe = Recipe.of(task.config, offset_rate=fast.OFFSET_RATE, gain_rate=gain_rate(task))
-    with training(task, [coarse, fine], gaussians, recipe) as trainer:
+    with training(task.poses, task.trained, [coarse, fine], gaussians, recipe) as trainer:
         follow(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
         body = trainer.body
         trainer.replace(fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces))
@@ -40,9 +43,19 @@ def refit(task: Task, gaussians: Gaussians, views: dict[int, View]) -> fast.Trai
     """As `ladder.refit`."""
     recipe = Recipe.of(task.config, steps=ladder.REFIT, begin=ladder.REFIT_FROM, coarse_share=0.0, pose_rate=0.0,
                        gain_rate=gain_rate(task))
-    with training(task, [views], gaussians, recipe) as trainer:
+    with training(task.poses, task.trained, [views], gaussians, recipe) as trainer:
         trainer.train(recipe.steps)
         return settled(trainer, task)
+
+
+def align_poses(gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:
+    """As `evaluate.align_poses`."""
+    if not len(frames):
+        return
+    recipe = AlignRecipe(steps=steps * len(frames), pose_rate=TEST_RATE, pose_end=TEST_END, pose_pull=0.0, ssim=0.0, mask=TEST_MASK)
+    with training(poses, frames, [{int(t): person_crop(views[t]) for t in frames}], gaussians, recipe, Aligner) as trainer:
+        trainer.train(recipe.steps)
+        poses.pose[frames], poses.transl[frames] = trainer.poses()
 
 
 def gain_rate(task: Task) -> float:
@@ -58,15 +71,14 @@ def settled(trainer: CudaTrainer, task: Task) -> fast.Trainer:
 
 
 @contextmanager
-def training(task: Task, levels: list[dict[int, View]], gaussians: Gaussians, recipe: Recipe,
+def training(poses: Poses, frames: np.ndarray, levels: list[dict[int, View]], gaussians: Gaussians, recipe: Recipe,
              kind: type[CudaTrainer] = CudaTrainer) -> Iterator[CudaTrainer]:
-    """A trainer over the task's trained frames, closed at the end. levels: frame -> view, coarse first."""
+    """A trainer over the frames (indices), closed at the end. levels: frame -> view, coarse first."""
     trainer = None
     try:
-        shots = [[Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained] for views in levels]
-        poses = task.poses
-        trainer = kind(body_arrays(task, recipe.beta_rate > 0), shots, poses.pose[task.trained], poses.transl[task.trained],
-                       gaussians, recipe)
+        shots = [[Shot(views[int(t)].pixels, views[int(t)].camera) for t in frames] for views in levels]
+        trainer = kind(body_arrays(poses, frames, recipe.beta_rate > 0), shots, poses.pose[frames], poses.transl[frames], gaussians,
+                       recipe)
         yield trainer
     except (DeviceError, CompileError) as error:
         raise StageError(f"train on the GPU: {error}; or set train.device to cpu") from error
@@ -75,11 +87,12 @@ def training(task: Task, levels: list[dict[int, View]], gaussians: Gaussians, re
             trainer.close()
 
 
-def body_arrays(task: Task, betas: bool) -> BodyArrays:
-    """The body as the trained frames wear it, the first frame's rest first; betas: whether they are to be learned."""
-    body, rests, rest_of, known = task.poses.body, [], [], {}
-    for t in task.trained:
-        vertices, joints = task.poses.rest(int(t))
+def body_arrays(poses: Poses, frames: np.ndarray, betas: bool) -> BodyArrays:
+    """The body as the frames wear it, the first frame's rest first; betas: whether they are to be learned."""
+    body, rests, rest_of, known = poses.body, [], [], {}
+    for t in frames:
+        vertices, joints = poses.rest(int(t))
+        vertices = vertices + poses.offset
         at = known.setdefault(vertices.tobytes(), len(rests))
         if at == len(rests):
             rests.append(vertices)
@@ -88,7 +101,7 @@ def body_arrays(task: Task, betas: bool) -> BodyArrays:
                         np.asarray(body.faces))
     if not betas:
         return arrays
-    shape = body.shapedirs[:, :, :len(task.poses.betas)]
+    shape = body.shapedirs[:, :, :len(poses.betas)]
     return arrays._replace(shape=shape, joint_shape=np.tensordot(body.J_regressor, shape, 1))
 
 

@@ -17,7 +17,9 @@ from gsac.stages.train.poses import Poses
 from gsac.stages.train.views import View, person_crop
 
 TEST_RATE = 1e-3
-"""Adam rate of the test-time pose optimisation, falls to a twentieth."""
+"""Adam rate of the test-time pose optimisation."""
+TEST_END, TEST_MASK = 0.05, 0.1
+"""What that rate falls to, and the weight of the mask beside the image."""
 ERROR_FULL = 0.5
 """Error that the error maps draw in their last colour."""
 
@@ -52,6 +54,12 @@ def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder:
     return rows
 
 
+def align_poses(gaussians: Gaussians, poses: Poses, frames, views: list[View], steps: int) -> None:
+    """`align_pose` of some frames; views: of all T."""
+    for t in map(int, frames):
+        align_pose(gaussians, poses, t, views[t], steps)
+
+
 def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: int) -> None:
     """Test-time pose optimisation: moves the pose of frame t in `poses` to its own image; the avatar stays as it is."""
     view, workspace = person_crop(view), Workspace()
@@ -62,10 +70,10 @@ def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: in
         on_background(rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
         grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(rendering.alpha)
         grad_image = (image - target) * np.float32(2 / image.size)
-        through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, 0.1, grad_rgb,
+        through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK, grad_rgb,
                            grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
-        poses.step(t, grads.vertices, TEST_RATE * 0.05 ** (step / steps), 0.0)
+        poses.step(t, grads.vertices, TEST_RATE * TEST_END ** (step / steps), 0.0)
 
 
 def turned(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:

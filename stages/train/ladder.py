@@ -15,7 +15,7 @@ from gsac.avatar.metrics import psnr
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
 from gsac.stages.train import fast
-from gsac.stages.train.evaluate import align_pose, judge
+from gsac.stages.train.evaluate import judge
 from gsac.stages.train.poses import carried
 from gsac.stages.train.sizes import Rung, choose
 from gsac.stages.train.task import Fit, Loop, Task
@@ -38,8 +38,7 @@ def fit(task: Task, loop: Loop) -> Fit:
         return fast.fit(task, loop, UNJUDGED)
     trainer, fine, coarse = loop.train(task, SIZES[0])
     poses, workspace = carried(task.poses, task.trained), Workspace()
-    for t in task.held:
-        align_pose(trainer.gaussians(), poses, int(t), task.views[t], ALIGN_STEPS)
+    loop.align(trainer.gaussians(), poses, task.held, task.views, ALIGN_STEPS)
     rungs, trainers = [], []
     for size in SIZES:
         if size != SIZES[0]:

@@ -19,7 +19,7 @@ def fit(task: Task) -> Fit:
     gaussians = start(len(task.poses.body.faces), rng)
     densifier = Densifier(len(gaussians))
     views = {int(t): person_crop(task.views[t]) for t in task.trained}
-    with training(task, [views], gaussians, recipe, PaperTrainer) as trainer:
+    with training(task.poses, task.trained, [views], gaussians, recipe, PaperTrainer) as trainer:
         for event in filter(due, range(recipe.steps)):
             follow(trainer, task, event + 1)
             densifier.length, densifier.hits = trainer.pulls()

@@ -2,19 +2,23 @@
 
 from functools import partial
 
-from gsac.stages.train import cuda, fast, ladder, paper, paper_cuda
+from gsac.stages.train import bundle, cuda, fast, ladder, paper, paper_cuda
 from gsac.stages.train.config import AUTO
+from gsac.stages.train.evaluate import align_poses
 from gsac.stages.train.task import Fit, Loop, Task
 
 
 def fit_fast(loop: Loop, task: Task) -> Fit:
-    """The given number of gaussians, or the ladder."""
+    """Poses moved to the images; then the given number of gaussians, or the ladder."""
+    bundle.adjust(task)
     return ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
 
 
 RECIPES = {
-    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit)),
-    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit)),
+    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit, align_poses)),
+    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit, cuda.align_poses)),
     ("paper", "cpu"): paper.fit,
     ("paper", "cuda"): paper_cuda.fit,
 }
+ALIGN = {"cpu": align_poses, "cuda": cuda.align_poses}
+"""Test-time pose optimisation by device."""

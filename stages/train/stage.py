@@ -13,10 +13,10 @@ from gsac.avatar.metrics import psnr, summary
 from gsac.avatar.workspace import Workspace
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
-from gsac.stages.train.evaluate import align_pose, judge, turned
+from gsac.stages.train.evaluate import judge, turned
 from gsac.stages.train.holdout import spaced_in_yaw
 from gsac.stages.train.poses import Poses, carried
-from gsac.stages.train.recipes import RECIPES
+from gsac.stages.train.recipes import ALIGN, RECIPES
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
 
@@ -131,8 +131,7 @@ class Run:
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
         aligned = poses.copy()
         if config.pose_test_steps:
-            for t in held:
-                align_pose(gaussians, aligned, int(t), self.views[t], config.pose_test_steps)
+            ALIGN[self.job.device](gaussians, aligned, held, self.views, config.pose_test_steps)
             ttpo = judge(gaussians, aligned, held, self.views, None, self.workspace)
         else:
             ttpo = []

@@ -50,3 +50,5 @@ class Loop(NamedTuple):
     """As `fast.train`."""
     refit: Callable[[Task, Gaussians, dict[int, View]], Any]
     """As `ladder.refit`."""
+    align: Callable[[Gaussians, Poses, np.ndarray, list[View], int], None]
+    """As `evaluate.align_poses`."""

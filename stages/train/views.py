@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,27 +45,30 @@ def read_views(frames: Path, alphas: Path, camera: Camera, height: int) -> tuple
 
     Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not belong.
     """
-    views, empty = [], []
     masks = {p.stem: p for p in frame_paths(alphas)}
-    for t, path in enumerate(frame_paths(frames)):
+    paths = frame_paths(frames)
+    for path in paths:
         if path.stem not in masks:
             raise StageError(f"{alphas}: no mask for frame {path.name}; run segment again")
-        rgb, alpha = read_frame(path), read_alpha(masks[path.stem])
-        if alpha.shape != rgb.shape[:2]:
-            raise StageError(f"{masks[path.stem]}: mask is {alpha.shape[1]}x{alpha.shape[0]} px, "
-                             f"its frame {rgb.shape[1]}x{rgb.shape[0]}")
-        if not np.isfinite(alpha).all():
-            raise StageError(f"{masks[path.stem]}: mask is not finite")
-        alpha = np.clip(alpha, 0, 1)
-        pixels = np.dstack([rgb * alpha[..., None], alpha * 255])
-        h = min(height, rgb.shape[0])
-        w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
-        if (w, h) != (rgb.shape[1], rgb.shape[0]):
-            pixels = cv2.resize(pixels, (w, h), interpolation=cv2.INTER_AREA)
-        views.append(View(camera.scaled(w, h), np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0)))
-        if alpha.mean() < LEAST_SHARE:
-            empty.append(t)
-    return views, empty
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        read = list(pool.map(lambda path: _read_view(path, masks[path.stem], camera, height), paths))
+    return [view for view, _ in read], [t for t, (_, shown) in enumerate(read) if shown < LEAST_SHARE]
+
+
+def _read_view(path: Path, mask: Path, camera: Camera, height: int) -> tuple[View, float]:
+    """The frame cut out with its mask, and the share of it that the mask covers."""
+    rgb, alpha = read_frame(path), read_alpha(mask)
+    if alpha.shape != rgb.shape[:2]:
+        raise StageError(f"{mask}: mask is {alpha.shape[1]}x{alpha.shape[0]} px, its frame {rgb.shape[1]}x{rgb.shape[0]}")
+    if not np.isfinite(alpha).all():
+        raise StageError(f"{mask}: mask is not finite")
+    alpha = np.clip(alpha, 0, 1)
+    pixels = np.dstack([rgb * alpha[..., None], alpha * 255])
+    h = min(height, rgb.shape[0])
+    w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
+    if (w, h) != (rgb.shape[1], rgb.shape[0]):
+        pixels = cv2.resize(pixels, (w, h), interpolation=cv2.INTER_AREA)
+    return View(camera.scaled(w, h), np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0)), float(alpha.mean())
 
 
 def person_crop(view: View) -> View:

@@ -58,8 +58,8 @@ def trainers(figure):
         recipe = paper_cuda.recipe_of(task)
         recipe.batch = batch
         views = {t: person_crop(view) for t, view in enumerate(task.views)}
-        context = training(task, [views], Gaussians(cpu.face, v["mu"], v["quat"], v["scale"], v["rgb"], start.opacity), recipe,
-                           PaperTrainer)
+        gaussians = Gaussians(cpu.face, v["mu"], v["quat"], v["scale"], v["rgb"], start.opacity)
+        context = training(task.poses, task.trained, [views], gaussians, recipe, PaperTrainer)
         cuda = context.__enter__()
         opened.append(context)
         cpu.rng = SimpleNamespace(random=iter(cuda.buffers["background"].read().reshape(-1, 3)).__next__)

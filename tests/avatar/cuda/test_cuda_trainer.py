@@ -272,3 +272,28 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     assert relative(ours.rgb, theirs.rgb) < 0.02 and relative(ours.mu, theirs.mu) < 0.05
     moved = task.poses.pose - task.poses.fit_pose
     assert relative(pose - task.poses.fit_pose, moved) < 0.2 and relative(transl, task.poses.transl) < 1e-3
+
+
+@gpu
+def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_stay(figure):
+    from gsac.avatar.body import Body, BodyParams
+    from gsac.benchmarks.gpu.check import relative
+    from gsac.benchmarks.gpu.figure import start
+    from gsac.stages.train import cuda, evaluate
+    from gsac.stages.train.poses import Poses
+    from gsac.stages.train.views import View
+
+    body, camera = Body.load(), figure.shots[0].camera
+    pose = figure.pose.copy()
+    pose[:, 22] = 0
+    params = BodyParams.from_pose(pose, figure.transl, np.zeros(body.num_betas), np.zeros((4, len(body.expression_names))),
+                                  camera.focal, camera.center)
+    views, gaussians, moved = [View(camera, shot.pixels, (0, 0)) for shot in figure.shots], start(figure.body, 3000), []
+    gaussians.log_scale[:, 0] += 3  # beyond recipe fast's limits, which must not touch a finished avatar
+    for align in (cuda.align_poses, evaluate.align_poses):
+        poses = Poses(body, params)
+        align(gaussians, poses, np.array([0, 1, 3]), views, 15)
+        assert (poses.pose[2] == poses.fit_pose[2]).all() and (poses.transl[2] == poses.fit_transl[2]).all()
+        moved.append((poses.pose - poses.fit_pose, poses.transl - poses.fit_transl))
+    for got, expected in zip(*moved, strict=True):
+        assert np.linalg.norm(expected) > 1e-3 and relative(got, expected) < 0.05
