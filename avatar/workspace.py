@@ -6,6 +6,7 @@ share. What it writes for an item never depends on who does it, so results are b
 
 from __future__ import annotations
 
+import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 
@@ -34,7 +35,7 @@ class Workspace:
 
     def take(self, name: str, shape: tuple[int, ...], dtype) -> np.ndarray:
         """An array with any content; the same memory for the same name."""
-        size = int(np.prod(shape))
+        size = math.prod(shape)
         buffer = self._buffers.get(name)
         if buffer is None or buffer.size < size or buffer.dtype != dtype:
             buffer = self._buffers[name] = np.empty(size + size // 8, dtype)

@@ -26,7 +26,7 @@ class Recipe:
     quat_rate: float = 1e-2
     scale_rate: float = 1e-2
     opacity_rate: float = 3e-2
-    pose_rate: float = 3e-3
+    pose_rate: float = 1e-3
     pose_pull: float = 1e-4
     ssim: float = 0.1
     sobel: float = 0.0

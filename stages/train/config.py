@@ -43,10 +43,12 @@ class TrainConfig:
     """Adam rate of the log scales."""
     opacity_rate: float = 3e-2
     """Adam rate of the opacity logits."""
-    pose_rate: float = 3e-3
+    pose_rounds: int = 6
+    """Rounds of Gauss-Newton that move all poses to small images before the steps (fast); 0 leaves the fit's."""
+    pose_rate: float = 1e-3
     """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; hands a tenth of it."""
     pose_pull: float = 1e-4
-    """Weight of the squared distance of a refined pose from the fit, in units of 0.05 rad and 2 cm."""
+    """Weight of the squared distance of a refined pose from the one it starts with, in units of 0.05 rad and 2 cm."""
     exposure: bool = False
     """Whether each frame gets a learned gain per colour channel."""
     ssim: float = 0.1
@@ -79,8 +81,8 @@ class TrainConfig:
             raise BadInput(f"train.gaussians is {self.gaussians!r}; give a number, or {AUTO}")
         if self.gaussians != AUTO and self.gaussians < 100:
             raise BadInput(f"train.gaussians is {self.gaussians}; it must be at least 100, or {AUTO}")
-        for name, low in (("steps", 1), ("height", 64), ("seed", 0), ("holdout", 0), ("curve", 0), ("pose_test_steps", 0),
-                          ("needle", 1)):
+        for name, low in (("steps", 1), ("height", 64), ("seed", 0), ("holdout", 0), ("curve", 0), ("pose_rounds", 0),
+                          ("pose_test_steps", 0), ("needle", 1)):
             if getattr(self, name) is not None and getattr(self, name) < low:
                 raise BadInput(f"train.{name} is {getattr(self, name)}; it must be at least {low}")
         if self.holdout == 1:

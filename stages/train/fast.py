@@ -71,15 +71,18 @@ def crops(task: Task) -> tuple[dict[int, View], dict[int, View]]:
 
 
 def start(task: Task, coarse: dict[int, View], count: int) -> Gaussians:
-    """Gaussians spread over the body of the first frame, coloured from the frames."""
-    faces = task.poses.body.faces
-    rest = task.poses.rest(int(task.trained[0]))[0]
+    """Gaussians spread over the body of the first frame, coloured from the frames; an offset of its surface is folded in."""
+    faces, offset = task.poses.body.faces, task.poses.offset
+    plain = task.poses.rest(int(task.trained[0]))[0]
+    rest = plain + offset
     gaussians = Gaussians.area(rest, faces, count, task.config.seed)
     every = -(-len(task.trained) // COLOUR_FRAMES)
     frames = [PosedFrame(task.poses.vertices(int(t)), coarse[int(t)].camera, coarse[int(t)].pixels)
               for t in task.trained[::every]]
     rgb, seen = read_colours(frames, faces, gaussians)
     gaussians.rgb = fill_unseen(rgb, seen, places(gaussians, rest, faces))
+    if offset.any():
+        gaussians, task.poses.offset = fold(gaussians, plain, offset, faces), np.zeros_like(offset)
     return gaussians
 
 
@@ -95,7 +98,7 @@ class Trainer:
         """settled: the surface and the poses stay where they are."""
         self.config, self.poses = task.config, task.poses
         self.rest = task.poses.rest(int(task.trained[0]))[0]
-        self.settled = settled
+        self.settled, self.pose_rate = settled, task.config.pose_rate
         self.offsets = None if settled else Offsets(task.poses.body)
         self.faces, self.face = task.poses.body.faces, gaussians.face
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
@@ -117,6 +120,21 @@ class Trainer:
 
     def step(self, t: int, view: View, done: float, background: np.ndarray, number: int) -> float:
         """One step on frame t. done: share of the steps so far; background: (3,). Returns the loss."""
+        config = self.config
+        loss, grads, opacity, grad_gain = self.gradients(t, view, background, number)
+        self._move(grads, opacity, done)
+        if not self.settled:
+            grad_rest, _ = self.poses.step(t, grads.vertices, self.pose_rate * 0.01**done, config.pose_pull)
+        if self.offsets:
+            self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
+            self.poses.offset = self.offsets.offset
+        if config.exposure:
+            gain = self.gains.get(t, np.ones(3))
+            self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
+        return loss
+
+    def gradients(self, t: int, view: View, background: np.ndarray, number: int):
+        """Loss of frame t, its gradients, the opacities (N,) and the gradient of the frame's gain (3,)."""
         config, v = self.config, self.values
         vertices = self.poses.vertices(t)
         shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity"][:, 0]))
@@ -131,15 +149,7 @@ class Trainer:
                                    config.mask, grad_rgb, grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
         self._guard(number, loss, grads)
-        self._move(grads, shown.opacity, done)
-        if not self.settled:
-            grad_rest, _ = self.poses.step(t, grads.vertices, config.pose_rate * 0.01**done, config.pose_pull)
-        if self.offsets:
-            self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
-            self.poses.offset = self.offsets.offset
-        if config.exposure:
-            self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
-        return float(loss)
+        return float(loss), grads, shown.opacity, grad_gain
 
     def fold_offsets(self) -> None:
         """From here on the gaussians themselves stand where the displaced body carried them."""

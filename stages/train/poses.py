@@ -13,7 +13,7 @@ BODY, JAW_EYES = slice(0, 22), slice(22, 25)
 HAND_SHARE = 0.1
 """Rate of the fingers, relative to the body's: an image says little about them."""
 TURN, SHIFT = 0.05, 0.02
-"""rad and m in which the distance from the fit is measured."""
+"""rad and m in which the distance from the start is measured."""
 
 
 def carried(poses: Poses, trained: np.ndarray) -> Poses:
@@ -21,7 +21,7 @@ def carried(poses: Poses, trained: np.ndarray) -> Poses:
     is_trained = np.zeros(len(poses.pose), bool)
     is_trained[trained] = True
     out = poses.copy()
-    out.pose, out.transl = carry_corrections(out.fit_pose, out.fit_transl, out.pose, out.transl, is_trained)
+    out.pose, out.transl = carry_corrections(out.base_pose, out.base_transl, out.pose, out.transl, is_trained)
     return out
 
 
@@ -33,6 +33,8 @@ class Poses:
         self.body, self.params = body, params
         self.fit_pose = np.array(params.pose, np.float64)
         self.fit_transl = np.array(params.transl, np.float64)
+        self.base_pose, self.base_transl = self.fit_pose.copy(), self.fit_transl.copy()
+        """Where the corrections of single frames start from; the fit, until `settle`."""
         self.pose, self.transl = self.fit_pose.copy(), self.fit_transl.copy()
         self.share = np.full((self.pose.shape[1], 1), HAND_SHARE)
         self.share[BODY] = 1
@@ -43,6 +45,8 @@ class Poses:
         self.offset = np.zeros((len(body.v_template), 3), np.float32)
         """(V, 3) m, added to the vertices at rest."""
         self.rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self.shaped: tuple[np.ndarray, np.ndarray] | None = None
+        self.moved: dict[int, np.ndarray] = {}
         self.betas, self.beta_moments, self.beta_count = np.array(params.betas, np.float64), np.zeros((2, len(params.betas))), 0
 
     def copy(self) -> Poses:
@@ -56,8 +60,13 @@ class Poses:
         """Vertices (V, 3) float32 and joints (55, 3) at rest, with the frame's expression."""
         if t not in self.rests:
             p = self.params
-            vertices, joints = self.body.rest(self.betas, self.body.effective_expression(p, t), p.joint_offset)
-            self.rests[t] = np.ascontiguousarray(vertices, np.float32), np.asarray(joints, np.float64)
+            if self.shaped is None:
+                self.shaped = self.body.rest(self.betas, None, p.joint_offset)
+            if t not in self.moved:
+                expression = np.asarray(self.body.effective_expression(p, t), np.float32)
+                self.moved[t] = self.body.exprdirs @ expression if expression.any() else np.float32(0)
+            vertices, joints = self.shaped
+            self.rests[t] = np.ascontiguousarray(vertices + self.moved[t], np.float32), np.asarray(joints, np.float64)
         return self.rests[t]
 
     def vertices(self, t: int) -> np.ndarray:
@@ -67,15 +76,27 @@ class Poses:
         posed = skin(rest + self.offset, transforms, self.body.skin_index, self.body.skin_weight)
         return posed + self.transl[t].astype(np.float32)
 
+    def settle(self) -> None:
+        """The poses as they stand become the base that single frames are corrected from; Adam starts anew."""
+        self.base_pose, self.base_transl = self.pose.copy(), self.transl.copy()
+        self.moments, self.count = np.zeros_like(self.moments), np.zeros_like(self.count)
+
+    def transforms(self, t: int) -> np.ndarray:
+        """(55, 3, 4) rest to posed, without transl."""
+        return joint_transforms(self.pose[t:t + 1], self.rest(t)[1], self.body.parents)[0]
+
+    def gradients(self, t: int, grad_vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of a loss with gradient grad_vertices (V, 3): of pose (55, 3), transl (3,), rest vertices (V, 3), joints (55, 3)."""
+        rest, joints = self.rest(t)
+        return skin_backward(np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest + self.offset, joints,
+                             self.body.parents, self.body.skin_index, self.body.skin_weight)
+
     def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> np.ndarray:
         """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradients of rest vertices (V, 3) and joints (55, 3)."""
-        rest, joints = self.rest(t)
-        grad_pose, grad_transl, grad_rest, grad_joints = skin_backward(
-            np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest + self.offset, joints,
-            self.body.parents, self.body.skin_index, self.body.skin_weight)
+        grad_pose, grad_transl, grad_rest, grad_joints = self.gradients(t, grad_vertices)
         grad = np.concatenate([grad_pose, grad_transl[None]]).astype(np.float64)
-        grad[:-1] += 2 * pull * (self.pose[t] - self.fit_pose[t]) / TURN**2
-        grad[-1] += 2 * pull * (self.transl[t] - self.fit_transl[t]) / SHIFT**2
+        grad[:-1] += 2 * pull * (self.pose[t] - self.base_pose[t]) / TURN**2
+        grad[-1] += 2 * pull * (self.transl[t] - self.base_transl[t]) / SHIFT**2
         self.count[t] += 1
         first, second = self.moments[:, t]
         first += 0.1 * (grad - first)
@@ -99,6 +120,7 @@ class Poses:
         second += 0.01 * (grad**2 - second)
         self.betas -= rate * (first / (1 - 0.9**self.beta_count)) / (np.sqrt(second / (1 - 0.99**self.beta_count)) + 1e-12)
         self.rests.clear()
+        self.shaped = None
 
     def refined(self):
         """BodyParams with the poses as they stand; `joints` computed anew."""

@@ -1,0 +1,116 @@
+"""One frame's pose against its image: gradient and Gauss-Newton Hessian, the avatar held still.
+
+The gradient is exact. The Hessian is that of Lucas and Kanade (1981): the rendered image's slope times the motion, in the
+image, of the surface that shows in a pixel; gaussians stand for the surface by their blend weights, and what a gaussian adds to
+all pixels, weighted, is the gradient of that weighted sum with respect to its colour.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from gsac.avatar import rotation
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.workspace import Workspace
+from gsac.stages.train.poses import BODY, Poses
+from gsac.stages.train.views import View
+from numba import njit
+
+TURNING = BODY.stop
+"""Joints that turn: pelvis and body."""
+UNKNOWNS = 3 * TURNING + 3
+"""Turns of the joints, each about its own axes after its rotation, and the translation."""
+MASK = 1.0
+"""Weight of the alpha channel beside the three of colour."""
+CURVATURE = 1.7
+"""By how much the Hessian is taken to be steeper, so that a full step does not overshoot (measured: 1.2 to 1.7)."""
+CLEAR = 0.1
+"""Least alpha that a pixel's slope is shared by."""
+FLAT = 1e-8
+"""Slope below which a gaussian says nothing."""
+
+
+class Normal(NamedTuple):
+    """Half the squared error of a frame around its pose as it stands, summed over pixels and channels."""
+
+    gradient: np.ndarray
+    """(U,)."""
+    hessian: np.ndarray
+    """(U, U)."""
+    error: float
+    """Squared error on the person."""
+    pixels: int
+    """That show the person in render or mask."""
+
+
+def carriers(body, face: np.ndarray) -> np.ndarray:
+    """(N, TURNING) float32: how much a turn of each joint carries the faces (N,) along."""
+    below = np.zeros((len(body.parents), TURNING))
+    for joint in range(len(body.parents)):
+        above = joint
+        while above >= 0:
+            if above < TURNING:
+                below[joint, above] = 1
+            above = body.parents[above]
+    return (body.weights[body.faces[face]].mean(1) @ below).astype(np.float32)
+
+
+def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: int, view: View, workspace: Workspace) -> Normal:
+    """Of frame t in its view. share: `carriers` of the gaussians' faces."""
+    vertices = poses.vertices(t)
+    rendering = render_bound(vertices, poses.body.faces, gaussians, view.camera, workspace)
+    weight = np.float32(np.sqrt(MASK))
+    image = np.dstack([rendering.rgb, weight * rendering.alpha])
+    truth = view.pixels * np.float32([1 / 255, 1 / 255, 1 / 255, weight / 255])
+    residual = image - truth
+    person = (rendering.alpha > 0.5) | (view.pixels[..., 3] > 127)
+    down, across = np.gradient(image, axis=(0, 1))
+    slope = np.stack([(across * across).sum(2), (across * down).sum(2), (down * down).sum(2)], 2)
+    slope /= np.maximum(rendering.alpha, np.float32(CLEAR))[..., None]
+    means = rendering.state.means.copy()
+    grads = render_bound_backward(rendering.state, np.ascontiguousarray(residual[..., :3]), weight * residual[..., 3])
+    grad_pose, grad_transl, _, _ = poses.gradients(t, grads.vertices)
+    turns = np.einsum("jba,jb->ja", rotation.log_derivative(poses.pose[t, BODY]), grad_pose[BODY])
+    tensors = render_bound_backward(rendering.state, slope, np.zeros_like(rendering.alpha)).rgb
+    used = tensors[:, 0] + tensors[:, 2] > FLAT
+    rows = np.empty((2 * int(used.sum()), UNKNOWNS), np.float32)
+    _rows(means[used], tensors[used], share[used], *_axes(poses, t), np.array(view.camera.focal, np.float32), rows)
+    return Normal(np.concatenate([turns.ravel(), grad_transl]), CURVATURE * (rows.T @ rows).astype(np.float64),
+                  float((residual[person] ** 2).sum()), int(person.sum()))
+
+
+def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:
+    """Axes (TURNING, 3, 3), columns, and places (TURNING, 3) of the joints in the camera frame."""
+    transforms, joints = poses.transforms(t)[BODY], poses.rest(t)[1][BODY]
+    places = np.einsum("jab,jb->ja", transforms[:, :, :3], joints) + transforms[:, :, 3] + poses.transl[t]
+    return transforms[:, :, :3].astype(np.float32), places.astype(np.float32)
+
+
+@njit(cache=True, error_model="numpy")
+def _rows(means, tensors, share, axes, places, focal, rows):
+    """Two rows a gaussian: its motion in the image by each unknown, times the root of its slope tensor [a b; b c]."""
+    last = 3 * axes.shape[0]
+    for i in range(means.shape[0]):
+        x, y, z = means[i, 0], means[i, 1], means[i, 2]
+        fx, fy = focal[0] / z, focal[1] / z
+        a = np.sqrt(max(tensors[i, 0], np.float32(1e-12)))
+        b = tensors[i, 1] / a
+        c = np.sqrt(max(tensors[i, 2] - b * b, np.float32(0)))
+        for j in range(axes.shape[0]):
+            w = share[i, j]
+            ax, ay, az = x - places[j, 0], y - places[j, 1], z - places[j, 2]
+            for k in range(3):
+                if w == 0:
+                    rows[2 * i, 3 * j + k] = rows[2 * i + 1, 3 * j + k] = 0
+                    continue
+                ex, ey, ez = axes[j, 0, k], axes[j, 1, k], axes[j, 2, k]
+                mx, my, mz = w * (ey * az - ez * ay), w * (ez * ax - ex * az), w * (ex * ay - ey * ax)
+                u, v = fx * (mx - x / z * mz), fy * (my - y / z * mz)
+                rows[2 * i, 3 * j + k] = a * u + b * v
+                rows[2 * i + 1, 3 * j + k] = c * v
+        rows[2 * i, last], rows[2 * i + 1, last] = a * fx, 0
+        rows[2 * i, last + 1], rows[2 * i + 1, last + 1] = b * fy, c * fy
+        rows[2 * i, last + 2] = -(a * fx * x + b * fy * y) / z
+        rows[2 * i + 1, last + 2] = -c * fy * y / z

@@ -1,0 +1,141 @@
+"""Poses of all frames moved to the images before the training: few gaussians on small images, poses by Gauss-Newton.
+
+Rounds of two: the gaussians and the surface learn from the frames as they are posed; then the corrections of all frames
+are solved together. The body fit's error is smooth in time and in part the same in all frames, so the corrections are a
+Gaussian process: frames that are not trained on are corrected as those around them are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar import rotation
+from gsac.avatar.workspace import Workspace
+from gsac.stages.contract import StageError
+from gsac.stages.train import fast
+from gsac.stages.train.alignment import TURNING, UNKNOWNS, carriers, normal_equations
+from gsac.stages.train.poses import BODY
+from gsac.stages.train.task import Task
+from gsac.stages.train.views import View
+
+COUNT = 3000
+"""Gaussians, at most as many as are asked for."""
+LEAST_HEIGHT = 90
+"""px of the largest crop; images are halved as long as that leaves this much, at most twice."""
+EPOCHS = 2
+"""Steps of a frame's appearance in a round."""
+DONE = 0.6
+"""Rates of the last round are those of a training after this share of its steps."""
+TURN, SHIFT = 0.1, 0.03
+"""rad and m by which the fit is taken to be off."""
+SAME, NEAR, OWN = 0.3, 0.6, 0.03
+"""Variance of what is the same in all frames, of what changes smoothly, and of a frame's own error."""
+SPAN = 0.038
+"""Length of the smooth part, as a share of the clip."""
+CORRELATED = 40.0
+"""Values (pixels times channels) that are wrong together."""
+MOST = 0.15
+"""rad and m of a round's step, at most."""
+WORSE = 1.1
+"""Growth of the squared error from round to round that is taken back."""
+SOLVER_STEPS, SOLVED = 60, 1e-10
+
+
+def adjust(task: Task) -> None:
+    """Corrects the poses of all frames in task.poses, and leaves the surface's offset there, for `fast.start`."""
+    config, rounds = task.config, task.config.pose_rounds
+    if not rounds:
+        return
+    views = small(task)
+    rng = np.random.default_rng([config.seed, 1])
+    count = COUNT if isinstance(config.gaussians, str) else min(COUNT, config.gaussians)
+    trainer = fast.Trainer(fast.start(task, views, count), task)
+    trainer.pose_rate = 0.0
+    corrections = Corrections(trainer, views)
+    for number in range(rounds):
+        for step, t in enumerate(np.concatenate([rng.permutation(list(views)) for _ in range(EPOCHS)])):
+            trainer.step(int(t), views[int(t)], DONE * number / rounds, rng.random(3), step)
+        corrections.solve()
+        task.progress(number + 1, rounds, "rounds of poses")
+    task.poses.settle()
+
+
+def small(task: Task) -> dict[int, View]:
+    """The trained frames, cut to the person, at a quarter of the size."""
+    views = {int(t): fast.person_crop(task.views[t]) for t in task.trained}
+    for _ in range(2):
+        if max(view.camera.height for view in views.values()) < 2 * LEAST_HEIGHT:
+            break
+        views = {t: view.halved() for t, view in views.items()}
+    return views
+
+
+class Corrections:
+    """turns (T, TURNING, 3) rad after the fit's rotations and shifts (T, 3) m, as one array (T, U)."""
+
+    def __init__(self, trainer: fast.Trainer, views: dict[int, View]):
+        self.trainer, self.views, self.poses = trainer, views, trainer.poses
+        frames = len(self.poses.pose)
+        self.share = carriers(self.poses.body, trainer.face)
+        self.root = np.linalg.cholesky(covariance(frames))
+        self.spread = np.append(np.full(3 * TURNING, TURN), np.full(3, SHIFT))
+        self.values = np.zeros((frames, UNKNOWNS))
+        self.kept, self.error = self.values, np.inf
+        self.workspace = Workspace()
+
+    def solve(self) -> None:
+        """One Gauss-Newton step of all frames. A step that made the images worse is taken back instead."""
+        gradient, hessian = np.zeros(self.values.shape), np.zeros((*self.values.shape, UNKNOWNS))
+        gaussians, error, pixels = self.trainer.gaussians(), 0.0, 0
+        for t, view in self.views.items():
+            normal = normal_equations(gaussians, self.share, self.poses, t, view, self.workspace)
+            gradient[t], hessian[t] = normal.gradient, normal.hessian
+            error, pixels = error + normal.error, pixels + normal.pixels
+        error /= max(4 * pixels, 1)
+        if not np.isfinite(error + np.sum(gradient) + np.sum(hessian)):
+            raise StageError("train: the poses' equations are not finite; look at smplx/body.npz, or set train.pose_rounds to 0")
+        if error > WORSE * self.error:
+            self.values = self.kept
+            self.place()
+            return
+        self.kept, self.error = self.values, error
+        known = 1 / (max(error, 1e-6) * CORRELATED)
+        root, spread, before = self.root, self.spread, self.values
+
+        def pulled(y):
+            return root.T @ (y * spread)
+
+        def apply(z):
+            return z + known * pulled(np.einsum("tab,tb->ta", hessian, (root @ z) * spread))
+
+        z = conjugate_gradients(apply, -known * pulled(gradient - np.einsum("tab,tb->ta", hessian, before)))
+        self.values = before + np.clip((root @ z) * spread - before, -MOST, MOST)
+        self.place()
+
+    def place(self) -> None:
+        """Poses as corrected."""
+        poses, turns = self.poses, self.values[:, :-3].reshape(-1, TURNING, 3)
+        poses.pose[:, BODY] = rotation.log(rotation.exp(poses.fit_pose[:, BODY]) @ rotation.exp(turns))
+        poses.transl[:] = poses.fit_transl + self.values[:, -3:]
+
+
+def covariance(frames: int) -> np.ndarray:
+    """(T, T) of the corrections, in units of their spread."""
+    apart = np.arange(frames)[:, None] - np.arange(frames)
+    return SAME + NEAR * np.exp(-0.5 * (apart / (SPAN * frames)) ** 2) + OWN * (apart == 0)
+
+
+def conjugate_gradients(apply, b: np.ndarray) -> np.ndarray:
+    """x of apply(x) = b, apply linear, symmetric and positive."""
+    x, rest = np.zeros_like(b), b.copy()
+    way, square = rest.copy(), float((rest**2).sum())
+    goal = SOLVED * square
+    for _ in range(SOLVER_STEPS):
+        if square <= goal:
+            break
+        image = apply(way)
+        size = square / float((way * image).sum())
+        x += size * way
+        rest -= size * image
+        square, last = float((rest**2).sum()), square
+        way = rest + square / last * way
+    return x

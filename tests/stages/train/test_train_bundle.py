@@ -1,0 +1,84 @@
+"""Poses by Gauss-Newton: the equations of one frame against differences, the solve against the small person's truth."""
+
+import numpy as np
+import pytest
+from gsac.avatar import rotation
+from gsac.avatar.artifacts import Clip
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.raster import render_bound
+from gsac.avatar.workspace import Workspace
+from gsac.stages.train import alignment, bundle, fast
+from gsac.stages.train.poses import BODY, Poses, carried
+from gsac.stages.train.task import Task
+from gsac.stages.train.views import read_views
+
+TRUE_SHIFT = 0.03
+"""m by which conftest's fit stands too far right."""
+
+
+def task_of(made, held=()):
+    params = BodyParams.read(made.inputs["smplx/body.npz"])
+    clip = Clip.read(made.inputs["split/clip.json"])
+    views, _ = read_views(made.inputs["split/frames"], made.inputs["segment/alpha"], params.camera(clip.width, clip.height), 128)
+    trained = np.setdiff1d(np.arange(params.frames), held)
+    return Task(views, trained, np.array(held, int), Poses(Body.load(), params), made.config, lambda *a: None)
+
+
+def half_error(gaussians, poses, t, view, workspace):
+    rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
+    colour = rendering.rgb - view.pixels[..., :3] / 255
+    return 0.5 * ((colour**2).sum() + alignment.MASK * ((rendering.alpha - view.pixels[..., 3] / 255) ** 2).sum())
+
+
+def test_the_equations_of_a_frame_are_its_slope_and_nearly_its_curvature(job):
+    task, workspace = task_of(job(frames=2)), Workspace(1)
+    poses, view = task.poses, fast.person_crop(task.views[0])
+    gaussians = fast.start(task, {0: view, 1: fast.person_crop(task.views[1])}, 3000)
+    normal = alignment.normal_equations(gaussians, alignment.carriers(poses.body, gaussians.face), poses, 0, view, workspace)
+    rng = np.random.default_rng(0)
+    pose, transl = poses.pose[0].copy(), poses.transl[0].copy()
+    for _ in range(3):
+        way = rng.normal(size=alignment.UNKNOWNS) * np.append(np.full(3 * alignment.TURNING, 0.1), np.full(3, 0.03))
+        errors = []
+        for h in (-0.02, 0, 0.02):
+            turned = rotation.exp(pose[BODY]) @ rotation.exp(h * way[:-3].reshape(-1, 3))
+            poses.pose[0, BODY], poses.transl[0] = rotation.log(turned), transl + h * way[-3:]
+            errors.append(half_error(gaussians, poses, 0, view, workspace))
+        slope, curvature = (errors[2] - errors[0]) / 0.04, (errors[0] + errors[2] - 2 * errors[1]) / 0.02**2
+        assert normal.gradient @ way == pytest.approx(slope, rel=0.05, abs=0.3)
+        assert 0.7 < way @ normal.hessian @ way / curvature < 3
+
+
+def test_rounds_bring_trained_and_held_out_frames_nearer_the_truth(job):
+    task = task_of(job(pose_rounds=4), held=(3, 8))
+    bundle.adjust(task)
+    off = np.abs(task.poses.transl[:, 0])
+    assert off[task.trained].max() < 0.6 * TRUE_SHIFT and off[task.held].max() < 0.6 * TRUE_SHIFT
+    after = carried(task.poses, task.trained)
+    np.testing.assert_allclose(after.transl, task.poses.transl, atol=1e-6)
+    np.testing.assert_array_equal(task.poses.fit_transl[:, 0], np.float32(TRUE_SHIFT))
+
+
+def test_a_step_that_made_the_images_worse_is_taken_back(job):
+    task = task_of(job(frames=3))
+    views = {t: fast.person_crop(task.views[t]).halved() for t in range(3)}
+    corrections = bundle.Corrections(fast.Trainer(fast.start(task, views, 600), task), views)
+    corrections.solve()
+    good = corrections.kept.copy()
+    corrections.values = np.full_like(good, 0.5)
+    corrections.place()
+    corrections.solve()
+    np.testing.assert_array_equal(corrections.values, good)
+    np.testing.assert_allclose(task.poses.transl, task.poses.fit_transl + good[:, -3:])
+
+
+def test_no_round_leaves_the_fit_as_it_came(job):
+    task = task_of(job(frames=2, pose_rounds=0))
+    bundle.adjust(task)
+    np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
+    assert not task.poses.offset.any()
+
+
+def test_photos_far_apart_share_only_what_is_the_same_in_all():
+    few, many = bundle.covariance(7), bundle.covariance(60)
+    assert few[0, 1] < bundle.SAME + 0.05 and many[0, 1] > bundle.SAME + 0.9 * bundle.NEAR
