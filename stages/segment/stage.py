@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+from threading import Lock
+
 import numpy as np
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
 from gsac.stages.contract import Job, StageError
@@ -37,22 +41,29 @@ def run(job: Job) -> None:
     given = (frames / "plate.png").exists()
     (job.out / "alpha").mkdir()
     absent, other_scene = np.zeros((2, len(paths)), bool)
-    for t, path in enumerate(paths):
-        image = read_frame(path)
+    one_at_a_time = Lock()  # the network's interpreter holds one image
+
+    def frame(t: int) -> None:
+        image = read_frame(paths[t])
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
         region = person_region(xy, score)
         if region is None:
             absent[t] = True
             alpha = np.zeros(image.shape[:2], np.float32)
         else:
-            alpha, plate_fits = segment_frame(image, network(image, region), xy, score, plate, job.config.iterations)
+            with one_at_a_time:
+                probability = network(image, region)
+            alpha, plate_fits = segment_frame(image, probability, xy, score, plate, job.config.iterations)
             if given and not plate_fits:
                 other_scene[t] = True
             if not (alpha > 0.5).any():
-                raise StageError(f"frame {t} ({path.name}): the mask is empty although a person was found there; "
+                raise StageError(f"frame {t} ({paths[t].name}): the mask is empty although a person was found there; "
                                  "look at the frame, and remove it or try segment.method=selfie")
-        write_alpha(job.out / "alpha" / f"{path.stem}.exr", alpha)
-        job.progress(t + 1, len(paths), "frames")
+        write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for done, _ in enumerate(pool.map(frame, range(len(paths))), 1):
+            job.progress(done, len(paths), "frames")
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
     if absent.any():
