@@ -1,13 +1,11 @@
 """report.html: whole, partial and failed runs; nothing outside the page; nothing of the user's text taken for HTML."""
 
-import importlib.util
 import json
 import re
 import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
-from pathlib import Path
 from urllib.parse import unquote
 
 import cv2
@@ -17,6 +15,7 @@ from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
+from gsac.benchmarks.viewer import browser as chromium
 from gsac.pipeline.report import write_report
 from gsac.pipeline.report.charts import curve_chart
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
@@ -24,11 +23,6 @@ from gsac.pipeline.report.page import seconds, size
 from gsac.pipeline.report.pictures import MOST_BYTES, picture
 from gsac.pipeline.report.sheets import turn_covered
 from gsac.pipeline.report.verdict import BAD, grade, weaknesses
-
-spec = importlib.util.spec_from_file_location(
-    "report_browser", Path(__file__).parents[1] / "stages" / "export" / "browser.py")
-chromium = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(chromium)
 
 T, WIDTH, HEIGHT = 6, 90, 160
 STAGES = ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")

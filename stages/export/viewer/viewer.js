@@ -98,7 +98,7 @@ class Viewer {
     const ratio = Math.min(window.devicePixelRatio || 1, MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
-    const panel = this.still ? 0 : window.innerHeight - document.getElementById("panel").offsetTop;
+    const { offsetHeight, offsetTop } = document.getElementById("panel"), panel = offsetHeight ? window.innerHeight - offsetTop : 0;
     const covered = Math.min(0.5, panel / window.innerHeight), same = this.canvas.width === width && this.canvas.height === height;
     const other = !same || Math.abs(covered - this.camera.covered) > 0.01;
     if (!same) Object.assign(this.canvas, { width, height });

@@ -1,9 +1,7 @@
 """viewer.html in headless Chromium with software GL: what it shows is what the trainer's renderer gives."""
 
 import base64
-import importlib.util
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,13 +9,10 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
+from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.motion import add_motion
 from gsac.stages.export.page import page_bytes
 from gsac.stages.export.stage import rigged
-
-spec = importlib.util.spec_from_file_location("export_browser", Path(__file__).with_name("browser.py"))
-chromium = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(chromium)
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]

@@ -1,18 +1,13 @@
 """The controls of viewer.html: time, joints, face, picture, rate, and a headset that this file plays."""
 
 import base64
-import importlib.util
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.page import page_bytes
-
-spec = importlib.util.spec_from_file_location("controls_browser", Path(__file__).with_name("browser.py"))
-chromium = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(chromium)
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]

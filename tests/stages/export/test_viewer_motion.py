@@ -11,6 +11,7 @@ from gsac.avatar.motion.bvh import parse_bvh, read_bvh
 from gsac.avatar.motion.names import match
 from gsac.avatar.motion.retarget import retarget
 from gsac.avatar.motion.source import Motion
+from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.page import page_bytes
 from gsac.stages.export.stage import posed_gaussians
@@ -27,7 +28,7 @@ def helpers(path, name):
     return module
 
 
-chromium, motion = helpers("stages/export/browser.py", "motion_browser"), helpers("avatar/motion/conftest.py", "motion_helpers")
+motion = helpers("avatar/motion/conftest.py", "motion_helpers")
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]
 

@@ -1,4 +1,4 @@
-"""Headless Chromium for the tests, driven over its debugging pipe: no driver package, no port."""
+"""Headless Chromium for benchmarks and tests, driven over its debugging pipe: no driver package, no port."""
 
 import base64
 import json

@@ -1,0 +1,1 @@
+"""The viewer page against PlayCanvas on the same splats."""

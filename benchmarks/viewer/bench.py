@@ -1,0 +1,98 @@
+"""gsac bench viewer: frames a second of viewer.html, walking, against PlayCanvas with the same splats standing still.
+
+Both in headless Chromium's software GL at the same size and distance, in turns, each frame waited for. Needs chromium and npm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gsac.stages.contract import BadInput, StageError
+
+if TYPE_CHECKING:
+    from gsac.benchmarks.viewer.race import Count
+    from gsac.stages.export.rigged import RiggedAvatar
+
+PACKAGE = "playcanvas@2.23.3"
+PAGE = Path(__file__).with_name("playcanvas.html")
+CAMERA = {"fov": 30.0, "dist": 3.8, "bg": "3a6080"}
+
+
+def parser() -> argparse.ArgumentParser:
+    out = argparse.ArgumentParser(prog="gsac bench viewer", description=__doc__.splitlines()[0])
+    out.add_argument("--out", type=Path, default=Path("bench-viewer"), metavar="DIR", help="default: bench-viewer")
+    out.add_argument("--avatar", type=Path, metavar="FILE", help="an avatar.gsac; default: a made-up person")
+    out.add_argument("--gaussians", type=int, default=6000, metavar="N", help="of the made-up person; default: 6000")
+    out.add_argument("--size", type=int, default=512, metavar="PX", help="of the square picture; default: 512")
+    out.add_argument("--rounds", type=int, default=3, metavar="N", help="default: 3")
+    out.add_argument("--seconds", type=float, default=6.0, metavar="N", help="of one count; default: 6")
+    return out
+
+
+def main(argv: list[str] | None = None) -> int:
+    options = parser().parse_args(argv)
+    from gsac.benchmarks.viewer import browser, race
+
+    if browser.find_chromium() is None or not shutil.which("npm"):
+        raise BadInput("gsac bench viewer needs chromium and npm (Debian packages of those names)")
+    options.out.mkdir(parents=True, exist_ok=True)
+    avatar = prepare(options)
+    counts: dict[str, list[race.Count]] = {"viewer.html": [], "PlayCanvas": []}
+    with race.served(options.out.absolute()) as address:
+        for k in range(options.rounds):
+            for name, page in pages(avatar).items():
+                picture = options.out / f"{name.split('.')[0].lower()}.png" if k == 0 else None
+                counts[name].append(race.count(f"{address}/{page}", options.size, options.seconds, picture))
+                print(f"round {k + 1}: {name:11} {counts[name][-1].fps:6.2f} frames a second", file=sys.stderr)
+    words = text(counts, len(avatar.gaussians["face"]), options.size)
+    print(words)
+    (options.out / "viewer.txt").write_text(words + "\n")
+    return 0
+
+
+def prepare(options: argparse.Namespace) -> RiggedAvatar:
+    """Writes the two pages and the splats, and has npm bring PlayCanvas. Returns the avatar."""
+    from gsac.benchmarks.viewer.person import person
+    from gsac.stages.export.page import page_bytes
+    from gsac.stages.export.ply import ply_bytes
+    from gsac.stages.export.rigged import RiggedAvatar
+    from gsac.stages.export.stage import posed_gaussians
+
+    avatar = person(options.gaussians) if options.avatar is None else RiggedAvatar.read(options.avatar)
+    if "walk" not in avatar.clips:
+        raise BadInput(f"{options.avatar}: it carries no clip walk; export it with export.animations=walk")
+    splats = posed_gaussians(avatar, avatar.pose("A"))
+    (options.out / "viewer.html").write_bytes(page_bytes(avatar.to_bytes()))
+    (options.out / "avatar.ply").write_bytes(ply_bytes(*splats, avatar.gaussians["rgb"], avatar.gaussians["opacity"]))
+    shutil.copy(PAGE, options.out)
+    if not (options.out / "node_modules" / "playcanvas").is_dir():
+        done = subprocess.run(["npm", "install", "--silent", "--no-audit", "--no-fund", PACKAGE], cwd=options.out,
+                              capture_output=True, text=True)
+        if done.returncode:
+            raise StageError(f"npm could not install {PACKAGE}: {done.stderr.strip() or 'it said nothing'}")
+    return avatar
+
+
+def pages(avatar: RiggedAvatar) -> dict[str, str]:
+    """Addresses of the two pages, with the same camera; PlayCanvas has the person's feet at y = 0."""
+    middle = float(avatar.vertices[:, 1].max() + avatar.ground) / 2
+    camera = "&".join(f"{name}={value}" for name, value in CAMERA.items())
+    return {"viewer.html": f"viewer.html#clip=walk&yaw=0&pitch=0&target=0,{middle:.4f},0&{camera}",
+            "PlayCanvas": f"playcanvas.html#file=avatar.ply&height={middle - avatar.ground:.4f}&{camera}"}
+
+
+def text(counts: dict[str, list[Count]], count: int, size: int) -> str:
+    """Medians over the rounds, and how many times as many frames ours gives."""
+    fps = {name: statistics.median(c.fps for c in found) for name, found in counts.items()}
+    work = {name: 1000 * statistics.median(c.processor_s for c in found) for name, found in counts.items()}
+    rows = [f"{name:11}  {fps[name]:6.2f} fps  {work[name]:6.1f} ms of processor a frame   "
+            f"rounds: {', '.join(f'{c.fps:.2f}' for c in found)}" for name, found in counts.items()]
+    (ours, theirs), (our_work, their_work) = fps.values(), work.values()
+    return "\n".join([f"{count} gaussians, {size} x {size}, software GL; ours walks, PlayCanvas stands still", *rows,
+                      f"ratio: {ours / theirs:.2f} of frames, {their_work / our_work:.2f} of processor time"])

@@ -1,0 +1,90 @@
+"""Frames a second of a page in headless Chromium: every frame is waited for, so that none is counted before it is drawn."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import http.server
+import os
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from gsac.benchmarks.viewer.browser import Browser
+from gsac.stages.contract import StageError
+
+WARM_S = 2.0
+WATCH = """
+(() => {
+  if (window.drawn !== undefined) return;
+  window.drawn = 0;
+  document.body.classList.add("bare");
+  const { gl } = gsac.painter, pixel = new Uint8Array(4), draw = gsac.draw.bind(gsac);
+  gsac.draw = () => {
+    draw();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    window.drawn += 1;
+  };
+})()
+"""
+"""Makes viewer.html count its frames and hide its controls, which the other page does not have; that one counts by itself."""
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    extensions_map = http.server.SimpleHTTPRequestHandler.extensions_map | {".mjs": "text/javascript"}
+
+    def log_message(self, *words) -> None:
+        pass
+
+
+@contextlib.contextmanager
+def served(folder: Path) -> Iterator[str]:
+    """The address of a folder's files on this machine."""
+    handler = functools.partial(Quiet, directory=str(folder))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+
+
+@dataclass
+class Count:
+    fps: float
+    processor_s: float
+    """Processor time of all of the browser's processes for one frame; other work on the machine changes it little."""
+
+
+def processor_s(pid: int) -> float:
+    """Seconds that a process and all below it have worked so far; those that have ended are left out."""
+    parents, spent = {}, {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            words = stat.read_text().rpartition(")")[2].split()
+            parents[int(stat.parent.name)], spent[int(stat.parent.name)] = int(words[1]), int(words[11]) + int(words[12])
+    family = {pid}
+    while more := {child for child, parent in parents.items() if parent in family} - family:
+        family |= more
+    return sum(spent.get(one, 0) for one in family) / os.sysconf("SC_CLK_TCK")
+
+
+def count(address: str, size: int, seconds: float, picture: Path | None) -> Count:
+    """A page at an address; picture: where to keep what it shows."""
+    page = Browser(size, size)
+    try:
+        page.open(address)
+        page.run(WATCH)
+        time.sleep(WARM_S)
+        began, worked, first = time.monotonic(), processor_s(page.process.pid), page.run("window.drawn")
+        time.sleep(seconds)
+        frames, ended, done = page.run("window.drawn") - first, time.monotonic(), processor_s(page.process.pid)
+        if picture is not None:
+            import cv2
+
+            cv2.imwrite(str(picture), page.picture()[:, :, ::-1])
+        if page.errors:
+            raise StageError(f"{address}: the page failed: {page.errors[0]}")
+        return Count(frames / (ended - began), (done - worked) / max(frames, 1))
+    finally:
+        page.close()

@@ -1,0 +1,32 @@
+from gsac.benchmarks.viewer.bench import pages, text
+from gsac.benchmarks.viewer.person import person
+from gsac.benchmarks.viewer.race import Count, processor_s
+
+
+def test_both_pages_look_at_the_same_point_from_the_same_distance():
+    avatar = person(200)
+    ours, theirs = pages(avatar).values()
+    asked = [dict(part.split("=") for part in page.split("#")[1].split("&")) for page in (ours, theirs)]
+    assert {k: asked[0][k] for k in ("fov", "dist", "bg")} == {k: asked[1][k] for k in ("fov", "dist", "bg")}
+    target = float(asked[0]["target"].split(",")[1])
+    assert abs(target - avatar.ground - float(asked[1]["height"])) < 1e-4
+    assert len(avatar.gaussians["face"]) == 200 and list(avatar.clips)[0] == "walk"
+
+
+def test_the_ratio_is_of_medians():
+    counts = {"viewer.html": [Count(10, .02), Count(30, .04), Count(12, .03)],
+              "PlayCanvas": [Count(6, .09), Count(5, .06), Count(7, .05)]}
+    words = text(counts, 6000, 512)
+    assert "ratio: 2.00 of frames, 2.00 of processor time" in words and "6000 gaussians, 512 x 512" in words
+
+
+def test_processor_time_counts_a_child_that_works():
+    import os
+    import subprocess
+    import sys
+    before = processor_s(os.getpid())
+    child = subprocess.Popen([sys.executable, "-c", "print(sum(i * i for i in range(3000000)), flush=True); input()"],
+                             stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    child.stdout.readline()
+    assert processor_s(os.getpid()) - before > 0.05
+    child.communicate(b"\n")
