@@ -17,6 +17,7 @@ SKIN_SCALE = 1 / UNIT
 QUAT_SCALE = 1 / 32767
 LOG_SCALE_SCALE = 1 / 2048
 MAX_JOINTS = 256
+MAX_LEVELS = 16
 BLEND = {"low_pass_px2": 0.3, "alpha_max": 0.999, "alpha_min": 1 / 255}
 """How a gaussian is drawn: added to the image covariance's diagonal; cap of one alpha; below this it is not drawn."""
 
@@ -62,6 +63,8 @@ class RiggedAvatar:
     """(E, 3) float32: expression weights that a rotation of the jaw joint, axis-angle, stands for."""
     gaussians: dict[str, np.ndarray]
     """The arrays of avatar.npz: face, mu, quat (wxyz), log_scale, rgb, opacity (0..1)."""
+    coarser: list[dict[str, np.ndarray]] = field(default_factory=list)
+    """The same arrays for levels of detail with ever fewer gaussians, to be seen from afar."""
     poses: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     """Still poses: name -> joint name -> axis-angle."""
     clips: dict[str, Clip] = field(default_factory=dict)
@@ -91,7 +94,6 @@ class RiggedAvatar:
         """The `.gsac` file (docs/gsac-format.md)."""
         vertex_type = np.uint16 if len(self.vertices) <= 1 << 16 else np.uint32
         face_type = np.uint16 if len(self.faces) <= 1 << 16 else np.uint32
-        g = self.gaussians
         blocks = {
             "rest.vertices": self.vertices.astype(np.float32),
             "rest.faces": self.faces.astype(vertex_type),
@@ -102,16 +104,20 @@ class RiggedAvatar:
             "expression.vertex": self.expression_vertex.astype(vertex_type),
             "expression.delta": self.expression_delta.astype(np.float16),
             "expression.jaw": self.jaw_actions.astype(np.float32),
-            "gaussian.face": g["face"].astype(face_type),
-            "gaussian.mu": g["mu"].astype(np.float16),
-            "gaussian.quat": np.rint(_unit(g["quat"]) / QUAT_SCALE).astype(np.int16),
-            "gaussian.log_scale": np.rint(np.clip(g["log_scale"], -15.9, 15.9) / LOG_SCALE_SCALE).astype(np.int16),
-            "gaussian.rgb": g["rgb"].astype(np.float16),
-            "gaussian.opacity": np.rint(np.clip(g["opacity"], 0, 1) * UNIT).astype(np.uint16),
         }
-        scales = {"skin.weight": SKIN_SCALE, "gaussian.quat": QUAT_SCALE, "gaussian.log_scale": LOG_SCALE_SCALE,
-                  "gaussian.opacity": 1 / UNIT}
-        clips = []
+        scales, levels, clips = {"skin.weight": SKIN_SCALE}, [], []
+        for n, g in enumerate([self.gaussians, *self.coarser]):
+            prefix = f"gaussian{n or ''}"
+            blocks |= {
+                f"{prefix}.face": g["face"].astype(face_type),
+                f"{prefix}.mu": g["mu"].astype(np.float16),
+                f"{prefix}.quat": np.rint(_unit(g["quat"]) / QUAT_SCALE).astype(np.int16),
+                f"{prefix}.log_scale": np.rint(np.clip(g["log_scale"], -15.9, 15.9) / LOG_SCALE_SCALE).astype(np.int16),
+                f"{prefix}.rgb": g["rgb"].astype(np.float16),
+                f"{prefix}.opacity": np.rint(np.clip(g["opacity"], 0, 1) * UNIT).astype(np.uint16),
+            }
+            scales |= {f"{prefix}.quat": QUAT_SCALE, f"{prefix}.log_scale": LOG_SCALE_SCALE, f"{prefix}.opacity": 1 / UNIT}
+            levels.append({"prefix": prefix, "count": len(g["face"])})
         for name, clip in self.clips.items():
             blocks[f"clip.{name}.rotation"] = clip.rotation.astype(np.float32)
             blocks[f"clip.{name}.transl"] = clip.transl.astype(np.float32)
@@ -120,8 +126,7 @@ class RiggedAvatar:
             "format": "gsac", "axes": "right-handed, metres, y up, facing +z, left +x", "ground": self.ground,
             "joints": {"names": self.joint_names, "parents": self.parents.tolist()},
             "expressions": self.expression_names, "poses": self.poses, "clips": clips, "blend": BLEND,
-            "levels": [{"prefix": "gaussian", "count": len(g["face"])}],
-            "licence": self.licence, "provenance": self.provenance,
+            "levels": levels, "licence": self.licence, "provenance": self.provenance,
         }
         return pack(head, blocks, scales)
 
@@ -207,27 +212,37 @@ class _Reading:
         moved = self.below(self.block("expression.vertex", (None,), True), V, "expression.vertex")
         if start[0] != 0 or start[-1] != len(moved) or (np.diff(start) < 0).any():
             raise self.bad(Fault.VALUE, "expression.start must rise from 0 to the number of moved vertices")
-        levels = self.entry(self.head, "levels", list)
-        if not levels:
-            raise self.bad(Fault.HEAD, "`levels` is empty")
-        prefix = self.entry(levels[0], "prefix", str)
-        face = self.below(self.block(f"{prefix}.face", (None,), True), len(faces), f"{prefix}.face")
-        N = len(face)
-        if self.entry(levels[0], "count", int) != N:
-            raise self.bad(Fault.VALUE, f"level 0 says it has other than {N} gaussians")
-        gaussians = {"face": face} | {name: self.block(f"{prefix}.{name}", (N, *shape[1:]))
-                                      for name, shape in AVATAR_SHAPES.items() if name != "face"}
-        if N and np.abs((gaussians["quat"] ** 2).sum(1) - 1).max() > 1e-2:
-            raise self.bad(Fault.VALUE, f"{prefix}.quat must hold unit quaternions")
+        gaussians, *coarser = self.levels(len(faces))
         return RiggedAvatar(
             vertices=vertices, faces=faces, joints=self.block("rest.joints", (J, 3)),
             parents=np.asarray(parents, np.int32), joint_names=joint_names,
             skin_index=self.below(self.block("skin.index", (V, 4), True), J, "skin.index"), skin_weight=weight,
             expression_names=names, expression_start=start, expression_vertex=moved,
             expression_delta=self.block("expression.delta", (len(moved), 3)),
-            jaw_actions=self.block("expression.jaw", (len(names), 3)), gaussians=gaussians,
+            jaw_actions=self.block("expression.jaw", (len(names), 3)), gaussians=gaussians, coarser=coarser,
             poses=self.poses(joint_names), clips=self.clips(joint_names),
             licence=self.words("licence"), provenance=self.words("provenance"))
+
+    def levels(self, faces: int) -> list[dict[str, np.ndarray]]:
+        """The gaussians of each level of detail, finest first."""
+        levels = self.entry(self.head, "levels", list)
+        if not 1 <= len(levels) <= MAX_LEVELS:
+            raise self.bad(Fault.HEAD, "`levels` is empty or too long")
+        prefixes = [self.entry(level, "prefix", str) for level in levels]
+        if len(set(prefixes)) != len(prefixes):
+            raise self.bad(Fault.HEAD, "two levels have the same gaussians")
+        out = []
+        for level, prefix in zip(levels, prefixes, strict=True):
+            face = self.below(self.block(f"{prefix}.face", (None,), True), faces, f"{prefix}.face")
+            N = len(face)
+            if self.entry(level, "count", int) != N:
+                raise self.bad(Fault.VALUE, f"a level says it has other than {N} gaussians")
+            gaussians = {"face": face} | {name: self.block(f"{prefix}.{name}", (N, *shape[1:]))
+                                          for name, shape in AVATAR_SHAPES.items() if name != "face"}
+            if N and np.abs((gaussians["quat"] ** 2).sum(1) - 1).max() > 1e-2:
+                raise self.bad(Fault.VALUE, f"{prefix}.quat must hold unit quaternions")
+            out.append(gaussians)
+        return out
 
     def poses(self, joint_names: list[str]) -> dict[str, dict[str, list[float]]]:
         poses = self.entry(self.head, "poses", dict)

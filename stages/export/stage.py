@@ -13,6 +13,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.glb import glb_bytes
+from gsac.stages.export.levels import MEMBERS, coarser
 from gsac.stages.export.motion import add_motion
 from gsac.stages.export.page import page_bytes
 from gsac.stages.export.ply import ply_bytes
@@ -39,6 +40,7 @@ def run(job: Job) -> None:
     avatar.licence = {"avatar": job.config.licence, "body": BODY_LICENCE}
     avatar.provenance = {"gsac": version("gsac"), "body_model": body.digest, "clip_sha256": clip.source_sha256}
     add_motion(avatar, job.config.clip_names())
+    avatar.coarser = [coarser(avatar, members) for members in MEMBERS]
 
     container = avatar.to_bytes()
     pose = avatar.pose(job.config.ply_pose.upper())

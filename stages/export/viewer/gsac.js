@@ -7,6 +7,7 @@ const GSAC_MAX_FILE = 256 * 2 ** 20;
 const GSAC_MAX_HEAD = 2 ** 20;
 const GSAC_MAX_BLOCKS = 1024;
 const GSAC_MAX_JOINTS = 256;
+const GSAC_MAX_LEVELS = 16;
 const GSAC_TYPES = { f32: Float32Array, f16: Uint16Array, u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, i16: Int16Array };
 
 class GsacError extends Error {
@@ -161,11 +162,19 @@ function readAvatar(buffer) {
     if (Math.abs(sum - 1) > 1e-3 || Math.min(...four) < 0) throw new GsacError("value", "skin.weight must have rows that sum to 1");
   }
   if (V === 0) throw new GsacError("value", "the mesh has no vertices");
-  const level = list(head.levels, "levels")[0];
-  if (!isTable(level) || typeof level.prefix !== "string") throw new GsacError("head", "levels is empty");
-  const face = index(`${level.prefix}.face`, faces.length / 3, null), N = face.length;
-  if (level.count !== N) throw new GsacError("value", `level 0 says it has other than ${N} gaussians`);
-  const gaussian = (name, ...shape) => finite(`${level.prefix}.${name}`, N, ...shape);
+  const levels = list(head.levels, "levels").map((level) => {
+    if (!isTable(level) || typeof level.prefix !== "string") throw new GsacError("head", "a level has no prefix");
+    const face = index(`${level.prefix}.face`, faces.length / 3, null), N = face.length;
+    if (level.count !== N) throw new GsacError("value", `a level says it has other than ${N} gaussians`);
+    const gaussian = (name, ...shape) => finite(`${level.prefix}.${name}`, N, ...shape);
+    const quat = gaussian("quat", 4);
+    for (let q = 0; q < quat.length; q += 4) {
+      if (Math.abs(Math.hypot(...quat.subarray(q, q + 4)) ** 2 - 1) > 1e-2) throw new GsacError("value", "quat must hold unit quaternions");
+    }
+    return { face, mu: gaussian("mu", 3), quat, logScale: gaussian("log_scale", 3), rgb: gaussian("rgb", 3), opacity: gaussian("opacity") };
+  });
+  if (levels.length === 0 || levels.length > GSAC_MAX_LEVELS) throw new GsacError("head", "levels is empty or too long");
+  if (new Set(head.levels.map((level) => level.prefix)).size !== levels.length) throw new GsacError("head", "two levels have the same gaussians");
   for (const pose of Object.values(head.poses)) {
     const rows = isTable(pose) ? Object.entries(pose) : [["", null]];
     for (const [joint, r] of rows) {
@@ -188,16 +197,11 @@ function readAvatar(buffer) {
     if (keys === 0) throw new GsacError("value", "a clip has no keys");
     clips[clip.name] = { fps: clip.fps, loop: clip.loop, joints, keys, rotation, transl: finite(`clip.${clip.name}.transl`, keys, 3) };
   }
-  const quat = gaussian("quat", 4);
-  for (let q = 0; q < quat.length; q += 4) {
-    if (Math.abs(Math.hypot(...quat.subarray(q, q + 4)) ** 2 - 1) > 1e-2) throw new GsacError("value", "quat must hold unit quaternions");
-  }
   return {
     names, parents, vertices, faces, expressions, start, moved, clips, head,
     joints: finite("rest.joints", names.length, 3),
     skinIndex: index("skin.index", names.length, V, 4), skinWeight: weights,
     delta: finite("expression.delta", moved.length, 3), poses: head.poses,
-    face, mu: gaussian("mu", 3), quat, logScale: gaussian("log_scale", 3),
-    rgb: gaussian("rgb", 3), opacity: gaussian("opacity"),
+    ...levels[0],
   };
 }

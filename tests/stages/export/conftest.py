@@ -94,6 +94,7 @@ def make_figure(per_face=1, seed=0):
             "rgb": np.clip(rgb + rng.normal(size=(N, 3)) * .03, 0, 1).astype(np.float32),
             "opacity": rng.uniform(.6, 1, N).astype(np.float32)},
         licence={"avatar": "test figure"}, provenance={"gsac": "0"})
+    avatar.coarser = [{name: array[::step] for name, array in avatar.gaussians.items()} for step in (3, 9)]
     add_motion(avatar, ("wave", "walk"))
     return avatar
 

@@ -76,6 +76,7 @@ def files(data):
             {"joints": joints | {"parents": [-1, *[1 << 70] * 54]}}, {"joints": joints | {"parents": 7}},
             {"joints": joints | {"names": ["a"] * 55}},
             {"levels": []}, {"levels": [{"prefix": 3, "count": 1}]}, {"levels": [{"prefix": "gaussian", "count": 1}]},
+            {"levels": head["levels"][:1] * 2}, {"levels": head["levels"][:1] + [{"prefix": "gaussian1", "count": 1}]},
             {"levels": {}}, {"levels": [3]}, {"poses": {"T": {"nobody": [0, 0, 0]}}}, {"poses": {"T": 1}},
             {"poses": {"T": {"head": [0, 0]}}}, {"poses": {"T": {"head": [0, "0", 0]}}}, {"poses": {"T": {"head": [1e9, 0, 0]}}},
             {"poses": []}, {"clips": [{}]}, {"clips": 3}, {"clips": [1]}, {"clips": [head["clips"][0]] * 2},

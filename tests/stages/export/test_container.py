@@ -49,6 +49,8 @@ def test_what_is_written_is_read(figure, data):
     for name, tolerance in (("mu", 2e-5), ("quat", 2e-5), ("log_scale", 3e-4), ("rgb", 5e-4), ("opacity", 1e-5)):
         np.testing.assert_allclose(back.gaussians[name], figure.gaussians[name], atol=tolerance)
     np.testing.assert_array_equal(back.gaussians["face"], figure.gaussians["face"])
+    assert [len(level["face"]) for level in back.coarser] == [len(level["face"]) for level in figure.coarser]
+    np.testing.assert_array_equal(back.coarser[1]["mu"], back.gaussians["mu"][::9])
     for name, clip in figure.clips.items():
         assert (back.clips[name].fps, back.clips[name].joints) == (clip.fps, clip.joints)
         np.testing.assert_array_equal(back.clips[name].rotation, clip.rotation)
@@ -70,7 +72,7 @@ def test_the_specification_lists_the_blocks_and_keys_that_are_written(data):
     text = (Path(__file__).parents[3] / "docs" / "gsac-format.md").read_text()
     head, _ = head_and_body(data)
     rows = {name for line in text.splitlines() if line.startswith("| `") for name in re.findall(r"^\| `([^`]+)`", line)}
-    blocks = {re.sub(r"^clip\.\w+\.", "clip.<name>.", name) for name in head["blocks"]}
+    blocks = {re.sub(r"^clip\.\w+\.", "clip.<name>.", re.sub(r"^gaussian\d+", "gaussian", name)) for name in head["blocks"]}
     assert blocks <= rows
     assert {name for name in rows if "." in name} == blocks
     assert set(head) - {"blocks"} <= rows

@@ -33,7 +33,7 @@ namespace Gsac
         static Camera[] cameras = new Camera[8];
 
         [SerializeField, Tooltip("m: nearer than this the finest level of detail is drawn; each doubling takes the next, where the file has more.")]
-        float finestWithin = 4;
+        float finestWithin = 8;
 
         readonly List<GsacView> views = new List<GsacView>();
         GsacAvatar avatar;

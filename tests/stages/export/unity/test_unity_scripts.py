@@ -8,7 +8,6 @@ import socket
 import numpy as np
 import pytest
 from gsac.avatar.skinning import joint_transforms
-from gsac.stages.export.container import pack, unpack
 from gsac.stages.export.rigged import RiggedAvatar
 from scipy.spatial.transform import Rotation
 
@@ -200,19 +199,9 @@ def test_wrong_calls_name_the_avatar_and_the_word(play, files):
     assert lines[8].startswith("1 lame: the avatar cannot be drawn"), "said once, not each frame"
 
 
-def test_a_coarser_level_is_drawn_from_afar(play, files, tmp_path):
-    data = (files / "figure.gsac").read_bytes()
-    head, blocks = unpack(data)
-    scales = {name: entry["scale"] for name, entry in head.pop("blocks").items() if "scale" in entry}
-    stored = {name: np.rint(a / scales[name]).astype({"gaussian.opacity": np.uint16, "skin.weight": np.uint16}.get(name, np.int16))
-              if name in scales else a for name, a in blocks.items()}
-    coarse = {f"coarse.{name[9:]}": a[::3] for name, a in stored.items() if name.startswith("gaussian.")}
-    scales |= {name: scales[f"gaussian.{name[7:]}"] for name in coarse if f"gaussian.{name[7:]}" in scales}
-    N, few = len(stored["gaussian.face"]), len(coarse["coarse.face"])
-    head["levels"] = [{"prefix": "gaussian", "count": N}, {"prefix": "coarse", "count": few}]
-    path = tmp_path / "levels.gsac"
-    path.write_bytes(pack(head, stored | coarse, scales))
-    assert play("levels", path).split() == [str(N), str(few)]
+def test_coarser_levels_are_drawn_from_afar(play, files, figure):
+    counts = [len(level["face"]) for level in (figure.gaussians, *figure.coarser)]
+    assert play("levels", files / "figure.gsac").split() == [str(n) for n in (counts[0], counts[1], counts[2], counts[2])]
 
 
 def test_every_stub_of_unity_has_its_page_and_first_version_and_none_is_newer_than_the_package_asks_for(package):
