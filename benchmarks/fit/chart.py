@@ -1,4 +1,4 @@
-"""Error against seconds, both methods: one picture."""
+"""One picture of the two halves: body error against seconds, both methods; palm error against the gap, all hand methods."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from gsac.benchmarks.fit.trial import Trial
+from gsac.benchmarks.handgap.table import draw as draw_gaps
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -18,12 +19,26 @@ BAR_MM, BAR_S = 30.0, 5.0
 TICKS_S = [n * 10.0**power for power in range(-1, 4) for n in (1, 2, 5)]
 
 
-def draw(trials: list[Trial], folder: Path) -> list[Path]:
-    """Writes fit.png and fit.svg. Filled marks know the focal length; a light line joins a clip's two fits.
+def draw(trials: list[Trial], filled: list[dict], folder: Path) -> list[Path]:
+    """Writes fit.png and fit.svg. filled: rows of `handgap.gaps.summary`; without them the second panel is left out."""
+    figure, axes = plt.subplots(1, 1 + bool(filled), figsize=(7.2 + 4.6 * bool(filled), 4.8), layout="constrained", squeeze=False)
+    draw_fits(axes[0, 0], trials)
+    if filled:
+        draw_gaps(axes[0, 1], filled, "inside", "arm")
+        axes[0, 1].spines[["top", "right"]].set_visible(False)
+        axes[0, 1].legend(fontsize=7, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
+    paths = [folder / "fit.png", folder / "fit.svg"]
+    for path in paths:
+        figure.savefig(path, dpi=160)
+    plt.close(figure)
+    return paths
+
+
+def draw_fits(axes: plt.Axes, trials: list[Trial]) -> None:
+    """Filled marks know the focal length; a light line joins a clip's two fits.
 
     Seconds are those of the processor: the clock's depend on what else the machine does, and both methods keep one core busy.
     """
-    figure, axes = plt.subplots(figsize=(7.2, 4.6), layout="constrained")
     for clip, given in dict.fromkeys((t.clip, t.focal_given) for t in trials):
         pair = sorted((t for t in trials if (t.clip, t.focal_given) == (clip, given)), key=lambda t: t.cpu_s)
         axes.plot([t.cpu_s for t in pair], [t.scores["joints_mean_mm"] for t in pair], color="0.85", lw=1, zorder=1)
@@ -51,8 +66,3 @@ def draw(trials: list[Trial], folder: Path) -> list[Path]:
     axes.grid(alpha=0.25, which="both", lw=0.5)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=7, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
-    paths = [folder / "fit.png", folder / "fit.svg"]
-    for path in paths:
-        figure.savefig(path, dpi=160)
-    plt.close(figure)
-    return paths

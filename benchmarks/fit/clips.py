@@ -26,6 +26,8 @@ class Case:
     truth: Truth
     inputs: dict[str, Path]
     """Ports of `smplx`."""
+    detections: Path
+    """keypoints.npz before the hand gaps are filled."""
 
 
 def truth_folder(folder: Path, seed: int, say: PlainReporter) -> Path:
@@ -49,4 +51,5 @@ def seen(folder: Path, store: Store, out: Path, say: PlainReporter) -> Case:
     workspace.prepare(clip, project, configs)
     for last in dict.fromkeys(port.split("/")[0] for port in STAGE.inputs):
         Chain(project, configs, store, workspace, say).run(clip, Options(until=last))
-    return Case(folder.name, read_truth(folder), {port: workspace.path(port) for port in STAGE.inputs})
+    return Case(folder.name, read_truth(folder), {port: workspace.path(port) for port in STAGE.inputs},
+                workspace.path("keypoints/keypoints.npz"))

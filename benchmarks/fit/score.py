@@ -48,10 +48,15 @@ def score(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
     return {name: float(value) for name, value in out.items()}
 
 
+def joint_distances(body: Body, params: BodyParams, truth: Truth) -> np.ndarray:
+    """(T, n) mm between the truth's joints and the fit's, aligned as in `score`."""
+    fitted, true = _rooted(body.posed(params)[1][:, truth.joint]), _rooted(truth.joints)
+    return np.linalg.norm(_scale(fitted, true) * fitted - true, axis=-1) * 1e3
+
+
 def joint_errors(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
     """Joint name -> mean error mm, aligned as in `score`."""
-    fitted, true = _rooted(body.posed(params)[1][:, truth.joint]), _rooted(truth.joints)
-    off = np.linalg.norm(_scale(fitted, true) * fitted - true, axis=-1).mean(0) * 1e3
+    off = joint_distances(body, params, truth).mean(0)
     return {body.joint_names[j]: float(mm) for j, mm in zip(truth.joint, off, strict=True)}
 
 

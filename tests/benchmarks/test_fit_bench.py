@@ -1,10 +1,13 @@
 import csv
 
+import numpy as np
 import pytest
-from gsac.benchmarks.fit import bench, chart, table
+from gsac.avatar.wholebody import ARM, HANDS
+from gsac.benchmarks.fit import bench, chart, hidden, table
 from gsac.benchmarks.fit.clips import seen
 from gsac.benchmarks.fit.trial import Trial
 from gsac.stages.contract import BadInput
+from gsac.stages.handgap.config import METHODS
 
 
 def trial(clip, method, given, seconds, mm):
@@ -46,7 +49,9 @@ def test_the_csv_holds_every_score_unrounded(tmp_path):
 
 
 def test_the_chart_is_written_as_picture_and_as_vectors(tmp_path):
-    paths = chart.draw(TRIALS, tmp_path)
+    gap = {"place": "inside", "lost": "arm"}
+    filled = [gap | {"gap": n, "method": m, "mean_px": n + i} for i, m in enumerate(METHODS) for n in (2, 8)]
+    paths = chart.draw(TRIALS, filled, tmp_path)
     assert [p.name for p in paths] == ["fit.png", "fit.svg"]
     assert paths[0].read_bytes()[:4] == b"\x89PNG" and "<svg" in paths[1].read_text()[:600]
 
@@ -58,3 +63,31 @@ def test_a_folder_that_is_no_truth_clip_is_refused_by_name(tmp_path):
 
 def test_clips_that_measured_the_detector_are_not_what_is_reported():
     assert not set(bench.parser().parse_args([]).seeds) & {11, 12, 41, 42, 43, 44}
+
+
+def test_windows_of_one_hand_are_apart_and_as_long_as_they_say():
+    for frames in (60, 40, 24):
+        found = list(hidden.windows(frames))
+        assert found and all(last <= frames - hidden.MARGIN for *_, last in found)
+        for side in HANDS:
+            ends = [0, *(t for s, *span in found if s == side for t in span)]
+            assert np.diff(ends)[::2].min() >= hidden.MARGIN
+    lengths = sorted(last - first for side, first, last in hidden.windows(60) if side == "left")
+    assert lengths == sorted(hidden.GAPS["left"])
+
+
+def test_masking_hides_arm_and_hand_there_and_nothing_else():
+    seen = {"xy": np.ones((60, 133, 2)), "score": np.ones((60, 133)), "world": np.ones((60, 133, 3))}
+    masked = hidden.mask(seen)
+    hide = np.zeros((60, 133), bool)
+    for side, first, last in hidden.windows(60):
+        hide[first:last, [*range(133)[HANDS[side]], *ARM[side][1:3]]] = True
+    assert np.array_equal(masked["score"] == 0, hide) and np.array_equal(np.isnan(masked["world"]).all(-1), hide)
+    assert seen["score"].all()
+
+
+def test_the_hidden_wrists_table_has_a_line_for_each_gap_and_one_for_all():
+    found = [hidden.Hidden("a", "left", 3, np.full(4, 10.0)), hidden.Hidden("a", "right", 9, np.full(8, 40.0))]
+    lines = hidden.text(found).splitlines()
+    assert [line.split()[0] for line in lines[2:]] == ["4", "8", "all", "bar"]
+    assert lines[4].split()[1:] == ["2", "40.0", "30.0", "40.0"]
