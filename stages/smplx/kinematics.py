@@ -91,3 +91,19 @@ class Points:
         shift = place - (world @ rest[None, :, :, None])[..., 0]
         turned = world.transpose(1, 2).flatten(2) @ moment.T  # (T, 3, P)
         return turned.transpose(1, 2) + self.mass @ shift
+
+
+class Mesh:
+    """All vertices of the body: linear blend skinning, T frames as one matrix product over the joints."""
+
+    def __init__(self, body: Body):
+        self.template = torch.tensor(body.v_template, dtype=torch.float32)  # (V, 3)
+        self.dirs = torch.tensor(body.shapedirs, dtype=torch.float32)  # (V, 3, B)
+        self.weights = torch.tensor(body.weights.T.copy(), dtype=torch.float32)  # (J, V)
+
+    def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
+        """As `Points.at`; returns (T, 3, V)."""
+        vertices = (self.template + self.dirs @ betas).T  # (3, V)
+        moment = (self.weights[:, None] * vertices).flatten(0, 1)  # (3 J, V)
+        shift = place - (world @ rest[None, :, :, None])[..., 0]
+        return world.transpose(1, 2).flatten(2) @ moment + shift.transpose(1, 2) @ self.weights

@@ -2,8 +2,9 @@
 all means, by Adam in three passes over batches of frames. The baseline that `lm` is measured against.
 
 Read differently from the publication, because what it takes is not there: the start is `lm`'s closed form (the paper regresses it
-by Hand4Whole); the face terms need a head mesh in face.npz (`head.py`); the body has no face offsets, so they move its shape only;
-the term that holds the mesh to the start looks at every `MESH_STEP`th vertex, which makes this method faster than its model.
+by Hand4Whole); the face terms need a head mesh in face.npz (`head.py`); the body has no face offsets, so they move its shape only,
+and the second key point term, which differs from the first by the face offsets alone, is left out. Every step poses all vertices,
+as the published one does for the term that holds the mesh to the start.
 """
 
 from __future__ import annotations

@@ -11,15 +11,13 @@ from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.stages.smplx.detector import Detector
 from gsac.stages.smplx.fit import Sightings
 from gsac.stages.smplx.head import Head, HeadTerms, visible
-from gsac.stages.smplx.kinematics import Kinematics, Points, matrices, rotation_vectors, six_of
+from gsac.stages.smplx.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
 from gsac.stages.smplx.prior import BODY_JOINTS
 from gsac.stages.smplx.problem import State
-from scipy import sparse
 
 SPACE = 8.0
 """Side of the square that the person's box is projected to: pixel weights do not depend on the resolution."""
 INIT, SHAPE, JOINT_OFFSET, SYMMETRY, UPRIGHT = 0.1, 0.01, 100.0, 1.0, 1.0
-MESH_STEP = 32
 OVERLAP = 0.5
 """Hand boxes that cover each other more than this: the farther hand does not count."""
 BODY = len(BODY_JOINTS)
@@ -77,7 +75,7 @@ class Objective:
         offsets = Detector.measured(sightings.detector, body).offsets
         self.known = np.flatnonzero(body.known_keypoints)
         self.points = Points(body, body.keypoint_matrix[self.known], offsets[self.known])
-        self.mesh = Points(body, sparse.eye_array(len(body.v_template), format="csr")[::MESH_STEP])
+        self.mesh = Mesh(body)
         self.focal, self.center = float(np.exp(start.log_focal)), torch.tensor(center, dtype=torch.float32)
         corner, side = boxes(sightings)
         seen = sightings.seen[:, self.known]
@@ -144,7 +142,7 @@ class Objective:
 
     @staticmethod
     def _relative(mesh: torch.Tensor, place: torch.Tensor) -> torch.Tensor:
-        return mesh - place[:, :1]
+        return mesh - place[:, 0, :, None]
 
     def _countable(self, x: torch.Tensor, uv: torch.Tensor, frames: slice) -> torch.Tensor:
         """(n, K) 0 for the face that is turned away, and for the farther of two hands (with its wrist) that lie on each other."""

@@ -11,7 +11,7 @@ from gsac.stages.contract import StageError
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.fit import HIPS, Sightings, starting_state
 from gsac.stages.smplx.head import Head, HeadTerms, visible
-from gsac.stages.smplx.kinematics import Kinematics, Points, matrices, rotation_vectors, six_of
+from gsac.stages.smplx.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
 from gsac.stages.smplx.paper import BATCH, PASSES, Pass, fit_clip
 from gsac.stages.smplx.paper_loss import Objective, Unknowns, boxes
 from gsac.stages.smplx.smooth import smooth_linear, smooth_rotations
@@ -85,6 +85,17 @@ def test_points_lie_where_the_posed_body_has_them(body):
     transl = params.transl[:, None]
     np.testing.assert_allclose(place.numpy() + transl, joints, atol=1e-5)
     np.testing.assert_allclose(points.at(world, place, rest, betas).numpy() + transl, body.keypoints(vertices)[:, known], atol=1e-5)
+
+
+def test_every_vertex_lies_where_the_posed_body_has_it(body):
+    """The term that holds the mesh to the start looks at all of them."""
+    params = person(body)
+    params.transl[:] = 0
+    betas, local = torch.tensor(params.betas), torch.tensor(rotation.exp(params.pose.astype(np.float64)), dtype=torch.float32)
+    kinematics = Kinematics(body)
+    rest = kinematics.joints(betas, torch.zeros(55, 3))
+    found = Mesh(body).at(*kinematics.pose(local, rest), rest, betas)
+    np.testing.assert_allclose(found.numpy().transpose(0, 2, 1), body.posed(params)[0], atol=1e-5)
 
 
 def test_a_short_descent_lowers_the_reprojection(body, fitted):
