@@ -93,7 +93,7 @@ const WIDE = 1.3;
 
 class Painter {
   constructor(canvas, avatar, binding, sort) {
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true,
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: false,
       powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser offers no WebGL2, which the viewer draws with");
     Object.assign(this, { gl, canvas, avatar, binding, sort });
