@@ -14,7 +14,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector, yaw_of
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
-from gsac.stages.smplx.problem import Observations, Problem, State
+from gsac.stages.smplx.problem import ROBUST, Observations, Problem, State
 from gsac.stages.smplx.silhouette import Outline, outline_points
 from gsac.stages.smplx.solver import levenberg_marquardt
 
@@ -35,6 +35,8 @@ ADULT_HEIGHT = (1.72, 0.02)
 FOCAL_GUESS = 0.95
 """Focal length when nothing is known, as a share of the picture's longer side: between a phone's main lens and a tele."""
 FOCAL_SPREAD = 0.15
+FAR_OFF = 5.0
+"""Before the outline counts, points are believed so many times further off: an arm that starts hanging has a long way to go."""
 START_STEPS = 4
 """Steps in which the body only turns and moves as a whole, before anything bends."""
 VIEW = np.radians(30)
@@ -99,6 +101,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     seen.depth *= scale_of_world(problem, state, sightings)
     seen.repeats = repeats(state.local[:, 0])
     take_off_habits(seen, sightings, detector, BODY_POINTS, state)
+    problem.limit = FAR_OFF * ROBUST
     free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1, bool)
     trunk_only = free.copy()
     trunk_only[3:-3] = True
@@ -106,7 +109,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     take_off_habits(seen, sightings, detector, BODY_POINTS, state)
     state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, 3 * config.iterations)
     steps, iou = trace.steps + more.steps, np.full(len(sightings.xy), np.nan)
-    problem.outline_weight, seen.depth_spread = config.silhouette, DEPTH_TRUST
+    problem.outline_weight, problem.limit, seen.depth_spread = config.silhouette, ROBUST, DEPTH_TRUST
     for r in range(config.rounds if config.silhouette > 0 else 0):
         progress(r, config.rounds + 1, "rounds")
         take_off_habits(seen, sightings, detector, BODY_POINTS, state)

@@ -18,7 +18,7 @@ from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.solver import System
 
 ROBUST = 3.0
-"""Residuals beyond so many spreads count less and less."""
+"""Residuals beyond so many spreads count less and less; `Problem.limit` may be wider while the body is still far off."""
 OUTLINE_ROBUST = 2.0
 OUTLINE_SIGHTINGS = 40
 """How many independent sightings one frame's outline is worth."""
@@ -73,6 +73,7 @@ class Problem:
         speed, acceleration = prior.turning_spread(active)
         self.speed_spread, self.acceleration_spread = speed, acceleration
         self.smoothness, self.outline_weight = smoothness, outline_weight
+        self.limit = ROBUST
         self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
         self.size = 3 * len(active) + 3
         top, sole = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
@@ -92,8 +93,8 @@ class Problem:
         chain = self.skeleton.pose(state.local, state.betas)
         total = 0.0
         x = self.points(chain, state)
-        total += robust(self._point_residual(self.project(state, x)), ROBUST)[0].sum()
-        total += robust(self._depth_residual(x), ROBUST)[0].sum()
+        total += robust(self._point_residual(self.project(state, x)), self.limit)[0].sum()
+        total += robust(self._depth_residual(x), self.limit)[0].sum()
         for t, x in self.outline_points(chain, state):
             distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
             scaled = np.where(inside, distance / self.seen.outline_spread, 0)
@@ -136,10 +137,10 @@ class Problem:
         x = self.points(chain, state)
         uv = self.project(state, x)
         residual = self._point_residual(uv)
-        shrink = robust(residual, ROBUST)[1]
+        shrink = robust(residual, self.limit)[1]
         weight = shrink / self.seen.spread[..., None]  # zero where a point was not seen
         depth = self._depth_residual(x)
-        depth_shrink = np.where(np.isfinite(self.seen.depth), robust(depth, ROBUST)[1], 0)
+        depth_shrink = np.where(np.isfinite(self.seen.depth), robust(depth, self.limit)[1], 0)
         covectors = np.zeros((*x.shape[:2], 3, 3))
         covectors[..., :2, :], covectors[..., 2, 2] = self._projection_slope(state, x), 1
         scale = np.concatenate([weight, (depth_shrink / self.seen.depth_spread)[..., None]], 2)
