@@ -28,6 +28,8 @@ SMPLX_JOINTS = (
              for finger in ("index", "middle", "pinky", "ring", "thumb") for i in (1, 2, 3)]
 SMPLX_EXPRESSIONS = 100
 """How many of an official file's last shape directions are expressions (v1.1: 300 + 100; older files: 10 + 10)."""
+LOST = 0.5
+"""Joint spread, m, of a frame that could not be fitted: far more than any fitted frame's."""
 
 
 @dataclass
@@ -79,6 +81,11 @@ class BodyParams:
     @property
     def frames(self) -> int:
         return len(self.transl)
+
+    @property
+    def lost(self) -> np.ndarray:
+        """(T,) bool: frames that could not be fitted; nothing is to be learned from them."""
+        return self.sigma_joints[:, 0] >= LOST
 
     @property
     def pose(self) -> np.ndarray:

@@ -6,17 +6,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
+from gsac.avatar.body import LOST
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
-from gsac.stages.frame_names import name_frames
 from gsac.stages.smplx.fit import THREADS, Sightings, fit_clip, to_params
 from gsac.stages.smplx.mimic import mimic
 from gsac.stages.smplx.silhouette import read_outline
+from gsac.stages.smplx.trust import lost_frames, sentences
 from threadpoolctl import threadpool_limits
-
-POOR_IOU = 0.7
-LOST = 0.5
-"""Joint spread, m, of a frame in which nobody was seen: far more than any fitted frame's."""
 
 
 def published(*clip):
@@ -47,29 +44,25 @@ def run(job: Job) -> None:
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
-    expression, jaw, lost = mimic(body, face)
-    if lost:
-        job.warn(lost)
+    expression, jaw, silent = mimic(body, face)
+    if silent:
+        job.warn(silent)
     params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression)
     params.jaw_pose = jaw
     if fit.joint_offset is not None:
         params.joint_offset = fit.joint_offset.astype(np.float32)
     params.joints = body.posed(params)[1]
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
-    params.sigma_joints[~seen] = LOST
-    warn(job, fit, seen, params, clip)
+    lost = lost_frames(fit, seen, sightings.person_height)
+    params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
+    for sentence in (*fit.notes, *sentences(lost, fit.iou)):
+        job.warn(sentence)
+    warn(job, params, clip)
     params.write(job.out / "body.npz")
 
 
-def warn(job: Job, fit, seen: np.ndarray, params, clip: Clip) -> None:
-    """Says which frames are not to be trusted and what one camera left open."""
-    for note in fit.notes:
-        job.warn(note)
-    if not seen.all():
-        job.warn(f"No person is in {name_frames(~seen)}; the pose there is interpolated.")
-    poor = np.nan_to_num(fit.iou, nan=1.0) < POOR_IOU
-    if (poor & seen).any():
-        job.warn(f"The body covers the silhouette badly (IoU below {POOR_IOU}) in {name_frames(poor & seen)}.")
+def warn(job: Job, params, clip: Clip) -> None:
+    """Says what one camera left open."""
     if not clip.focal_px and not job.config.focal_px:
         job.warn(f"The clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it).")
     if job.config.height_m is None:

@@ -13,6 +13,7 @@ from gsac.avatar.metrics import psnr, summary
 from gsac.avatar.workspace import Workspace
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
+from gsac.stages.frame_names import name_frames
 from gsac.stages.train.evaluate import judge, turned
 from gsac.stages.train.holdout import spaced_in_yaw
 from gsac.stages.train.poses import Poses, carried
@@ -45,6 +46,11 @@ def run(job: Job) -> None:
                  f"{', '.join(f'{t:06d}' for t in empty[:10])}{' ...' if len(empty) > 10 else ''}.")
     usable = np.ones(count, bool)
     usable[empty] = False
+    if params.lost.any():
+        job.warn(f"The body could not be fitted in {name_frames(params.lost)}; not trained on, not judged.")
+        usable &= ~params.lost
+    if not usable.any():
+        raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
     held = spaced_in_yaw(params.global_orient, usable, config.holdout)
     if not len(held):
         job.warn(f"No frame is held out ({int(usable.sum())} usable frames, train.holdout is {config.holdout}): "

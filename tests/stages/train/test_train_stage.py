@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from gsac.avatar.artifacts import read_arrays
+from gsac.avatar.body import LOST, BodyParams
 from gsac.stages.contract import BadInput, StageError, make_config
 from gsac.stages.train import STAGE, fast
 from gsac.stages.train.stage import run
@@ -52,6 +53,20 @@ def test_empty_masks_are_left_out_with_a_warning_that_names_the_frames(job):
     assert "000002" in made.warnings[0] and "000005" in made.warnings[0]
     assert figures["trained_frames"] + len(figures["heldout_frames"]) == 10
     assert not {2, 5} & set(figures["heldout_frames"])
+
+
+@pytest.mark.slow
+def test_frames_without_a_fitted_body_are_neither_trained_on_nor_judged(job):
+    made = job(steps=20, pose_test_steps=0)
+    path = made.inputs["smplx/body.npz"]
+    params = BodyParams.read(path)
+    params.sigma_joints[[2, 3]] = LOST
+    params.write(path)
+    run(made)
+    figures = metrics(made)
+    assert not {2, 3} & set(figures["heldout_frames"])
+    assert figures["trained_frames"] + len(figures["heldout_frames"]) == 10
+    assert any("2 of 12 frames (2-3)" in warning for warning in made.warnings)
 
 
 def test_masks_that_are_all_empty_stop_the_stage(job):
