@@ -141,6 +141,7 @@ BODY_SHAPES = {
     "reye_pose": ("T", 3), "transl": ("T", 3), "joint_offset": (55, 3), "joints": ("T", 55, 3), "focal": (2,),
     "center": (2,), "sigma_joints": ("T", 55), "model": (),
 }
+LIGHT_SHAPE = {"light": (4, 3)}
 AVATAR_SHAPES = {"face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": ("N", 3), "rgb": ("N", 3), "opacity": ("N",)}
 
 
@@ -166,11 +167,14 @@ def check_body(path: Path) -> None:
             raise ArtifactError(f"{path}: array {name} is not finite")
 
 
-def check_avatar(path: Path) -> None:
+def check_avatar(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of avatar.npz; `light` may be among them."""
     arrays = check_arrays(path, AVATAR_SHAPES)
-    for name in AVATAR_SHAPES:
+    lit = check_arrays(path, LIGHT_SHAPE) if "light" in arrays else {}
+    for name in (*AVATAR_SHAPES, *(LIGHT_SHAPE if lit else ())):
         if not _finite(arrays[name]):
             raise ArtifactError(f"{path}: array {name} is not finite")
+    return arrays
 
 
 def check_json(path: Path) -> None:

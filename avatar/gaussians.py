@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,10 @@ SPREAD = 0.55
 
 GOLDEN = (0.7548776662466927, 0.5698402909980532)
 """Steps of the plane's R2 sequence: powers of 1/1.3247..., the plastic number."""
+
+
+EACH = tuple(artifacts.AVATAR_SHAPES)
+"""What every gaussian has."""
 
 
 @dataclass
@@ -31,24 +35,27 @@ class Gaussians:
     """(N, 3) colour in 0..1."""
     opacity: np.ndarray
     """(N,) in 0..1."""
+    light: np.ndarray | None = None
+    """(4, 3) of `avatar.light`, camera frame of the clip: what rgb is multiplied with by the way a face looks; None: by 1."""
 
     def __len__(self) -> int:
         return len(self.face)
 
     def __getitem__(self, which) -> Gaussians:
         """The gaussians that an index array, mask or slice picks."""
-        return Gaussians(*(np.ascontiguousarray(getattr(self, f.name)[which]) for f in fields(self)))
+        return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in EACH), self.light)
 
     def write(self, path: Path) -> None:
-        """avatar.npz: float32, face int32."""
-        arrays = {f.name: np.asarray(getattr(self, f.name), np.float32) for f in fields(self)}
+        """avatar.npz: float32, face int32; `light` where there is one."""
+        names = EACH if self.light is None else (*EACH, "light")
+        arrays = {name: np.asarray(getattr(self, name), np.float32) for name in names}
         artifacts.write_arrays(path, **(arrays | {"face": np.asarray(self.face, np.int32)}))
 
     @classmethod
     def read(cls, path: Path) -> Gaussians:
         """From avatar.npz; `artifacts.ArtifactError` where an array is missing or has another shape."""
-        arrays = artifacts.check_arrays(path, artifacts.AVATAR_SHAPES)
-        return cls(*(arrays[f.name] for f in fields(cls)))
+        arrays = artifacts.check_avatar(path)
+        return cls(*(arrays[name] for name in EACH), arrays.get("light"))
 
     @classmethod
     def per_face(cls, vertices: np.ndarray, faces: np.ndarray, rgb=(0.5, 0.5, 0.5), opacity: float = 0.9) -> Gaussians:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from gsac.avatar import binding
+from gsac.avatar import binding, light
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import backward, forward, project, tiles
@@ -41,6 +41,8 @@ class State:
     alpha: np.ndarray
     bound: tuple = field(default=())
     """vertices, faces, face, mu, quat, log_scale of `render_bound`."""
+    shade: np.ndarray | None = None
+    """(N, 3) that `render_bound` multiplied the colours with; None without a light."""
 
 
 class Rendering(NamedTuple):
@@ -160,13 +162,18 @@ def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, 
                                 take("valid", (f,), np.bool_))
     bound = binding.Bound(take("means", (n, 3), real), take("rotations", (n, 3, 3), real), take("scales", (n, 3), real))
     binding.forward(workspace.share, vertices, faces, take("used", (f,), np.bool_), frames, face, mu, quat, log_scale, bound)
-    rendering = render(*bound, gaussians.rgb, gaussians.opacity, camera, workspace)
-    rendering.state.bound = (vertices, faces, face, mu, quat, log_scale)
+    shade = None if gaussians.light is None else light.shade(gaussians.light, frames.R[face, :, 1])
+    rgb = gaussians.rgb if shade is None else gaussians.rgb * shade
+    rendering = render(*bound, rgb, gaussians.opacity, camera, workspace)
+    rendering.state.bound, rendering.state.shade = (vertices, faces, face, mu, quat, log_scale), shade
     return rendering
 
 
 def render_bound_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) -> BoundGradients:
-    """As `render_backward`, for the state of `render_bound`: gradients of the gaussians' own values and of the vertices."""
+    """As `render_backward`, for the state of `render_bound`: gradients of the gaussians' own values and of the vertices.
+
+    The light is taken as it falls on the mesh: what a turning face gains or loses by it gives no gradient.
+    """
     gradients = render_backward(state, grad_rgb, grad_alpha)
     vertices, faces, face, mu, quat, log_scale = state.bound
     real, take, n = mu.dtype, state.workspace.take, len(mu)
@@ -174,4 +181,6 @@ def render_bound_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.nda
                                    take("grad_log_scale", (n, 3), real), take("grad_vertices", vertices.shape, real))
     binding.backward(state.workspace.share, vertices, faces, face, mu, quat, log_scale, gradients.means,
                      gradients.rotations, gradients.scales, take("corners", (n, 9), real), out)
+    if state.shade is not None:
+        gradients.rgb[:] *= state.shade
     return BoundGradients(out.mu, out.quat, out.log_scale, gradients.rgb, gradients.opacity, out.vertices)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
 from gsac.stages.train.poses import BODY, Poses
 from gsac.stages.train.views import View
@@ -73,7 +73,7 @@ def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: i
     grads = render_bound_backward(rendering.state, np.ascontiguousarray(residual[..., :3]), weight * residual[..., 3])
     grad_pose, grad_transl, _, _ = poses.gradients(t, grads.vertices)
     turns = np.einsum("jba,jb->ja", rotation.log_derivative(poses.pose[t, BODY]), grad_pose[BODY])
-    tensors = render_bound_backward(rendering.state, slope, np.zeros_like(rendering.alpha)).rgb
+    tensors = render_backward(rendering.state, slope, np.zeros_like(rendering.alpha)).rgb
     used = tensors[:, 0] + tensors[:, 2] > FLAT
     rows = np.empty((2 * int(used.sum()), UNKNOWNS), np.float32)
     _rows(means[used], tensors[used], share[used], *_axes(poses, t), np.array(view.camera.focal, np.float32), rows)

@@ -1,4 +1,7 @@
-"""Colours to start from, read off the frames; what no frame sees takes the colour of what lies beside it."""
+"""Colours to start from, and the light they were seen in, read off the frames.
+
+What no frame sees takes the colour of what lies beside it.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,16 @@ import numpy as np
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.light import basis, shade
 from gsac.avatar.zbuffer import rasterise, visible_points
 from scipy.spatial import cKDTree
 
+TOLD = 10.0
+"""Independent values that a frame says of the light: what is wrong in it is wrong over large parts of the body."""
+NOISE = 0.1
+EVEN = 0.3
+"""Spread of the light's directed part, before anything is seen."""
+ROUNDS = 12
 LEAST_FACING = 0.1
 """Cosine between the face's normal and the ray to the camera below which a colour is not read."""
 SURE = 200
@@ -26,12 +36,23 @@ class PosedFrame:
     """(h, w, 4) uint8, premultiplied RGB and mask."""
 
 
-def read_colours(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussians) -> tuple[np.ndarray, np.ndarray]:
-    """Mean colour of each gaussian's place over the frames that see it, straight views counting more.
+@dataclass
+class Sight:
+    """What one frame shows of M gaussians' places."""
 
-    Returns rgb (N, 3) float32 in 0..1, grey where unseen, and seen (N,) bool.
-    """
-    total, weight = np.zeros((len(gaussians), 3)), np.zeros(len(gaussians))
+    which: np.ndarray
+    """(M,) indices of the gaussians."""
+    colour: np.ndarray
+    """(M, 3) in 0..1."""
+    normal: np.ndarray
+    """(M, 3) of the faces, camera frame."""
+    weight: np.ndarray
+    """(M,): straight views count more."""
+
+
+def read_sights(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussians) -> list[Sight]:
+    """The colours that the frames show where gaussians are."""
+    sights = []
     for frame in frames:
         posed = face_frames(frame.vertices, faces)
         places = bind(posed, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means.astype(np.float64)
@@ -41,13 +62,52 @@ def read_colours(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussia
         x, y = frame.camera.project(places[visible]).astype(np.int64).T
         pixel = frame.pixels[y, x].astype(np.float64)
         sure = pixel[:, 3] > SURE
-        chosen, w = visible[sure], facing[visible[sure]] ** 2
-        total[chosen] += w[:, None] * pixel[sure, :3] / pixel[sure, 3:]
-        weight[chosen] += w
-    seen = weight > 0
-    rgb = np.full((len(seen), 3), 0.5, np.float32)
-    rgb[seen] = np.clip(total[seen] / weight[seen, None], 0, 1)
+        chosen = visible[sure]
+        sights.append(Sight(chosen, pixel[sure, :3] / pixel[sure, 3:], posed.R[gaussians.face[chosen], :, 1], facing[chosen] ** 2))
+    return sights
+
+
+def mean_colours(sights: list[Sight], count: int, light: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Of `count` gaussians, what was seen of them with the light (4, 3) taken off.
+
+    Returns rgb (N, 3) float32 in 0..1, grey where unseen, and seen (N,) bool.
+    """
+    total, weight = np.zeros((count, 3)), np.zeros((count, 3))
+    for sight in sights:
+        factor = np.ones_like(sight.colour) if light is None else shade(light, sight.normal)
+        total[sight.which] += sight.weight[:, None] * sight.colour * factor
+        weight[sight.which] += sight.weight[:, None] * factor**2
+    seen = weight[:, 0] > 0
+    rgb = np.full((count, 3), 0.5, np.float32)
+    rgb[seen] = np.clip(total[seen] / weight[seen], 0, 1)
     return rgb, seen
+
+
+def find_light(sights: list[Sight], count: int) -> np.ndarray:
+    """(4, 3) float32: the light under which `count` gaussians, each of one colour, look most as they were seen.
+
+    Colours and light in turns, each by least squares. How strong the light is as a whole cannot be told from how bright the
+    colours are: its mean over what was seen is 1. A clip that shows no turn says nothing of it, and it stays even.
+    """
+    light = np.concatenate([np.ones((1, 3)), np.zeros((3, 3))])
+    seen = sum(float(sight.weight.sum()) for sight in sights)
+    if not seen:
+        return light.astype(np.float32)
+    trust = TOLD * len(sights) / NOISE**2 / seen
+    for _ in range(ROUNDS):
+        rgb, _ = mean_colours(sights, count, light)
+        square, product, mean = np.zeros((3, 4, 4)), np.zeros((3, 4)), np.zeros(3)
+        for sight in sights:
+            terms = basis(sight.normal)[:, :, None] * rgb[sight.which, None]
+            weighted = terms * sight.weight[:, None, None]
+            square += np.einsum("mac,mbc->cab", weighted, terms)
+            product += np.einsum("mac,mc->ca", weighted, sight.colour)
+        prior = np.diag([0, 1, 1, 1]) / EVEN**2
+        light = np.linalg.solve(trust * square + prior, trust * product[..., None])[..., 0].T
+        for sight in sights:
+            mean += (sight.weight[:, None] * (basis(sight.normal) @ light)).sum(0)
+        light /= mean / seen
+    return light.astype(np.float32)
 
 
 def fill_unseen(rgb: np.ndarray, seen: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -11,10 +11,10 @@ import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
 from gsac.stages.contract import StageError
-from gsac.stages.train.colours import PosedFrame, fill_unseen, read_colours
+from gsac.stages.train.colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.offsets import Offsets, fold
 from gsac.stages.train.task import Fit, Loop, Task
@@ -79,7 +79,9 @@ def start(task: Task, coarse: dict[int, View], count: int) -> Gaussians:
     every = -(-len(task.trained) // COLOUR_FRAMES)
     frames = [PosedFrame(task.poses.vertices(int(t)), coarse[int(t)].camera, coarse[int(t)].pixels)
               for t in task.trained[::every]]
-    rgb, seen = read_colours(frames, faces, gaussians)
+    sights = read_sights(frames, faces, gaussians)
+    gaussians.light = find_light(sights, count) if task.config.light else None
+    rgb, seen = mean_colours(sights, count, gaussians.light)
     gaussians.rgb = fill_unseen(rgb, seen, places(gaussians, rest, faces))
     if offset.any():
         gaussians, task.poses.offset = fold(gaussians, plain, offset, faces), np.zeros_like(offset)
@@ -100,7 +102,7 @@ class Trainer:
         self.rest = task.poses.rest(int(task.trained[0]))[0]
         self.settled, self.pose_rate = settled, task.config.pose_rate
         self.offsets = None if settled else Offsets(task.poses.body)
-        self.faces, self.face = task.poses.body.faces, gaussians.face
+        self.faces, self.face, self.light = task.poses.body.faces, gaussians.face, gaussians.light
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
                        "rgb": gaussians.rgb, "opacity": np.log(opacity / (1 - opacity))[:, None]}
@@ -116,7 +118,7 @@ class Trainer:
     def gaussians(self) -> Gaussians:
         v = self.values
         return Gaussians(self.face, v["mu"].copy(), v["quat"].copy(), v["log_scale"].copy(), v["rgb"].copy(),
-                         1 / (1 + np.exp(-v["opacity"][:, 0])))
+                         1 / (1 + np.exp(-v["opacity"][:, 0])), self.light)
 
     def step(self, t: int, view: View, done: float, background: np.ndarray, number: int) -> float:
         """One step on frame t. done: share of the steps so far; background: (3,). Returns the loss."""
@@ -137,7 +139,7 @@ class Trainer:
         """Loss of frame t, its gradients, the opacities (N,) and the gradient of the frame's gain (3,)."""
         config, v = self.config, self.values
         vertices = self.poses.vertices(t)
-        shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity"][:, 0]))
+        shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity"][:, 0]), self.light)
         rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
         background = background.astype(np.float32)
         gain = self.gains.get(t, np.ones(3)).astype(np.float32)
@@ -168,7 +170,7 @@ class Trainer:
         for t, view in views.items():
             rendering = render_bound(self.poses.vertices(t), self.faces, gaussians, view.camera, self.workspace)
             ones = np.ones_like(rendering.rgb)
-            shown += render_bound_backward(rendering.state, ones, np.zeros_like(rendering.alpha)).rgb[:, 0]
+            shown += render_backward(rendering.state, ones, np.zeros_like(rendering.alpha)).rgb[:, 0]
         seen = shown > LEAST_SHOWN * len(views)
         gaussians.rgb = fill_unseen(gaussians.rgb, seen, places(gaussians, self.rest, self.faces))
         return gaussians, seen

@@ -12,7 +12,7 @@ from dataclasses import asdict
 import numpy as np
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import psnr
-from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.workspace import Workspace
 from gsac.stages.train import fast
 from gsac.stages.train.evaluate import judge
@@ -64,7 +64,7 @@ def thinned(gaussians: Gaussians, size: int, task: Task, views, workspace: Works
     for t in task.trained[::-(-len(task.trained) // fast.COLOUR_FRAMES)]:
         rendering = render_bound(task.poses.vertices(int(t)), task.poses.body.faces, gaussians, views[int(t)].camera, workspace)
         ones = np.ones_like(rendering.rgb)
-        shown += render_bound_backward(rendering.state, ones, np.zeros_like(rendering.alpha)).rgb[:, 0]
+        shown += render_backward(rendering.state, ones, np.zeros_like(rendering.alpha)).rgb[:, 0]
     chance = (shown + 1e-3 * shown.mean()) ** EVENNESS
     share = np.minimum(1, size * chance / chance.sum())
     for _ in range(20):  # chances above one are handed to the others

@@ -7,6 +7,8 @@ smoothed by (1 + lambda L)^-1, L the mesh's uniform Laplacian, with one Adam sca
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
@@ -62,5 +64,4 @@ def fold(gaussians: Gaussians, rest: np.ndarray, offset: np.ndarray, faces: np.n
     mu = np.einsum("nji,nj->ni", R, displaced.means - T) / k
     quat = Rotation.from_matrix(np.einsum("nji,njk->nik", R, displaced.rotations)).as_quat()[:, [3, 0, 1, 2]]
     log_scale = np.log(np.maximum(displaced.scales, 1e-9) / k)
-    return Gaussians(gaussians.face, mu.astype(np.float32), quat.astype(np.float32), log_scale.astype(np.float32),
-                     gaussians.rgb, gaussians.opacity)
+    return replace(g, mu=mu.astype(np.float32), quat=quat.astype(np.float32), log_scale=log_scale.astype(np.float32))

@@ -153,6 +153,7 @@ class Run:
                 "*_ttpo": f"that pose, {config.pose_test_steps} steps optimised on the held-out image, avatar frozen",
                 "psnr_fg_fit": "the body fit's pose as it came",
             },
+            "light": None if gaussians.light is None else gaussians.light.tolist(),
             "n_gaussians": len(gaussians), "steps": self.curve[-1]["step"], "recipe": config.recipe,
             "device": self.job.device, "gpu_seconds": self.curve[-1].get("gpu_seconds"), "seed": config.seed,
             "image_size": [self.views[0].camera.width, self.views[0].camera.height],

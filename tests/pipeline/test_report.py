@@ -180,7 +180,7 @@ def test_hands_are_said_to_be_found_filled_or_missing_frame_by_frame(whole):
 def test_the_worst_held_out_frame_is_named(whole):
     page = Page(whole / "report.html")
     assert "frame 4, 21.25 dB on the person (the worst frame)" in page.text("heldout")
-    assert "Size judged 45 x 80 px Trained on 4 frames Held out 2 frames LPIPS not measured" in page.text("heldout")
+    assert "Size judged 45 x 80 px Light even Trained on 4 frames Held out 2 frames LPIPS not measured" in page.text("heldout")
     assert "Held-out frame 4 is much worse than the others (21.2 dB)." in page.text("head")
     assert "Aligning the pose to a held-out frame gains 2.4 dB" in page.text("head")
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from gsac.avatar.artifacts import Clip, write_alpha, write_frame
+from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.light import shade
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.stages.contract import Job, make_config
 from gsac.stages.train import STAGE
@@ -12,9 +14,12 @@ SIZE = (72, 128)
 SMALL = {"gaussians": 900, "steps": 300, "height": 128, "holdout": 4, "pose_rate": 3e-3, "pose_test_steps": 10}
 
 
-def write_inputs(folder, frames=12, blank=(), timestamps=True):
+LAMP = np.array([[0.7, 0.7, 0.7], [0.35, 0.3, 0.3], [0, 0, 0], [-0.2, -0.2, -0.2]])
+
+
+def write_inputs(folder, frames=12, blank=(), timestamps=True, lamp=False):
     """The input ports of `train` in `folder`; frames named in `blank` get an empty mask. The fit is off by
-    3 cm to the right and a third of a degree a joint."""
+    3 cm to the right and a third of a degree a joint. lamp: the person turns under LAMP, not in even light."""
     body, rng = Body.load(), np.random.default_rng(0)
     width, height = SIZE
     for name in ("split/frames", "segment/alpha", "smplx"):
@@ -37,6 +42,9 @@ def write_inputs(folder, frames=12, blank=(), timestamps=True):
         vertices = body.posed(true, [t])[0][0]
         face_id, bary, _ = rasterise(vertices, body.faces, true.camera(width, height))
         rgb = interpolate(colours, body.faces, face_id, bary)
+        if lamp:
+            factor = shade(LAMP, face_frames(vertices, body.faces).R[..., 1])
+            rgb = np.clip(rgb * factor[face_id], 0, 1)
         alpha = (face_id >= 0).astype(np.float32)
         write_frame(folder / f"split/frames/{t:06d}.png", np.uint8(np.where(alpha[..., None] > 0, rgb, 0.3) * 255))
         write_alpha(folder / f"segment/alpha/{t:06d}.exr", alpha * (t not in blank))
@@ -50,11 +58,11 @@ def write_inputs(folder, frames=12, blank=(), timestamps=True):
 
 @pytest.fixture
 def job(tmp_path):
-    """job(**parameters, frames=, blank=): a Job over fresh inputs; its warnings are in job.warnings."""
-    def make(name="out", frames=12, blank=(), timestamps=True, **parameters):
-        inputs = tmp_path / f"in_{frames}_{len(blank)}_{timestamps}"
+    """job(**parameters, frames=, blank=, lamp=): a Job over fresh inputs; its warnings are in job.warnings."""
+    def make(name="out", frames=12, blank=(), timestamps=True, lamp=False, **parameters):
+        inputs = tmp_path / f"in_{frames}_{len(blank)}_{timestamps}_{lamp}"
         if not inputs.exists():
-            write_inputs(inputs, frames, blank, timestamps)
+            write_inputs(inputs, frames, blank, timestamps, lamp)
         out = tmp_path / name
         out.mkdir()
         warnings = []
