@@ -150,7 +150,7 @@ def exported(person, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def node_package(tmp_path_factory):
-    """name@version -> a folder where node finds that package; skips where npm or the package index is absent."""
+    """name@version, several with spaces between -> a folder where node finds them; skips where npm or the index is absent."""
     folders = {}
 
     def folder(package):
@@ -158,7 +158,7 @@ def node_package(tmp_path_factory):
             pytest.skip("needs npm (Debian package npm)")
         if package not in folders:
             where = tmp_path_factory.mktemp("node")
-            install = ["npm", "install", "--silent", "--no-audit", "--no-fund", package]
+            install = ["npm", "install", "--silent", "--no-audit", "--no-fund", *package.split()]
             folders[package] = where if subprocess.run(install, cwd=where, capture_output=True).returncode == 0 else None
         if folders[package] is None:
             pytest.skip(f"npm could not install {package}")
