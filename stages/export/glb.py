@@ -1,6 +1,7 @@
 """`avatar.glb`: a skinned, vertex-coloured, animated mesh for any glTF tool, with the gaussians beside it.
 
-Mesh: 55 joints with identity rest rotations, at most 4 weights a vertex, y up, facing +z, feet at y = 0.
+Mesh: 55 joints with identity rest rotations, at most 4 weights a vertex, y up, facing +z, feet at y = 0; expressions are
+morph targets by their ARKit names.
 Gaussians: a POINTS primitive in T-pose with KHR_gaussian_splatting, on the same skin, each with the mesh face that it
 is bound to in `_GSAC_FACE`.
 """
@@ -53,6 +54,9 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
             "COLOR_0": file.add(_linear(colours), ARRAY_BUFFER),
             **_skin_attributes(file, avatar.skin_index, avatar.skin_weight),
         }}], "name": "body"}
+    if avatar.expression_names:
+        mesh["primitives"][0]["targets"] = _targets(file, avatar)
+        mesh |= {"weights": [0.0] * len(avatar.expression_names), "extras": {"targetNames": avatar.expression_names}}
     corners = avatar.faces[g["face"]]
     rgb = np.clip(g["rgb"], 0, 1)
     points = {"primitives": [{
@@ -128,6 +132,13 @@ def _point_skin(avatar: RiggedAvatar, corners: np.ndarray) -> tuple[np.ndarray, 
     return index, np.take_along_axis(dense, index, axis=1)
 
 
+def _targets(file: _Buffer, avatar: RiggedAvatar) -> list[dict[str, int]]:
+    """One morph target an expression: only the vertices that it moves."""
+    spans = [slice(a, b) for a, b in zip(avatar.expression_start, avatar.expression_start[1:], strict=False)]
+    return [{"POSITION": file.add_sparse(len(avatar.vertices), avatar.expression_vertex[span], avatar.expression_delta[span])}
+            for span in spans]
+
+
 def _animation(file: _Buffer, name: str, clip: Clip, avatar: RiggedAvatar, rest: list[float], root: int) -> dict:
     """glTF animation; a looping clip ends with its first key."""
     closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]
@@ -155,17 +166,35 @@ class _Buffer:
         """array: (n,) or (n, width). Returns the accessor's index."""
         array = np.ascontiguousarray(array)
         width = 1 if array.ndim == 1 else array.shape[1]
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes}
-        self.views.append(view | ({"target": target} if target else {}))
-        accessor = {"bufferView": len(self.views) - 1, "componentType": CODES[array.dtype], "count": len(array),
+        view = self._view(array)
+        self.views[view] |= {"target": target} if target else {}
+        accessor = {"bufferView": view, "componentType": CODES[array.dtype], "count": len(array),
                     "type": KINDS[width]}
         if bounds:
             flat = array.reshape(len(array), width)
             accessor |= {"min": flat.min(0).tolist(), "max": flat.max(0).tolist()}
         self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+    def add_sparse(self, count: int, rows: np.ndarray, values: np.ndarray) -> int:
+        """(count, 3) float32, zero but for values (n, 3) at rows (n,). Returns the accessor's index."""
+        order = np.argsort(rows)
+        rows, values = rows[order].astype("<u2" if count <= 1 << 16 else "<u4"), values[order].astype("<f4")
+        accessor = {"componentType": FLOAT, "count": count, "type": "VEC3"}
+        held = np.vstack([values, np.zeros((int(count > len(rows)), 3), "<f4")])
+        accessor |= {"min": held.min(0).tolist(), "max": held.max(0).tolist()}
+        if len(rows):
+            accessor["sparse"] = {"count": len(rows), "values": {"bufferView": self._view(values)},
+                                  "indices": {"bufferView": self._view(rows), "componentType": CODES[rows.dtype]}}
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+    def _view(self, array: np.ndarray) -> int:
+        """The array's bytes as a bufferView without a target."""
+        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes})
         self.data += array.tobytes()
         self.data += b"\0" * (-len(self.data) % 4)
-        return len(self.accessors) - 1
+        return len(self.views) - 1
 
     def glb(self, document: dict) -> bytes:
         document = document | {"buffers": [{"byteLength": len(self.data)}], "bufferViews": self.views,

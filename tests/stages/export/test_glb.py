@@ -146,3 +146,39 @@ def test_the_validator_finds_nothing_but_its_four_known_false_reports(glb, node_
     wrong = {m["pointer"] for m in messages if m["severity"] == 0}
     assert wrong == KNOWN_FALSE
     assert [m["code"] for m in messages if m["severity"] == 1] == []
+
+
+THREE = "three@0.180.0"
+LOOK = """
+import * as THREE from 'three';
+import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
+import fs from 'fs';
+globalThis.self = globalThis;
+const bytes = fs.readFileSync('avatar.glb');
+const gltf = await new GLTFLoader().parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), '');
+let mesh = null;
+gltf.scene.traverse((o) => { if (o.isSkinnedMesh && o.morphTargetDictionary) mesh = o; });
+gltf.scene.updateMatrixWorld(true);
+const places = () => Array.from({ length: mesh.geometry.attributes.position.count },
+  (_, i) => mesh.getVertexPosition(i, new THREE.Vector3()).toArray());
+const out = { names: mesh.morphTargetDictionary, rest: places() };
+mesh.morphTargetInfluences[mesh.morphTargetDictionary.jawOpen] = 0.5;
+out.jawOpen = places();
+console.log(JSON.stringify(out));
+"""
+
+
+@pytest.mark.slow
+def test_expressions_are_morph_targets_that_threes_loader_moves(figure, glb, node_package):
+    folder = node_package(THREE)
+    (folder / "avatar.glb").write_bytes(glb)
+    (folder / "morph.mjs").write_text(LOOK)
+    done = subprocess.run(["node", "morph.mjs"], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(done.stdout.splitlines()[-1])
+    assert seen["names"] == {name: e for e, name in enumerate(figure.expression_names)}
+    rest = figure.vertices - np.float32([0, figure.ground, 0])
+    np.testing.assert_allclose(seen["rest"], rest, atol=1e-6)
+    span = slice(figure.expression_start[0], figure.expression_start[1])
+    rest[figure.expression_vertex[span]] += 0.5 * figure.expression_delta[span]
+    np.testing.assert_allclose(seen["jawOpen"], rest, atol=1e-6)
