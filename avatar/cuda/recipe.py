@@ -32,7 +32,7 @@ class Recipe:
     sobel: float = 0.0
     mask: float = 0.3
     needle: float = 4.0
-    largest: float = 0.05
+    largest: float = 0.025
     """Longest axis of a gaussian, m at rest."""
     reach: float = 0.08
     place_pull: float = 1e-3

@@ -61,6 +61,8 @@ class TrainConfig:
     """Weight of the L2 between the avatar's alpha and the mask."""
     needle: float = 4.0
     """Longest axis of a gaussian over its middle one, at most."""
+    largest: float = 0.025
+    """Longest axis (standard deviation) of a gaussian at rest, m; more where there are fewer than 12,000."""
     reach: float = 0.08
     """How far a gaussian may lie from where it was placed on its face, m at rest."""
     place_pull: float = 1e-3
@@ -90,6 +92,6 @@ class TrainConfig:
         if self.holdout == 1:
             raise BadInput("train.holdout is 1: every frame would be held out; use 0 for none, or 2 and more")
         for name in ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "pose_pull", "ssim",
-                     "sobel", "mask", "reach", "place_pull"):
+                     "sobel", "mask", "largest", "reach", "place_pull"):
             if not 0 <= getattr(self, name) < 1e3:
                 raise BadInput(f"train.{name} is {getattr(self, name)}; it must be 0 or more")

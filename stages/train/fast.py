@@ -11,13 +11,14 @@ import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
+from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
 from gsac.stages.contract import StageError
 from gsac.stages.train.colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.offsets import Offsets, fold
 from gsac.stages.train.task import Fit, Loop, Task
+from gsac.stages.train.unseen import LEAST_SHOWN, laid, shown
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 1600
@@ -29,10 +30,8 @@ OFFSET_RATE = 1e-3
 """m for each step of the offsets, falls to a tenth."""
 COLOUR_FRAMES = 24
 """How many frames the first colours are read from."""
-LARGEST = 0.05
-"""Longest axis of a gaussian, m at rest."""
-LEAST_SHOWN = 0.1
-"""Pixels of a half-size frame, on average over the frames, that a gaussian must fill to have a colour of its own."""
+LARGEST_OF = 12000
+"""Gaussians of an avatar whose longest axis may be `train.largest`; fewer must each cover more."""
 GAIN_RATE = 2e-3
 
 
@@ -56,6 +55,7 @@ def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, V
         t, done = int(order.pop()), step / steps
         if trainer.offsets and done >= OFFSET_SHARE:
             trainer.fold_offsets()
+            trainer.lay_unseen(coarse)
         loss = trainer.step(t, (coarse if done < COARSE_SHARE else fine)[t], done, rng.random(3), step)
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
         task.progress(step + 1, steps, "steps")
@@ -110,9 +110,11 @@ class Trainer:
         self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)
-        self.start = self.values["mu"].copy()
+        self.start, self.largest = self.values["mu"].copy(), self.config.largest * max(1, LARGEST_OF / len(self.face)) ** 0.5
         self.face_scale = face_frames(self.rest, self.faces).k[self.face].astype(np.float64)
         self.gains: dict[int, np.ndarray] = {}
+        self.seen: np.ndarray | None = None
+        """(N,) bool, once it is decided; the others are no longer moved."""
         self.workspace, self.losses = Workspace(), Workspace()
 
     def gaussians(self) -> Gaussians:
@@ -160,20 +162,29 @@ class Trainer:
         self.start = folded.mu.copy()
         self.poses.offset, self.offsets = np.zeros_like(self.poses.offset), None
 
-    def recoloured(self, views: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
-        """The gaussians, those that (almost) no frame shows in the colour of their neighbours; seen (N,) bool.
+    def lay_unseen(self, views: dict[int, View]) -> None:
+        """Gaussians that no frame shows are laid among their neighbours, and stay there. views: frame -> view at half the size."""
+        gaussians, self.seen = self.gaussians(), self._seen(views)
+        gaussians = laid(gaussians, self.seen, self.rest, self.faces)
+        opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
+        self.values |= {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
+                        "opacity": np.log(opacity / (1 - opacity))[:, None].astype(np.float32)}
+        self.start = gaussians.mu.copy()
 
-        What a gaussian adds to all images, in pixels, is the gradient of their sum with respect to its colour.
-        """
-        gaussians = self.gaussians()
-        shown = np.zeros(len(gaussians))
-        for t, view in views.items():
-            rendering = render_bound(self.poses.vertices(t), self.faces, gaussians, view.camera, self.workspace)
-            ones = np.ones_like(rendering.rgb)
-            shown += render_backward(rendering.state, ones, np.zeros_like(rendering.alpha)).rgb[:, 0]
-        seen = shown > LEAST_SHOWN * len(views)
-        gaussians.rgb = fill_unseen(gaussians.rgb, seen, places(gaussians, self.rest, self.faces))
+    def recoloured(self, views: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
+        """The gaussians, those that no frame shows in the colour of their neighbours unless laid already; seen (N,) bool."""
+        gaussians, seen = self.gaussians(), self.seen
+        if seen is None:
+            seen = self._seen(views)
+            gaussians.rgb = fill_unseen(gaussians.rgb, seen, places(gaussians, self.rest, self.faces))
         return gaussians, seen
+
+    def _seen(self, views: dict[int, View]) -> np.ndarray:
+        """(N,) bool, whether the frames show the gaussian's front."""
+        gaussians = self.gaussians()
+        pixels = sum(shown(gaussians, self.poses.vertices(t), self.faces, view.camera, self.workspace)
+                     for t, view in views.items())
+        return pixels > LEAST_SHOWN * len(views)
 
     def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:
         config = self.config
@@ -202,11 +213,14 @@ class Trainer:
                  "opacity": config.opacity_rate * 0.1**done}
         by_name = {"mu": grads.mu, "quat": grads.quat, "log_scale": grads.log_scale, "rgb": grads.rgb,
                    "opacity": (grads.opacity * opacity * (1 - opacity))[:, None]}
-        count_rows(grads.rgb, self.count)
+        if self.seen is not None:
+            for grad in by_name.values():
+                grad[~self.seen] = 0
+        count_rows(by_name["rgb"], self.count)
         for name, rate in rates.items():
             adam_rows(v[name], by_name[name], self.first[name], self.second[name], self.count, rate)
         limit(v["mu"], v["quat"], v["log_scale"], v["rgb"], v["opacity"], self.start, self.face_scale, config.needle,
-              LARGEST, config.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
+              self.largest, config.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
 
 
 def sigmoid(x: np.ndarray) -> np.ndarray:

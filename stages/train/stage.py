@@ -16,6 +16,7 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.evaluate import judge, turned
 from gsac.stages.train.holdout import spaced_in_yaw
+from gsac.stages.train.novel import judge_novel
 from gsac.stages.train.poses import Poses, carried
 from gsac.stages.train.recipes import ALIGN, RECIPES
 from gsac.stages.train.task import Task
@@ -163,5 +164,6 @@ class Run:
                                "psnr_fg_ttpo": psnr(other["mse_fg"])}
                         for row, other in zip(rows, ttpo or [{"mse_fg": None}] * len(rows), strict=True)],
             "unseen_gaussians": int((~self.result.seen).sum()),
+            **judge_novel(gaussians, poses, self.workspace),
             "curve": self.curve,
         } | self.result.figures

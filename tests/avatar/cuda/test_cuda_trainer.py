@@ -60,7 +60,7 @@ def test_what_the_recipe_shares_with_the_stage_has_the_same_default():
 
     assert Recipe.of(TrainConfig()) == Recipe(steps=fast.STEPS)
     assert Recipe.of(TrainConfig(steps=7, mask=0.5), batch=3) == Recipe(steps=7, mask=0.5, batch=3)
-    assert (Recipe().largest, Recipe().coarse_share, Recipe().offset_share) == (fast.LARGEST, fast.COARSE_SHARE, fast.OFFSET_SHARE)
+    assert (Recipe().coarse_share, Recipe().offset_share) == (fast.COARSE_SHARE, fast.OFFSET_SHARE)
     assert (Recipe().turn_unit, Recipe().shift_unit, Recipe().hand_share) == (poses.TURN, poses.SHIFT, poses.HAND_SHARE)
 
 

@@ -1,0 +1,54 @@
+"""Gaussians that no frame shows from their front: laid on the surface that their neighbours make, in their neighbours' colour.
+
+Nothing in the images says where they belong, and training would leave them as fur at edges and ragged soles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar.binding import face_frames
+from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import FLATNESS, Gaussians
+from gsac.avatar.raster import render_backward, render_bound
+from gsac.avatar.workspace import Workspace
+from scipy.spatial import cKDTree
+
+FRONT = 0.3
+"""Cosine between a face's normal and the way to the camera from which on a frame shows it fully; at none it shows nothing."""
+LEAST_SHOWN = 0.05
+"""Pixels of a half-size frame, on average over the frames, that a gaussian must show of its front to be called seen."""
+NEIGHBOURS = 8
+LEAST_OPACITY = 0.9
+
+
+def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera, workspace: Workspace) -> np.ndarray:
+    """(N,) pixels that each gaussian adds to one image from its front. vertices: (V, 3).
+
+    What it adds to all pixels is the gradient of their sum with respect to its colour.
+    """
+    rendering = render_bound(vertices, faces, gaussians, camera, workspace)
+    added = render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0]
+    frames = face_frames(vertices, faces)
+    normal, place = frames.R[gaussians.face, :, 1], frames.T[gaussians.face]
+    facing = -(normal * place).sum(1) / np.maximum(np.linalg.norm(place, axis=1), 1e-9)
+    return np.clip(facing / FRONT, 0, 1) * added
+
+
+def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
+    """The gaussians, unseen ones as flat discs at the height, size and colour of their neighbours. seen: (N,); rest: (V, 3)."""
+    poor = np.flatnonzero(~seen)
+    if not len(poor) or not seen.any():
+        return gaussians
+    frames = face_frames(rest, faces)
+    size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
+    count = min(NEIGHBOURS, int(seen.sum()))
+    near = np.flatnonzero(seen)[cKDTree(middle[seen]).query(middle[poor], k=count)[1]].reshape(len(poor), count)
+    out = gaussians[np.arange(len(gaussians))]
+    out.mu[poor, 1] = np.median(size[near] * gaussians.mu[near, 1], axis=1) / size[poor]
+    widths = np.sort(gaussians.log_scale, 1)[:, 1:].mean(1) + np.log(size)
+    width = np.maximum(np.median(widths[near], axis=1), widths[poor]) - np.log(size[poor])
+    out.log_scale[poor] = np.stack([width, width + np.log(FLATNESS), width], 1)
+    out.quat[poor] = [1, 0, 0, 0]
+    out.rgb[poor] = gaussians.rgb[near].mean(1)
+    out.opacity[poor] = np.maximum(gaussians.opacity[near].mean(1), LEAST_OPACITY)
+    return out

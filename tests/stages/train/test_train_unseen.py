@@ -1,0 +1,76 @@
+"""Gaussians that no frame shows, and what the avatar looks like in poses that no frame has."""
+
+import numpy as np
+import pytest
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.workspace import Workspace
+from gsac.stages.train import fast, novel, unseen
+from gsac.stages.train.poses import Poses
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Body.load()
+
+
+def covering(body, count=4000):
+    gaussians = Gaussians.area(body.v_template, body.faces, count, 0)
+    return gaussians, fast.places(gaussians, body.v_template, body.faces)
+
+
+def standing(body):
+    """Vertices before a camera that looks at the front."""
+    middle = (body.v_template.min(0) + body.v_template.max(0)) / 2
+    vertices = (body.v_template - middle) @ np.diag([1.0, -1.0, -1.0]) + [0, 0, 4.0]
+    return np.float32(vertices), Camera((300.0, 300.0), (110.0, 110.0), 220, 220)
+
+
+def test_a_front_view_shows_the_chest_and_neither_back_nor_soles(body):
+    gaussians, at = covering(body)
+    vertices, camera = standing(body)
+    pixels = unseen.shown(gaussians, vertices, body.faces, camera, Workspace(1))
+    normal = fast.face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
+    height = (at[:, 1] - at[:, 1].min()) / np.ptp(at[:, 1])
+    trunk, soles = (np.abs(at[:, 0]) < 0.1) & (height > 0.55) & (height < 0.75), (height < 0.01) & (normal[:, 1] < -0.8)
+    assert np.median(pixels[trunk & (normal[:, 2] > 0.5)]) > 0.5
+    assert np.quantile(pixels[trunk & (normal[:, 2] < -0.2)], 0.9) < 0.05
+    assert soles.sum() > 10 and np.quantile(pixels[soles], 0.9) < 0.05
+
+
+def test_unseen_gaussians_take_height_shape_and_colour_of_their_neighbours_and_seen_ones_stay(body):
+    gaussians, at = covering(body)
+    rng = np.random.default_rng(0)
+    seen = at[:, 1] > at[:, 1].min() + 0.05
+    gaussians.rgb[:] = [0.9, 0.1, 0.1]
+    gaussians.rgb[~seen] = rng.random((int((~seen).sum()), 3))
+    gaussians.mu[~seen] += rng.normal(0, 2, (int((~seen).sum()), 3)).astype(np.float32)
+    gaussians.quat[~seen] = rng.normal(size=(int((~seen).sum()), 4))
+    out = unseen.laid(gaussians, seen, body.v_template, body.faces)
+    np.testing.assert_allclose(out.rgb[~seen], [[0.9, 0.1, 0.1]] * int((~seen).sum()), atol=1e-5)
+    np.testing.assert_array_equal(out.quat[~seen], [[1, 0, 0, 0]] * int((~seen).sum()))
+    assert np.abs(out.mu[~seen, 1]).max() < 1e-3, "the neighbours lie on the surface"
+    np.testing.assert_array_equal(out.mu[seen], gaussians.mu[seen])
+    np.testing.assert_array_equal(gaussians.quat[~seen, 0] == 1, False)
+
+
+def test_where_nothing_or_everything_is_seen_nothing_changes(body):
+    gaussians, _ = covering(body, 300)
+    for seen in (np.zeros(300, bool), np.ones(300, bool)):
+        assert unseen.laid(gaussians, seen, body.v_template, body.faces) is gaussians
+
+
+def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
+    params = BodyParams.from_pose(np.zeros((1, 55, 3)), np.zeros((1, 3)), np.zeros(4), np.zeros((1, body.exprdirs.shape[2])),
+                                  300.0, (64.0, 64.0))
+    poses = Poses(body, params)
+    gaussians, at = covering(body)
+    clean = novel.judge_novel(gaussians, poses, Workspace(1))
+    assert clean["stray_alpha"] < 1e-4 and clean["needle_share"] == 0
+    armpit = int(np.argmin(np.linalg.norm(at - body.keypoint_matrix[5] @ body.v_template, axis=1)))
+    gaussians.mu[armpit, 1] += 0.2 / fast.face_frames(body.v_template, body.faces).k[gaussians.face[armpit]]
+    gaussians.log_scale[armpit] += 1.5
+    assert novel.judge_novel(gaussians, poses, Workspace(1))["stray_alpha"] > 10 * max(clean["stray_alpha"], 1e-4)
+    gaussians.log_scale[7] += [3, 0, 0]
+    assert novel.judge_novel(gaussians, poses, Workspace(1))["needle_share"] == pytest.approx(1 / 4000)
