@@ -82,7 +82,12 @@ def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
             order[step, b] = left.pop()
             background[step, b] = random.random(3)
     done = recipe.begin + (1 - recipe.begin) * np.arange(recipe.steps) / max(recipe.steps, 1)
-    rates = np.zeros(recipe.steps, [(name, np.int32 if name == "level" else np.float32) for name in PLAN])
+    return Drawn(order, background, rates_of(recipe, done, levels))
+
+
+def rates_of(recipe: Recipe, done: np.ndarray, levels: int = 1) -> np.ndarray:
+    """As `Drawn.rates`, of steps at these shares of the way, (steps,)."""
+    rates = np.zeros(len(done), [(name, np.int32 if name == "level" else np.float32) for name in PLAN])
     rates["level"] = np.where(done < recipe.coarse_share, 0, levels - 1)
     for name, rate, end in (("mu", recipe.mu_rate, 0.01), ("quat", recipe.quat_rate, 0.1), ("log_scale", recipe.scale_rate, 0.1),
                             ("rgb", recipe.rgb_rate, 0.1), ("opacity", recipe.opacity_rate, 0.1), ("pose", recipe.pose_rate, 0.01),
@@ -90,4 +95,4 @@ def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
         rates[name] = rate * end**done
     rates["offset"] = np.where(done < recipe.offset_share, recipe.offset_rate * 0.1 ** (done / max(recipe.offset_share, 1e-9)), 0)
     rates["betas"], rates["gain"] = recipe.beta_rate, recipe.gain_rate * 0.1**done
-    return Drawn(order, background, rates)
+    return rates

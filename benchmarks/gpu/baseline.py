@@ -14,8 +14,8 @@ from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.cuda.trainer import BodyArrays, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.benchmarks.gpu.figure import Figure
-from gsac.stages.train import fast
-from gsac.stages.train.cuda import body_arrays
+from gsac.stages.train import bundle, fast
+from gsac.stages.train.cuda import body_arrays, learning
 from gsac.stages.train.poses import BODY, HAND_SHARE, JAW_EYES
 from gsac.stages.train.task import Fit, Task
 from torch.nn import functional
@@ -49,6 +49,7 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
 
 def fit(task: Task) -> Fit:
     """Recipe fast as the stage knows recipes, eager: frames, sizes, backgrounds and rates as on the GPU."""
+    bundle.adjust(task, learning)
     fine, coarse = fast.crops(task)
     recipe, gaussians = Recipe.of(task.config), fast.start(task, coarse, task.config.gaussians)
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]

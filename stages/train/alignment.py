@@ -88,7 +88,7 @@ def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:
     return transforms[:, :, :3].astype(np.float32), places.astype(np.float32)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _rows(means, tensors, share, axes, places, focal, rows):
     """Two rows a gaussian: its motion in the image by each unknown, times the root of its slope tensor [a b; b c]."""
     last = 3 * axes.shape[0]

@@ -7,15 +7,22 @@ Gaussian process: frames that are not trained on are corrected as those around t
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager
+from typing import NamedTuple
+
 import numpy as np
 from gsac.avatar import rotation
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.workspace import Workspace, available
 from gsac.stages.contract import StageError
 from gsac.stages.train import fast
-from gsac.stages.train.alignment import TURNING, UNKNOWNS, carriers, normal_equations
-from gsac.stages.train.poses import BODY
+from gsac.stages.train.alignment import TURNING, UNKNOWNS, Normal, carriers, normal_equations
+from gsac.stages.train.poses import BODY, Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
+from threadpoolctl import threadpool_limits
 
 COUNT = 3000
 """Gaussians, at most as many as are asked for."""
@@ -40,23 +47,54 @@ WORSE = 1.1
 SOLVER_STEPS, SOLVED = 60, 1e-10
 
 
-def adjust(task: Task) -> None:
-    """Corrects the poses of all frames in task.poses, and leaves the surface's offset there, for `fast.start`."""
+class Round(NamedTuple):
+    frames: np.ndarray
+    """(n,) in the order of the steps."""
+    backgrounds: np.ndarray
+    """(n, 3)."""
+    done: float
+    """Share of a training's steps that the rates are those of."""
+
+
+def adjust(task: Task, learning: Callable[..., AbstractContextManager]) -> None:
+    """Corrects the poses of all frames in task.poses, and leaves the surface's offset there, for `fast.start`.
+
+    learning: where gaussians and surface learn, as `learning_on_cpu`.
+    """
     config, rounds = task.config, task.config.pose_rounds
     if not rounds:
         return
     views = small(task)
-    rng = np.random.default_rng([config.seed, 1])
     count = COUNT if isinstance(config.gaussians, str) else min(COUNT, config.gaussians)
-    trainer = fast.Trainer(fast.start(task, views, count), task)
-    trainer.pose_rate = 0.0
-    corrections = Corrections(trainer, views)
-    for number in range(rounds):
-        for step, t in enumerate(np.concatenate([rng.permutation(list(views)) for _ in range(EPOCHS)])):
-            trainer.step(int(t), views[int(t)], DONE * number / rounds, rng.random(3), step)
-        corrections.solve()
-        task.progress(number + 1, rounds, "rounds of poses")
+    plan = drawn(list(views), rounds, np.random.default_rng([config.seed, 1]))
+    with learning(task, views, fast.start(task, views, count), plan) as (learn, gaussians, face):
+        corrections = Corrections(task.poses, gaussians, face, views)
+        for number in range(rounds):
+            learn(plan[number])
+            corrections.solve()
+            task.progress(number + 1, rounds, "rounds of poses")
     task.poses.settle()
+
+
+def drawn(frames: list[int], rounds: int, rng: np.random.Generator) -> list[Round]:
+    out = []
+    for number in range(rounds):
+        order = np.concatenate([rng.permutation(frames) for _ in range(EPOCHS)])
+        out.append(Round(order, rng.random((len(order), 3)), DONE * number / rounds))
+    return out
+
+
+@contextmanager
+def learning_on_cpu(task: Task, views: dict[int, View], gaussians: Gaussians, plan: list[Round]):
+    """`learn(round)` with the poses as they are in the task; the gaussians as they stand, `gaussians()`; their faces."""
+    trainer = fast.Trainer(gaussians, task)
+    trainer.pose_rate = 0.0
+
+    def learn(one: Round) -> None:
+        for step, (t, background) in enumerate(zip(one.frames, one.backgrounds, strict=True)):
+            trainer.step(int(t), views[int(t)], one.done, background, step)
+
+    yield learn, trainer.gaussians, trainer.face
 
 
 def small(task: Task) -> dict[int, View]:
@@ -72,22 +110,21 @@ def small(task: Task) -> dict[int, View]:
 class Corrections:
     """turns (T, TURNING, 3) rad after the fit's rotations and shifts (T, 3) m, as one array (T, U)."""
 
-    def __init__(self, trainer: fast.Trainer, views: dict[int, View]):
-        self.trainer, self.views, self.poses = trainer, views, trainer.poses
-        frames = len(self.poses.pose)
-        self.share = carriers(self.poses.body, trainer.face)
+    def __init__(self, poses: Poses, gaussians: Callable[[], Gaussians], face: np.ndarray, views: dict[int, View]):
+        self.poses, self.gaussians, self.views = poses, gaussians, views
+        frames = len(poses.pose)
+        self.share = carriers(poses.body, face)
         self.root = np.linalg.cholesky(covariance(frames))
         self.spread = np.append(np.full(3 * TURNING, TURN), np.full(3, SHIFT))
         self.values = np.zeros((frames, UNKNOWNS))
         self.kept, self.error = self.values, np.inf
-        self.workspace = Workspace()
+        self.workspaces = [Workspace(1) for _ in range(min(available(), len(views)))]
 
     def solve(self) -> None:
         """One Gauss-Newton step of all frames. A step that made the images worse is taken back instead."""
         gradient, hessian = np.zeros(self.values.shape), np.zeros((*self.values.shape, UNKNOWNS))
-        gaussians, error, pixels = self.trainer.gaussians(), 0.0, 0
-        for t, view in self.views.items():
-            normal = normal_equations(gaussians, self.share, self.poses, t, view, self.workspace)
+        gaussians, error, pixels = self.gaussians(), 0.0, 0
+        for t, normal in self.equations(gaussians):
             gradient[t], hessian[t] = normal.gradient, normal.hessian
             error, pixels = error + normal.error, pixels + normal.pixels
         error /= max(4 * pixels, 1)
@@ -110,6 +147,17 @@ class Corrections:
         z = conjugate_gradients(apply, -known * pulled(gradient - np.einsum("tab,tb->ta", hessian, before)))
         self.values = before + np.clip((root @ z) * spread - before, -MOST, MOST)
         self.place()
+
+    def equations(self, gaussians: Gaussians) -> list[tuple[int, Normal]]:
+        """Of every frame, in the order of the views; a thread a frame, since one small image is not worth many."""
+        work, many = list(self.views.items()), len(self.workspaces)
+
+        def part(k: int) -> list[Normal]:
+            return [normal_equations(gaussians, self.share, self.poses, t, view, self.workspaces[k]) for t, view in work[k::many]]
+
+        with threadpool_limits(1, "blas"), ThreadPoolExecutor(many) as pool:
+            parts = list(pool.map(part, range(many)))
+        return [(t, parts[i % many][i // many]) for i, (t, _) in enumerate(work)]
 
     def place(self) -> None:
         """Poses as corrected."""

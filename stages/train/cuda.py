@@ -14,10 +14,11 @@ from gsac.avatar.cuda.align import Aligner, AlignRecipe
 from gsac.avatar.cuda.device import DeviceError
 from gsac.avatar.cuda.kernels import CompileError
 from gsac.avatar.cuda.recipe import Recipe
+from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
 from gsac.avatar.cuda.trainer import BodyArrays, CudaTrainer, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import StageError
-from gsac.stages.train import fast, ladder
+from gsac.stages.train import bundle, fast, ladder
 from gsac.stages.train.evaluate import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.offsets import fold
 from gsac.stages.train.poses import Poses
@@ -56,6 +57,22 @@ def align_poses(gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: l
     with training(poses, frames, [{int(t): person_crop(views[t]) for t in frames}], gaussians, recipe, Aligner) as trainer:
         trainer.train(recipe.steps)
         poses.pose[frames], poses.transl[frames] = trainer.poses()
+
+
+@contextmanager
+def learning(task: Task, views: dict[int, View], gaussians: Gaussians, plan: list[bundle.Round]):
+    """As `bundle.learning_on_cpu`."""
+    poses, where = task.poses, {int(t): k for k, t in enumerate(task.trained)}
+    rounds = [Round(np.array([where[int(t)] for t in one.frames]), one.backgrounds, one.done) for one in plan]
+    recipe = RoundsRecipe.of(task.config, steps=sum(len(one.frames) for one in rounds), offset_rate=fast.OFFSET_RATE,
+                             pose_rate=0.0, gain_rate=gain_rate(task), rounds=rounds)
+    with training(poses, task.trained, [views], gaussians, recipe, RoundsTrainer) as trainer:
+        def learn(one: bundle.Round) -> None:
+            trainer.place(poses.pose[task.trained], poses.transl[task.trained])
+            trainer.train(len(one.frames))
+            poses.offset = trainer.offset()
+
+        yield learn, trainer.gaussians, gaussians.face
 
 
 def gain_rate(task: Task) -> float:
@@ -128,6 +145,7 @@ def hand_back(trainer: CudaTrainer, task: Task) -> None:
     poses.offset = trainer.offset()
     if trainer.recipe.beta_rate:
         poses.betas = np.array(poses.params.betas, np.float64) + trainer.betas()
+        poses.shaped = None
         poses.rests.clear()
 
 

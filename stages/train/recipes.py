@@ -10,13 +10,13 @@ from gsac.stages.train.task import Fit, Loop, Task
 
 def fit_fast(loop: Loop, task: Task) -> Fit:
     """Poses moved to the images; then the given number of gaussians, or the ladder."""
-    bundle.adjust(task)
+    bundle.adjust(task, loop.learning)
     return ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
 
 
 RECIPES = {
-    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit, align_poses)),
-    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit, cuda.align_poses)),
+    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit, align_poses, bundle.learning_on_cpu)),
+    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit, cuda.align_poses, cuda.learning)),
     ("paper", "cpu"): paper.fit,
     ("paper", "cuda"): paper_cuda.fit,
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -52,3 +53,5 @@ class Loop(NamedTuple):
     """As `ladder.refit`."""
     align: Callable[[Gaussians, Poses, np.ndarray, list[View], int], None]
     """As `evaluate.align_poses`."""
+    learning: Callable[..., AbstractContextManager]
+    """As `bundle.learning_on_cpu`."""

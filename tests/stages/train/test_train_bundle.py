@@ -51,7 +51,7 @@ def test_the_equations_of_a_frame_are_its_slope_and_nearly_its_curvature(job):
 
 def test_rounds_bring_trained_and_held_out_frames_nearer_the_truth(job):
     task = task_of(job(pose_rounds=4), held=(3, 8))
-    bundle.adjust(task)
+    bundle.adjust(task, bundle.learning_on_cpu)
     off = np.abs(task.poses.transl[:, 0])
     assert off[task.trained].max() < 0.6 * TRUE_SHIFT and off[task.held].max() < 0.6 * TRUE_SHIFT
     after = carried(task.poses, task.trained)
@@ -62,7 +62,8 @@ def test_rounds_bring_trained_and_held_out_frames_nearer_the_truth(job):
 def test_a_step_that_made_the_images_worse_is_taken_back(job):
     task = task_of(job(frames=3))
     views = {t: fast.person_crop(task.views[t]).halved() for t in range(3)}
-    corrections = bundle.Corrections(fast.Trainer(fast.start(task, views, 600), task), views)
+    trainer = fast.Trainer(fast.start(task, views, 600), task)
+    corrections = bundle.Corrections(task.poses, trainer.gaussians, trainer.face, views)
     corrections.solve()
     good = corrections.kept.copy()
     corrections.values = np.full_like(good, 0.5)
@@ -74,7 +75,7 @@ def test_a_step_that_made_the_images_worse_is_taken_back(job):
 
 def test_no_round_leaves_the_fit_as_it_came(job):
     task = task_of(job(frames=2, pose_rounds=0))
-    bundle.adjust(task)
+    bundle.adjust(task, bundle.learning_on_cpu)
     np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
     assert not task.poses.offset.any()
 

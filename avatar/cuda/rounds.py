@@ -1,0 +1,40 @@
+"""Rounds of steps with the poses given from outside: gaussians and surface learn, then someone else moves the poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from gsac.avatar.cuda.recipe import Drawn, Recipe, rates_of
+from gsac.avatar.cuda.trainer import CudaTrainer
+
+
+class Round(NamedTuple):
+    frames: np.ndarray
+    """(n,) indices of the trainer's frames, in the order of the steps."""
+    backgrounds: np.ndarray
+    """(n, 3)."""
+    done: float
+    """Share of the way that the rates are those of."""
+
+
+@dataclass
+class RoundsRecipe(Recipe):
+    rounds: list[Round] = field(default_factory=list)
+
+
+class RoundsTrainer(CudaTrainer):
+    """As CudaTrainer, with one level of shots; the recipe's `steps` are those of all rounds."""
+
+    recipe: RoundsRecipe
+
+    def plan(self, levels) -> Drawn:
+        rounds = self.recipe.rounds
+        done = np.repeat([r.done for r in rounds], [len(r.frames) for r in rounds])
+        return Drawn(np.concatenate([r.frames for r in rounds]).astype(np.int32)[:, None],
+                     np.concatenate([r.backgrounds for r in rounds]).astype(np.float32)[:, None], rates_of(self.recipe, done))
+
+    def place(self, pose: np.ndarray, transl: np.ndarray) -> None:
+        """The poses (T, 55, 3) and translations (T, 3) from here on."""
+        self.buffers["pose"].write(np.concatenate([pose, transl[:, None]], 1))
