@@ -73,6 +73,7 @@ def learning(task: Task, views: dict[int, View], gaussians: Gaussians, plan: lis
             poses.offset = trainer.offset()
 
         yield learn, trainer.gaussians, gaussians.face
+        task.gpu_seconds += trainer.seconds
 
 
 def gain_rate(task: Task) -> float:
@@ -133,7 +134,7 @@ def follow(trainer: CudaTrainer, task: Task, until: int) -> None:
                              "smplx/body.npz, or lower the rates (train.*_rate)")
         hand_back(trainer, task)
         for step, loss in enumerate(losses, done + 1):
-            task.checkpoint(step, steps, float(loss), trainer.gaussians, trainer.seconds)
+            task.checkpoint(step, steps, float(loss), trainer.gaussians, task.gpu_seconds + trainer.seconds)
         task.progress(stop, steps, "steps")
         done = stop
 

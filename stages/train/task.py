@@ -31,6 +31,8 @@ class Task:
     on the GPU so far where it runs there."""
     marks: Callable[[int], list[int]] = lambda steps: []
     """Of so many steps, those after which `checkpoint` looks at gaussians and poses."""
+    gpu_seconds: float = 0.0
+    """On the GPU before the steps: the rounds that move the poses."""
 
 
 @dataclass

@@ -64,6 +64,35 @@ def test_what_the_recipe_shares_with_the_stage_has_the_same_default():
     assert (Recipe().turn_unit, Recipe().shift_unit, Recipe().hand_share) == (poses.TURN, poses.SHIFT, poses.HAND_SHARE)
 
 
+def test_plans_of_the_other_trainers_hold_their_frames_and_rates():
+    from types import SimpleNamespace
+
+    from gsac.avatar.cuda.align import Aligner, AlignRecipe
+    from gsac.avatar.cuda.paper import PaperRecipe, PaperTrainer
+    from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
+
+    def plan(kind, recipe, frames):
+        return kind.plan(SimpleNamespace(recipe=recipe, frames=frames), [None])
+
+    still = plan(Aligner, AlignRecipe(steps=12, pose_rate=1e-3, pose_end=0.05), 3)
+    assert still.order[:, 0].tolist() == [0] * 4 + [1] * 4 + [2] * 4 and (still.background == 1).all()
+    np.testing.assert_allclose(still.rates["pose"], np.tile(1e-3 * 0.05 ** (np.arange(4) / 4), 3), rtol=1e-6)
+    assert not any(still.rates[name].any() for name in ("mu", "quat", "log_scale", "rgb", "opacity", "offset", "place_pull"))
+
+    grounds = np.random.default_rng(0).random((2, 3, 3))
+    rounds = [Round(np.array([2, 0, 1]), grounds[0], 0.0), Round(np.array([1, 2, 0]), grounds[1], 0.3)]
+    found = plan(RoundsTrainer, RoundsRecipe(steps=6, offset_rate=1e-3, pose_rate=0.0, gain_rate=2e-3, rounds=rounds), 3)
+    assert found.order[:, 0].tolist() == [2, 0, 1, 1, 2, 0] and not found.rates["pose"].any()
+    np.testing.assert_allclose(found.background[:, 0], grounds.reshape(-1, 3), rtol=1e-6)
+    np.testing.assert_allclose(found.rates["mu"], np.repeat([1.5e-3, 1.5e-3 * 0.01**0.3], 3), rtol=1e-6)
+    np.testing.assert_allclose(found.rates["offset"], np.repeat([1e-3, 1e-3 * 0.1**0.5], 3), rtol=1e-6)
+    np.testing.assert_allclose(found.rates["gain"], np.repeat([2e-3, 2e-3 * 0.1**0.3], 3), rtol=1e-6)
+
+    found = plan(PaperTrainer, PaperRecipe(steps=10, batch=4, mu_rate=1e-4, mu_decay=0.01, rgb_rate=5e-3, beta_rate=2e-4), 6)
+    assert found.order.shape == (10, 4) and (found.rates["rgb"] == np.float32(5e-3)).all() and (found.rates["betas"] > 0).all()
+    np.testing.assert_allclose(found.rates["mu"], 1e-4 * 0.01 ** (np.arange(10) / 10), rtol=1e-6)
+
+
 def test_a_step_never_holds_a_frame_twice():
     order = draw(Recipe(steps=50, batch=4), 6, 1).order
     assert all(len(set(row)) == 4 for row in order)
