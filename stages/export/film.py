@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.light import turned
 from gsac.avatar.motion.source import Motion
 from gsac.avatar.raster import render_bound
 from gsac.avatar.workspace import Workspace
@@ -68,6 +69,7 @@ def frames(avatar: RiggedAvatar, film: Film, width: int, height: int, background
     for t in range(len(film)):
         vertices = avatar.posed(film.pose[t]) + film.transl[t]
         R, eye = look(film.yaw[t], place[t] * (1, 0, 1) + (0, middle, 0), distance)
+        gaussians.light = None if avatar.light is None else turned(avatar.light, R)
         out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, gaussians, camera, workspace)
         image = out.rgb + (1 - out.alpha[..., None]) * background
         yield np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from gsac.avatar.artifacts import AVATAR_SHAPES
+from gsac.avatar.artifacts import AVATAR_SHAPES, LIGHT_SHAPE
 from gsac.stages.export.container import Fault, GsacError, pack, read_bytes, unpack
 
 UNIT = 65535
@@ -65,6 +65,8 @@ class RiggedAvatar:
     """The arrays of avatar.npz: face, mu, quat (wxyz), log_scale, rgb, opacity (0..1)."""
     coarser: list[dict[str, np.ndarray]] = field(default_factory=list)
     """The same arrays for levels of detail with ever fewer gaussians, to be seen from afar."""
+    light: np.ndarray | None = None
+    """(4, 3) of `avatar.light` in the canonical axes, of the clip's room: what all rgb are multiplied with; None: by 1."""
     poses: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     """Still poses: name -> joint name -> axis-angle."""
     clips: dict[str, Clip] = field(default_factory=dict)
@@ -118,6 +120,8 @@ class RiggedAvatar:
             }
             scales |= {f"{prefix}.quat": QUAT_SCALE, f"{prefix}.log_scale": LOG_SCALE_SCALE, f"{prefix}.opacity": 1 / UNIT}
             levels.append({"prefix": prefix, "count": len(g["face"])})
+        if self.light is not None:
+            blocks["light"] = self.light.astype(np.float32)
         for name, clip in self.clips.items():
             blocks[f"clip.{name}.rotation"] = clip.rotation.astype(np.float32)
             blocks[f"clip.{name}.transl"] = clip.transl.astype(np.float32)
@@ -220,6 +224,7 @@ class _Reading:
             expression_names=names, expression_start=start, expression_vertex=moved,
             expression_delta=self.block("expression.delta", (len(moved), 3)),
             jaw_actions=self.block("expression.jaw", (len(names), 3)), gaussians=gaussians, coarser=coarser,
+            light=self.block("light", LIGHT_SHAPE["light"]) if "light" in self.blocks else None,
             poses=self.poses(joint_names), clips=self.clips(joint_names),
             licence=self.words("licence"), provenance=self.words("provenance"))
 

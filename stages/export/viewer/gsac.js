@@ -202,6 +202,7 @@ function readAvatar(buffer) {
     joints: finite("rest.joints", names.length, 3),
     skinIndex: index("skin.index", names.length, V, 4), skinWeight: weights,
     delta: finite("expression.delta", moved.length, 3), poses: head.poses,
+    light: blocks.light ? finite("light", 4, 3) : null,
     ...levels[0],
   };
 }

@@ -22,15 +22,26 @@ def built(head, body):
     return HEADER.pack(MAGIC, VERSION, len(text), HEADER.size + len(rest), zlib.crc32(rest), 0) + rest
 
 
-def with_values(data, name, value):
-    """The avatar with the second row of a block set to `value`, as stored."""
-    head, _ = unpack(data)
-    _, body = parts(data)
+def as_stored(data):
+    """Head without its table of blocks, blocks as stored, their scales."""
+    head, body = parts(data)
     plain = {k: {n: v for n, v in e.items() if n != "scale"} for k, e in head["blocks"].items()}
     stored = {k: v.copy() for k, v in unpack(built(head | {"blocks": plain}, body))[1].items()}
-    stored[name][1] = value
     scales = {k: e["scale"] for k, e in head["blocks"].items() if "scale" in e}
-    return pack({k: v for k, v in head.items() if k != "blocks"}, stored, scales)
+    return {k: v for k, v in head.items() if k != "blocks"}, stored, scales
+
+
+def with_values(data, name, value):
+    """The avatar with the second row of a block set to `value`, as stored."""
+    head, stored, scales = as_stored(data)
+    stored[name][1] = value
+    return pack(head, stored, scales)
+
+
+def with_block(data, name, array, scale=None):
+    """The avatar with one more block, or another one of that name."""
+    head, stored, scales = as_stored(data)
+    return pack(head, stored | {name: array}, scales if scale is None else scales | {name: scale})
 
 
 def files(data):
@@ -69,6 +80,16 @@ def files(data):
                         ("gaussian.face", 60000), ("skin.weight", 65535), ("rest.vertices", np.nan), ("gaussian.mu", np.inf),
                         ("gaussian.quat", 0), ("rest.joints", -np.inf), ("clip.wave.transl", np.nan)]:
         out[f"value_{name}"] = with_values(data, name, value), {"value"}
+    for n, array in enumerate([np.ones((3, 4)), np.ones(12), np.ones((4, 3, 1)), np.ones((0, 3)), np.ones((4, 4)), np.array(1.0)]):
+        out[f"light_shape{n}"] = with_block(data, "light", array.astype(np.float32)), {"block"}
+    for kind in (np.uint8, np.int16, np.uint32):
+        out[f"light_{kind.__name__}"] = with_block(data, "light", np.ones((4, 3), kind)), {"block"}
+    for n, value in enumerate([np.nan, np.inf, -np.inf]):
+        out[f"light_value{n}"] = with_block(data, "light", np.full((4, 3), value, np.float32)), {"value"}
+    out["light_whole"] = with_block(data, "light", np.full((4, 3), .5, np.float32)), {"ok"}
+    out["light_f16"] = with_block(data, "light", np.full((4, 3), .5, np.float16)), {"ok"}
+    out["light_scaled"] = with_block(data, "light", np.full((4, 3), -7, np.int16), 1e-2), {"ok"}
+    out["unknown_block"] = with_block(data, "mirror", np.full((2, 2), np.nan, np.float32)), {"ok"}
     joints = head["joints"]
     for n, change in enumerate([
             {"joints": None}, {"joints": {"names": ["a"], "parents": [0]}}, {"joints": {"names": [], "parents": []}},

@@ -2,6 +2,7 @@ import json
 import re
 import tracemalloc
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,15 @@ def test_what_is_written_is_read(figure, data):
         np.testing.assert_array_equal(back.clips[name].rotation, clip.rotation)
 
 
+def test_a_light_is_written_and_read_and_without_one_no_block_is_there(figure, data):
+    light = np.linspace(-.4, 1, 12, dtype=np.float32).reshape(4, 3)
+    lit = replace(figure, light=light)
+    back = RiggedAvatar.from_bytes(lit.to_bytes())
+    np.testing.assert_array_equal(back.light, light)
+    assert back.to_bytes() == lit.to_bytes()
+    assert "light" not in head_and_body(data)[0]["blocks"] and RiggedAvatar.from_bytes(data).light is None
+
+
 def test_same_avatar_same_bytes_and_a_second_round_changes_nothing(figure, data):
     assert figure.to_bytes() == data
     assert RiggedAvatar.from_bytes(data).to_bytes() == data
@@ -73,7 +83,7 @@ def test_the_specification_lists_the_blocks_and_keys_that_are_written(data):
     head, _ = head_and_body(data)
     rows = {name for line in text.splitlines() if line.startswith("| `") for name in re.findall(r"^\| `([^`]+)`", line)}
     blocks = {re.sub(r"^clip\.\w+\.", "clip.<name>.", re.sub(r"^gaussian\d+", "gaussian", name)) for name in head["blocks"]}
-    assert blocks <= rows
+    assert blocks | {"light"} <= rows
     assert {name for name in rows if "." in name} == blocks
     assert set(head) - {"blocks"} <= rows
     assert {fault.name.lower() for fault in Fault} <= rows

@@ -1,5 +1,7 @@
 """Films of the asymmetric figure: its left hand is red, its right one blue, its front green."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gsac.avatar.motion.source import Motion
@@ -65,6 +67,16 @@ def test_the_camera_goes_along_and_a_step_is_still_seen_as_one(figure):
     jump.transl[1, 0] = 0.3
     seen = drawn(figure, performance(jump, 10))
     assert FOLLOW_S > 0.3 and columns(seen[1], 0) > columns(seen[0], 0) + 5
+
+
+def test_the_light_stands_still_in_the_room_while_the_camera_goes_round(figure):
+    grey = replace(figure, gaussians=figure.gaussians | {"rgb": np.full_like(figure.gaussians["rgb"], .4)})
+    from_its_left = replace(grey, light=np.float32([[1] * 3, [.8] * 3, [0] * 3, [0] * 3]))
+    film = turntable(figure, 0.8, 10)
+    even, lit = drawn(grey, film).mean(-1), drawn(from_its_left, film).mean(-1)
+    person = even > 90
+    at_left, front, at_right, back = (lit[t][person[t]].mean() / even[t][person[t]].mean() for t in (2, 0, 6, 4))
+    assert at_left > 1.25 and at_right < .75 and abs(front - 1) < .1 and abs(back - 1) < .1
 
 
 @pytest.mark.parametrize(("fps", "seconds", "count"), [(10, None, 11), (20, None, 21), (7, None, 8), (10, 0.5, 6), (10, 9, 11)])

@@ -1,17 +1,22 @@
 """The C# reader of the Unity package, compiled by mcs and run under Mono: the numbers that the Python reader gives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gsac.stages.export.rigged import RiggedAvatar
 
+LIGHT = np.linspace(-1, 1, 12, dtype=np.float32).reshape(4, 3)
+
 
 @pytest.fixture(scope="module")
 def got(mono, package, programs_folder, exported, tmp_path_factory):
-    """(arrays, printed lines) of the C# reader for an exported person."""
+    """(arrays, printed lines) of the C# reader for an exported person, in a light."""
     folder = tmp_path_factory.mktemp("reader")
     exe = mono.compile_csharp([*(package / "Runtime" / "Core").glob("*.cs"), programs_folder / "Dump.cs",
                                programs_folder / "Read.cs"], folder / "read.exe")
-    lines = mono.run(exe, "dump", exported / "avatar.gsac", folder / "arrays").splitlines()
+    (folder / "lit.gsac").write_bytes(replace(RiggedAvatar.read(exported / "avatar.gsac"), light=LIGHT).to_bytes())
+    lines = mono.run(exe, "dump", folder / "lit.gsac", folder / "arrays").splitlines()
     return mono.arrays(folder / "arrays"), lines
 
 
@@ -26,6 +31,7 @@ def test_mesh_skeleton_skin_expressions_and_gaussians_are_those_of_the_python_re
         np.testing.assert_array_equal(got[0][name], np.ravel(getattr(avatar, name)), name)
     for name, truth in avatar.gaussians.items():
         np.testing.assert_array_equal(got[0][name], np.ravel(truth), name)
+    np.testing.assert_array_equal(got[0]["light"], LIGHT.ravel())
     np.testing.assert_allclose(got[0]["blend"], [.3, .999, 1 / 255, avatar.ground], rtol=1e-6)
 
 

@@ -48,6 +48,7 @@ namespace Gsac
         public float[] ExpressionDelta;  // M x 3, m at weight 1
         public float[] ExpressionJaw;    // E x 3, weights for a rotation of the jaw, per rad
         public GsacLevel[] Levels;       // finest first
+        public float[] Light;            // 4 x 3: the colours' factor by the face's normal, of 1, x, y, z; null: 1
         public Dictionary<string, GsacClip> Poses = new Dictionary<string, GsacClip>(); // of one key each
         public Dictionary<string, GsacClip> Clips = new Dictionary<string, GsacClip>();
         public Dictionary<string, string> Licence = new Dictionary<string, string>();
@@ -85,7 +86,7 @@ namespace Gsac
 
         /// <summary>
         /// To Unity's axes and back: x changes its sign. Faces keep their corners' order, so the third column of a face
-        /// frame keeps its sense and the second turns round: mu (x, -y, z), quat (w, -x, y, -z).
+        /// frame keeps its sense and the second turns round: mu (x, -y, z), quat (w, -x, y, -z), the light's y and z.
         /// </summary>
         public GsacData Mirror()
         {
@@ -102,6 +103,7 @@ namespace Gsac
                     level.Quat[i + 3] = -level.Quat[i + 3];
                 }
             }
+            for (int i = 6; Light != null && i < 12; i++) Light[i] = -Light[i];
             foreach (GsacClip pose in Poses.Values) Flip(pose);
             foreach (GsacClip clip in Clips.Values) Flip(clip);
             IsMirrored = !IsMirrored;

@@ -29,6 +29,7 @@ namespace Gsac
             CheckWeights(data.SkinWeight);
             ReadExpressions(data);
             ReadLevels(data);
+            if (file.Has("light")) data.Light = file.Reals("light", 4, 3);
             ReadPoses(data);
             ReadClips(data);
             data.Licence = Words("licence");

@@ -47,6 +47,7 @@ public static class Read
         dump.Put("log_scale", data.Levels[0].LogScale);
         dump.Put("rgb", data.Levels[0].Rgb);
         dump.Put("opacity", data.Levels[0].Opacity);
+        if (data.Light != null) dump.Put("light", data.Light);
         dump.Put("blend", new float[] { data.LowPass, data.AlphaMax, data.AlphaMin, data.Ground });
         foreach (KeyValuePair<string, GsacClip> pair in data.Clips) Write("clip." + pair.Key, pair.Value, dump);
         foreach (KeyValuePair<string, GsacClip> pair in data.Poses) Write("pose." + pair.Key, pair.Value, dump);
