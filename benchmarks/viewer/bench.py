@@ -1,6 +1,7 @@
 """gsac bench viewer: frames a second of viewer.html, walking, against PlayCanvas with the same splats standing still.
 
-Both in headless Chromium's software GL at the same size and distance, in turns, each frame waited for. Needs chromium and npm.
+Both in headless Chromium without a graphics card at the same size and distance, in turns, each frame waited for. There PlayCanvas
+draws through software GL, and viewer.html by itself unless `--draw webgl`. Needs chromium and npm.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--avatar", type=Path, metavar="FILE", help="an avatar.gsac; default: a made-up person")
     out.add_argument("--gaussians", type=int, default=6000, metavar="N", help="of the made-up person; default: 6000")
     out.add_argument("--size", type=int, default=512, metavar="PX", help="of the square picture; default: 512")
+    out.add_argument("--draw", choices=("webgl", "software"), default="software", help="how viewer.html draws; default: software")
     out.add_argument("--rounds", type=int, default=3, metavar="N", help="default: 3")
     out.add_argument("--seconds", type=float, default=6.0, metavar="N", help="of one count; default: 6")
     return out
@@ -46,7 +48,7 @@ def main(argv: list[str] | None = None) -> int:
     counts: dict[str, list[race.Count]] = {"viewer.html": [], "PlayCanvas": []}
     with race.served(options.out.absolute()) as address:
         for k in range(options.rounds):
-            for name, page in pages(avatar).items():
+            for name, page in pages(avatar, options.draw).items():
                 picture = options.out / f"{name.split('.')[0].lower()}.png" if k == 0 else None
                 counts[name].append(race.count(f"{address}/{page}", options.size, options.seconds, picture))
                 print(f"round {k + 1}: {name:11} {counts[name][-1].fps:6.2f} frames a second", file=sys.stderr)
@@ -79,11 +81,11 @@ def prepare(options: argparse.Namespace) -> RiggedAvatar:
     return avatar
 
 
-def pages(avatar: RiggedAvatar) -> dict[str, str]:
+def pages(avatar: RiggedAvatar, draw: str = "software") -> dict[str, str]:
     """Addresses of the two pages, with the same camera; PlayCanvas has the person's feet at y = 0."""
     middle = float(avatar.vertices[:, 1].max() + avatar.ground) / 2
     camera = "&".join(f"{name}={value}" for name, value in CAMERA.items())
-    return {"viewer.html": f"viewer.html#clip=walk&yaw=0&pitch=0&target=0,{middle:.4f},0&{camera}",
+    return {"viewer.html": f"viewer.html#draw={draw}&clip=walk&yaw=0&pitch=0&target=0,{middle:.4f},0&{camera}",
             "PlayCanvas": f"playcanvas.html#file=avatar.ply&height={middle - avatar.ground:.4f}&{camera}"}
 
 
@@ -94,5 +96,5 @@ def text(counts: dict[str, list[Count]], count: int, size: int) -> str:
     rows = [f"{name:11}  {fps[name]:6.2f} fps  {work[name]:6.1f} ms of processor a frame   "
             f"rounds: {', '.join(f'{c.fps:.2f}' for c in found)}" for name, found in counts.items()]
     (ours, theirs), (our_work, their_work) = fps.values(), work.values()
-    return "\n".join([f"{count} gaussians, {size} x {size}, software GL; ours walks, PlayCanvas stands still", *rows,
+    return "\n".join([f"{count} gaussians, {size} x {size}, no graphics card; ours walks, PlayCanvas stands still", *rows,
                       f"ratio: {ours / theirs:.2f} of frames, {their_work / our_work:.2f} of processor time"])

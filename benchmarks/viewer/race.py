@@ -24,7 +24,7 @@ WATCH = """
   const { gl } = gsac.painter, pixel = new Uint8Array(4), draw = gsac.draw.bind(gsac);
   gsac.draw = () => {
     draw();
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    if (gl) gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     window.drawn += 1;
   };
 })()

@@ -1,12 +1,19 @@
 // Gaussians on the faces of the posed mesh: for a face (v0, v1, v2) with a = (v2-v1)/|.|, n = (v2-v1) x (v0-v1)/|.|,
 // b = a x n, R = [a n b], T = mean, k = 0.5 (h + L)/0.05, L = |v0-v2|, h = 2 area/L: mean k R mu + T, axes k R r s.
+// The light of the clip's room multiplies a colour with light . (1, n), between DARKEST and BRIGHTEST.
+
+const DARKEST = 0.25;
+const BRIGHTEST = 2.5;
+const EVEN_LIGHT = Float32Array.of(1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0);
 
 class Binding {
   constructor(avatar) {
     this.avatar = avatar;
+    // Whether the colours are those in the light of the clip's room, where the file has it.
+    this.lit = true;
     this.count = avatar.face.length;
     this.axes = new Float32Array(this.count * 9);
-    // Rows of three RGBA texels a gaussian: mean xyz, xx | xy, xz, yy, yz | zz, 0, 0, 0 of the covariance.
+    // Rows of three RGBA texels a gaussian: mean xyz, xx | xy, xz, yy, yz | zz of the covariance, factor of the colour.
     this.rows = Math.max(1, Math.ceil(this.count / Binding.PER_ROW));
     this.data = new Float32Array(this.rows * Binding.PER_ROW * 12);
     const q = new Float32Array(4), r = new Float32Array(9);
@@ -21,7 +28,8 @@ class Binding {
 
   // vertices: (V, 3) posed. Fills this.data.
   update(vertices) {
-    const { faces, face, mu } = this.avatar, M = this.axes, D = this.data;
+    const { faces, face, mu } = this.avatar, M = this.axes, D = this.data, light = (this.lit && this.avatar.light) || EVEN_LIGHT;
+    const shade = (c, x, y, z) => Math.min(BRIGHTEST, Math.max(DARKEST, light[c] + x * light[3 + c] + y * light[6 + c] + z * light[9 + c]));
     for (let i = 0; i < this.count; i++) {
       const f = face[i] * 3, i0 = faces[f] * 3, i1 = faces[f + 1] * 3, i2 = faces[f + 2] * 3;
       const x1 = vertices[i1], y1 = vertices[i1 + 1], z1 = vertices[i1 + 2];
@@ -33,6 +41,7 @@ class Binding {
       D[o] = x1 + (px + qx) / 3; D[o + 1] = y1 + (py + qy) / 3; D[o + 2] = z1 + (pz + qz) / 3;
       if (!(area2 > 1e-6 * (pp + qx * qx + qy * qy + qz * qz) && area2 > 1e-15)) {
         D.fill(0, o + 3, o + 9);
+        for (let c = 0; c < 3; c++) D[o + 9 + c] = shade(c, 0, 0, 0);
         continue;
       }
       const w = 1 / Math.sqrt(pp), ax = px * w, ay = py * w, az = pz * w;
@@ -50,6 +59,7 @@ class Binding {
         xx += x * x; xy += x * y; xz += x * z; yy += y * y; yz += y * z; zz += z * z;
       }
       D[o + 3] = xx; D[o + 4] = xy; D[o + 5] = xz; D[o + 6] = yy; D[o + 7] = yz; D[o + 8] = zz;
+      for (let c = 0; c < 3; c++) D[o + 9 + c] = shade(c, nx, ny, nz);
     }
   }
 }

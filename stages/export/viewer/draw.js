@@ -25,6 +25,7 @@ void main() {
   vec4 d1 = texelFetch(gaussians, ivec2(at.x * 3 + 1, at.y), 0);
   vec4 d2 = texelFetch(gaussians, ivec2(at.x * 3 + 2, at.y), 0);
   colour = texelFetch(colours, at, 0);
+  colour.rgb *= d2.yzw;
   sigmas = vec2(0);
   gl_Position = vec4(0, 0, 2, 1);
   vec4 p = vec4(d0.xyz, 1);
@@ -90,6 +91,7 @@ void main() {
 
 const NEAR = 0.05;
 const WIDE = 1.3;
+const SHADOW = 0.4;
 
 class Painter {
   constructor(canvas, avatar, binding, sort) {
@@ -177,7 +179,7 @@ class Painter {
     if (shadow) {
       this.use(this.floor, eye);
       gl.uniform4f(this.floor.places.disc, shadow.x, shadow.y, shadow.z, shadow.radius);
-      gl.uniform1f(this.floor.places.strength, 0.4);
+      gl.uniform1f(this.floor.places.strength, SHADOW);
       gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     }
     this.use(this.splats, eye);

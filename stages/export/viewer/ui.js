@@ -1,6 +1,8 @@
 // The page: opens the avatar inside it, plays it, and listens to the buttons and to the address.
 // Address: #pose=T|A or #clip=NAME, t=SECONDS, yaw, pitch, dist, fov (degrees, m), target=x,y,z, bg=rrggbb,
-// expression=NAME:WEIGHT,..., joints=NAME:x,y,z;... (axis-angle, degrees), turntable, still (one frame, no controls, no floor).
+// expression=NAME:WEIGHT,..., joints=NAME:x,y,z;... (axis-angle, degrees), light=off, turntable,
+// still (one frame, no controls, no floor);
+// draw=webgl|software, when the page opens.
 
 const NOTE_MS = 9000;
 
@@ -19,6 +21,8 @@ class Controls {
     for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
     for (const pose of Object.keys(viewer.avatar.poses).sort()) this.addButton(`${pose}-pose`, { pose });
     this.onClick("turntable", () => { viewer.turntable = !viewer.turntable; });
+    this.onClick("light", () => { viewer.binding.lit = !viewer.binding.lit; });
+    find("light").hidden = viewer.avatar.light === null;
     this.onClick("pause", () => { viewer.paused = !viewer.paused; });
     this.onClick("reset", () => {
       viewer.camera.yaw = 0;
@@ -122,6 +126,7 @@ class Controls {
       button.setAttribute("aria-pressed", String(button.dataset.pose === playing.pose && button.dataset.clip === playing.clip));
     }
     find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
+    find("light").setAttribute("aria-pressed", String(viewer.binding.lit));
     find("timeline").hidden = !viewer.length;
     find("pause").textContent = viewer.paused ? "Play" : "Pause";
     find("background").value = viewer.background;
@@ -137,7 +142,7 @@ function tell(error) {
 }
 
 async function main() {
-  const viewer = new Viewer(readAvatar(await inlinedAvatar()));
+  const viewer = new Viewer(readAvatar(await inlinedAvatar()), new URLSearchParams(location.hash.slice(1)).get("draw"));
   window.gsac = viewer;
   const controls = new Controls(viewer);
   const follow = () => {

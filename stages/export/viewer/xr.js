@@ -6,7 +6,7 @@ const XR_DISTANCE = 1.6;
 
 // Adds a button for each mode that the device has.
 async function offerHeadset(viewer, place, tell) {
-  if (!navigator.xr) return;
+  if (!navigator.xr || !viewer.painter.gl) return;
   for (const [mode, label] of XR_MODES) {
     if (!await navigator.xr.isSessionSupported(mode).catch(() => false)) continue;
     const button = document.createElement("button");

@@ -203,7 +203,7 @@ def test_no_headset_no_button_and_each_eye_sees_the_avatar_from_its_place(addres
         page.open(address)
         assert page.run("document.getElementById('xr-vr')") is None
         page.call("Page.addScriptToEvaluateOnNewDocument", source=HEADSET)
-        page.open(address + "?headset#pose=T&bg=204060")
+        page.open(address + "?headset#pose=T&bg=204060&draw=webgl")
         assert page.run("document.getElementById('xr-ar')") is None
         click(page, "xr-vr")
         page.until("gsac.session !== null && Headset.session.next instanceof Function")
@@ -233,5 +233,45 @@ def test_no_headset_no_button_and_each_eye_sees_the_avatar_from_its_place(addres
         page.run("Headset.session.end()")
         page.until("gsac.session === null && gsac.clock >= 0")
         assert page.errors == []
+    finally:
+        page.close()
+
+
+SHADOWED = """(() => {
+  gsac.still = true;
+  document.body.classList.add('bare');
+  gsac.resize();
+  const eye = gsac.camera.eye(gsac.canvas.width, gsac.canvas.height);
+  gsac.painter.prepare(eye.view);
+  gsac.painter.clear([...colour(gsac.background), 1]);
+  gsac.painter.paint(eye, gsac.shadow);
+})()"""
+
+
+@pytest.mark.parametrize("place", [
+    "yaw=20&pitch=12", "yaw=-70&pitch=30&dist=1.4&target=0,-0.8,0", "yaw=0&pitch=40&dist=0.9&target=0,-1,0.5"])
+def test_without_a_graphics_card_the_picture_and_its_shadow_are_the_same(page, address, place):
+    seen = []
+    for draw in ("webgl", "software"):
+        page.call("Page.navigate", url="about:blank")
+        page.open(f"{address}#pose=A&bg=a0b0c0&draw={draw}&{place}")
+        page.run(SHADOWED)
+        page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        seen.append(page.picture().astype(int))
+    webgl, software = seen
+    assert np.abs(webgl - software).max() <= 4 and np.abs(webgl - software).mean() < 0.5
+    grey = webgl[..., 0] * (0xC0 / 0xA0) - webgl[..., 2]
+    assert ((np.abs(grey) < 3) & (webgl[..., 2] < 0xC0 - 20)).sum() > 100, "a part of the floor is in the shadow"
+    assert page.errors == []
+
+
+def test_a_device_without_webgl_draws_by_itself(address):
+    page = chromium.Browser(SIZE, SIZE)
+    try:
+        none = "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...rest) {" \
+               "return kind === 'webgl2' ? null : get.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)"
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=none)
+        page.open(address + "#pose=A&still")
+        assert red(page.picture()).any() and page.errors == []
     finally:
         page.close()
