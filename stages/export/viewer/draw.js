@@ -91,7 +91,6 @@ void main() {
 
 const NEAR = 0.05;
 const WIDE = 1.3;
-const SHADOW = 0.4;
 
 class Painter {
   constructor(canvas, avatar, binding, sort) {
@@ -179,7 +178,7 @@ class Painter {
     if (shadow) {
       this.use(this.floor, eye);
       gl.uniform4f(this.floor.places.disc, shadow.x, shadow.y, shadow.z, shadow.radius);
-      gl.uniform1f(this.floor.places.strength, SHADOW);
+      gl.uniform1f(this.floor.places.strength, 0.4);
       gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     }
     this.use(this.splats, eye);

@@ -6,8 +6,7 @@ const BACKGROUND = "#2b303b";
 const MAX_PIXEL_RATIO = 2;
 
 class Viewer {
-  // asked: how to draw, for makePainter.
-  constructor(avatar, asked) {
+  constructor(avatar) {
     this.avatar = avatar;
     this.pose = new Pose(avatar);
     this.before = new Pose(avatar);
@@ -15,7 +14,7 @@ class Viewer {
     this.binding = new Binding(avatar);
     this.sort = new DepthSort(this.binding.count);
     this.canvas = document.getElementById("stage");
-    this.painter = makePainter(asked, this.canvas, avatar, this.binding, this.sort);
+    this.painter = new Painter(this.canvas, avatar, this.binding, this.sort);
     this.camera = new OrbitCamera();
     [this.low, this.high] = bounds(avatar.vertices);
     this.rate = new FrameRate();
@@ -96,7 +95,7 @@ class Viewer {
 
   // Returns whether the room for the figure has another size than before.
   resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, this.painter.gl ? MAX_PIXEL_RATIO : 1);
+    const ratio = Math.min(window.devicePixelRatio || 1, MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     const { offsetHeight, offsetTop } = document.getElementById("panel"), panel = offsetHeight ? window.innerHeight - offsetTop : 0;
