@@ -91,6 +91,7 @@ void main() {
 
 const NEAR = 0.05;
 const WIDE = 1.3;
+const SHADOW = 0.4;
 
 class Painter {
   constructor(canvas, avatar, binding, sort) {
@@ -178,7 +179,7 @@ class Painter {
     if (shadow) {
       this.use(this.floor, eye);
       gl.uniform4f(this.floor.places.disc, shadow.x, shadow.y, shadow.z, shadow.radius);
-      gl.uniform1f(this.floor.places.strength, 0.4);
+      gl.uniform1f(this.floor.places.strength, SHADOW);
       gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     }
     this.use(this.splats, eye);

@@ -1,7 +1,8 @@
 // The page: opens the avatar inside it, plays it, and listens to the buttons and to the address.
 // Address: #pose=T|A or #clip=NAME, t=SECONDS, yaw, pitch, dist, fov (degrees, m), target=x,y,z, bg=rrggbb,
 // expression=NAME:WEIGHT,..., joints=NAME:x,y,z;... (axis-angle, degrees), light=off, turntable,
-// still (one frame, no controls, no floor).
+// still (one frame, no controls, no floor);
+// draw=webgl|software, when the page opens.
 
 const NOTE_MS = 9000;
 
@@ -141,7 +142,7 @@ function tell(error) {
 }
 
 async function main() {
-  const viewer = new Viewer(readAvatar(await inlinedAvatar()));
+  const viewer = new Viewer(readAvatar(await inlinedAvatar()), new URLSearchParams(location.hash.slice(1)).get("draw"));
   window.gsac = viewer;
   const controls = new Controls(viewer);
   const follow = () => {

@@ -6,7 +6,8 @@ const BACKGROUND = "#2b303b";
 const MAX_PIXEL_RATIO = 2;
 
 class Viewer {
-  constructor(avatar) {
+  // asked: how to draw, for makePainter.
+  constructor(avatar, asked) {
     this.avatar = avatar;
     this.pose = new Pose(avatar);
     this.before = new Pose(avatar);
@@ -14,7 +15,7 @@ class Viewer {
     this.binding = new Binding(avatar);
     this.sort = new DepthSort(this.binding.count);
     this.canvas = document.getElementById("stage");
-    this.painter = new Painter(this.canvas, avatar, this.binding, this.sort);
+    this.painter = makePainter(asked, this.canvas, avatar, this.binding, this.sort);
     this.camera = new OrbitCamera();
     [this.low, this.high] = bounds(avatar.vertices);
     this.rate = new FrameRate();
@@ -95,7 +96,7 @@ class Viewer {
 
   // Returns whether the room for the figure has another size than before.
   resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, MAX_PIXEL_RATIO);
+    const ratio = Math.min(window.devicePixelRatio || 1, this.painter.gl ? MAX_PIXEL_RATIO : 1);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     const { offsetHeight, offsetTop } = document.getElementById("panel"), panel = offsetHeight ? window.innerHeight - offsetTop : 0;
