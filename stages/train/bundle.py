@@ -19,6 +19,7 @@ from gsac.avatar.workspace import Workspace, available
 from gsac.stages.contract import StageError
 from gsac.stages.train import fast
 from gsac.stages.train.alignment import TURNING, UNKNOWNS, Normal, carriers, normal_equations
+from gsac.stages.train.holdout import near
 from gsac.stages.train.poses import BODY, Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
@@ -44,6 +45,8 @@ MOST = 0.15
 """rad and m of a round's step, at most."""
 WORSE = 1.1
 """Growth of the squared error from round to round that is taken back."""
+MOSTLY = 0.5
+"""Share of the trained frames that must be near to the next."""
 SOLVER_STEPS, SOLVED = 60, 1e-10
 
 
@@ -59,10 +62,11 @@ class Round(NamedTuple):
 def adjust(task: Task, learning: Callable[..., AbstractContextManager]) -> None:
     """Corrects the poses of all frames in task.poses, and leaves the surface's offset there, for `fast.start`.
 
+    Views that are far from each other, as photos are, show hardly a surface together: their poses stay.
     learning: where gaussians and surface learn, as `learning_on_cpu`.
     """
     config, rounds = task.config, task.config.pose_rounds
-    if not rounds:
+    if not rounds or apart(task.poses.fit_pose[task.trained, 0]):
         return
     views = small(task)
     count = COUNT if isinstance(config.gaussians, str) else min(COUNT, config.gaussians)
@@ -164,6 +168,11 @@ class Corrections:
         poses, turns = self.poses, self.values[:, :-3].reshape(-1, TURNING, 3)
         poses.pose[:, BODY] = rotation.log(rotation.exp(poses.fit_pose[:, BODY]) @ rotation.exp(turns))
         poses.transl[:] = poses.fit_transl + self.values[:, -3:]
+
+
+def apart(global_orient: np.ndarray) -> bool:
+    """global_orient: (T, 3) axis-angle. Whether most views are not near to the next."""
+    return len(global_orient) > 1 and np.mean(near(global_orient[:-1], global_orient[1:])) < MOSTLY
 
 
 def covariance(frames: int) -> np.ndarray:

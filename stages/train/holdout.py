@@ -7,6 +7,8 @@ from scipy.spatial.transform import Rotation
 
 FEWEST = 5
 """Frames below which every one is needed for training."""
+NEAR = np.radians(45)
+"""Frames between which the body turns by more say nothing of each other's pose: photos of one turn, not a clip."""
 
 
 def yaw(global_orient: np.ndarray) -> np.ndarray:
@@ -33,7 +35,8 @@ def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.nda
 
     pose: (T, J, 3) axis-angle and transl (T, 3) as fitted; refined_*: the same after training; trained: (T,) bool.
     A correction is the turn from the fitted to the refined joint and the shift between the translations; both are
-    interpolated linearly between the nearest trained frames. Returns pose, transl: refined where trained.
+    interpolated linearly between the nearest trained frames, of which one that is not near counts as not corrected.
+    Returns pose, transl: refined where trained.
     """
     frames = np.flatnonzero(trained)
     if not len(frames):
@@ -46,7 +49,14 @@ def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.nda
         after = np.searchsorted(frames, t)
         a, b = frames[max(after - 1, 0)], frames[min(after, len(frames) - 1)]
         u = (t - a) / (b - a) if b > a else 0.0
-        turn = (1 - u) * turns[a] + u * turns[b]
+        before, behind = (1 - u) * near(pose[t, 0], pose[a, 0]), u * near(pose[t, 0], pose[b, 0])
+        turn = before * turns[a] + behind * turns[b]
         out_pose[t] = (Rotation.from_rotvec(pose[t]) * Rotation.from_rotvec(turn)).as_rotvec()
-        out_transl[t] = transl[t] + (1 - u) * shifts[a] + u * shifts[b]
+        out_transl[t] = transl[t] + before * shifts[a] + behind * shifts[b]
     return out_pose, out_transl
+
+
+def near(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(...) bool of global_orient (..., 3) axis-angle: the body turned by less than NEAR."""
+    turn = Rotation.from_rotvec(np.reshape(one, (-1, 3))).inv() * Rotation.from_rotvec(np.reshape(other, (-1, 3)))
+    return (turn.magnitude() < NEAR).reshape(np.shape(one)[:-1])

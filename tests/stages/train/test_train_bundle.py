@@ -80,6 +80,13 @@ def test_no_round_leaves_the_fit_as_it_came(job):
     assert not task.poses.offset.any()
 
 
+def test_photos_far_apart_keep_the_poses_of_the_fit(job):
+    task = task_of(job(frames=6))
+    bundle.adjust(task, bundle.learning_on_cpu)
+    np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
+    assert not bundle.apart(task.poses.fit_pose[:1, 0])
+
+
 def test_photos_far_apart_share_only_what_is_the_same_in_all():
     few, many = bundle.covariance(7), bundle.covariance(60)
     assert few[0, 1] < bundle.SAME + 0.05 and many[0, 1] > bundle.SAME + 0.9 * bundle.NEAR

@@ -39,6 +39,7 @@ def test_unusable_frames_are_never_held_out_short_clips_keep_one_and_the_shortes
 def test_a_correction_shared_by_all_frames_reaches_the_held_out_ones():
     rng = np.random.default_rng(1)
     pose, transl = rng.normal(0, 1, (9, 5, 3)), rng.normal(0, 1, (9, 3))
+    pose[:, 0] = turning(np.radians(6 * np.arange(9)))
     turn = Rotation.from_rotvec(rng.normal(0, 0.05, (5, 3)))
     refined = np.stack([(Rotation.from_rotvec(p) * turn).as_rotvec() for p in pose])
     trained = np.ones(9, bool)
@@ -49,3 +50,13 @@ def test_a_correction_shared_by_all_frames_reaches_the_held_out_ones():
         left_over = Rotation.from_rotvec(got[t]).inv() * Rotation.from_rotvec(refined[t])
         np.testing.assert_allclose(left_over.magnitude(), 0, atol=1e-9)
     np.testing.assert_allclose(shift, transl + [0.1, 0, -0.2])
+
+
+def test_views_far_apart_do_not_correct_each_other():
+    pose, transl = np.zeros((3, 5, 3)), np.zeros((3, 3))
+    pose[:, 0] = turning(np.radians([0, 60, 70]))
+    trained = np.array([True, False, True])
+    got, shift = carry_corrections(pose, transl, pose, transl + trained[:, None] * [0.1, 0, 0], trained)
+    np.testing.assert_allclose(shift[1], [0.05, 0, 0])  # of the near one of its two neighbours alone
+    got, shift = carry_corrections(pose[:2], transl[:2], pose[:2], transl[:2] + [[0.1, 0, 0], [0, 0, 0]], trained[:2])
+    np.testing.assert_allclose(shift[1], 0)
