@@ -7,8 +7,10 @@ render is scored as rgb premultiplied + alpha; the frame is cut out with the mas
 from __future__ import annotations
 
 import numpy as np
+from gsac.avatar.flip import flip
 
 WHITE, BLACK = 1.0, 0.0
+BOXES = ("face", "left_hand", "right_hand")
 
 
 def composite(premultiplied: np.ndarray, alpha: np.ndarray, background: float) -> np.ndarray:
@@ -48,12 +50,14 @@ def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
     return float(own / true) if true > 0 else float("nan")
 
 
-def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> dict[str, float]:
-    """One image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1.
+def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray, boxes: dict | None = None,
+          with_flip: bool = False) -> dict[str, float]:
+    """One image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1; boxes: name -> x0, y0, x1, y1 px.
 
     `mse_white`, `mse_black`: the whole frame on that background. `mse_fg`: the person only, that is pixels where mask
     or alpha is at least 0.5, on white, so that a missing and an added limb both cost. `ssim`: whole frame on white.
     `alpha_iou`: of alpha and mask at 0.5. `detail`: gradient energy over the truth's, where both show the person.
+    `mse_<name>`: all of a box on white, NaN without one. `flip`: mean over the person, NaN unless asked for.
     """
     white, white_truth = composite(rgb, alpha, WHITE), composite(truth, mask, WHITE)
     error = ((white - white_truth) ** 2).mean(2)
@@ -66,7 +70,14 @@ def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarra
         "fg_pixels": int(either.sum()), "ssim": ssim(white, white_truth),
         "alpha_iou": float(both.sum() / either.sum()) if either.any() else float("nan"),
         "detail": detail(white, white_truth, both) if both.any() else float("nan"),
+        **{f"mse_{name}": _in_box(error, (boxes or {}).get(name)) for name in BOXES},
+        "flip": float(flip(white_truth, white)[either].mean()) if with_flip and either.any() else float("nan"),
     }
+
+
+def _in_box(error: np.ndarray, box: tuple[int, int, int, int] | None) -> float:
+    x0, y0, x1, y1 = box or (0, 0, 0, 0)
+    return float(error[y0:y1, x0:x1].mean()) if x1 > x0 and y1 > y0 else float("nan")
 
 
 def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
@@ -78,8 +89,8 @@ def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
         values = [s[name] for s in scores if np.isfinite(s[name])]
         return float(np.mean(values)) if values else None
 
-    def mean_psnr(name):
-        values = [psnr(s[name]) for s in scores if np.isfinite(s[name])]
+    def mean_psnr(*names):
+        values = [psnr(s[name]) for s in scores for name in names if np.isfinite(s[name])]
         return float(np.mean(values)) if values else None
 
     def pooled(name, weight):
@@ -92,5 +103,6 @@ def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
         "psnr_full": mean_psnr("mse_white"), "psnr_full_pooled": pooled("mse_white", None),
         "psnr_full_black": mean_psnr("mse_black"), "psnr_fg": mean_psnr("mse_fg"),
         "psnr_fg_pooled": pooled("mse_fg", "fg_pixels"), "ssim": mean("ssim"), "lpips": None,
+        "flip": mean("flip"), "psnr_face": mean_psnr("mse_face"), "psnr_hands": mean_psnr("mse_left_hand", "mse_right_hand"),
         "alpha_iou": mean("alpha_iou"), "detail": mean("detail"),
     }

@@ -69,6 +69,8 @@ class TrainConfig:
     """Share of that distance that each step takes back, relative to the rate of the places."""
     pose_test_steps: int = 40
     """Steps of the test-time pose optimisation behind the `*_ttpo` figures; 0 leaves these figures null."""
+    flip: bool = False
+    """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""

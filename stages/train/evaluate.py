@@ -6,12 +6,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from gsac.avatar import wholebody
 from gsac.avatar.artifacts import write_frame
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import WHITE, composite, score
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
+from gsac.avatar.zbuffer import rasterise, visible_points
 from gsac.stages.train.kernels import on_background, through_background
 from gsac.stages.train.poses import Poses
 from gsac.stages.train.views import View, person_crop
@@ -20,6 +22,10 @@ TEST_RATE = 1e-3
 """Adam rate of the test-time pose optimisation."""
 TEST_END, TEST_MASK = 0.05, 0.1
 """What that rate falls to, and the weight of the mask beside the image."""
+FACE_WIDTH, HAND_MARGIN = 1.3, 0.15
+"""Sides of the boxes that are judged apart: over the way from ear to ear; room round a hand's key points."""
+BOX_SLACK, LEAST_VISIBLE = 0.03, 0.4
+"""m that a key point lies inside the body, and the share of them that must be in view."""
 ERROR_FULL = 0.5
 """Error that the error maps draw in their last colour."""
 
@@ -36,14 +42,14 @@ def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
-          workspace: Workspace | None = None) -> list[dict]:
+          workspace: Workspace | None = None, flip: bool = False) -> list[dict]:
     """One row of `metrics.score` a frame; with a folder also %06d_truth, _render and _error PNGs on white."""
     workspace = workspace or Workspace()
     rows = []
     for t in map(int, frames):
         rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
         true_rgb, mask = truth(views[t])
-        rows.append({"frame": t} | score(rgb, alpha, true_rgb, mask))
+        rows.append({"frame": t} | score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip))
         if folder is not None:
             render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
             error = np.abs(render - real).mean(2) / ERROR_FULL
@@ -52,6 +58,32 @@ def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder:
             write_frame(folder / f"{t:06d}_render.png", np.uint8(np.round(render * 255)))
             write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(heat, cv2.COLOR_BGR2RGB))
     return rows
+
+
+def boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:
+    """x0, y0, x1, y1 px of face, left_hand and right_hand, of those that the body itself does not hide.
+
+    The face is a square between nose and ears, as wide as FACE_WIDTH times the way from ear to ear; a hand is the box of its key points.
+    """
+    vertices = poses.vertices(t)
+    points = poses.body.keypoints(vertices)
+    depth = rasterise(vertices, poses.body.faces, camera)[2]
+    nose, ears = points[wholebody.BODY][0], points[wholebody.BODY][3:5]
+    middle = 0.6 * nose + 0.4 * ears.mean(0)
+    half = FACE_WIDTH / 2 * np.linalg.norm(ears[1] - ears[0]) * np.array([1.0, 1.0, 0.0])
+    areas = {"face": (points[:3], np.stack([middle - half, middle + half]), 0.0)}
+    for side, part in wholebody.HANDS.items():
+        areas[f"{side}_hand"] = points[part], points[part], HAND_MARGIN
+    found = {}
+    for name, (shown, extent, margin) in areas.items():
+        if not np.isfinite(extent).all() or visible_points(shown, depth, camera, BOX_SLACK).mean() < LEAST_VISIBLE:
+            continue
+        xy = camera.project(extent)
+        low, high = xy.min(0), xy.max(0)
+        room = margin * (high - low).max()
+        (x0, y0), (x1, y1) = np.floor(low - room).astype(int), np.ceil(high + room).astype(int)
+        found[name] = max(x0, 0), max(y0, 0), min(x1, camera.width), min(y1, camera.height)
+    return found
 
 
 def align_poses(gaussians: Gaussians, poses: Poses, frames, views: list[View], steps: int) -> None:

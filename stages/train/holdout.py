@@ -17,6 +17,12 @@ def yaw(global_orient: np.ndarray) -> np.ndarray:
     return np.arctan2(forward[:, 0], -forward[:, 2])
 
 
+def turn_seen(global_orient: np.ndarray) -> float:
+    """Degrees about the upright axis, of 360, from which (T, 3) axis-angle frames show the body: all but the widest gap."""
+    at = np.sort(np.degrees(yaw(global_orient)))
+    return 360 - float(np.diff(at, append=at[0] + 360).max()) if len(at) else 0.0
+
+
 def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> np.ndarray:
     """Indices of the frames to hold out: every `every`-th of the usable (T,) bool frames in the order of yaw.
 

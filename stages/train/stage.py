@@ -15,7 +15,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.evaluate import judge, turned
-from gsac.stages.train.holdout import spaced_in_yaw
+from gsac.stages.train.holdout import spaced_in_yaw, turn_seen
 from gsac.stages.train.novel import judge_novel
 from gsac.stages.train.poses import Poses, carried
 from gsac.stages.train.recipes import ALIGN, RECIPES
@@ -24,6 +24,10 @@ from gsac.stages.train.views import read_views
 
 LOSS_ROWS = 20
 """How many rows of the curve tell the loss."""
+LEAST_TURN = 270
+"""Degrees of the turn below which the user is warned."""
+MOST_UNSEEN = 0.2
+"""Share of gaussians that no frame shows above which the user is warned."""
 TRAIN_SAMPLE = 8
 """How many trained frames `psnr_fg_train` is taken over."""
 
@@ -57,9 +61,15 @@ def run(job: Job) -> None:
         job.warn(f"No frame is held out ({int(usable.sum())} usable frames, train.holdout is {config.holdout}): "
                  "the quality of this avatar is not measured.")
     trained = np.setdiff1d(np.flatnonzero(usable), held)
+    turn = turn_seen(params.global_orient[usable])
+    if turn < LEAST_TURN:
+        job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
     run = Run(job, Poses(body, params), views, trained, held)
     run.fit()
+    unseen = float((~run.result.seen).mean())
+    if unseen > MOST_UNSEEN:
+        job.warn(f"{unseen:.0%} of the gaussians were shown from the front by no frame; they look like their neighbours.")
     run.write()
 
 
@@ -72,6 +82,11 @@ def check_device(device: str) -> None:
 def due(step: int, steps: int, times: int) -> bool:
     """Whether one of `times` even marks of a run is reached by this step (from 1)."""
     return step * times // steps > (step - 1) * times // steps
+
+
+def known(row: dict) -> dict:
+    """The row with what was not measured (NaN) as None: JSON has no NaN."""
+    return {name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in row.items()}
 
 
 class Run:
@@ -133,13 +148,13 @@ class Run:
 
     def metrics(self, gaussians, poses: Poses, folder) -> dict:
         config, held = self.job.config, self.held
-        rows = judge(gaussians, poses, held, self.views, folder, self.workspace)
+        rows = judge(gaussians, poses, held, self.views, folder, self.workspace, config.flip)
         fitted = poses.copy()
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
         aligned = poses.copy()
         if config.pose_test_steps:
             ALIGN[self.job.device](gaussians, aligned, held, self.views, config.pose_test_steps)
-            ttpo = judge(gaussians, aligned, held, self.views, None, self.workspace)
+            ttpo = judge(gaussians, aligned, held, self.views, None, self.workspace, config.flip)
         else:
             ttpo = []
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
@@ -160,7 +175,7 @@ class Run:
             "image_size": [self.views[0].camera.width, self.views[0].camera.height],
             "seconds": round(float(self.seconds), 3), "cpu_seconds": round(float(self.cpu_seconds), 3),
             "trained_frames": len(self.trained), "heldout_frames": [int(t) for t in held],
-            "heldout": [row | {"psnr_fg": psnr(row["mse_fg"]), "psnr_full": psnr(row["mse_white"]),
+            "heldout": [known(row) | {"psnr_fg": psnr(row["mse_fg"]), "psnr_full": psnr(row["mse_white"]),
                                "psnr_fg_ttpo": psnr(other["mse_fg"])}
                         for row, other in zip(rows, ttpo or [{"mse_fg": None}] * len(rows), strict=True)],
             "unseen_gaussians": int((~self.result.seen).sum()),

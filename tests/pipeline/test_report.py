@@ -343,7 +343,7 @@ def test_a_turn_is_counted_by_the_directions_seen():
 @pytest.mark.parametrize(("metrics", "facts", "words"), [
     ({"psnr_fg": 25.0, "psnr_fg_train": 28.0}, {}, "better by 3.0 dB"),
     ({"psnr_fg": 25.0, "alpha_iou": 0.9}, {}, "alpha IoU 0.90"),
-    ({"n_gaussians": 100, "unseen_gaussians": 20}, {}, "20% of the gaussians"),
+    ({"n_gaussians": 100, "unseen_gaussians": 30}, {}, "30% of the gaussians"),
     ({}, {"left_hand_share": 0.0}, "left hand was never seen"),
     ({}, {"right_hand_share": 0.25, "right_hand_filled": 0.5}, "right hand was seen in 25%"),
     ({}, {"turn_degrees": 90.0}, "Only 90 of 360"),

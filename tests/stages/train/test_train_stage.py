@@ -26,6 +26,9 @@ def test_held_out_frames_are_rendered_better_as_training_goes_on_and_poses_come_
     assert figures["psnr_fg"] > next(r["psnr_fg"] for r in figures["curve"] if "psnr_fg" in r) + 1.2
     assert figures["psnr_fg"] > figures["psnr_fg_fit"] + 2, "the neighbours' pose correction reaches held-out frames"
     assert figures["psnr_fg_ttpo"] > figures["psnr_fg"] and figures["lpips"] is None
+    assert figures["flip"] is None and figures["psnr_hands_ttpo"] > 5
+    assert 0 <= figures["stray_alpha"] < 0.2 and figures["needle_share"] == 0
+    assert "NaN" not in (made.out / "metrics.json").read_text()
     assert sum("psnr_fg" in row for row in figures["curve"]) == 10 and len(figures["curve"]) == 20
     assert len(figures["heldout_frames"]) == 3 and figures["trained_frames"] == 9
     assert (made.out / f"heldout/{figures['heldout_frames'][0]:06d}_render.png").is_file()
@@ -73,6 +76,30 @@ def test_masks_that_are_all_empty_stop_the_stage(job):
     made = job(frames=2, blank=(0, 1), steps=5)
     with pytest.raises(StageError, match="every mask is empty"):
         run(made)
+
+
+@pytest.mark.slow
+def test_flip_is_measured_where_it_is_asked_for_with_and_without_the_pose_moved_to_the_image(job):
+    made = job(steps=10, flip=True)
+    run(made)
+    figures = metrics(made)
+    assert 0 < figures["flip_ttpo"] <= figures["flip"] * 1.05 < 1
+    assert all(0 < row["flip"] < 1 for row in figures["heldout"])
+
+
+@pytest.mark.slow
+def test_a_turn_that_was_seen_in_part_is_warned_of_and_a_whole_one_is_not(job):
+    whole, part = job("whole", steps=4), job("part", steps=4)
+    params = BodyParams.read(part.inputs["smplx/body.npz"])
+    run(whole)
+    params.global_orient[:] = params.global_orient[6] + np.linspace(0, 0.1, len(params.global_orient))[:, None]
+    folder = part.out.parent / "front"
+    folder.mkdir()
+    params.write(folder / "body.npz")
+    part.inputs = part.inputs | {"smplx/body.npz": folder / "body.npz"}
+    run(part)
+    assert not any("of 360 degrees" in w for w in whole.warnings)
+    assert any("of 360 degrees" in w for w in part.warnings)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.workspace import Workspace
-from gsac.stages.train import fast, novel, unseen
+from gsac.stages.train import evaluate, fast, novel, unseen
 from gsac.stages.train.poses import Poses
 
 
@@ -74,3 +74,14 @@ def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
     assert novel.judge_novel(gaussians, poses, Workspace(1))["stray_alpha"] > 10 * max(clean["stray_alpha"], 1e-4)
     gaussians.log_scale[7] += [3, 0, 0]
     assert novel.judge_novel(gaussians, poses, Workspace(1))["needle_share"] == pytest.approx(1 / 4000)
+
+
+def test_the_face_has_a_box_from_the_front_and_none_from_behind(body):
+    params = BodyParams.from_pose(np.array([[[np.pi, 0, 0]] + [[0, 0, 0]] * 54, [[0, 0, np.pi]] + [[0, 0, 0]] * 54]),
+                                  np.tile([0, 0, 4.0], (2, 1)), np.zeros(4), np.zeros((2, body.exprdirs.shape[2])), 300.0,
+                                  (110.0, 110.0))
+    poses, camera = Poses(body, params), Camera((300.0, 300.0), (110.0, 110.0), 220, 220)
+    front, back = (evaluate.boxes(poses, t, camera) for t in (0, 1))
+    x0, y0, x1, y1 = front["face"]
+    assert 5 < x1 - x0 < 30 and 5 < y1 - y0 < 30
+    assert "face" not in back
