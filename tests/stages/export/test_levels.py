@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
+from gsac.avatar.light import shade
 from gsac.avatar.raster import render
 from gsac.stages.export.levels import MEMBERS, coarser
 from gsac.stages.export.rigged import RiggedAvatar
@@ -11,25 +12,29 @@ from gsac.stages.export.rigged import RiggedAvatar
 TALL = 120
 """px: a person of 1.7 m at 14 m on a screen of 1080 lines with 60 degrees."""
 
+EVEN = np.float32([[1] * 3, [0] * 3, [0] * 3, [0] * 3])
+
 
 @pytest.fixture(scope="module")
 def avatar(exported):
     return RiggedAvatar.read(exported / "avatar.gsac")
 
 
-def picture(avatar, g, pose):
+def picture(avatar, g, pose, light=EVEN):
     vertices = avatar.posed(avatar.pose(pose))
-    bound = bind(face_frames(vertices, avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    frames = face_frames(vertices, avatar.faces)
+    rgb = g["rgb"] * shade(light, frames.R[g["face"], :, 1].astype(np.float32))
+    bound = bind(frames, g["face"], g["mu"], g["quat"], g["log_scale"])
     flip, middle = np.diag([1.0, -1, -1]), (vertices.min(0) + vertices.max(0)) / 2
     focal = TALL / np.ptp(vertices[:, 1]) * 6
     out = render(((bound.means - middle) @ flip.T + (0, 0, 6)).astype(np.float32), (flip @ bound.rotations).astype(np.float32),
-                 bound.scales.astype(np.float32), g["rgb"], g["opacity"], Camera((focal, focal), (80.0, 80.0), 160, 160))
+                 bound.scales.astype(np.float32), rgb, g["opacity"], Camera((focal, focal), (80.0, 80.0), 160, 160))
     return np.concatenate([out.rgb, out.alpha[..., None]], 2)
 
 
-def error(avatar, g, pose):
-    fine = picture(avatar, avatar.gaussians, pose)
-    return ((picture(avatar, g, pose) - fine)[fine[..., 3] > .02] ** 2).mean()
+def error(avatar, g, pose, light=EVEN):
+    fine = picture(avatar, avatar.gaussians, pose, light)
+    return ((picture(avatar, g, pose, light) - fine)[fine[..., 3] > .02] ** 2).mean()
 
 
 def test_the_file_carries_a_third_and_a_ninth_of_the_gaussians(avatar):
@@ -46,6 +51,15 @@ def test_a_coarser_level_is_nearer_to_the_fine_picture_than_left_out_gaussians_m
         got, simple = error(avatar, level, pose), error(avatar, fewer, pose)
         print(f"{pose} 1/{members}: {-10 * np.log10(got):.1f} dB, left out {-10 * np.log10(simple):.1f} dB")
         assert got < simple * .7
+
+
+@pytest.mark.parametrize("pose", ["T", "A"])
+def test_a_coarser_level_is_as_near_to_the_fine_picture_in_a_strong_light_as_in_an_even_one(avatar, pose):
+    light = np.float32([[.8, .75, .7], [.3, .2, -.1], [.2, .1, .3], [.25, -.6, .2]])
+    for level in avatar.coarser:
+        got, even = error(avatar, level, pose, light), error(avatar, level, pose)
+        print(f"{pose} {len(level['face'])}: lit {-10 * np.log10(got):.1f} dB, even {-10 * np.log10(even):.1f} dB")
+        assert got < even * 1.25
 
 
 def test_merging_one_by_one_changes_nothing(avatar):

@@ -26,6 +26,10 @@ namespace Gsac
         static readonly int CornersId = Shader.PropertyToID("GsacCorners");
         static readonly int LocalId = Shader.PropertyToID("GsacLocal");
         static readonly int SplatsId = Shader.PropertyToID("GsacSplats");
+        static readonly int[] LightIds =
+        {
+            Shader.PropertyToID("GsacLightRed"), Shader.PropertyToID("GsacLightGreen"), Shader.PropertyToID("GsacLightBlue"),
+        };
 
         /// <summary>Cameras beyond those of the scene; the editor adds its scene views.</summary>
         public static readonly List<Camera> ExtraCameras = new List<Camera>();
@@ -34,6 +38,9 @@ namespace Gsac
 
         [SerializeField, Tooltip("m: nearer than this the finest level of detail is drawn; each doubling takes the next, where the file has more.")]
         float finestWithin = 8;
+
+        [SerializeField, Tooltip("0..1: how far the avatar stands in the light of the room in which its clip was filmed; 0 is even light.")]
+        float clipLight = 1;
 
         readonly List<GsacView> views = new List<GsacView>();
         GsacAvatar avatar;
@@ -50,6 +57,13 @@ namespace Gsac
         {
             get { return finestWithin; }
             set { finestWithin = value; }
+        }
+
+        /// <summary>0..1: 1 draws the avatar in the light of its clip, 0 evenly lit. The light turns with the avatar's transform, not with its pose.</summary>
+        public float ClipLight
+        {
+            get { return clipLight; }
+            set { clipLight = value; }
         }
 
         void OnEnable()
@@ -150,11 +164,21 @@ namespace Gsac
             kernels.SetBuffer(skinKernel, BonesId, bones);
             kernels.SetBuffer(skinKernel, PosedId, posed);
             kernels.Dispatch(skinKernel, Groups(model.Data.VertexCount), 1, 1);
+            float lit = model.Data.Light == null ? 0 : Mathf.Clamp(clipLight, 0, 1);
+            for (int c = 0; c < 3; c++) kernels.SetVector(LightIds[c], Light(c, lit));
             kernels.SetBuffer(bindKernel, CornersId, level.Corners);
             kernels.SetBuffer(bindKernel, LocalId, level.Local);
             kernels.SetBuffer(bindKernel, PosedId, posed);
             kernels.SetBuffer(bindKernel, SplatsId, splats);
             kernels.Dispatch(bindKernel, Groups(level.Count), 1, 1);
+        }
+
+        /// <summary>A channel's factors of a normal's x, y, z and of 1, between even light and the clip's.</summary>
+        Vector4 Light(int channel, float lit)
+        {
+            if (lit == 0) return new Vector4(0, 0, 0, 1);
+            float[] light = model.Data.Light;
+            return new Vector4(lit * light[3 + channel], lit * light[6 + channel], lit * light[9 + channel], 1 - lit + lit * light[channel]);
         }
 
         public static int Groups(int count)

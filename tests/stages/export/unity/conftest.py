@@ -87,13 +87,17 @@ def play(mono, package, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def files(figure, exported, tmp_path_factory):
-    """figure.gsac: the small figure; person.gsac: an exported person; numbers: a pose and weights for each."""
+    """figure.gsac: the small figure; person.gsac: an exported person, in a light; numbers: a pose and weights for each."""
+    from dataclasses import replace
+
     import numpy as np
+    from gsac.stages.export.rigged import RiggedAvatar
 
     folder = tmp_path_factory.mktemp("files")
     rng = np.random.default_rng(2)
     (folder / "figure.gsac").write_bytes(figure.to_bytes())
-    (folder / "person.gsac").write_bytes((exported / "avatar.gsac").read_bytes())
+    light = np.float32([[.8, .75, .7], [.3, .2, -.1], [.2, .1, .3], [.25, -.6, .2]])
+    (folder / "person.gsac").write_bytes(replace(RiggedAvatar.read(exported / "avatar.gsac"), light=light).to_bytes())
     for name, count in (("figure", 2), ("person", 52)):
         pose, transl = rng.normal(size=165) * .3, rng.normal(size=3) * .2
         np.savetxt(folder / f"{name}.txt", np.concatenate([pose, transl, rng.random(count) * .6]).astype(np.float32)[None], "%.9g")

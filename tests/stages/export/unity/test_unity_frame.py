@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
+from gsac.avatar.light import DARKEST, shade
 from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.stages.export.rigged import RiggedAvatar
@@ -23,9 +24,10 @@ def frame(play, mono, files, gpu, kernels, tmp_path_factory):
         if name.startswith("Gsac"):
             gpu.put(name, array)
     jobs = []
-    for row in asked["steps"].reshape(-1, 14):
+    for row in asked["steps"].reshape(-1, 26):
         names = ("GsacVertexCount", "GsacSplatCount", "GsacKeyCount", "GsacIndexBits", "GsacSortStage", "GsacSortStride")
         parameters = dict(zip(names, map(int, row[2:8]), strict=True)) | {"GsacDepthRange": row[8:10], "GsacDepthRow": row[10:14]}
+        parameters |= {f"GsacLight{name}": row[14 + 4 * c:18 + 4 * c] for c, name in enumerate(("Red", "Green", "Blue"))}
         jobs.append((kernels[KERNELS[int(row[0])]], parameters, int(row[1])))
     gpu.run(jobs)
     return asked, {name: gpu.get(name) for name in ("GsacPosed", "GsacSplats")} | {"GsacKeys": gpu.get("GsacKeys", np.uint32)}
@@ -33,7 +35,7 @@ def frame(play, mono, files, gpu, kernels, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def truth(given):
-    """(vertices, bound gaussians) of that frame in the avatar's own space, canonical axes turned to Unity's."""
+    """(vertices turned to Unity's axes, bound gaussians, factors of their colours) of that frame in the avatar's own space."""
     avatar, pose, transl, weights = given("person")
     rest = avatar.vertices.copy()
     for e, w in enumerate(weights):
@@ -42,7 +44,9 @@ def truth(given):
     bones = joint_transforms(pose[None], avatar.joints, avatar.parents)[0]
     vertices = skin(rest, bones, avatar.skin_index, avatar.skin_weight) + transl - (0, avatar.ground, 0)
     g = avatar.gaussians
-    return vertices @ MIRROR, bind(face_frames(vertices, avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    frames = face_frames(vertices, avatar.faces)
+    bound = bind(frames, g["face"], g["mu"], g["quat"], g["log_scale"])
+    return vertices @ MIRROR, bound, shade(avatar.light, frames.R[g["face"], :, 1])
 
 
 def test_a_frame_of_the_scripts_skins_as_the_trainer_does(frame, truth):
@@ -59,6 +63,13 @@ def test_a_frame_of_the_scripts_binds_as_the_trainer_does_though_mirrored(frame,
     assert np.quantile(error, .99) < 2e-4 and error.max() < 5e-2, "posed in float32: a sliver's normal is as uncertain as its area"
 
 
+def test_a_frame_of_the_scripts_lights_each_face_as_the_trainer_does_though_mirrored(frame, truth):
+    factor = frame[1]["GsacSplats"].reshape(-1, 12)[:, 9:]
+    error = abs(factor - truth[2]).max(1)
+    assert np.ptp(truth[2], axis=0).min() > .5 and (truth[2] == np.float32(DARKEST)).any()
+    assert np.quantile(error, .99) < 1e-4 and error.max() < 2e-2, "a sliver's normal is as uncertain as its area"
+
+
 def test_a_frame_of_the_scripts_sorts_from_far_to_near_for_the_camera(frame):
     asked, got = frame
     draw, ahead, place = asked["draw"], *asked["camera"].reshape(3, 4).T[2:]
@@ -66,7 +77,7 @@ def test_a_frame_of_the_scripts_sorts_from_far_to_near_for_the_camera(frame):
     means = got["GsacSplats"].reshape(-1, 12)[:, :3]
     world = means @ model[:, :3].T + model[:, 3]
     depth = (world - place) @ ahead
-    low, per_metre = asked["steps"].reshape(-1, 14)[-1, 8:10]
+    low, per_metre = asked["steps"].reshape(-1, 26)[-1, 8:10]
     assert low <= depth.min() and depth.max() <= low + 1 / per_metre, "no depth falls out of the keys' range"
     order = got["GsacKeys"][:len(means)] & ((1 << bits) - 1)
     assert sorted(order) == list(range(len(means)))
@@ -111,7 +122,7 @@ def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, hls
     centre = np.diag([1.0, -1, -1]) @ (view[:3, :3] @ model[:, 3] + view[:3, 3])
     assert np.linalg.det(total) > 0
     want = render((bound.means @ total.T + centre).astype(np.float32), (total / size @ bound.rotations).astype(np.float32),
-                  (bound.scales * size).astype(np.float32), g["rgb"], g["opacity"], camera)
+                  (bound.scales * size).astype(np.float32), g["rgb"] * truth[2], g["opacity"], camera)
     want = np.concatenate([want.rgb, want.alpha[..., None]], 2)
     assert (want[..., 3] > .5).mean() > .05, "the figure is in the picture"
     assert -10 * np.log10(((got - want) ** 2).mean()) > 55

@@ -8,6 +8,8 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.stages.export.rigged import RiggedAvatar
 
+EVEN = {f"GsacLight{name}": np.float32([0, 0, 0, 1]) for name in ("Red", "Green", "Blue")}
+
 
 @pytest.fixture(scope="module")
 def avatar(exported):
@@ -39,7 +41,7 @@ def on_gpu(gpu, kernels, packing, avatar, frame):
     gpu.put("GsacPosed", np.zeros((V, 4), np.float32))
     gpu.put("GsacSplats", np.zeros((N, 12), np.float32))
     gpu.put("Parts", np.zeros((-(-N // 64) * 64, 20), np.float32))
-    parameters = {"GsacVertexCount": V, "GsacSplatCount": N, "GsacKeyCount": 0, "GsacIndexBits": 0, "GsacSortStage": 0,
+    parameters = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacKeyCount": 0, "GsacIndexBits": 0, "GsacSortStage": 0,
                   "GsacSortStride": 0, "GsacDepthRange": np.zeros(2), "GsacDepthRow": np.zeros(4)}
     gpu.run([(kernels["Skin"], parameters, -(-V // 64)), (kernels["Bind"], parameters, -(-N // 64)),
              (kernels["BindParts"], parameters, -(-N // 64))])
@@ -77,6 +79,7 @@ def test_covariances_agree_with_the_trainer(gpu, bound):
     assert abs(s[:, :3] - bound.means).max() < 1e-5
     error = abs(got - truth).max((1, 2)) / bound.scales.max(1) ** 2
     assert np.quantile(error, .99) < 1e-5 and error.max() < 1e-3
+    assert (s[:, 9:] == 1).all(), "in even light colours are as they are"
 
 
 def test_a_face_without_area_gives_a_point_and_no_nan(gpu, kernels, packing, figure):
@@ -103,7 +106,7 @@ def run_sort(gpu, hlsl, kernels, means, row, near, far):
     splats[:, :3] = means
     gpu.put("GsacSplats", splats)
     gpu.put("GsacKeys", np.zeros(total, np.uint32))
-    base = {"GsacVertexCount": 0, "GsacSplatCount": N, "GsacKeyCount": total, "GsacIndexBits": bits, "GsacSortStage": 0,
+    base = EVEN | {"GsacVertexCount": 0, "GsacSplatCount": N, "GsacKeyCount": total, "GsacIndexBits": bits, "GsacSortStage": 0,
             "GsacSortStride": 0, "GsacDepthRange": np.array([near, 1 / (far - near)]), "GsacDepthRow": np.array(row, float)}
     jobs = [(kernels["Keys"], base, total // 64)]
     for name, k, j in steps:

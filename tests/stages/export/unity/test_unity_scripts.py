@@ -4,6 +4,7 @@ import json
 import random
 import re
 import socket
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -202,6 +203,19 @@ def test_wrong_calls_name_the_avatar_and_the_word(play, files):
 def test_coarser_levels_are_drawn_from_afar(play, files, figure):
     counts = [len(level["face"]) for level in (figure.gaussians, *figure.coarser)]
     assert play("levels", files / "figure.gsac").split() == [str(n) for n in (counts[0], counts[1], counts[2], counts[2])]
+
+
+def test_every_level_is_bound_in_the_light_of_the_file_as_far_as_the_component_says(play, files, tmp_path, figure):
+    light = np.linspace(-.4, .7, 12, dtype=np.float32).reshape(4, 3)
+    (tmp_path / "lit.gsac").write_bytes(replace(figure, light=light).to_bytes())
+    got = np.array([line.split() for line in play("light", tmp_path / "lit.gsac").splitlines()], float)
+    mirrored = (light[[1, 2, 3, 0]] * np.float32([[1], [-1], [-1], [1]])).T
+    even = np.tile([0, 0, 0, 1], (3, 1))
+    assert [row[0] for row in got] == [len(g["face"]) for g in (figure.gaussians, figure.coarser[-1])] * 4
+    for row, strength in zip(got, np.repeat([1, .25, 0, 1], 2), strict=True):
+        np.testing.assert_allclose(row[1:].reshape(3, 4), (1 - strength) * even + strength * mirrored, atol=1e-6)
+    got = [line.split()[1:] for line in play("light", files / "figure.gsac").splitlines()]
+    np.testing.assert_array_equal(np.array(got, float).reshape(-1, 3, 4), np.tile(even, (8, 1, 1)))
 
 
 def test_every_stub_of_unity_has_its_page_and_first_version_and_none_is_newer_than_the_package_asks_for(package):

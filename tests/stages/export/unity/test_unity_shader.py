@@ -44,7 +44,7 @@ def picture(gpu, hlsl, packing, passes, scene, pipeline, flipped=False, linear=0
     half = bound.rotations * bound.scales[:, None]
     c = half @ half.transpose(0, 2, 1)
     splats = np.zeros((N, 12), np.float32)
-    splats[:, :3], splats[:, 3:9] = bound.means, c[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    splats[:, :3], splats[:, 3:9], splats[:, 9:] = bound.means, c[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], scene.get("shade", 1)
     order = np.argsort(-(bound.means @ scene["total"][2]), kind="stable").astype(np.uint32)
     gpu.put("GsacSplats", splats)
     gpu.put("GsacColours", packing.packed(scene["avatar"])["GsacColours"])
@@ -88,11 +88,12 @@ def test_each_eye_of_a_headset_is_drawn_by_its_own_matrices_in_one_pass(gpu, hls
         assert abs(painting.draw(parameters, instance=eye) - alone[eye]).max() < 1e-3
 
 
-def test_in_a_linear_project_an_opaque_colour_is_the_display_colour_made_linear(gpu, hlsl, packing, passes, scene):
-    one = scene | {"bound": type(scene["bound"])(*(a[:1] for a in scene["bound"])), "avatar": _first(scene["avatar"])}
+def test_in_a_linear_project_an_opaque_colour_is_the_lit_display_colour_made_linear(gpu, hlsl, packing, passes, scene):
+    factor = np.array([.5, 1, 1.5])
+    one = scene | {"shade": factor, "bound": type(scene["bound"])(*(a[:1] for a in scene["bound"])), "avatar": _first(scene["avatar"])}
     got = picture(gpu, hlsl, packing, passes, one, "", linear=1)
     peak = got.reshape(-1, 4)[got[..., 3].argmax()]
-    rgb = one["avatar"].gaussians["rgb"][0].astype(np.float64)
+    rgb = one["avatar"].gaussians["rgb"][0].astype(np.float64) * factor
     linear = np.where(rgb > .04045, ((rgb + .055) / 1.055) ** 2.4, rgb / 12.92)
     np.testing.assert_allclose(peak[:3] / peak[3], linear, atol=2e-3)
 

@@ -25,6 +25,7 @@ public static class Play
             case "benchmark": Benchmark(args[1], args[2]); break;
             case "import": Import(args[1]); break;
             case "levels": Levels(args[1]); break;
+            case "light": Light(args[1]); break;
             case "inspector": Inspector(args[1]); break;
             case "demo": Demo(args[1]); break;
             case "life": Life(args[1]); break;
@@ -80,6 +81,11 @@ public static class Play
                 foreach (string name in names) steps.Add(Player.Value(shader, Shader.PropertyToID(name)).x);
                 Vector4 range = Player.Value(shader, Shader.PropertyToID("GsacDepthRange")), row = Player.Value(shader, Shader.PropertyToID("GsacDepthRow"));
                 steps.AddRange(new[] { range.x, range.y, row.x, row.y, row.z, row.w });
+                foreach (string name in new[] { "GsacLightRed", "GsacLightGreen", "GsacLightBlue" })
+                {
+                    Vector4 light = Player.Value(shader, Shader.PropertyToID(name));
+                    steps.AddRange(new[] { light.x, light.y, light.z, light.w });
+                }
                 foreach (string name in buffers)
                 {
                     GraphicsBuffer buffer = Player.Buffer(shader, kernel, Shader.PropertyToID(name));
@@ -262,6 +268,34 @@ public static class Play
         {
             camera.transform.SetPositionAndRotation(new Vector3(0, 1, away), Quaternion.Euler(0, 180, 0));
             Player.Frame(new[] { avatar.gameObject })();
+        }
+    }
+
+    /// <summary>For each strength of the light, near and far: gaussians bound, and the three channels that bind them.</summary>
+    static void Light(string file)
+    {
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        Camera camera = Player.AddCamera("eye");
+        Player.OnDispatch = (shader, kernel, groups) =>
+        {
+            if (kernel != shader.FindKernel("Bind")) return;
+            string line = Player.Value(shader, Shader.PropertyToID("GsacSplatCount")).x.ToString(CultureInfo.InvariantCulture);
+            foreach (string name in new[] { "GsacLightRed", "GsacLightGreen", "GsacLightBlue" })
+            {
+                Vector4 light = Player.Value(shader, Shader.PropertyToID(name));
+                line += string.Format(CultureInfo.InvariantCulture, " {0} {1} {2} {3}", light.x, light.y, light.z, light.w);
+            }
+            Console.WriteLine(line);
+        };
+        var renderer = avatar.GetComponent<GsacRenderer>();
+        foreach (float strength in new[] { renderer.ClipLight, 0.25f, 0, 7 })
+        {
+            renderer.ClipLight = strength;
+            foreach (float away in new[] { 3f, 300f })
+            {
+                camera.transform.SetPositionAndRotation(new Vector3(0, 1, away), Quaternion.Euler(0, 180, 0));
+                Player.Frame(new[] { avatar.gameObject })();
+            }
         }
     }
 

@@ -5,6 +5,8 @@
 
 #define GSAC_NEAR 0.01
 #define GSAC_WIDE 1.3
+#define GSAC_DARKEST 0.25
+#define GSAC_BRIGHTEST 2.5
 
 // The frame of a face: orthonormal a, n, b, its centre, its size k (0 where it has no area).
 struct GsacFrame
@@ -69,6 +71,13 @@ GsacBound GsacBind(GsacFrame f, float3 mu, float4 quat, float3 scale)
     g.z = GsacTurn(f, z);
     g.scale = f.k * scale;
     return g;
+}
+
+// What the light of the clip's room multiplies the colours on a face with; red, green, blue: of x, y, z of its normal and of 1.
+float3 GsacLightOn(GsacFrame f, float4 red, float4 green, float4 blue)
+{
+    float4 n = float4(f.k > 0 ? f.n : float3(0, 0, 0), 1);
+    return clamp(float3(dot(red, n), dot(green, n), dot(blue, n)), GSAC_DARKEST, GSAC_BRIGHTEST);
 }
 
 // Covariance: diagonal xx yy zz, rest xy xz yz.

@@ -32,6 +32,7 @@ GsacCorner GsacSplatCorner(uint vertex, float4x4 view, float4x4 projection, floa
     float4 s0 = GsacSplats[splat * 3];
     float4 s1 = GsacSplats[splat * 3 + 1];
     float4 s2 = GsacSplats[splat * 3 + 2];
+    corner.colour.rgb *= s2.yzw;
 
     float3 x = float3(GsacModel0.x, GsacModel1.x, GsacModel2.x);
     float3 y = float3(GsacModel0.y, GsacModel1.y, GsacModel2.y);
