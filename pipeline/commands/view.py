@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import functools
 import http.server
+import tempfile
 from pathlib import Path
 
 from gsac.pipeline.outcomes import ExitCode
@@ -16,27 +17,43 @@ PAGE = "viewer.html"
 
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("avatar", type=Path, metavar="AVATAR",
-                         help="the folder of a run, its export folder, or a file in it")
+                         help="the folder of a run, its export folder, a file in it, or an avatar.gsac that lies alone")
     command.add_argument("--port", type=int, default=0, metavar="N", help="default: any free one")
     command.set_defaults(do=do)
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    page = find_page(arguments.avatar)
-    with serve(page, arguments.port) as server:
+    with tempfile.TemporaryDirectory() as folder, serve(find_page(arguments.avatar, Path(folder)), arguments.port) as server:
         print(address(server), flush=True)
         with contextlib.suppress(KeyboardInterrupt):  # the way to end it
             server.serve_forever()
     return ExitCode.OK
 
 
-def find_page(path: Path) -> Path:
-    """viewer.html of a run's folder, of an export folder, or beside a file. BadInput where there is none."""
+def find_page(path: Path, spare: Path) -> Path:
+    """viewer.html of a run's folder, of an export folder, or beside a file; a .gsac file without one gets its page in the
+    folder `spare`. BadInput where there is none."""
     folders = [path / "export", path] if path.is_dir() else [path.parent]
     for folder in folders:
         if (folder / PAGE).is_file():
             return folder / PAGE
+    if path.is_file() and path.suffix.lower() == ".gsac":
+        return made_page(path, spare)
     raise BadInput(f"{path}: no {PAGE} here; give the folder of a run whose stage export is done")
+
+
+def made_page(path: Path, folder: Path) -> Path:
+    """The page of an avatar file. BadInput where the file is none."""
+    from gsac.avatar.artifacts import ArtifactError
+    from gsac.stages.export.page import page_bytes
+    from gsac.stages.export.rigged import RiggedAvatar
+
+    try:
+        RiggedAvatar.read(path)
+    except ArtifactError as e:
+        raise BadInput(str(e)) from e
+    (folder / PAGE).write_bytes(page_bytes(path.read_bytes()))
+    return folder / PAGE
 
 
 class Handler(http.server.SimpleHTTPRequestHandler):

@@ -1,6 +1,8 @@
+import importlib.util
 import threading
 import urllib.error
 import urllib.request
+from pathlib import Path
 
 import pytest
 from gsac.benchmarks.turntable import clip as turntable
@@ -8,6 +10,11 @@ from gsac.pipeline.commands.demo import truth_clip
 from gsac.pipeline.commands.view import address, find_page, serve
 from gsac.pipeline.events import PlainReporter
 from gsac.stages.contract import BadInput
+from gsac.stages.export.page import page_bytes
+
+spec = importlib.util.spec_from_file_location("export_helpers", Path(__file__).parents[1] / "stages" / "export" / "conftest.py")
+export = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(export)
 
 
 @pytest.fixture
@@ -22,7 +29,7 @@ def folder(tmp_path):
 
 
 def test_the_viewer_page_is_served_through_its_link_on_this_machine_only(folder):
-    with serve(find_page(folder), 0) as server:
+    with serve(find_page(folder, folder), 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         assert address(server).startswith("http://127.0.0.1:") and server.server_address[0] == "127.0.0.1"
         assert urllib.request.urlopen(address(server)).read() == b"<h1>avatar</h1>"
@@ -33,14 +40,28 @@ def test_the_viewer_page_is_served_through_its_link_on_this_machine_only(folder)
 
 def test_the_page_is_found_from_the_run_from_its_export_and_from_a_file_beside_it(folder):
     page = folder / "export" / "viewer.html"
-    assert find_page(folder) == find_page(folder / "export") == find_page(folder / "export" / "avatar.gsac") == page
+    for path in (folder, folder / "export", folder / "export" / "avatar.gsac"):
+        assert find_page(path, folder) == page
+    with pytest.raises(BadInput, match="gone"):
+        find_page(folder / "gone" / "avatar.gsac", folder)
+
+
+def test_an_avatar_file_that_lies_alone_gets_a_page_and_a_damaged_one_is_named(tmp_path):
+    whole = export.make_figure().to_bytes()
+    (tmp_path / "me.gsac").write_bytes(whole)
+    (tmp_path / "spare").mkdir()
+    page = find_page(tmp_path / "me.gsac", tmp_path / "spare")
+    assert page.parent == tmp_path / "spare" and page.read_bytes() == page_bytes(whole)
+    (tmp_path / "me.gsac").write_bytes(whole[:500])
+    with pytest.raises(BadInput, match=r"me\.gsac.*truncated"):
+        find_page(tmp_path / "me.gsac", tmp_path)
 
 
 def test_a_port_that_is_taken_or_impossible_is_named(folder):
-    with serve(find_page(folder), 0) as server, pytest.raises(BadInput, match=str(server.server_address[1])):
-        serve(find_page(folder), server.server_address[1])
+    with serve(find_page(folder, folder), 0) as server, pytest.raises(BadInput, match=str(server.server_address[1])):
+        serve(find_page(folder, folder), server.server_address[1])
     with pytest.raises(BadInput, match="99999"):
-        serve(find_page(folder), 99999)
+        serve(find_page(folder, folder), 99999)
 
 
 def test_the_demo_clip_is_made_once_and_whole_or_not_at_all(tmp_path, monkeypatch):
