@@ -90,7 +90,8 @@ def test_each_eye_of_a_headset_is_drawn_by_its_own_matrices_in_one_pass(gpu, hls
 
 def test_in_a_linear_project_an_opaque_colour_is_the_lit_display_colour_made_linear(gpu, hlsl, packing, passes, scene):
     factor = np.array([.5, 1, 1.5])
-    one = scene | {"shade": factor, "bound": type(scene["bound"])(*(a[:1] for a in scene["bound"])), "avatar": _first(scene["avatar"])}
+    first = type(scene["bound"])(*(a[:1] for a in scene["bound"]))
+    one = scene | {"shade": factor, "bound": first, "avatar": _first(scene["avatar"])}
     got = picture(gpu, hlsl, packing, passes, one, "", linear=1)
     peak = got.reshape(-1, 4)[got[..., 3].argmax()]
     rgb = one["avatar"].gaussians["rgb"][0].astype(np.float64) * factor
