@@ -20,6 +20,8 @@ from gsac.stages.smplx.solver import System
 ROBUST = 3.0
 """Residuals beyond so many spreads count less and less; `Problem.limit` may be wider while the body is still far off."""
 OUTLINE_ROBUST = 2.0
+CLOTHES = 0.006
+"""Metres that the silhouette is believed to stand off the skin: little enough for bare skin, half of what clothes and hair do."""
 OUTLINE_SIGHTINGS = 40
 """How many independent sightings one frame's outline is worth."""
 
@@ -97,7 +99,7 @@ class Problem:
         total += robust(self._depth_residual(x), self.limit)[0].sum()
         for t, x in self.outline_points(chain, state):
             distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
-            scaled = np.where(inside, distance / self.seen.outline_spread, 0)
+            scaled = np.where(inside, (distance + self._clothes(state, x)) / self.seen.outline_spread, 0)
             total += self._outline_share(len(x)) * robust(scaled, OUTLINE_ROBUST)[0].sum()
         vector = rotation.log(state.local[:, self.active])
         total += (self._prior_residual(vector) ** 2).sum() + (self._limit_residual(vector)[0] ** 2).sum()
@@ -174,15 +176,22 @@ class Problem:
         """Weight of one outline point: neighbours along an edge are not independent sightings."""
         return self.outline_weight * OUTLINE_SIGHTINGS / max(count, 1)
 
+    def _clothes(self, state: State, x: np.ndarray) -> np.ndarray:
+        """(P,) px that the silhouette stands off outline points (P, 3)."""
+        return CLOTHES * np.exp(state.log_focal) / np.maximum(x[:, 2], 0.05)
+
     def _add_outline(self, system: System, state: State, chain: Chain, t: int, x: np.ndarray) -> None:
         uv = self.project(state, x)
         distance, direction, inside = self.seen.outlines[t].at(uv)
-        residual = np.where(inside, distance / self.seen.outline_spread, 0)
+        clothes = self._clothes(state, x)
+        residual = np.where(inside, (distance + clothes) / self.seen.outline_spread, 0)
         shrink = robust(residual, OUTLINE_ROBUST)[1] * np.sqrt(self._outline_share(len(x)))
         weight = np.where(inside, shrink / self.seen.outline_spread, 0)
-        along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x)) * weight[:, None]  # (P, 3)
+        along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x))  # (P, 3)
+        along[:, 2] -= clothes / np.maximum(x[:, 2], 0.05)
+        along *= weight[:, None]
         rows = pulled_back(self.skeleton, chain.frame(t), self.outline_pairs[t], state.betas, along[None, :, None])[0, :, 0]
-        focal = ((uv - self.seen.center) * direction).sum(1) * weight
+        focal = (((uv - self.seen.center) * direction).sum(1) + clothes) * weight
         system.add(slice(t, t + 1), np.concatenate([rows, focal[:, None]], 1)[None], (residual * shrink)[None])
 
     def _prior_residual(self, vector: np.ndarray) -> np.ndarray:
