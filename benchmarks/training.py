@@ -68,20 +68,32 @@ def _train(inputs: dict[str, Path], folder: Path, values: dict) -> float:
 
 
 def _rendered(seed: int, options: argparse.Namespace, say) -> Case:
+    folder = clip(options.out, f"seed{seed}_{options.frames}", say, seed=seed, frames=options.frames)
+    return fitted(options.out, folder, "", say)
+
+
+def clip(out: Path, name: str, say, **turntable) -> Path:
+    """Folder of the truth clip of that name, rendered where it is not yet. turntable: its options."""
     from gsac.benchmarks.turntable.clip import make_clip
+
+    folder = out / "clips" / name
+    if not (folder / "truth.npz").is_file():
+        make_clip(folder, height=1280, progress=lambda done, total, unit: say.progress(name, done, total, unit), **turntable)
+    return folder
+
+
+def fitted(out: Path, folder: Path, variant: str, say, settings: tuple[str, ...] = ()) -> Case:
+    """The clip run up to the body fit. settings: `stage.key=value` that make the variant."""
     from gsac.cache.store import Store
     from gsac.pipeline.params import resolve
     from gsac.pipeline.project import Project
     from gsac.pipeline.run import Chain, Options
     from gsac.pipeline.workspace import Workspace
 
-    folder = options.out / "clips" / f"seed{seed}_{options.frames}"
-    if not (folder / "truth.npz").is_file():
-        make_clip(folder, seed=seed, frames=options.frames, height=1280,
-                  progress=lambda done, total, unit: say.progress(folder.name, done, total, unit))
-    project, clip = Project.at_hand(), (folder / "clip.mp4").resolve()
-    configs, workspace = resolve(project), Workspace(options.out / "runs" / folder.name)
-    workspace.prepare(clip, project, configs)
+    name = f"{folder.name}_{variant}" if variant else folder.name
+    project, video = Project.at_hand(), (folder / "clip.mp4").resolve()
+    configs, workspace = resolve(project, sets=settings), Workspace(out / "runs" / name)
+    workspace.prepare(video, project, configs)
     for last in ("segment", "smplx"):
-        Chain(project, configs, Store.open(say=say.note), workspace, say).run(clip, Options(until=last))
-    return Case(folder.name, {port: workspace.path(port) for port in STAGE.inputs})
+        Chain(project, configs, Store.open(say=say.note), workspace, say).run(video, Options(until=last))
+    return Case(name, {port: workspace.path(port) for port in STAGE.inputs})

@@ -1,0 +1,46 @@
+"""Rows of metrics as words and as CSV: mean and spread over the repeats."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+COLUMNS = {"time, s": ("seconds", ".0f"), "gaussians": ("n_gaussians", ".0f"), "PSNR": ("psnr_full_black", ".3f"),
+           "SSIM": ("ssim", ".4f"), "LPIPS": ("lpips", ".4f"), "PSNR person": ("psnr_fg", ".2f"),
+           "PSNR hands": ("psnr_hands", ".2f"), "pose aligned": ("psnr_fg_ttpo", ".2f")}
+"""Head -> figure of metrics.json, and its format."""
+
+
+def spread(metrics: list[dict], name: str) -> tuple[float, float] | None:
+    """Mean and standard deviation over repeats; None where one of them has no such figure."""
+    values = [m.get(name) for m in metrics]
+    if any(value is None for value in values):
+        return None
+    return float(np.mean(values)), float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+
+
+def cells(metrics: list[dict]) -> list[str]:
+    """One a column; a dash where nothing was measured."""
+    out = []
+    for name, form in COLUMNS.values():
+        found = spread(metrics, name)
+        out.append("-" if found is None else f"{found[0]:{form}} +- {found[1]:{form}}")
+    return out
+
+
+def text(rows: dict[tuple[str, str], list[dict]]) -> str:
+    """rows: (clip, fill) -> metrics.json of each repeat."""
+    table = [("clip", "hands", *COLUMNS)] + [(clip, fill, *cells(metrics)) for (clip, fill), metrics in rows.items()]
+    widths = [max(len(row[c]) for row in table) for c in range(len(table[0]))]
+    lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+
+
+def write_csv(rows: dict[tuple[str, str], list[dict]], path: Path) -> None:
+    with open(path, "w", newline="") as f:
+        sheet = csv.writer(f)
+        sheet.writerow(["clip", "fill", "seed", *(name for name, _ in COLUMNS.values())])
+        for (clip, fill), metrics in rows.items():
+            sheet.writerows([clip, fill, seed, *(m.get(name) for name, _ in COLUMNS.values())] for seed, m in enumerate(metrics))
