@@ -36,7 +36,7 @@ class Gaussians:
     opacity: np.ndarray
     """(N,) in 0..1."""
     light: np.ndarray | None = None
-    """(4, 3) of `avatar.light`, camera frame of the clip: what rgb is multiplied with by the way a face looks; None: by 1."""
+    """(4, 3) of `avatar.light`: what rgb is multiplied with by the way a face looks to the clip's camera; None: by 1."""
 
     def __len__(self) -> int:
         return len(self.face)

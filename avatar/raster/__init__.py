@@ -162,7 +162,7 @@ def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, 
                                 take("valid", (f,), np.bool_))
     bound = binding.Bound(take("means", (n, 3), real), take("rotations", (n, 3, 3), real), take("scales", (n, 3), real))
     binding.forward(workspace.share, vertices, faces, take("used", (f,), np.bool_), frames, face, mu, quat, log_scale, bound)
-    shade = None if gaussians.light is None else light.shade(gaussians.light, frames.R[face, :, 1])
+    shade = None if gaussians.light is None else light.shade(gaussians.light, frames.R[face, :, 1] * light.FROM_CAMERA.astype(real))
     rgb = gaussians.rgb if shade is None else gaussians.rgb * shade
     rendering = render(*bound, rgb, gaussians.opacity, camera, workspace)
     rendering.state.bound, rendering.state.shade = (vertices, faces, face, mu, quat, log_scale), shade

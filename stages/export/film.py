@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from gsac.avatar.binding import face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.light import turned
+from gsac.avatar.light import shade
 from gsac.avatar.motion.source import Motion
 from gsac.avatar.raster import render_bound
 from gsac.avatar.workspace import Workspace
@@ -69,7 +70,9 @@ def frames(avatar: RiggedAvatar, film: Film, width: int, height: int, background
     for t in range(len(film)):
         vertices = avatar.posed(film.pose[t]) + film.transl[t]
         R, eye = look(film.yaw[t], place[t] * (1, 0, 1) + (0, middle, 0), distance)
-        gaussians.light = None if avatar.light is None else turned(avatar.light, R)
+        if avatar.light is not None:
+            normals = face_frames(vertices, avatar.faces).R[gaussians.face, :, 1]
+            gaussians.rgb = avatar.gaussians["rgb"] * shade(avatar.light, normals)
         out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, gaussians, camera, workspace)
         image = out.rgb + (1 - out.alpha[..., None]) * background
         yield np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)

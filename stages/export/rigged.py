@@ -66,7 +66,7 @@ class RiggedAvatar:
     coarser: list[dict[str, np.ndarray]] = field(default_factory=list)
     """The same arrays for levels of detail with ever fewer gaussians, to be seen from afar."""
     light: np.ndarray | None = None
-    """(4, 3) of `avatar.light` in the canonical axes, of the clip's room: what all rgb are multiplied with; None: by 1."""
+    """(4, 3) of `avatar.light`, of the clip's room: what all rgb are multiplied with; None: by 1."""
     poses: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     """Still poses: name -> joint name -> axis-angle."""
     clips: dict[str, Clip] = field(default_factory=dict)

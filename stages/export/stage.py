@@ -9,7 +9,6 @@ from gsac.avatar.artifacts import Clip
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import EACH, Gaussians
-from gsac.avatar.light import turned
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.fbx import avatar_fbx
@@ -23,8 +22,6 @@ from gsac.stages.export.spz import spz_bytes
 from gsac.stages.export.unity_package import write_unity
 from scipy.spatial.transform import Rotation
 
-UPRIGHT = np.diag([1.0, -1, -1])
-"""From the clip's camera frame to the canonical axes, and back: the camera stands before a person who faces it."""
 MOVED = 1e-4
 """m: a vertex that an expression moves less than this is left out."""
 
@@ -79,7 +76,7 @@ def rigged(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar
         expression_delta=np.concatenate([*(body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
         jaw_actions=body.jaw_actions.astype(np.float32),
         gaussians={name: getattr(gaussians, name) for name in EACH},
-        light=None if gaussians.light is None else turned(gaussians.light, UPRIGHT),
+        light=gaussians.light,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.light import basis, shade
+from gsac.avatar.light import FROM_CAMERA, basis, shade
 from gsac.avatar.zbuffer import rasterise, visible_points
 from scipy.spatial import cKDTree
 
@@ -45,7 +45,7 @@ class Sight:
     colour: np.ndarray
     """(M, 3) in 0..1."""
     normal: np.ndarray
-    """(M, 3) of the faces, camera frame."""
+    """(M, 3) of the faces, in the light's axes."""
     weight: np.ndarray
     """(M,): straight views count more."""
 
@@ -63,7 +63,8 @@ def read_sights(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussian
         pixel = frame.pixels[y, x].astype(np.float64)
         sure = pixel[:, 3] > SURE
         chosen = visible[sure]
-        sights.append(Sight(chosen, pixel[sure, :3] / pixel[sure, 3:], posed.R[gaussians.face[chosen], :, 1], facing[chosen] ** 2))
+        sights.append(Sight(chosen, pixel[sure, :3] / pixel[sure, 3:], posed.R[gaussians.face[chosen], :, 1] * FROM_CAMERA,
+                            facing[chosen] ** 2))
     return sights
 
 

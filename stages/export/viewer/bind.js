@@ -1,6 +1,6 @@
 // Gaussians on the faces of the posed mesh: for a face (v0, v1, v2) with a = (v2-v1)/|.|, n = (v2-v1) x (v0-v1)/|.|,
 // b = a x n, R = [a n b], T = mean, k = 0.5 (h + L)/0.05, L = |v0-v2|, h = 2 area/L: mean k R mu + T, axes k R r s.
-// The light of the clip's room multiplies a colour with light . (1, n), between DARKEST and BRIGHTEST.
+// The light of the clip's room multiplies a colour with light . (1, n_x, n_y, |n_z|), between DARKEST and BRIGHTEST.
 
 const DARKEST = 0.25;
 const BRIGHTEST = 2.5;
@@ -29,7 +29,7 @@ class Binding {
   // vertices: (V, 3) posed. Fills this.data.
   update(vertices) {
     const { faces, face, mu } = this.avatar, M = this.axes, D = this.data, light = (this.lit && this.avatar.light) || EVEN_LIGHT;
-    const shade = (c, x, y, z) => Math.min(BRIGHTEST, Math.max(DARKEST, light[c] + x * light[3 + c] + y * light[6 + c] + z * light[9 + c]));
+    const shade = (c, x, y, z) => Math.min(BRIGHTEST, Math.max(DARKEST, light[c] + x * light[3 + c] + y * light[6 + c] + Math.abs(z) * light[9 + c]));
     for (let i = 0; i < this.count; i++) {
       const f = face[i] * 3, i0 = faces[f] * 3, i1 = faces[f + 1] * 3, i2 = faces[f + 2] * 3;
       const x1 = vertices[i1], y1 = vertices[i1 + 1], z1 = vertices[i1 + 2];

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gsac.avatar.binding import face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.light import DARKEST, shade, turned
+from gsac.avatar.light import DARKEST, shade
 from gsac.avatar.raster import render_bound
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.film import FOV, PITCH, look
@@ -43,8 +44,10 @@ def address(lit, tmp_path_factory):
 def expected(avatar, pose, yaw):
     R, eye = look(yaw, np.zeros(3), DISTANCE)
     f = SIZE / 2 / math.tan(math.radians(FOV / 2))
-    gaussians = Gaussians(**avatar.gaussians, light=None if avatar.light is None else turned(avatar.light, R))
-    out = render_bound(((avatar.posed(avatar.pose(pose)) - eye) @ R.T).astype(np.float32), avatar.faces, gaussians,
+    vertices, gaussians = avatar.posed(avatar.pose(pose)), Gaussians(**avatar.gaussians)
+    if avatar.light is not None:
+        gaussians.rgb = gaussians.rgb * shade(avatar.light, face_frames(vertices, avatar.faces).R[gaussians.face, :, 1])
+    out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, gaussians,
                        Camera((f, f), (SIZE / 2, SIZE / 2), SIZE, SIZE))
     image = out.rgb + (1 - out.alpha[..., None]) * np.array(BACKGROUND) / 255
     return np.clip(image, 0, 1), out.alpha > 0.02

@@ -5,7 +5,7 @@ import pytest
 from gsac.avatar.artifacts import Clip, write_alpha, write_frame
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
-from gsac.avatar.light import shade
+from gsac.avatar.light import FROM_CAMERA, shade
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.stages.contract import Job, make_config
 from gsac.stages.train import STAGE
@@ -14,7 +14,7 @@ SIZE = (72, 128)
 SMALL = {"gaussians": 900, "steps": 300, "height": 128, "holdout": 4, "pose_rate": 3e-3, "pose_test_steps": 10}
 
 
-LAMP = np.array([[0.7, 0.7, 0.7], [0.35, 0.3, 0.3], [0, 0, 0], [-0.2, -0.2, -0.2]])
+LAMP = np.array([[0.7, 0.7, 0.7], [0.35, 0.3, 0.3], [0, 0, 0], [0.2, 0.2, 0.2]])
 
 
 def write_inputs(folder, frames=12, blank=(), timestamps=True, lamp=False):
@@ -43,7 +43,7 @@ def write_inputs(folder, frames=12, blank=(), timestamps=True, lamp=False):
         face_id, bary, _ = rasterise(vertices, body.faces, true.camera(width, height))
         rgb = interpolate(colours, body.faces, face_id, bary)
         if lamp:
-            factor = shade(LAMP, face_frames(vertices, body.faces).R[..., 1])
+            factor = shade(LAMP, face_frames(vertices, body.faces).R[..., 1] * FROM_CAMERA)
             rgb = np.clip(rgb * factor[face_id], 0, 1)
         alpha = (face_id >= 0).astype(np.float32)
         write_frame(folder / f"split/frames/{t:06d}.png", np.uint8(np.where(alpha[..., None] > 0, rgb, 0.3) * 255))

@@ -173,7 +173,7 @@ namespace Gsac
             kernels.Dispatch(bindKernel, Groups(level.Count), 1, 1);
         }
 
-        /// <summary>A channel's factors of a normal's x, y, z and of 1, between even light and the clip's.</summary>
+        /// <summary>A channel's factors of a normal's x, y, |z| and of 1, between even light and the clip's.</summary>
         Vector4 Light(int channel, float lit)
         {
             if (lit == 0) return new Vector4(0, 0, 0, 1);

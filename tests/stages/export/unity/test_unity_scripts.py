@@ -209,7 +209,7 @@ def test_every_level_is_bound_in_the_light_of_the_file_as_far_as_the_component_s
     light = np.linspace(-.4, .7, 12, dtype=np.float32).reshape(4, 3)
     (tmp_path / "lit.gsac").write_bytes(replace(figure, light=light).to_bytes())
     got = np.array([line.split() for line in play("light", tmp_path / "lit.gsac").splitlines()], float)
-    mirrored = (light[[1, 2, 3, 0]] * np.float32([[1], [-1], [-1], [1]])).T
+    mirrored = (light[[1, 2, 3, 0]] * np.float32([[1], [-1], [1], [1]])).T
     even = np.tile([0, 0, 0, 1], (3, 1))
     assert [row[0] for row in got] == [len(g["face"]) for g in (figure.gaussians, figure.coarser[-1])] * 4
     for row, strength in zip(got, np.repeat([1, .25, 0, 1], 2), strict=True):

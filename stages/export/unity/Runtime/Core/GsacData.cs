@@ -86,7 +86,7 @@ namespace Gsac
 
         /// <summary>
         /// To Unity's axes and back: x changes its sign. Faces keep their corners' order, so the third column of a face
-        /// frame keeps its sense and the second turns round: mu (x, -y, z), quat (w, -x, y, -z), the light's y and z.
+        /// frame keeps its sense and the second turns round: mu (x, -y, z), quat (w, -x, y, -z), the light's y.
         /// </summary>
         public GsacData Mirror()
         {
@@ -103,7 +103,7 @@ namespace Gsac
                     level.Quat[i + 3] = -level.Quat[i + 3];
                 }
             }
-            for (int i = 6; Light != null && i < 12; i++) Light[i] = -Light[i];
+            for (int i = 6; Light != null && i < 9; i++) Light[i] = -Light[i];
             foreach (GsacClip pose in Poses.Values) Flip(pose);
             foreach (GsacClip clip in Clips.Values) Flip(clip);
             IsMirrored = !IsMirrored;

@@ -73,10 +73,10 @@ GsacBound GsacBind(GsacFrame f, float3 mu, float4 quat, float3 scale)
     return g;
 }
 
-// What the light of the clip's room multiplies the colours on a face with; red, green, blue: of x, y, z of its normal and of 1.
+// What the light of the clip's room multiplies the colours on a face with; red, green, blue: of x, y, |z| of its normal and of 1.
 float3 GsacLightOn(GsacFrame f, float4 red, float4 green, float4 blue)
 {
-    float4 n = float4(f.k > 0 ? f.n : float3(0, 0, 0), 1);
+    float4 n = float4(f.k > 0 ? float3(f.n.xy, abs(f.n.z)) : float3(0, 0, 0), 1);
     return clamp(float3(dot(red, n), dot(green, n), dot(blue, n)), GSAC_DARKEST, GSAC_BRIGHTEST);
 }
 
