@@ -115,6 +115,23 @@ def test_the_body_never_faces_the_wrong_way(body, tmp_path):
     assert (np.einsum("tc,tc->t", front, true_front) > np.cos(np.radians(25))).all()
 
 
+def test_arms_that_reach_forward_are_not_left_hanging(body):
+    """The fit begins with hanging arms, far from hands held before the chest."""
+    truth = turning_person(body, 14)
+    lift = np.clip(np.minimum(np.arange(14) - 2, 11 - np.arange(14)) / 2, 0, 1)
+    pose = truth.pose.copy()
+    pose[:, 0] = [np.pi, 0, 0]
+    for shoulder, elbow, side in ((16, 18, -1), (17, 19, 1)):
+        forward = Rotation.from_euler("y", side * 1.4 * lift[:, None])
+        pose[:, shoulder] = (forward * Rotation.from_euler("z", side * (0.9 - 0.8 * lift)[:, None])).as_rotvec()
+        pose[:, elbow] = np.stack([0 * lift, side * (0.3 + 1.2 * lift), 0 * lift], 1)
+    truth = BodyParams.from_pose(pose, truth.transl, truth.betas, np.zeros((14, 52)), FOCAL, (WIDTH / 2, HEIGHT / 2))
+    config = SmplxConfig(silhouette=0, height_m=height_of(body, truth))
+    fit = fit_clip(body, sightings_of(body, truth), [], config, lambda *a: None)
+    arms = joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), truth)[:, 18:22].mean(1)
+    assert arms[4:10].max() < 250  # hanging: 400
+
+
 def test_derivatives_agree_with_finite_differences(body, tmp_path):
     truth = turning_person(body, 3)
     outlines = outlines_of(body, truth, tmp_path)
