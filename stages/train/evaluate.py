@@ -63,7 +63,7 @@ def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder:
 def boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:
     """x0, y0, x1, y1 px of face, left_hand and right_hand, of those that the body itself does not hide.
 
-    The face is a square between nose and ears, as wide as FACE_WIDTH times the way from ear to ear; a hand is the box of its key points.
+    The face is a square between nose and ears, FACE_WIDTH times the way from ear to ear; a hand is the box of its key points.
     """
     vertices = poses.vertices(t)
     points = poses.body.keypoints(vertices)

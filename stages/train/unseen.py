@@ -13,12 +13,12 @@ from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.workspace import Workspace
 from scipy.spatial import cKDTree
 
-FRONT = 0.3
-"""Cosine between a face's normal and the way to the camera from which on a frame shows it fully; at none it shows nothing."""
+BEHIND, FRONT = -0.2, 0.3
+"""Cosine between a face's normal and the way to the camera: up to the first a frame shows nothing of it, from the second on all.
+The first is below zero, since a limb's outline is made by what lies just behind its edge."""
 LEAST_SHOWN = 0.05
 """Pixels of a half-size frame, on average over the frames, that a gaussian must show of its front to be called seen."""
 NEIGHBOURS = 8
-LEAST_OPACITY = 0.9
 
 
 def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera, workspace: Workspace) -> np.ndarray:
@@ -31,11 +31,14 @@ def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera:
     frames = face_frames(vertices, faces)
     normal, place = frames.R[gaussians.face, :, 1], frames.T[gaussians.face]
     facing = -(normal * place).sum(1) / np.maximum(np.linalg.norm(place, axis=1), 1e-9)
-    return np.clip(facing / FRONT, 0, 1) * added
+    return np.clip((facing - BEHIND) / (FRONT - BEHIND), 0, 1) * added
 
 
 def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians, unseen ones as flat discs at the height, size and colour of their neighbours. seen: (N,); rest: (V, 3)."""
+    """The gaussians, unseen ones as flat discs in the colour of their neighbours. seen: (N,) bool; rest: (V, 3) m.
+
+    They lie no higher over the body than their neighbours and are no larger; opacity stays: the masks have told where nothing is.
+    """
     poor = np.flatnonzero(~seen)
     if not len(poor) or not seen.any():
         return gaussians
@@ -44,11 +47,11 @@ def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.nda
     count = min(NEIGHBOURS, int(seen.sum()))
     near = np.flatnonzero(seen)[cKDTree(middle[seen]).query(middle[poor], k=count)[1]].reshape(len(poor), count)
     out = gaussians[np.arange(len(gaussians))]
-    out.mu[poor, 1] = np.median(size[near] * gaussians.mu[near, 1], axis=1) / size[poor]
+    height = np.median(size[near] * gaussians.mu[near, 1], axis=1) / size[poor]
+    out.mu[poor, 1] = np.minimum(gaussians.mu[poor, 1], height)
     widths = np.sort(gaussians.log_scale, 1)[:, 1:].mean(1) + np.log(size)
-    width = np.maximum(np.median(widths[near], axis=1), widths[poor]) - np.log(size[poor])
+    width = np.minimum(np.median(widths[near], axis=1), widths[poor]) - np.log(size[poor])
     out.log_scale[poor] = np.stack([width, width + np.log(FLATNESS), width], 1)
     out.quat[poor] = [1, 0, 0, 0]
     out.rgb[poor] = gaussians.rgb[near].mean(1)
-    out.opacity[poor] = np.maximum(gaussians.opacity[near].mean(1), LEAST_OPACITY)
     return out

@@ -39,7 +39,7 @@ def test_a_front_view_shows_the_chest_and_neither_back_nor_soles(body):
     assert soles.sum() > 10 and np.quantile(pixels[soles], 0.9) < 0.05
 
 
-def test_unseen_gaussians_take_height_shape_and_colour_of_their_neighbours_and_seen_ones_stay(body):
+def test_unseen_gaussians_lie_flat_no_higher_and_coloured_as_their_neighbours_and_seen_ones_stay(body):
     gaussians, at = covering(body)
     rng = np.random.default_rng(0)
     seen = at[:, 1] > at[:, 1].min() + 0.05
@@ -50,7 +50,8 @@ def test_unseen_gaussians_take_height_shape_and_colour_of_their_neighbours_and_s
     out = unseen.laid(gaussians, seen, body.v_template, body.faces)
     np.testing.assert_allclose(out.rgb[~seen], [[0.9, 0.1, 0.1]] * int((~seen).sum()), atol=1e-5)
     np.testing.assert_array_equal(out.quat[~seen], [[1, 0, 0, 0]] * int((~seen).sum()))
-    assert np.abs(out.mu[~seen, 1]).max() < 1e-3, "the neighbours lie on the surface"
+    assert out.mu[~seen, 1].max() < 1e-3, "the neighbours lie on the surface"
+    np.testing.assert_array_equal(out.opacity, gaussians.opacity)
     np.testing.assert_array_equal(out.mu[seen], gaussians.mu[seen])
     np.testing.assert_array_equal(gaussians.quat[~seen, 0] == 1, False)
 
