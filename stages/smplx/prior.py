@@ -51,16 +51,16 @@ def finger_prior(side: str, part: str) -> tuple[np.ndarray, np.ndarray]:
 
 def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Spread of angular speed (A,) rad/s (infinite for the pelvis, which turns) and of acceleration (A,) rad/s^2."""
-    speed, acceleration = np.full(len(joints), 0.28), np.full(len(joints), 0.7)
+    speed, acceleration = np.full(len(joints), 0.4), np.full(len(joints), 1.0)
     limbs = np.isin(joints, (16, 17, 18, 19, 20, 21, 1, 2, 4, 5))
-    speed[limbs], acceleration[limbs] = 0.53, 1.4
+    speed[limbs], acceleration[limbs] = 0.75, 2.0
     trunk = np.isin(joints, (3, 6, 9, 13, 14, 10, 11))
-    speed[trunk], acceleration[trunk] = 0.11, 0.35
+    speed[trunk], acceleration[trunk] = 0.15, 0.5
     fingers = joints >= 25
-    speed[fingers], acceleration[fingers] = 0.18, 0.7
-    speed[joints == 0], acceleration[joints == 0] = np.inf, 0.53
+    speed[fingers], acceleration[fingers] = 0.25, 1.0
+    speed[joints == 0], acceleration[joints == 0] = np.inf, 0.75
     return speed, acceleration
 
 
-TRANSL_ACCELERATION = 0.18
+TRANSL_ACCELERATION = 0.25
 """Spread of the body's acceleration, m/s^2."""
