@@ -131,6 +131,7 @@ def test_equal_options_give_equal_files_and_another_seed_another_person(made, tm
     assert not np.allclose(read_arrays(tmp_path / "other" / "truth.npz")["betas"], truth["betas"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hand", [h for h in HIDDEN_HANDS if h != "none"])
 def test_a_hidden_hand_is_flagged_while_it_is_away(hand, tmp_path):
     options = TurntableOptions(seed=5, frames=20, height=240, hidden_hand=hand, supersample=2, vertices=False)

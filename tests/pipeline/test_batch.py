@@ -3,6 +3,8 @@ import signal
 import pytest
 from gsac.pipeline.batch import find_clips, make_jobs
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def clips(toy):

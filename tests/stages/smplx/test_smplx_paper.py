@@ -16,6 +16,8 @@ from gsac.stages.smplx.paper import BATCH, PASSES, Pass, fit_clip
 from gsac.stages.smplx.paper_loss import Objective, Unknowns, boxes
 from gsac.stages.smplx.smooth import smooth_linear, smooth_rotations
 
+pytestmark = pytest.mark.slow
+
 WIDTH, HEIGHT, FOCAL = 360, 640, 700.0
 SHORT = (Pass(60, 0.1, (30, 50), 20, True), Pass(20, 0.01, (10,), 0, True), Pass(10, 0.01, (5,), 0, False))
 

@@ -9,6 +9,8 @@ from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.stages.export.rigged import RiggedAvatar
 
+pytestmark = pytest.mark.slow
+
 MIRROR = np.diag([-1.0, 1, 1])
 KERNELS = ("Skin", "Bind", "Keys", "SortBlocks", "SortAcross", "SortMerge")
 SIZE = 256

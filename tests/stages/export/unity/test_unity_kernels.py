@@ -8,6 +8,8 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.stages.export.rigged import RiggedAvatar
 
+pytestmark = pytest.mark.slow
+
 EVEN = {f"GsacLight{name}": np.float32([0, 0, 0, 1]) for name in ("Red", "Green", "Blue")}
 
 

@@ -12,6 +12,8 @@ from gsac.avatar.skinning import joint_transforms
 from gsac.stages.export.rigged import RiggedAvatar
 from scipy.spatial.transform import Rotation
 
+pytestmark = pytest.mark.slow
+
 MIRROR = np.diag([-1.0, 1, 1])
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
 

@@ -8,6 +8,8 @@ from gsac.avatar.raster import render
 from gsac.avatar.rotation import exp
 from gsac.stages.export.rigged import RiggedAvatar
 
+pytestmark = pytest.mark.slow
+
 PIPELINES = ["", "UniversalPipeline", "HDRenderPipeline"]
 SIZE = 256
 
