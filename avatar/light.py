@@ -1,8 +1,8 @@
 """The light of a clip: how a surface's colour changes with the way it faces, the same for all gaussians.
 
 The camera stands still and so do the lamps, while the person turns: in the room the light is fixed, and a diffuse surface
-under distant lamps takes it in as a smooth function of its normal n (Ramamoorthi and Hanrahan, 2001). Its first order, four
-numbers a channel, is all that measured better than none here: shade = light . (1, n_x, n_y, |n_z|), in the avatar's axes
+under distant lamps takes it in as a smooth function of its normal n (Ramamoorthi and Hanrahan, 2001). Its first order is
+all that measured better than none here: shade = light . (1, n_x, n_y, |n_z|), in the avatar's axes
 when it faces the clip's camera: x to its left, y up, z to the camera. That camera saw no surface that looks away from it; those
 are lit as if the room were the same behind.
 """

@@ -85,10 +85,11 @@ def mean_colours(sights: list[Sight], count: int, light: np.ndarray | None = Non
 
 
 def find_light(sights: list[Sight], count: int) -> np.ndarray:
-    """(4, 3) float32: the light under which `count` gaussians, each of one colour, look most as they were seen.
+    """(4, 3) float32: the white light under which `count` gaussians, each of one colour, look most as they were seen.
 
     Colours and light in turns, each by least squares. How strong the light is as a whole cannot be told from how bright the
-    colours are: its mean over what was seen is 1. A clip that shows no turn says nothing of it, and it stays even.
+    colours are: its mean over what was seen is 1. A clip that shows no turn says nothing of it, and it stays even. Coloured lamps
+    are not looked for: a turn seen in part takes them for stains, and whole turns are drawn as well without.
     """
     light = np.concatenate([np.ones((1, 3)), np.zeros((3, 3))])
     seen = sum(float(sight.weight.sum()) for sight in sights)
@@ -97,17 +98,17 @@ def find_light(sights: list[Sight], count: int) -> np.ndarray:
     trust = TOLD * len(sights) / NOISE**2 / seen
     for _ in range(ROUNDS):
         rgb, _ = mean_colours(sights, count, light)
-        square, product, mean = np.zeros((3, 4, 4)), np.zeros((3, 4)), np.zeros(3)
+        square, product, mean = np.zeros((4, 4)), np.zeros(4), 0.0
         for sight in sights:
             terms = basis(sight.normal)[:, :, None] * rgb[sight.which, None]
             weighted = terms * sight.weight[:, None, None]
-            square += np.einsum("mac,mbc->cab", weighted, terms)
-            product += np.einsum("mac,mc->ca", weighted, sight.colour)
+            square += np.einsum("mac,mbc->ab", weighted, terms) / 3
+            product += np.einsum("mac,mc->a", weighted, sight.colour) / 3
         prior = np.diag([0, 1, 1, 1]) / EVEN**2
-        light = np.linalg.solve(trust * square + prior, trust * product[..., None])[..., 0].T
+        white = np.linalg.solve(trust * square + prior, trust * product)
         for sight in sights:
-            mean += (sight.weight[:, None] * (basis(sight.normal) @ light)).sum(0)
-        light /= mean / seen
+            mean += float(sight.weight @ (basis(sight.normal) @ white))
+        light = np.tile((white * seen / mean)[:, None], 3)
     return light.astype(np.float32)
 
 

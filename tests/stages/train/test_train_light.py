@@ -6,7 +6,7 @@ from gsac.avatar.light import shade
 from gsac.stages.train.colours import Sight, find_light, mean_colours
 from gsac.stages.train.stage import run
 
-LAMP = np.array([[0.8, 0.8, 0.8], [0.3, 0.25, 0.3], [0.1, 0.1, 0.1], [0.2, 0.2, 0.25]])
+LAMP = np.tile([[0.8], [0.3], [0.1], [0.2]], 3)
 
 
 def turning(frames, span, noise=0.02, seed=0, count=400):
