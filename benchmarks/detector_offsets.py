@@ -19,8 +19,9 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import Body
+from gsac.avatar.turn import yaw
 from gsac.avatar.wholebody import BODY_NAMES, FACE, FEET_NAMES, INDEX, LEFT_HAND, RIGHT_HAND
-from gsac.stages.smplx.detector import HARMONICS, UNKNOWN, harmonics, yaw_of
+from gsac.stages.smplx.detector import HARMONICS, UNKNOWN, harmonics
 from gsac.stages.smplx.fit import Sightings
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")
@@ -122,9 +123,9 @@ def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple
         moved = clip.points + np.einsum("tpab,pb->tpa", clip.turn[:, joint], offsets)
         use = (clip.seen & (joint >= 0))[..., None]
         left.append((clip.xy - clip.project(np.where(use, moved, 1.0))) / np.where(use, clip.height, np.nan))
-    yaws = [yaw_of(clip.turn[:, 0]) for clip in clips]
+    yaws = [yaw(clip.turn[:, 0]) for clip in clips]
     for p in np.setdiff1d(np.nonzero(joint >= 0)[0], np.arange(FACE.start, FACE.stop)):
-        basis = np.concatenate([harmonics(sign * yaw) for yaw in yaws for sign in (1, -1)])
+        basis = np.concatenate([harmonics(sign * turned) for turned in yaws for sign in (1, -1)])
         value = np.concatenate([x for e in left for x in (e[:, p], e[:, other[p]] * [-1, 1])])
         known = np.isfinite(value).all(1)
         if known.sum() < FEW:

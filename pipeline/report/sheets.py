@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+from gsac.avatar import rotation
 from gsac.avatar.artifacts import frame_paths, read_frame
+from gsac.avatar.turn import turn_seen
 from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
 from gsac.pipeline.report.pictures import SEEN, Footage, Picture, fitted, picture, spread
@@ -172,7 +174,8 @@ def silhouette_iou(footage: Footage, t: int, face_id: np.ndarray) -> float | Non
 
 def body_figures(sheet: Sheet, body, params, focal: float, misses: np.ndarray, overlaps: list[float]) -> Sheet:
     rest = body.rest(params.betas)[0]
-    sheet.facts = {"turn_degrees": turn_covered(params.global_orient), "height_m": float(np.ptp(rest[:, 1]))}
+    sheet.facts = {"turn_degrees": turn_seen(rotation.exp(params.global_orient.astype(float))),
+                   "height_m": float(np.ptp(rest[:, 1]))}
     sheet.figures = {"Height": f"{sheet.facts['height_m']:.2f} m", "Focal length": f"{focal:.0f} px",
                      "Turn seen": f"{sheet.facts['turn_degrees']:.0f} of 360 degrees"}
     if len(misses):
@@ -182,13 +185,6 @@ def body_figures(sheet: Sheet, body, params, focal: float, misses: np.ndarray, o
         sheet.facts["outline_iou"] = float(np.mean(overlaps))
         sheet.figures["Outline IoU, mean of the frames shown"] = f"{sheet.facts['outline_iou']:.3f}"
     return sheet
-
-
-def turn_covered(global_orient: np.ndarray, step: int = 15) -> float:
-    """Degrees of the turn about the upright axis that some frame looks at. global_orient: (T, 3) axis-angle."""
-    turns = np.stack([cv2.Rodrigues(r.astype(np.float64))[0] for r in global_orient])
-    yaw = np.degrees(np.arctan2(turns[:, 0, 2], turns[:, 2, 2])) % 360
-    return float(len({int(y // step) for y in yaw}) * step)
 
 
 def heldout_sheet(results: Results) -> Sheet:

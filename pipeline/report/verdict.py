@@ -11,7 +11,7 @@ GRADES = ((30.0, "Very close to the frames"), (27.0, "Good"), (24.0, "Fair: fine
 """Least held-out PSNR on the person, dB, and the word for it."""
 BAD = "Bad: it does not look like the person"
 OVERFIT_DB, POSE_DB, WORST_DB = 2.0, 1.0, 3.0
-UNSEEN, TURN, OUTLINE, ALPHA_IOU, HAND, PERSON = 0.2, 300.0, 0.85, 0.95, 0.5, 0.95
+UNSEEN, TURN, OUTLINE, ALPHA_IOU, HAND, PERSON = 0.2, 270.0, 0.85, 0.95, 0.5, 0.95
 
 
 def grade(metrics: dict[str, Any]) -> str:

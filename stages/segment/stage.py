@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 
 import numpy as np
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
+from gsac.avatar.workspace import available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.segment.edge import soften
@@ -61,7 +61,7 @@ def run(job: Job) -> None:
                                  "look at the frame, and remove it or try segment.method=selfie")
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(available()) as pool:
         for done, _ in enumerate(pool.map(frame, range(len(paths))), 1):
             job.progress(done, len(paths), "frames")
     if absent.all():

@@ -47,8 +47,3 @@ def harmonics(yaw: np.ndarray) -> np.ndarray:
     """(T, 2 H + 1)."""
     angle = np.multiply.outer(yaw, np.arange(1, HARMONICS + 1))
     return np.concatenate([np.ones((len(yaw), 1)), np.cos(angle), np.sin(angle)], 1)
-
-
-def yaw_of(turns: np.ndarray) -> np.ndarray:
-    """turns: (T, 3, 3) of the body to the camera frame. (T,) rad, 0 where it faces the camera, growing to its left."""
-    return np.arctan2(turns[:, 0, 2], -turns[:, 2, 2])

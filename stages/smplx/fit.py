@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.turn import yaw
 from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
 from gsac.stages.smplx import start
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector import Detector, yaw_of
+from gsac.stages.smplx.detector import Detector
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.problem import ROBUST, Observations, Problem, State
@@ -152,7 +153,7 @@ def depths(sightings: Sightings) -> np.ndarray:
 
 def take_off_habits(seen: Observations, sightings: Sightings, detector: Detector, points: np.ndarray, state: State) -> None:
     """Frees the points of what the detector adds to a body turned as the state is."""
-    error = detector.error(yaw_of(state.local[:, 0]))[:, points]
+    error = detector.error(yaw(state.local[:, 0]))[:, points]
     seen.xy = sightings.xy[:, points] - error * sightings.person_height
 
 
@@ -180,7 +181,7 @@ def starting_state(body: Body, sightings: Sightings, focal: float, center: np.nd
 
 def repeats(turns: np.ndarray) -> float:
     """turns: (T, 3, 3) of the body. Frames for each different view, in yaw."""
-    return len(turns) / len(np.unique(np.floor(yaw_of(turns) / VIEW)))
+    return len(turns) / len(np.unique(np.floor(yaw(turns) / VIEW)))
 
 
 def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> float:

@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from gsac.avatar import rotation
+from gsac.avatar.turn import yaw
 from scipy.spatial.transform import Rotation
 
 FEWEST = 5
 """Frames below which every one is needed for training."""
 NEAR = np.radians(45)
 """Frames between which the body turns by more say nothing of each other's pose: photos of one turn, not a clip."""
-
-
-def yaw(global_orient: np.ndarray) -> np.ndarray:
-    """global_orient: (T, 3) axis-angle. Returns (T,) rad in -pi..pi, 0 where the body faces the camera."""
-    forward = Rotation.from_rotvec(np.asarray(global_orient, np.float64)).apply([0.0, 0.0, 1.0])
-    return np.arctan2(forward[:, 0], -forward[:, 2])
-
-
-def turn_seen(global_orient: np.ndarray) -> float:
-    """Degrees about the upright axis, of 360, from which (T, 3) axis-angle frames show the body: all but the widest gap."""
-    at = np.sort(np.degrees(yaw(global_orient)))
-    return 360 - float(np.diff(at, append=at[0] + 360).max()) if len(at) else 0.0
 
 
 def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> np.ndarray:
@@ -31,8 +21,8 @@ def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> 
     frames = np.flatnonzero(usable)
     if every < 2 or len(frames) < FEWEST:
         return np.zeros(0, np.int64)
-    every = min(every, len(frames))
-    return np.sort(frames[np.argsort(yaw(global_orient)[frames], kind="stable")][every // 2::every])
+    every, yaws = min(every, len(frames)), yaw(rotation.exp(np.asarray(global_orient, np.float64)))[frames]
+    return np.sort(frames[np.argsort(yaws, kind="stable")][every // 2::every])
 
 
 def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.ndarray, refined_transl: np.ndarray,

@@ -6,16 +6,18 @@ import json
 import time
 
 import numpy as np
+from gsac.avatar import rotation
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
 from gsac.avatar.body import BodyParams
 from gsac.avatar.cuda import why_not
 from gsac.avatar.metrics import psnr, summary
+from gsac.avatar.turn import turn_seen
 from gsac.avatar.workspace import Workspace
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.evaluate import judge, turned
-from gsac.stages.train.holdout import spaced_in_yaw, turn_seen
+from gsac.stages.train.holdout import spaced_in_yaw
 from gsac.stages.train.novel import judge_novel
 from gsac.stages.train.poses import Poses, carried
 from gsac.stages.train.recipes import ALIGN, RECIPES
@@ -46,11 +48,10 @@ def run(job: Job) -> None:
     views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height)
     if len(empty) == count:
         raise StageError("segment/alpha: every mask is empty, there is no person to train on; look at segment")
-    if empty:
-        job.warn(f"{len(empty)} of {count} frames have an empty mask and are not trained on: "
-                 f"{', '.join(f'{t:06d}' for t in empty[:10])}{' ...' if len(empty) > 10 else ''}.")
     usable = np.ones(count, bool)
     usable[empty] = False
+    if empty:
+        job.warn(f"The mask is empty in {name_frames(~usable)}; not trained on.")
     if params.lost.any():
         job.warn(f"The body could not be fitted in {name_frames(params.lost)}; not trained on, not judged.")
         usable &= ~params.lost
@@ -61,7 +62,7 @@ def run(job: Job) -> None:
         job.warn(f"No frame is held out ({int(usable.sum())} usable frames, train.holdout is {config.holdout}): "
                  "the quality of this avatar is not measured.")
     trained = np.setdiff1d(np.flatnonzero(usable), held)
-    turn = turn_seen(params.global_orient[usable])
+    turn = turn_seen(rotation.exp(params.global_orient[usable].astype(float)))
     if turn < LEAST_TURN:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 

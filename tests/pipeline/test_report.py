@@ -21,7 +21,6 @@ from gsac.pipeline.report.charts import curve_chart
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
 from gsac.pipeline.report.page import seconds, size
 from gsac.pipeline.report.pictures import MOST_BYTES, picture
-from gsac.pipeline.report.sheets import turn_covered
 from gsac.pipeline.report.verdict import BAD, grade, weaknesses
 
 T, WIDTH, HEIGHT = 6, 90, 160
@@ -328,16 +327,6 @@ def test_left_and_right_hands_differ_and_filled_and_missing_are_marked():
 def test_alpha_mixes_frame_and_magenta():
     mixed = over_magenta(np.full((1, 3, 3), 100, np.uint8), np.array([[0.0, 0.5, 1.0]]))
     assert mixed[0].tolist() == [[255, 0, 255], [178, 50, 178], [100, 100, 100]]
-
-
-def test_a_turn_is_counted_by_the_directions_seen():
-    def turned(angles):
-        return np.stack([cv2.Rodrigues(cv2.Rodrigues(np.array([np.pi, 0, 0.]))[0] @ cv2.Rodrigues(np.array([0, a, 0.]))[0])[0][:, 0]
-                         for a in angles])
-
-    assert turn_covered(turned(np.linspace(0, 2 * np.pi, 60))) == 360
-    assert 150 <= turn_covered(turned(np.linspace(0, np.pi, 60))) <= 195
-    assert turn_covered(turned([0.1] * 5)) == 15
 
 
 @pytest.mark.parametrize(("metrics", "facts", "words"), [

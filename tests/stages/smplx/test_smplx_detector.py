@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.turn import yaw as turn_yaw
 from gsac.avatar.wholebody import INDEX
 from gsac.benchmarks.detector_offsets import Sight, measure_habits, measure_offsets, mirror, world_rotations
-from gsac.stages.smplx.detector import HARMONICS, Detector, harmonics, yaw_of
+from gsac.stages.smplx.detector import HARMONICS, Detector, harmonics
 
 WRIST, OTHER = INDEX["left_wrist"], INDEX["right_wrist"]
 
@@ -34,7 +35,7 @@ def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> Sight:
     params = BodyParams.from_pose(pose, np.tile([0, 0, 3.0], (48, 1)), np.zeros(body.num_betas), still, 900.0, (360, 640))
     points = body.keypoints(body.posed(params)[0])
     turns = world_rotations(body, params.pose)
-    yaw = yaw_of(turns[:, 0])
+    yaw = turn_yaw(turns[:, 0])
     moved = points.astype(float).copy()
     for point, joint, sign in ((WRIST, 20, 1), (OTHER, 21, -1)):
         moved[:, point] += np.einsum("tab,b->ta", turns[:, joint], offset * [sign, 1, 1])
@@ -44,11 +45,6 @@ def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> Sight:
     xy[:, OTHER] += 500.0 * harmonics(-yaw) @ habit * [-1, 1]
     known = np.tile(body.known_keypoints, (48, 1))
     return Sight(xy, known, 500.0, points, turns, 900.0, np.array([360.0, 640.0]))
-
-
-def test_the_yaw_is_what_the_body_turned():
-    pose, yaw = turn(16)
-    assert np.allclose(np.exp(1j * yaw_of(rotation.exp(pose[:, 0]))), np.exp(1j * yaw))
 
 
 def test_a_planted_offset_is_found_and_other_points_keep_theirs(body):
@@ -67,7 +63,7 @@ def test_a_planted_habit_is_found_on_both_sides_and_adds_nothing_elsewhere(body)
     habit, spread = measure_habits(body, [seen], np.zeros((133, 3)))
     assert np.allclose(habit[WRIST], planted, atol=1.5e-3)
     assert np.abs(habit[INDEX["left_knee"]]).max() < 1e-6
-    found = Detector(np.zeros((133, 3)), habit, spread).error(yaw_of(seen.turn[:, 0])) * seen.height
+    found = Detector(np.zeros((133, 3)), habit, spread).error(turn_yaw(seen.turn[:, 0])) * seen.height
     true = seen.xy - seen.project(seen.points)
     assert np.abs(found - true)[:, [WRIST, OTHER]].max() < 1.0
 
