@@ -22,6 +22,8 @@ from gsac.cache.store import Store
 GRACE_S = 3600.0
 """A result used within this time stays, lease or not."""
 QUARANTINE_S = 7 * 86400.0
+PARTIAL_S = 86400.0
+"""What a stopped run left for the next one stays this long."""
 
 
 @dataclass
@@ -33,6 +35,8 @@ class GcReport:
     objects: list[str] = field(default_factory=list)
     temps: list[str] = field(default_factory=list)
     quarantined: list[str] = field(default_factory=list)
+    partial: list[str] = field(default_factory=list)
+    """Keys whose stopped runs left something that nobody came back for."""
     freed_bytes: int = 0
     kept_bytes: int = 0
     dry_run: bool = False
@@ -60,7 +64,8 @@ def collect(
 ) -> GcReport:
     """Removes results not used for `keep_days`, then the longest unused until `max_bytes` hold, then all rubbish.
 
-    With neither bound only rubbish goes: objects of no record, folders of dead runs, old quarantine.
+    With neither bound only rubbish goes: objects of no record, folders of dead runs, old quarantine, and what stopped runs left
+    for others that have not come.
     """
     report = GcReport(dry_run=dry_run)
     try:
@@ -72,17 +77,19 @@ def collect(
             wanted = {name for entry in entries if not entry.doomed for name in entry.names}
             rubbish = [path for name, path in stored.items() if name not in wanted]
             temps = _orphans(store, held)
+            left = _left(store, {entry.record.key for entry in entries})
             damaged = [path for path in (store.root / "quarantine").iterdir() if _age(path) > QUARANTINE_S]
             report.records = sorted(f"{entry.record.parts.stage}/{entry.record.key}" for entry in doomed)
             report.objects = sorted(path.name for path in rubbish)
             report.temps = sorted(path.name for path in temps)
             report.quarantined = sorted(path.name for path in damaged)
-            report.freed_bytes = sum(map(_bytes, [*rubbish, *temps, *damaged]))
+            report.partial = sorted(path.name for path in left)
+            report.freed_bytes = sum(map(_bytes, [*rubbish, *temps, *left, *damaged]))
             report.kept_bytes = sum(_bytes(path) for name, path in stored.items() if name in wanted)
             if not dry_run:
                 for file in [*broken, *(entry.file for entry in doomed)]:
                     file.unlink()
-                for number, path in enumerate([*rubbish, *temps, *damaged]):
+                for number, path in enumerate([*rubbish, *temps, *left, *damaged]):
                     objects.unseal_folders(path)
                     os.rename(path, aside / str(number))
     except OSError as error:
@@ -133,6 +140,13 @@ def _orphans(store: Store, held: contextlib.ExitStack) -> list[Path]:
         if held.enter_context(if_free(folder.with_suffix(".lock"))):
             orphans += [path for path in (folder, folder.with_suffix(".lock")) if path.exists()]
     return orphans
+
+
+def _left(store: Store, done: set[str]) -> list[Path]:
+    """Folders of partial/ that no living run holds, and that are old or whose key is done."""
+    live = live_keys(store)
+    return [path for path in (store.root / "partial").iterdir()
+            if path.name not in live and (path.name in done or _age(path) > PARTIAL_S)]
 
 
 def _age(path: Path) -> float:

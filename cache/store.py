@@ -4,6 +4,7 @@ objects/ab/<digest>[suffix]      outputs, files or folders, read-only
 actions/<stage>/<key>.json       records; a result counts from the moment its record is there
 actions/<stage>/<key>.<ns>.json  records of results that a forced run has replaced
 tmp/ leases/ quarantine/         work in progress, locks, what was found damaged
+partial/<key>/                   what a run left that was stopped, for the next one of the same key
 models/<sha256>/<name>           model files, kept by hand
 memo.sqlite lock                 stat memo; held in common by publishers, alone by gc
 """
@@ -25,7 +26,7 @@ from gsac.cache.publish import publish
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.root import default_root
 
-FOLDERS = ("objects", "actions", "tmp", "leases", "quarantine", "models")
+FOLDERS = ("objects", "actions", "tmp", "leases", "quarantine", "partial", "models")
 USED_AGAIN_S = 3600
 """A hit renews the record's date (gc goes by it) at most this often."""
 
@@ -109,6 +110,10 @@ class Store:
                 yield folder
             finally:
                 objects.remove(folder)
+
+    def partial(self, key: str) -> Path:
+        """Folder that a run of the key may make and leave behind, unlike `private`; only the holder of the key touches it."""
+        return self.root / "partial" / key
 
     def publish(
         self,

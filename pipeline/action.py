@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gsac.cache import objects
 from gsac.cache.errors import FULL, CacheFullError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store
-from gsac.pipeline.child import run_child, tail
+from gsac.pipeline.child import StageBugError, run_child, tail
 from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
@@ -52,17 +53,22 @@ class Actor:
             models = self.keys.models.need(parts.models, self.reporter.note)
             self.reporter.starts(name, verdict.reason.value)
             stage = self.keys.project.stage(name)
+            scratch = self.store.partial(parts.key())
+            if forced:
+                objects.remove(scratch)
             with self.store.private(name) as folder:
-                info = self._compute(parts, inputs, models, folder)
+                info = self._compute(parts, inputs, models, folder, scratch)
                 still_valid()
                 outputs = tuple(output.path for output in stage.outputs)
                 if METRICS_OUTPUT in outputs:
                     info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
                 record = self.store.publish(parts, folder, outputs, info, replace=forced)
+            objects.remove(scratch)
         self.reporter.ends(name, Outcome.RAN, info.seconds)
         return Outcome.RAN, record
 
-    def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path) -> RunInfo:
+    def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path,
+                 scratch: Path) -> RunInfo:
         name, project = parts.stage, self.keys.project
         now = datetime.datetime.now(datetime.UTC)
         info = RunInfo(started=now.isoformat(timespec="seconds"), device=parts.device or self.keys.device)
@@ -80,6 +86,7 @@ class Actor:
         order = {
             "declaration": f"{project.package}.{name}", "entry": project.entry(name),
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
+            "scratch": str(scratch),
             "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
             "device": info.device,
         }
@@ -88,6 +95,8 @@ class Actor:
         except StageError as error:
             if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
                 raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
+            if not isinstance(error, StageBugError):  # it would only come to the same end again
+                objects.remove(scratch)
             raise
         info.seconds, info.cpu_seconds, info.peak_rss_mb = end["seconds"], end["cpu_seconds"], end["peak_rss_mb"]
         info.log_tail = tail(log)

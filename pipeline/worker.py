@@ -69,6 +69,7 @@ def _work(order: dict[str, Any], voice: Voice) -> None:
     run(Job(
         inputs={port: Path(path) for port, path in order["inputs"].items()},
         out=out,
+        scratch=Path(order["scratch"]),
         config=make_config(stage, order["params"]),
         models={name: Path(path) for name, path in order["models"].items()},
         device=order["device"],

@@ -57,6 +57,9 @@ class Job:
     """Instance of the stage's config dataclass."""
     models: dict[str, Path] = field(default_factory=dict)
     """Model name -> file."""
+    scratch: Path | None = None
+    """A folder that outlives a run that was killed or stopped, for the next run of the very same key; the stage makes it when it
+    has something to keep there. None: nothing outlives."""
     device: str = "cpu"
     progress: Callable[[int, int, str], None] = lambda done, total, what: None
     """Called as work goes on: done, total, unit (`frames`, `steps`)."""

@@ -64,8 +64,9 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--keep-days {arguments.keep_days}: expected 0 or more")
     report = gc.collect(open_store(people), arguments.keep_days, limit, arguments.dry_run)
     verb = "would remove" if arguments.dry_run else "removed"
-    people.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {len(report.temps)} left-overs "
-                f"of dead runs: {size(report.freed_bytes)}; {size(report.kept_bytes)} stay")
+    left = len(report.temps) + len(report.partial)
+    people.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {left} left-overs of dead runs: "
+                f"{size(report.freed_bytes)}; {size(report.kept_bytes)} stay")
     if arguments.json:
         emit(dataclasses.asdict(report))
     return ExitCode.OK

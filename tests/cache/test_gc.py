@@ -157,6 +157,20 @@ def test_quarantine_is_kept_for_a_while_and_then_goes(store, make, parts_of, mon
     assert list((store.root / "quarantine").iterdir()) == []
 
 
+def test_what_a_stopped_run_left_stays_a_day_for_the_next_and_then_goes(store, make, parts_of, monkeypatch):
+    waiting, done = parts_of(fps=5), make(parts_of(fps=6))
+    for key in (waiting.key(), done.key):
+        store.partial(key).mkdir()
+        (store.partial(key) / "half").write_text("half")
+    assert collect(store).partial == [done.key], "who is done needs it no more"
+    monkeypatch.setattr(gc, "PARTIAL_S", -1.0)
+    with in_use(store, [waiting.key()]):
+        assert collect(store).partial == []
+    report = collect(store)
+    assert report.partial == [waiting.key()] and report.freed_bytes == 4
+    assert list((store.root / "partial").iterdir()) == []
+
+
 def test_models_are_never_collected(store):
     (store.root / "models" / "abc").mkdir()
     (store.root / "models" / "abc" / "pose.tflite").write_text("weights")
