@@ -7,6 +7,8 @@ being punished in the loss: no needle, no giant and no floater can arise, whatev
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import bind, face_frames
@@ -14,7 +16,9 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
 from gsac.stages.contract import StageError
+from gsac.stages.train.checkpoint import standing
 from gsac.stages.train.colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
+from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.offsets import Offsets, fold
 from gsac.stages.train.task import Fit, Loop, Task
@@ -33,6 +37,8 @@ COLOUR_FRAMES = 24
 LARGEST_OF = 12000
 """Gaussians of an avatar whose longest axis may be `train.largest`; fewer must each cover more."""
 GAIN_RATE = 2e-3
+KEPT = ("face", "values", "first", "second", "count", "start", "light", "seen")
+"""Attributes of Trainer that go into a checkpoint as they are."""
 
 
 def fit(task: Task, loop: Loop, count: int | None = None) -> Fit:
@@ -46,18 +52,24 @@ def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, V
     config = task.config
     rng = np.random.default_rng(config.seed)
     fine, coarse = crops(task)
-    trainer = Trainer(start(task, coarse, count), task)
     steps = config.steps or STEPS
-    order = []
-    for step in range(steps):
+    order: list[int] = []
+    if task.resumed is None:
+        trainer, first = Trainer(start(task, coarse, count), task), 0
+    else:
+        trainer, first = Trainer.restored(task.resumed["trainer"], task), task.resumed["step"]
+        order, rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
+        task.resumed = None
+    for step in range(first, steps):
         if not order:
-            order = list(rng.permutation(task.trained))
-        t, done = int(order.pop()), step / steps
+            order = [int(t) for t in rng.permutation(task.trained)]
+        t, done = order.pop(), step / steps
         if trainer.offsets and done >= OFFSET_SHARE:
             trainer.fold_offsets()
             trainer.lay_unseen(coarse)
         loss = trainer.step(t, (coarse if done < COARSE_SHARE else fine)[t], done, rng.random(3), step)
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
+        task.keep(step + 1, steps, partial(standing, step + 1, order, rng, trainer))
         task.progress(step + 1, steps, "steps")
     if trainer.offsets:
         trainer.fold_offsets()
@@ -88,6 +100,11 @@ def start(task: Task, coarse: dict[int, View], count: int) -> Gaussians:
     return gaussians
 
 
+def largest(config: TrainConfig, count: int) -> float:
+    """m, the longest axis that one of `count` gaussians may have."""
+    return config.largest * max(1, LARGEST_OF / count) ** 0.5
+
+
 def places(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(N, 3) m, centres of the gaussians on a mesh."""
     return bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means
@@ -110,12 +127,32 @@ class Trainer:
         self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)
-        self.start, self.largest = self.values["mu"].copy(), self.config.largest * max(1, LARGEST_OF / len(self.face)) ** 0.5
+        self.start, self.largest = self.values["mu"].copy(), largest(task.config, len(self.face))
         self.face_scale = face_frames(self.rest, self.faces).k[self.face].astype(np.float64)
         self.gains: dict[int, np.ndarray] = {}
         self.seen: np.ndarray | None = None
         """(N,) bool, once it is decided; the others are no longer moved."""
         self.workspace, self.losses = Workspace(), Workspace()
+
+    def state(self) -> dict:
+        """For a checkpoint; poses aside."""
+        return {name: getattr(self, name) for name in KEPT} | {
+            "gains": {str(t): gain for t, gain in self.gains.items()},
+            "offsets": self.offsets and self.offsets.state()}
+
+    @classmethod
+    def restored(cls, state: dict, task: Task) -> Trainer:
+        """The trainer that gave this state."""
+        v = state["values"]
+        made = cls(Gaussians(state["face"], v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity"][:, 0])), task)
+        for name in KEPT:
+            setattr(made, name, state[name])
+        made.gains = {int(t): gain for t, gain in state["gains"].items()}
+        if state["offsets"] is None:
+            made.offsets = None
+        else:
+            made.offsets.restore(state["offsets"])
+        return made
 
     def gaussians(self) -> Gaussians:
         v = self.values

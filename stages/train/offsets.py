@@ -22,6 +22,8 @@ FINGERS = 25
 """First finger joint: fingers are too thin for a displacement, their error is pose."""
 EVERY = 4
 """Steps of which the gradients are gathered for one step of the offsets."""
+KEPT = ("offset", "first", "second", "gathered", "seen", "count")
+"""Attributes of Offsets that change."""
 
 
 class Offsets:
@@ -39,6 +41,14 @@ class Offsets:
         self.offset = np.zeros((vertices, 3), np.float32)
         self.first, self.second = np.zeros((vertices, 3)), 0.0
         self.gathered, self.seen, self.count = np.zeros((vertices, 3)), 0, 0
+
+    def state(self) -> dict:
+        """For a checkpoint."""
+        return {name: getattr(self, name) for name in KEPT}
+
+    def restore(self, state: dict) -> None:
+        for name in KEPT:
+            setattr(self, name, state[name])
 
     def gather(self, grad: np.ndarray, rate: float) -> None:
         """grad: (V, 3) of a loss with respect to the rest vertices; every few calls the offsets take a step, m."""

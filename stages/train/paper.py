@@ -9,6 +9,8 @@ of its own; LPIPS (weight 0.01) is left out, its network is in no package.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import face_frames
@@ -16,6 +18,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound, render_bound_backward, screen_gradients
 from gsac.avatar.workspace import Workspace
 from gsac.stages.contract import StageError
+from gsac.stages.train.checkpoint import standing
 from gsac.stages.train.densify import LARGEST, Densifier
 from gsac.stages.train.kernels import adam, on_background, through_background
 from gsac.stages.train.neighbours import Neighbours
@@ -31,6 +34,8 @@ RATES = {"rgb": 5e-3, "quat": 5e-3, "scale": 5e-3}
 POSE_RATE = 2e-4
 """Of orientation, body pose, translation and betas; the hands' is a tenth (`Poses`)."""
 SSIM, SOBEL, KNN, DICE = 0.1, 1.0, 0.01, 0.1
+KEPT = ("face", "values", "first", "second")
+"""Attributes of Trainer that go into a checkpoint as they are."""
 
 
 def fit(task: Task) -> Fit:
@@ -41,13 +46,18 @@ def fit(task: Task) -> Fit:
     trainer = Trainer(task, rng)
     batch = min(BATCH, len(task.trained))
     order: list[int] = []
-    for step in range(steps):
+    begin = 0
+    if task.resumed is not None:
+        trainer.restore(task.resumed["trainer"])
+        begin, order, rng.bit_generator.state = (task.resumed[name] for name in ("step", "order", "rng"))
+    for step in range(begin, steps):
         if len(order) < batch:  # what is left of the last round is dropped
             order = [int(t) for t in rng.permutation(task.trained)]
         frames, order = order[:batch], order[batch:]
         loss = trainer.step({t: views[t] for t in frames}, step, steps)
         trainer.densifier.after(step, trainer, rng)
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
+        task.keep(step + 1, steps, partial(standing, step + 1, order, rng, trainer))
         task.progress(step + 1, steps, "steps")
     return Fit(trainer.gaussians(), np.ones(len(trainer.face), bool), figures={"lpips_in_loss": False})
 
@@ -70,6 +80,18 @@ class Trainer:
         self.neighbours = Neighbours()
         self.workspace, self.losses = Workspace(), Workspace()
         self.rng = rng
+
+    def state(self) -> dict:
+        """For a checkpoint; poses aside."""
+        return {name: getattr(self, name) for name in KEPT} | {
+            "frames": self.frames._asdict(), "neighbours": self.neighbours.index,
+            "length": self.densifier.length, "hits": self.densifier.hits}
+
+    def restore(self, state: dict) -> None:
+        for name in KEPT:
+            setattr(self, name, state[name])
+        self.frames, self.neighbours.index = self.frames._replace(**state["frames"]), state["neighbours"]
+        self.densifier.length, self.densifier.hits = state["length"], state["hits"]
 
     def gaussians(self) -> Gaussians:
         """As they stand, colours in range."""

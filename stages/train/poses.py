@@ -14,6 +14,8 @@ HAND_SHARE = 0.1
 """Rate of the fingers, relative to the body's: an image says little about them."""
 TURN, SHIFT = 0.05, 0.02
 """rad and m in which the distance from the start is measured."""
+KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "beta_moments", "beta_count")
+"""Attributes of Poses that training changes."""
 
 
 def carried(poses: Poses, trained: np.ndarray) -> Poses:
@@ -55,6 +57,20 @@ class Poses:
         other.pose, other.transl = self.pose.copy(), self.transl.copy()
         other.moments, other.count = np.zeros_like(self.moments), np.zeros_like(self.count)
         return other
+
+    def state(self) -> dict:
+        """What training has changed, for a checkpoint."""
+        return {name: getattr(self, name) for name in KEPT}
+
+    def restore(self, state: dict) -> None:
+        for name in KEPT:
+            setattr(self, name, state[name])
+        self.forget_rests()
+
+    def forget_rests(self) -> None:
+        """To be called when the betas have changed."""
+        self.rests.clear()
+        self.shaped = None
 
     def rest(self, t: int) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (V, 3) float32 and joints (55, 3) at rest, with the frame's expression."""
@@ -119,8 +135,7 @@ class Poses:
         first += 0.1 * (grad - first)
         second += 0.01 * (grad**2 - second)
         self.betas -= rate * (first / (1 - 0.9**self.beta_count)) / (np.sqrt(second / (1 - 0.99**self.beta_count)) + 1e-12)
-        self.rests.clear()
-        self.shaped = None
+        self.forget_rests()
 
     def refined(self):
         """BodyParams with the poses as they stand; `joints` computed anew."""

@@ -10,7 +10,8 @@ from gsac.stages.train.task import Fit, Loop, Task
 
 def fit_fast(loop: Loop, task: Task) -> Fit:
     """Poses moved to the images; then the given number of gaussians, or the ladder."""
-    bundle.adjust(task, loop.learning)
+    if task.resumed is None:
+        bundle.adjust(task, loop.learning)
     return ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable
 
 import numpy as np
 from gsac.avatar import rotation
@@ -16,6 +17,7 @@ from gsac.avatar.workspace import Workspace
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
+from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.evaluate import judge, turned
 from gsac.stages.train.holdout import spaced_in_yaw
 from gsac.stages.train.novel import judge_novel
@@ -80,6 +82,11 @@ def check_device(device: str) -> None:
         raise BadInput(f"train is to run on cuda, but {why}; or set train.device to cpu")
 
 
+def now() -> np.ndarray:
+    """Wall and CPU seconds."""
+    return np.array([time.perf_counter(), time.process_time()])
+
+
 def due(step: int, steps: int, times: int) -> bool:
     """Whether one of `times` even marks of a run is reached by this step (from 1)."""
     return step * times // steps > (step - 1) * times // steps
@@ -99,16 +106,35 @@ class Run:
         self.losses: list[float] = []
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
         self.workspace = Workspace()
+        self.checkpoints = Checkpoints(job.scratch, job.warn)
+        self.resumed_at: int | None = None
 
     def fit(self) -> None:
-        self.began = np.array([time.perf_counter(), time.process_time()])
+        self.began = now()
         task = Task(self.views, self.trained, self.held, self.poses, self.job.config, self.job.progress, self.checkpoint,
-                    self.marks)
+                    self.marks, self.keep)
+        state = self.checkpoints.read()
+        if state is not None:
+            self.restore(state)
+            task.resumed = state["recipe"]
         self.result = RECIPES[self.job.config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
 
     def clock(self) -> np.ndarray:
-        return np.array([time.perf_counter(), time.process_time()]) - self.began - self.aside
+        """Wall and CPU seconds of training, those before a stop among them."""
+        return now() - self.began - self.aside
+
+    def keep(self, step: int, steps: int, state: Callable[[], State]) -> None:
+        """A checkpoint, if it is time for one."""
+        if self.checkpoints.due(ends=step == steps):
+            self.checkpoints.write({"step": step, "recipe": state(), "poses": self.poses.state(), "curve": self.curve,
+                                    "losses": self.losses, "spent": self.clock()})
+
+    def restore(self, state: State) -> None:
+        self.resumed_at = state["step"]
+        self.poses.restore(state["poses"])
+        self.curve, self.losses = state["curve"], state["losses"]
+        self.began -= state["spent"]
 
     def marks(self, steps: int) -> list[int]:
         """The steps that get a row of the curve."""
@@ -125,8 +151,8 @@ class Run:
             row["gpu_seconds"] = round(gpu_seconds, 4)
         self.losses.clear()
         if len(self.held) and due(step, steps, self.job.config.curve):
-            now = gaussians()
-            row |= {"psnr_fg": self.psnr_fg(now, self.carried(), self.held), "n_gaussians": len(now)}
+            shown = gaussians()
+            row |= {"psnr_fg": self.psnr_fg(shown, self.carried(), self.held), "n_gaussians": len(shown)}
         self.curve.append(row)
         self.aside += self.clock() - before
 
@@ -179,6 +205,7 @@ class Run:
             "heldout": [known(row) | {"psnr_fg": psnr(row["mse_fg"]), "psnr_full": psnr(row["mse_white"]),
                                "psnr_fg_ttpo": psnr(other["mse_fg"])}
                         for row, other in zip(rows, ttpo or [{"mse_fg": None}] * len(rows), strict=True)],
+            "resumed_at_step": self.resumed_at,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses, self.workspace),
             "curve": self.curve,

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.checkpoint import State
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.poses import Poses
 from gsac.stages.train.views import View
@@ -31,6 +32,11 @@ class Task:
     on the GPU so far where it runs there."""
     marks: Callable[[int], list[int]] = lambda steps: []
     """Of so many steps, those after which `checkpoint` looks at gaussians and poses."""
+    keep: Callable[[int, int, Callable[[], State]], None] = lambda step, steps, state: None
+    """To be called after `checkpoint`: steps done and in all, and what gives the state that `resumed` will be, should the process
+    die. Poses are kept by the caller. Not on the GPU, where a training takes seconds."""
+    resumed: State | None = None
+    """What the recipe gave to `keep` in a run that was stopped; the poses are as they were then."""
     gpu_seconds: float = 0.0
     """On the GPU before the steps: the rounds that move the poses."""
 
