@@ -181,7 +181,7 @@ namespace Gsac
             return new Vector4(lit * light[3 + channel], lit * light[6 + channel], lit * light[9 + channel], 1 - lit + lit * light[channel]);
         }
 
-        public static int Groups(int count)
+        static int Groups(int count)
         {
             return (count + ThreadsPerGroup - 1) / ThreadsPerGroup;
         }

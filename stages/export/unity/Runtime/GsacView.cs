@@ -8,10 +8,10 @@ namespace Gsac
     public sealed class GsacView : IDisposable
     {
         static readonly int SplatCountId = Shader.PropertyToID("GsacSplatCount");
-        static readonly int KeyCountId = Shader.PropertyToID("GsacKeyCount");
         static readonly int IndexBitsId = Shader.PropertyToID("GsacIndexBits");
         static readonly int SortStageId = Shader.PropertyToID("GsacSortStage");
-        static readonly int SortStrideId = Shader.PropertyToID("GsacSortStride");
+        static readonly int SortShiftId = Shader.PropertyToID("GsacSortShift");
+        static readonly int SortStridesId = Shader.PropertyToID("GsacSortStrides");
         static readonly int DepthRangeId = Shader.PropertyToID("GsacDepthRange");
         static readonly int DepthRowId = Shader.PropertyToID("GsacDepthRow");
         static readonly int SplatsId = Shader.PropertyToID("GsacSplats");
@@ -29,7 +29,7 @@ namespace Gsac
         readonly MaterialPropertyBlock properties = new MaterialPropertyBlock();
         readonly int[] sortKernels = new int[3];
         GraphicsBuffer keys;
-        int keysKernel = -1;
+        bool found;
         Vector4 depthRow;
         Bounds bounds;
 
@@ -119,25 +119,23 @@ namespace Gsac
                 Dispose();
                 keys = GsacModel.Empty(level.Sort.KeyCount, 1);
             }
-            if (keysKernel < 0)
+            if (!found)
             {
-                keysKernel = kernels.FindKernel("Keys");
                 for (int i = 0; i < 3; i++) sortKernels[i] = kernels.FindKernel(SortNames[i]);
+                found = true;
             }
             kernels.SetInt(SplatCountId, level.Count);
-            kernels.SetInt(KeyCountId, level.Sort.KeyCount);
             kernels.SetInt(IndexBitsId, level.Sort.IndexBits);
             kernels.SetVector(DepthRangeId, new Vector4(low, 1 / (high - low), 0, 0));
             kernels.SetVector(DepthRowId, depthRow);
-            kernels.SetBuffer(keysKernel, SplatsId, splats);
-            kernels.SetBuffer(keysKernel, KeysId, keys);
-            kernels.Dispatch(keysKernel, GsacRenderer.Groups(level.Sort.KeyCount), 1, 1);
+            kernels.SetBuffer(sortKernels[(int)GsacSortKernel.Blocks], SplatsId, splats);
             GsacSortStep[] steps = level.Sort.Steps;
             for (int i = 0; i < steps.Length; i++)
             {
                 int kernel = sortKernels[(int)steps[i].Kernel];
                 kernels.SetInt(SortStageId, steps[i].Stage);
-                kernels.SetInt(SortStrideId, steps[i].Stride);
+                kernels.SetInt(SortShiftId, steps[i].Shift);
+                kernels.SetInt(SortStridesId, steps[i].Strides);
                 kernels.SetBuffer(kernel, KeysId, keys);
                 kernels.Dispatch(kernel, steps[i].Groups, 1, 1);
             }

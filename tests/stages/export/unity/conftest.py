@@ -17,41 +17,29 @@ def helper(name):
 
 @pytest.fixture(scope="session")
 def hlsl():
-    """The module gpu.py, where its Debian packages are there."""
-    module = helper("gpu")
-    missing = module.missing_packages()
+    """The benchmark's compiler of the package's HLSL, where its Debian packages are there."""
+    from gsac.benchmarks.unity import gpu, shaders
+
+    missing = shaders.missing_packages() + gpu.missing_packages()
     if missing:
         pytest.skip(f"needs the Debian packages {', '.join(missing)}")
-    return module
+    return shaders
 
 
 @pytest.fixture(scope="session")
 def gpu(hlsl):
     pytest.importorskip("wgpu", reason="needs the package wgpu (pip install gsac[dev])")
-    return hlsl.Gpu()
+    from gsac.benchmarks.unity.gpu import Gpu
+
+    return Gpu()
 
 
 @pytest.fixture(scope="session")
-def packing():
-    return helper("packing")
-
-
-@pytest.fixture(scope="session")
-def shaders():
-    """Folder of the package's HLSL."""
-    from gsac.stages import export
-
-    return Path(export.__file__).parent / "unity" / "Runtime" / "Resources" / "Gsac"
-
-
-@pytest.fixture(scope="session")
-def kernels(hlsl, shaders, tmp_path_factory):
+def kernels(hlsl, tmp_path_factory):
     """Kernel name -> Program, and the tests' own BindParts."""
     folder = tmp_path_factory.mktemp("spirv")
-    names = ("Skin", "Bind", "Keys", "SortBlocks", "SortAcross", "SortMerge")
-    sources = {name: shaders / "Gsac.compute" for name in names} | {"BindParts": HERE / "parts.compute"}
-    return {name: hlsl.Program(hlsl.compile_hlsl(source, name, "comp", folder, [shaders]), name)
-            for name, source in sources.items()}
+    sources = dict.fromkeys(hlsl.KERNELS, hlsl.PACKAGE / "Gsac.compute") | {"BindParts": HERE / "parts.compute"}
+    return {name: hlsl.compile_hlsl(source, name, "comp", folder) for name, source in sources.items()}
 
 
 @pytest.fixture(scope="session")
@@ -105,17 +93,12 @@ def files(figure, exported, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def passes(hlsl, shaders, tmp_path_factory):
+def passes(hlsl, tmp_path_factory):
     """Render pipeline -> (vertex, fragment) of the package's shader; `stereo`: the built-in one's for two eyes at once."""
-    folder = tmp_path_factory.mktemp("passes")
-    out, texts = {}, hlsl.shader_passes(shaders / "GsacSplats.shader")
-    stand_ins = dict.fromkeys(texts, hlsl.SHIMS) | {"stereo": HERE / "stereo"}
-    for pipeline, text in (texts | {"stereo": texts[""]}).items():
-        source = folder / f"pass{pipeline}.hlsl"
-        source.write_text(text)
-        out[pipeline] = [hlsl.Program(hlsl.compile_hlsl(source, entry, stage, folder, [shaders, stand_ins[pipeline]]), entry)
-                         for entry, stage in (("Vertex", "vert"), ("Fragment", "frag"))]
-    return out
+    texts = hlsl.shader_passes()
+    stand_ins = dict.fromkeys(texts, HERE / "shims") | {"stereo": hlsl.STEREO}
+    return {pipeline: hlsl.compile_pass(text, tmp_path_factory.mktemp("pass"), stand_ins[pipeline])
+            for pipeline, text in (texts | {"stereo": texts[""]}).items()}
 
 
 @pytest.fixture(scope="session")

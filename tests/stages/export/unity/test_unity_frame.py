@@ -7,12 +7,14 @@ from gsac.avatar.camera import Camera
 from gsac.avatar.light import DARKEST, shade
 from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
+from gsac.benchmarks.unity.gpu import Painting, projection
+from gsac.benchmarks.unity.packing import packed
+from gsac.benchmarks.unity.shaders import KERNELS
 from gsac.stages.export.rigged import RiggedAvatar
 
 pytestmark = pytest.mark.slow
 
 MIRROR = np.diag([-1.0, 1, 1])
-KERNELS = ("Skin", "Bind", "Keys", "SortBlocks", "SortAcross", "SortMerge")
 SIZE = 256
 
 
@@ -27,7 +29,7 @@ def frame(play, mono, files, gpu, kernels, tmp_path_factory):
             gpu.put(name, array)
     jobs = []
     for row in asked["steps"].reshape(-1, 26):
-        names = ("GsacVertexCount", "GsacSplatCount", "GsacKeyCount", "GsacIndexBits", "GsacSortStage", "GsacSortStride")
+        names = ("GsacVertexCount", "GsacSplatCount", "GsacIndexBits", "GsacSortStage", "GsacSortShift", "GsacSortStrides")
         parameters = dict(zip(names, map(int, row[2:8]), strict=True)) | {"GsacDepthRange": row[8:10], "GsacDepthRow": row[10:14]}
         parameters |= {f"GsacLight{name}": row[14 + 4 * c:18 + 4 * c] for c, name in enumerate(("Red", "Green", "Blue"))}
         jobs.append((kernels[KERNELS[int(row[0])]], parameters, int(row[1])))
@@ -97,16 +99,16 @@ def test_the_draw_is_two_triangles_a_gaussian_with_the_files_blending_made_linea
     np.testing.assert_array_equal(corners, np.arange(N)[:, None] * 4 + [0, 1, 2, 2, 1, 3])
 
 
-def test_what_is_uploaded_is_what_the_kernels_were_tested_with(frame, files, packing):
+def test_what_is_uploaded_is_what_the_kernels_were_tested_with(frame, files):
     asked, _ = frame
-    packed = packing.packed(RiggedAvatar.read(files / "person.gsac"))
+    expected = packed(RiggedAvatar.read(files / "person.gsac"))
     flips = {"GsacRest": (-1, 1, 1, 1), "GsacMoves": (-1, 1, 1, 1), "GsacLocal": (1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1)}
-    for name, array in packed.items():
+    for name, array in expected.items():
         got = asked[name].view(array.dtype).reshape(len(array), -1)
         np.testing.assert_allclose(got, array.reshape(len(array), -1) * flips.get(name, 1), rtol=1e-6, atol=1e-9, err_msg=name)
 
 
-def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, hlsl, frame, truth, passes, given):
+def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, frame, truth, passes, given):
     asked, _ = frame
     camera, g, bound = Camera((230.0, 230.0), (128.0, 128.0), SIZE, SIZE), given("person")[0].gaussians, truth[1]
     model, (right, up, ahead, place) = asked["draw"][:12].reshape(3, 4).astype(float), asked["camera"].reshape(3, 4).T.astype(float)
@@ -114,10 +116,10 @@ def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, hls
     view[:3, :3] = right, up, -ahead
     view[:3, 3] = -view[:3, :3] @ place
     screen = np.array([SIZE, SIZE, 0, 0])
-    parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": hlsl.projection(camera).T, "_ScreenParams": screen,
+    parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(camera).T, "_ScreenParams": screen,
                   "GsacBlend": [*asked["draw"][12:15], 0], "GsacIndexBits": int(asked["draw"][16]),
                   **{f"GsacModel{r}": model[r] for r in range(3)}}
-    got = hlsl.Painting(gpu, *passes[""], SIZE, SIZE, len(bound.means)).draw(parameters)
+    got = Painting(gpu, *passes[""], SIZE, SIZE, len(bound.means)).draw(parameters)
 
     size = np.linalg.norm(model[:, 0])
     total = np.diag([1.0, -1, -1]) @ view[:3, :3] @ model[:, :3] @ MIRROR  # canonical -> the trainer's camera

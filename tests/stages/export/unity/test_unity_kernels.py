@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.skinning import joint_transforms, skin
+from gsac.benchmarks.unity.frame import EVEN, index_bits, sort_steps
+from gsac.benchmarks.unity.packing import packed
 from gsac.stages.export.rigged import RiggedAvatar
 
 pytestmark = pytest.mark.slow
-
-EVEN = {f"GsacLight{name}": np.float32([0, 0, 0, 1]) for name in ("Red", "Green", "Blue")}
-
 
 @pytest.fixture(scope="module")
 def avatar(exported):
@@ -33,18 +32,18 @@ def frame(avatar):
 
 
 @pytest.fixture(scope="module")
-def on_gpu(gpu, kernels, packing, avatar, frame):
+def on_gpu(gpu, kernels, avatar, frame):
     """The device after skin and bind of that frame, and the kernels' parameters."""
     V, N = len(avatar.vertices), len(avatar.gaussians["face"])
-    for name, array in packing.packed(avatar).items():
+    for name, array in packed(avatar).items():
         gpu.put(name, array)
     gpu.put("GsacWeights", frame["weights"])
     gpu.put("GsacBones", frame["bones"].astype(np.float32))
     gpu.put("GsacPosed", np.zeros((V, 4), np.float32))
     gpu.put("GsacSplats", np.zeros((N, 12), np.float32))
     gpu.put("Parts", np.zeros((-(-N // 64) * 64, 20), np.float32))
-    parameters = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacKeyCount": 0, "GsacIndexBits": 0, "GsacSortStage": 0,
-                  "GsacSortStride": 0, "GsacDepthRange": np.zeros(2), "GsacDepthRow": np.zeros(4)}
+    parameters = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacIndexBits": 0, "GsacSortStage": 0, "GsacSortShift": 0,
+                         "GsacSortStrides": 0, "GsacDepthRange": np.zeros(2), "GsacDepthRow": np.zeros(4)}
     gpu.run([(kernels["Skin"], parameters, -(-V // 64)), (kernels["Bind"], parameters, -(-N // 64)),
              (kernels["BindParts"], parameters, -(-N // 64))])
     return parameters
@@ -84,11 +83,11 @@ def test_covariances_agree_with_the_trainer(gpu, bound):
     assert (s[:, 9:] == 1).all(), "in even light colours are as they are"
 
 
-def test_a_face_without_area_gives_a_point_and_no_nan(gpu, kernels, packing, figure):
+def test_a_face_without_area_gives_a_point_and_no_nan(gpu, kernels, figure):
     vertices = figure.vertices.copy()
     f = figure.faces[figure.gaussians["face"][0]]
     vertices[f[1]] = vertices[f[0]]
-    flat = packing.packed(replace(figure, vertices=vertices))
+    flat = packed(replace(figure, vertices=vertices))
     N = len(flat["GsacCorners"])
     for name in ("GsacCorners", "GsacLocal"):
         gpu.put(name, flat[name])
@@ -100,32 +99,27 @@ def test_a_face_without_area_gives_a_point_and_no_nan(gpu, kernels, packing, fig
     assert (parts[0, 4] == 0).all() and abs(parts[0, 0, :3] - vertices[f].mean(0)).max() < 1e-6
 
 
-def run_sort(gpu, hlsl, kernels, means, row, near, far):
+def run_sort(gpu, kernels, means, row, near, far):
     N = len(means)
-    total, steps = hlsl.sort_steps(N)
-    bits = max(int(N - 1).bit_length(), 1)
+    total, steps = sort_steps(N)
     splats = np.zeros((N, 12), np.float32)
     splats[:, :3] = means
     gpu.put("GsacSplats", splats)
     gpu.put("GsacKeys", np.zeros(total, np.uint32))
-    base = EVEN | {"GsacVertexCount": 0, "GsacSplatCount": N, "GsacKeyCount": total, "GsacIndexBits": bits, "GsacSortStage": 0,
-            "GsacSortStride": 0, "GsacDepthRange": np.array([near, 1 / (far - near)]), "GsacDepthRow": np.array(row, float)}
-    jobs = [(kernels["Keys"], base, total // 64)]
-    for name, k, j in steps:
-        jobs.append((kernels[name], base | {"GsacSortStage": k, "GsacSortStride": j},
-                     total // 512 if name == "SortAcross" else total // 4096))
-    gpu.run(jobs)
-    return gpu.get("GsacKeys", np.uint32), bits
+    base = EVEN | {"GsacVertexCount": 0, "GsacSplatCount": N, "GsacIndexBits": index_bits(N),
+                   "GsacDepthRange": np.array([near, 1 / (far - near)]), "GsacDepthRow": np.array(row, float)}
+    gpu.run([(kernels[name], base | parameters, groups) for name, parameters, groups in steps])
+    return gpu.get("GsacKeys", np.uint32), index_bits(N)
 
 
-@pytest.mark.parametrize("N", [1, 2, 4095, 4096, 4097, 25000, 40000])
-def test_the_sort_is_exact_stable_and_from_far_to_near(gpu, hlsl, kernels, N):
+@pytest.mark.parametrize("N", [1, 2, 4095, 4096, 4097, 25000, 40000, 132000])
+def test_the_sort_is_exact_stable_and_from_far_to_near(gpu, kernels, N):
     rng = np.random.default_rng(N)
     means = rng.normal(size=(N, 3)).astype(np.float32)
     means[N // 2:] = means[:N - N // 2]
     row = np.float32([.36, .48, .8, 3])
     near, far = -3.0, 9.0
-    keys, bits = run_sort(gpu, hlsl, kernels, means, row, near, far)
+    keys, bits = run_sort(gpu, kernels, means, row, near, far)
     order = keys[:N] & ((1 << bits) - 1)
     assert (np.diff(keys.astype(np.int64)) >= 0).all()
     assert sorted(order) == list(range(N)), "every gaussian once"
@@ -136,14 +130,14 @@ def test_the_sort_is_exact_stable_and_from_far_to_near(gpu, hlsl, kernels, N):
     assert (np.diff(order.astype(np.int64))[same] > 0).all(), "equal depths keep their order"
 
 
-def test_depths_outside_the_range_and_nans_are_still_a_permutation(gpu, hlsl, kernels):
+def test_depths_outside_the_range_and_nans_are_still_a_permutation(gpu, kernels):
     means = np.random.default_rng(0).normal(size=(300, 3)).astype(np.float32) * 100
     means[7] = np.nan
-    keys, bits = run_sort(gpu, hlsl, kernels, means, (0, 0, 1, 0), 0.0, 1.0)
+    keys, bits = run_sort(gpu, kernels, means, (0, 0, 1, 0), 0.0, 1.0)
     assert sorted(keys[:300] & ((1 << bits) - 1)) == list(range(300))
 
 
-def test_the_kernels_use_no_wave_operation_and_no_matrix_in_a_buffer(shaders):
-    for path in shaders.iterdir():
+def test_the_kernels_use_no_wave_operation_and_no_matrix_in_a_buffer(hlsl):
+    for path in hlsl.PACKAGE.iterdir():
         text = path.read_text()
         assert "Wave" not in text and "StructuredBuffer<float4x4>" not in text, path.name

@@ -1,3 +1,5 @@
+using System;
+
 namespace Gsac
 {
     public enum GsacSortKernel
@@ -12,16 +14,19 @@ namespace Gsac
     {
         public GsacSortKernel Kernel;
         public int Stage;
-        public int Stride;
+        public int Shift;
+        public int Strides;
         public int Groups;
     }
 
     /// <summary>Sizes and steps of the sort for a number of gaussians.</summary>
     public sealed class GsacSort
     {
-        /// <summary>Keys that a group sorts in shared memory; BLOCK and THREADS of Gsac.compute.</summary>
-        public const int Block = 4096;
-        const int Threads = 256;
+        /// <summary>Keys that a group sorts in shared memory; BLOCK of Gsac.compute.</summary>
+        public const int Block = 1 << BlockBits;
+        const int BlockBits = 12;
+        const int AcrossThreads = 64;
+        const int Hand = 16; // keys of a thread, four steps
 
         public readonly int KeyCount = Block;
         public readonly int IndexBits = 1;
@@ -36,21 +41,25 @@ namespace Gsac
                 merges++;
             }
             while (IndexBits < 31 && 1 << IndexBits < count) IndexBits++;
-            // merge number m is preceded by m steps across blocks
-            Steps = new GsacSortStep[1 + merges + merges * (merges + 1) / 2];
+            int steps = 1;
+            for (int m = 1; m <= merges; m++) steps += 1 + (m + 3) / 4;
+            Steps = new GsacSortStep[steps];
             int n = 0;
-            Steps[n++] = Step(GsacSortKernel.Blocks, Block, 0);
-            for (int stage = 2 * Block; stage <= KeyCount; stage *= 2)
+            Steps[n++] = new GsacSortStep { Kernel = GsacSortKernel.Blocks, Groups = KeyCount / Block };
+            // merge number m has m steps across blocks
+            for (int m = 1; m <= merges; m++)
             {
-                for (int stride = stage / 2; stride >= Block; stride /= 2) Steps[n++] = Step(GsacSortKernel.Across, stage, stride);
-                Steps[n++] = Step(GsacSortKernel.Merge, stage, 0);
+                int stage = Block << m;
+                for (int left = m; left > 0; left -= 4)
+                {
+                    Steps[n++] = new GsacSortStep
+                    {
+                        Kernel = GsacSortKernel.Across, Stage = stage, Shift = BlockBits + left - 4,
+                        Strides = Hand - 1 ^ (Hand - 1 >> Math.Min(left, 4)), Groups = KeyCount / Hand / AcrossThreads,
+                    };
+                }
+                Steps[n++] = new GsacSortStep { Kernel = GsacSortKernel.Merge, Stage = stage, Groups = KeyCount / Block };
             }
-        }
-
-        GsacSortStep Step(GsacSortKernel kernel, int stage, int stride)
-        {
-            int groups = kernel == GsacSortKernel.Across ? KeyCount / 2 / Threads : KeyCount / Block;
-            return new GsacSortStep { Kernel = kernel, Stage = stage, Stride = stride, Groups = groups };
         }
     }
 }

@@ -18,6 +18,7 @@ public static class Play
         switch (args[0])
         {
             case "frame": Frame(args[1], args[2], args[3]); break;
+            case "sort": Sort(args); break;
             case "pose": Pose(args[1], args[2], args[3]); break;
             case "garbage": Garbage(args[1]); break;
             case "stream": Stream(args[1], int.Parse(args[2])); break;
@@ -68,7 +69,7 @@ public static class Play
         avatar.transform.localScale = new Vector3(1.2f, 1.2f, 1.2f);
         Camera camera = Player.AddCamera("eye");
         camera.transform.SetPositionAndRotation(new Vector3(1.5f, 1.6f, 2.5f), Quaternion.Euler(12, 215, 2));
-        string[] names = { "GsacVertexCount", "GsacSplatCount", "GsacKeyCount", "GsacIndexBits", "GsacSortStage", "GsacSortStride" };
+        string[] names = { "GsacVertexCount", "GsacSplatCount", "GsacIndexBits", "GsacSortStage", "GsacSortShift", "GsacSortStrides" };
         string[] buffers = { "GsacRest", "GsacSkin", "GsacMoves", "GsacWeights", "GsacBones", "GsacPosed", "GsacCorners", "GsacLocal", "GsacSplats", "GsacKeys" };
         using (var dump = new Dump(path))
         {
@@ -113,6 +114,17 @@ public static class Play
             };
             Player.Frame(new[] { avatar.gameObject })();
             dump.Put("steps", steps.ToArray());
+        }
+    }
+
+    /// <summary>The sort's dispatches for some numbers of gaussians.</summary>
+    static void Sort(string[] counts)
+    {
+        for (int i = 1; i < counts.Length; i++)
+        {
+            var sort = new GsacSort(int.Parse(counts[i]));
+            Console.WriteLine("keys " + sort.KeyCount + " " + sort.IndexBits);
+            foreach (GsacSortStep s in sort.Steps) Console.WriteLine("Sort" + s.Kernel + " " + s.Stage + " " + s.Shift + " " + s.Strides + " " + s.Groups);
         }
     }
 

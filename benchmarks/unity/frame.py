@@ -1,0 +1,113 @@
+"""A frame of one avatar as the package's C# asks for it: Skin, Bind, the sort, and a draw for each eye of a headset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.camera import Camera
+from gsac.avatar.skinning import joint_transforms, skin
+from gsac.benchmarks.unity.gpu import Gpu, projection
+from gsac.benchmarks.unity.packing import packed
+from gsac.benchmarks.unity.spirv import Program
+from gsac.stages.export.rigged import BLEND, RiggedAvatar
+
+BLOCK_BITS, HAND, ACROSS_THREADS, THREADS = 12, 16, 64, 64
+"""Of Gsac.compute: keys of a block, keys of a thread, threads of a group of SortAcross, of Skin and Bind."""
+EVEN = {f"GsacLight{name}": np.float32([0, 0, 0, 1]) for name in ("Red", "Green", "Blue")}
+LENS_DEGREES, EYES_APART = 100.0, 0.064
+"""Angle of view of a headset's eye; m between the eyes."""
+
+
+def sort_steps(count: int) -> tuple[int, list[tuple[str, dict[str, int], int]]]:
+    """(keys, [(kernel, parameters, groups)]): the bitonic network as GsacSort.cs has it run."""
+    merges = max(0, (max(count, 1) - 1).bit_length() - BLOCK_BITS)
+    keys = 1 << BLOCK_BITS + merges
+    steps = [("SortBlocks", {"GsacSortStage": 0, "GsacSortShift": 0, "GsacSortStrides": 0}, keys >> BLOCK_BITS)]
+    for m in range(1, merges + 1):
+        stage = {"GsacSortStage": 1 << BLOCK_BITS + m}
+        for left in range(m, 0, -4):
+            strides = HAND - 1 ^ (HAND - 1 >> min(left, 4))
+            steps.append(("SortAcross", stage | {"GsacSortShift": BLOCK_BITS + left - 4, "GsacSortStrides": strides},
+                          keys // HAND // ACROSS_THREADS))
+        steps.append(("SortMerge", stage | {"GsacSortShift": 0, "GsacSortStrides": 0}, keys >> BLOCK_BITS))
+    return keys, steps
+
+
+def index_bits(count: int) -> int:
+    return max((count - 1).bit_length(), 1)
+
+
+@dataclass
+class Pass:
+    """A kernel's dispatches in a frame, and the fewest bytes that they move: inputs read once, outputs written once."""
+
+    name: str
+    jobs: list
+    moved: int
+
+
+class Frame:
+    """An avatar in its A-pose, each fourth expression half on, in the avatar's own (unmirrored) axes."""
+
+    def __init__(self, gpu: Gpu, programs: dict[str, Program], avatar: RiggedAvatar) -> None:
+        self.gpu, self.avatar = gpu, avatar
+        V, N, E, J = len(avatar.vertices), len(avatar.gaussians["face"]), len(avatar.expression_names), len(avatar.joints)
+        self.count, self.weights = N, np.where(np.arange(E) % 4 == 0, np.float32(.5), np.float32(0))
+        self.bones = joint_transforms(avatar.pose("A")[None], avatar.joints, avatar.parents)[0].astype(np.float32)
+        keys, steps = sort_steps(N)
+        for name, array in packed(avatar).items():
+            gpu.put(name, array)
+        gpu.put("GsacWeights", self.weights)
+        gpu.put("GsacBones", self.bones)
+        gpu.put("GsacPosed", np.full((V, 4), np.nan, np.float32))
+        gpu.put("GsacSplats", np.full((N, 12), np.nan, np.float32))
+        gpu.put("GsacKeys", np.zeros(keys, np.uint32))
+        low, high = -1.5, 1.5
+        base = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacIndexBits": index_bits(N), "GsacSortStage": 0,
+                       "GsacSortShift": 0, "GsacSortStrides": 0, "GsacDepthRange": np.array([low, 1 / (high - low)]),
+                       "GsacDepthRow": np.array([0, 0, -1.0, 0])}
+        M = len(avatar.expression_vertex)
+        moved = {"SortBlocks": 16 * N + 4 * keys, "SortAcross": 8 * keys, "SortMerge": 8 * keys}
+        self.passes = [
+            Pass("Skin", [gpu.job(programs["Skin"], base, -(-V // THREADS))], 48 * V + 16 + 16 * M + 4 * E + 48 * J),
+            Pass("Bind", [gpu.job(programs["Bind"], base, -(-N // THREADS))], 16 * V + (16 + 48 + 48) * N)]
+        self.order = [job for p in self.passes for job in p.jobs]
+        """Every dispatch of the frame, in order."""
+        for name in moved:
+            jobs = [gpu.job(programs[name], base | parameters, groups) for kernel, parameters, groups in steps if kernel == name]
+            if jobs:
+                self.passes.append(Pass(name, jobs, moved[name] * len(jobs)))
+        self.order += [gpu.job(programs[name], base | parameters, groups) for name, parameters, groups in steps]
+
+    def errors(self) -> dict[str, float]:
+        """Largest differences of the last frame to the trainer's arithmetic, m; whether the order is one from far to near."""
+        a, g = self.avatar, self.avatar.gaussians
+        rest = a.vertices.copy()
+        for e, w in enumerate(self.weights):
+            span = slice(a.expression_start[e], a.expression_start[e + 1])
+            rest[a.expression_vertex[span]] += w * a.expression_delta[span]
+        vertices = skin(rest, self.bones, a.skin_index, a.skin_weight)
+        posed = self.gpu.get("GsacPosed").reshape(-1, 4)[:, :3]
+        means = bind(face_frames(posed.astype(np.float64), a.faces), g["face"], g["mu"], g["quat"], g["log_scale"]).means
+        got = self.gpu.get("GsacSplats").reshape(-1, 12)[:, :3]
+        keys = self.gpu.get("GsacKeys", np.uint32)
+        order = keys[:self.count] & ((1 << index_bits(self.count)) - 1)
+        sorted_once = (np.diff(keys.astype(np.int64)) >= 0).all() and (np.sort(order) == np.arange(self.count)).all()
+        return {"vertices": float(abs(posed - vertices).max()), "means": float(abs(got - means).max()),
+                "order": 0.0 if sorted_once and np.diff(-got[order, 2]).max() < 2e-4 else 1.0}
+
+    def eyes(self, size: int, distance: float) -> dict:
+        """Parameters of a draw for both eyes of a headset, `distance` m before the person's chest."""
+        focal = size / 2 / np.tan(np.radians(LENS_DEGREES / 2))
+        camera = Camera((focal, focal), (size / 2, size / 2), size, size)
+        views = []
+        for side in (-.5, .5):
+            view = np.eye(4)
+            view[:3, 3] = side * -EYES_APART, -self.avatar.joints[9, 1], -distance
+            views.append(view.T)
+        blend = [BLEND["low_pass_px2"], BLEND["alpha_max"], BLEND["alpha_min"], 0]
+        return {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(camera).T] * 2,
+                "_ScreenParams": [size, size, 0, 0], "GsacBlend": blend, "GsacIndexBits": index_bits(self.count),
+                **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}

@@ -1,0 +1,63 @@
+"""Times on the GPU's own clock, by timestamp queries; medians of many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from gsac.benchmarks.unity.frame import Frame
+from gsac.benchmarks.unity.gpu import Gpu, Painting
+
+IN_A_ROW = 16
+"""How often a dispatch runs between two timestamps, so that they weigh little."""
+
+
+class Clock:
+    def __init__(self, gpu: Gpu) -> None:
+        from wgpu.backends.wgpu_native import lib
+
+        usage = gpu.wgpu.BufferUsage
+        self.gpu = gpu
+        self.nanoseconds = lib.wgpuQueueGetTimestampPeriod(gpu.device.queue._internal)  # wgpu has no other way to it
+        self.queries = gpu.device.create_query_set(type="timestamp", count=4)
+        self.resolved = gpu.device.create_buffer(size=32, usage=usage.QUERY_RESOLVE | usage.COPY_SRC)
+
+    def between(self, first: int) -> dict:
+        """Timestamps `first` and the next about a pass."""
+        return {"query_set": self.queries, "beginning_of_pass_write_index": first, "end_of_pass_write_index": first + 1}
+
+    def microseconds(self, repeats: int, encode: Callable) -> np.ndarray:
+        """encode(encoder) writes timestamps 0 and 1, perhaps 2 and 3 after them. Returns (repeats,) from the first to the last."""
+        took = []
+        for _ in range(repeats + repeats // 4 + 1):
+            encoder = self.gpu.device.create_command_encoder()
+            last = encode(encoder)
+            encoder.resolve_query_set(self.queries, 0, last + 1, self.resolved, 0)
+            self.gpu.device.queue.submit([encoder.finish()])
+            ticks = np.frombuffer(self.gpu.device.queue.read_buffer(self.resolved), np.uint64)
+            took.append(int(ticks[last]) - int(ticks[0]))
+        return np.array(took[-repeats:]) * self.nanoseconds / 1e3
+
+
+def pass_times(clock: Clock, frame: Frame, repeats: int) -> dict[str, np.ndarray]:
+    """Pass -> us of all its dispatches in a frame; `frame`: of the whole frame, once, as Unity runs it."""
+
+    def encoder_of(jobs):
+        def encode(encoder):
+            clock.gpu.dispatch(encoder, jobs, clock.between(0))
+            return 1
+        return encode
+
+    times = {p.name: clock.microseconds(repeats, encoder_of(p.jobs * IN_A_ROW)) / IN_A_ROW for p in frame.passes}
+    return times | {"frame": clock.microseconds(repeats, encoder_of(frame.order))}
+
+
+def draw_times(clock: Clock, paintings: tuple[Painting, Painting], parameters: dict, repeats: int) -> np.ndarray:
+    """us of the draws of both eyes, their targets' clearing included."""
+    groups = [painting.group(parameters) for painting in paintings]
+
+    def encode(encoder):
+        for eye, (painting, group) in enumerate(zip(paintings, groups, strict=True)):
+            painting.encode(encoder, group, clock.between(2 * eye), eye)
+        return 3
+    return clock.microseconds(repeats, encode)
