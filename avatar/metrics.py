@@ -6,11 +6,16 @@ render is scored as rgb premultiplied + alpha; the frame is cut out with the mas
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from gsac.avatar.flip import flip
+from gsac.avatar.lpips import Lpips
 
 WHITE, BLACK = 1.0, 0.0
 BOXES = ("face", "left_hand", "right_hand")
+LPIPS = {"lpips_alex": ("lpips-alex", True), "lpips_alex_unscaled": ("lpips-alex", False), "lpips_vgg": ("lpips-vgg", True)}
+"""Figure -> network, and whether images are handed to it in -1..1 as it was made for, or in 0..1 as many papers' scorers do."""
 
 
 def composite(premultiplied: np.ndarray, alpha: np.ndarray, background: float) -> np.ndarray:
@@ -51,13 +56,14 @@ def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
 
 
 def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray, boxes: dict | None = None,
-          with_flip: bool = False) -> dict[str, float]:
+          with_flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> dict[str, float]:
     """One image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1; boxes: name -> x0, y0, x1, y1 px.
 
     `mse_white`, `mse_black`: the whole frame on that background. `mse_fg`: the person only, that is pixels where mask
     or alpha is at least 0.5, on white, so that a missing and an added limb both cost. `ssim`: whole frame on white.
     `alpha_iou`: of alpha and mask at 0.5. `detail`: gradient energy over the truth's, where both show the person.
-    `mse_<name>`: all of a box on white, NaN without one. `flip`: mean over the person, NaN unless asked for.
+    `mse_<name>`: all of a box on white, NaN without one. `flip`: mean over the person, NaN unless asked for. The names of LPIPS:
+    whole frame on white, NaN for a network that is not in `lpips` (name -> network).
     """
     white, white_truth = composite(rgb, alpha, WHITE), composite(truth, mask, WHITE)
     error = ((white - white_truth) ** 2).mean(2)
@@ -72,6 +78,8 @@ def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarra
         "detail": detail(white, white_truth, both) if both.any() else float("nan"),
         **{f"mse_{name}": _in_box(error, (boxes or {}).get(name)) for name in BOXES},
         "flip": float(flip(white_truth, white)[either].mean()) if with_flip and either.any() else float("nan"),
+        **{figure: lpips[net].distance(white, white_truth, scaled) if lpips and net in lpips else float("nan")
+           for figure, (net, scaled) in LPIPS.items()},
     }
 
 
@@ -83,7 +91,7 @@ def _in_box(error: np.ndarray, box: tuple[int, int, int, int] | None) -> float:
 def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
     """Of many images: `psnr_*` is the mean of the images' PSNR, `psnr_*_pooled` the PSNR of all their pixels together.
 
-    `lpips` is null: it needs a network that no package carries.
+    `lpips` is that of `lpips_net`, the first network of LPIPS that was there; null without one.
     """
     def mean(name):
         values = [s[name] for s in scores if np.isfinite(s[name])]
@@ -99,10 +107,13 @@ def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
             return None
         return psnr(float(np.average([s[name] for s in kept], weights=[s[weight] for s in kept] if weight else None)))
 
+    perceptual = {name: mean(name) for name in LPIPS}
+    first = next((name for name, value in perceptual.items() if value is not None), None)
     return {
         "psnr_full": mean_psnr("mse_white"), "psnr_full_pooled": pooled("mse_white", None),
-        "psnr_full_black": mean_psnr("mse_black"), "psnr_fg": mean_psnr("mse_fg"),
-        "psnr_fg_pooled": pooled("mse_fg", "fg_pixels"), "ssim": mean("ssim"), "lpips": None,
+        "psnr_full_black": mean_psnr("mse_black"), "psnr_full_black_pooled": pooled("mse_black", None),
+        "psnr_fg": mean_psnr("mse_fg"), "psnr_fg_pooled": pooled("mse_fg", "fg_pixels"), "ssim": mean("ssim"),
+        "lpips": first and perceptual[first], "lpips_net": first and LPIPS[first][0], **perceptual,
         "flip": mean("flip"), "psnr_face": mean_psnr("mse_face"), "psnr_hands": mean_psnr("mse_left_hand", "mse_right_hand"),
         "alpha_iou": mean("alpha_iou"), "detail": mean("detail"),
     }

@@ -1,6 +1,7 @@
 """Network files: what they are, where they come from and where they lie.
 
-Every file of the table is a member of one wheel of the package index and Apache-2.0, as that wheel's own LICENSE says.
+Every file of the table is a member of one wheel of the package index and Apache-2.0, as that wheel's own LICENSE says. Others are
+brought by the user under names of their own.
 Nothing here downloads; `gsac models pull` fills the store.
 """
 
@@ -66,6 +67,10 @@ MODELS: dict[str, ModelFile] = {
         "a77d03f4659b9f6b6c1f5106947bf40e99d7655094b6527f214ea7d451106edd",
         "256 wide, 144 high, RGB in 0..1: person mask"),
 }
+
+
+BROUGHT = ("lpips-vgg", "lpips-alex")
+"""Networks that `train` judges by where the user has brought their weights (`avatar.lpips`); nothing needs them."""
 
 
 def store_path(name: str, store_root: Path) -> Path:

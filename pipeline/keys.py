@@ -14,7 +14,7 @@ from gsac.pipeline.models import Models
 from gsac.pipeline.packages import package_version
 from gsac.pipeline.params import plain
 from gsac.pipeline.project import Project
-from gsac.stages.contract import BadInput
+from gsac.stages.contract import BadInput, Stage
 
 DEVICE = "GSAC_DEVICE"
 """Environment variable: `cpu` or `cuda`, instead of what is found."""
@@ -49,6 +49,10 @@ class Keys:
             raise BadInput(f"{name}.device is cuda, but {why}; or set {name}.device to auto")
         return self.device if wanted == AUTO else wanted
 
+    def _models(self, stage: Stage, config: Any) -> list[str]:
+        """What the stage must have, and what it wishes for as far as it is here."""
+        return [*stage.models(config), *(name for name in stage.wishes(config) if name in self.models.brought)]
+
     def parts(self, name: str, inputs: dict[str, str]) -> KeyParts:
         """inputs: port -> tree digest."""
         stage = self.project.stage(name)
@@ -61,7 +65,7 @@ class Keys:
             inputs=dict(inputs),
             params=params,
             code=code_parts(self.project.entry(name), stage.code, self.memo),
-            models={model: self.models.sha256(model) for model in stage.models(config)},
+            models={model: self.models.sha256(model) for model in self._models(stage, config)},
             packages={package: package_version(package) for package in stage.packages},
             device=device,
         )

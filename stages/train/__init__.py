@@ -19,6 +19,7 @@ STAGE = Stage(
     ),
     config=TrainConfig,
     uses_device=True,
-    packages=("numpy", "numba", "scipy", "opencv-contrib-python-headless", "OpenEXR"),
+    packages=("numpy", "numba", "scipy", "opencv-contrib-python-headless", "OpenEXR", "torch"),
     models=lambda config: config.models(),
+    wishes=lambda config: config.wishes(),
 )

@@ -11,6 +11,7 @@ RECIPES = ("fast", "paper")
 AUTO = "auto"
 """`gaussians` that the ladder of sizes chooses; `device` that the engine chooses."""
 DEVICES = (AUTO, "cpu", "cuda")
+NETWORKS = ("lpips-vgg", "lpips-alex")
 
 
 @dataclass
@@ -72,9 +73,16 @@ class TrainConfig:
     flip: bool = False
     """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
+    lpips: bool = True
+    """Whether LPIPS is judged by, and part of the loss of recipe paper (cpu), where `gsac models add` has brought its weights."""
+
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
         return brought(self.body_model)
+
+    def wishes(self) -> tuple[str, ...]:
+        """Names of the model files that are used where they are here."""
+        return NETWORKS if self.lpips else ()
 
     def check(self) -> None:
         if self.recipe not in RECIPES:

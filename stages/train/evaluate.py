@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -10,6 +11,7 @@ from gsac.avatar import wholebody
 from gsac.avatar.artifacts import write_frame
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import WHITE, composite, score
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
@@ -42,14 +44,14 @@ def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
-          workspace: Workspace | None = None, flip: bool = False) -> list[dict]:
+          workspace: Workspace | None = None, flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
     """One row of `metrics.score` a frame; with a folder also %06d_truth, _render and _error PNGs on white."""
     workspace = workspace or Workspace()
     rows = []
     for t in map(int, frames):
         rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
         true_rgb, mask = truth(views[t])
-        rows.append({"frame": t} | score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip))
+        rows.append({"frame": t} | score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips))
         if folder is not None:
             render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
             error = np.abs(render - real).mean(2) / ERROR_FULL

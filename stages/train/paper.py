@@ -4,7 +4,7 @@ One gaussian a face, colours from noise, opacity fixed, four frames a step, dens
 places, pose and betas learned. Everything is worked out on the person's box but scaled to the whole frame: outside of the
 box render and frame are the same background. Known departures, all of them small: neighbours and their distances are taken at
 rest; jaw and expression stay as fitted (their rate could move them by 0.015 at most); each frame's pose has Adam moments
-of its own; LPIPS (weight 0.01) is left out, its network is in no package.
+of its own. LPIPS (weight 0.01) takes part where its network is here: no package has it, and it takes nearly all of the time.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import face_frames
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.lpips import LEAST_SIDE
 from gsac.avatar.raster import render_bound, render_bound_backward, screen_gradients
 from gsac.avatar.workspace import Workspace
 from gsac.stages.contract import StageError
@@ -22,7 +23,7 @@ from gsac.stages.train.checkpoint import standing
 from gsac.stages.train.densify import LARGEST, Densifier
 from gsac.stages.train.kernels import adam, on_background, through_background
 from gsac.stages.train.neighbours import Neighbours
-from gsac.stages.train.paper_losses import dice, sobel_magnitude
+from gsac.stages.train.paper_losses import dice, perceptual, sobel_magnitude
 from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import View, person_crop
 
@@ -33,7 +34,7 @@ MU_RATE, MU_DECAY = 1.6e-4, 0.01
 RATES = {"rgb": 5e-3, "quat": 5e-3, "scale": 5e-3}
 POSE_RATE = 2e-4
 """Of orientation, body pose, translation and betas; the hands' is a tenth (`Poses`)."""
-SSIM, SOBEL, KNN, DICE = 0.1, 1.0, 0.01, 0.1
+SSIM, SOBEL, KNN, DICE, LPIPS = 0.1, 1.0, 0.01, 0.1, 0.01
 KEPT = ("face", "values", "first", "second")
 """Attributes of Trainer that go into a checkpoint as they are."""
 
@@ -59,7 +60,7 @@ def fit(task: Task) -> Fit:
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
         task.keep(step + 1, steps, partial(standing, step + 1, order, rng, trainer))
         task.progress(step + 1, steps, "steps")
-    return Fit(trainer.gaussians(), np.ones(len(trainer.face), bool), figures={"lpips_in_loss": False})
+    return Fit(trainer.gaussians(), np.ones(len(trainer.face), bool), figures={"lpips_in_loss": trainer.lpips is not None})
 
 
 class Trainer:
@@ -76,6 +77,7 @@ class Trainer:
         self.first = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.second = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.frame_size = task.views[0].camera.width, task.views[0].camera.height
+        self.lpips = task.lpips if min(self.frame_size) >= LEAST_SIDE else None
         self.densifier = Densifier(count)
         self.neighbours = Neighbours()
         self.workspace, self.losses = Workspace(), Workspace()
@@ -138,7 +140,8 @@ class Trainer:
 
     def _image(self, t: int, view: View, shown: Gaussians, share: float):
         """Loss of one frame times its share of the batch, and its gradients."""
-        rendering = render_bound(self.poses.vertices(t), self.faces, shown, view.camera, self.workspace)
+        vertices = self.poses.vertices(t)
+        rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
         background = self.rng.random(3).astype(np.float32)
         image, target = np.empty_like(rendering.rgb), np.empty_like(rendering.rgb)
         gain, grad_gain = np.ones(3, np.float32), np.empty(3)
@@ -150,6 +153,10 @@ class Trainer:
         similarity = losses.ssim(image, target, factor=-SSIM * part, gradient=gradient, workspace=self.losses).value
         loss += SSIM * part * (1 - similarity)
         loss += sobel_magnitude(image, target, SOBEL * share / frame, gradient)
+        if self.lpips is not None:
+            centre = view.camera.project(vertices[[self.rng.integers(len(vertices))]])[0] + view.corner
+            loss += perceptual(self.lpips, image, target, background, np.array(view.corner), self.frame_size, centre, LPIPS * share,
+                               gradient)
         grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(rendering.alpha)
         through_background(gradient, rendering.rgb, rendering.alpha, view.pixels, background, gain, 0.0, grad_rgb, grad_alpha,
                            grad_gain)

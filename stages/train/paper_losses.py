@@ -1,12 +1,14 @@
-"""Losses that only recipe `paper` has: the edges' strength in grey, and Dice of what is not person."""
+"""Losses that only recipe `paper` has: the edges' strength in grey, Dice of what is not person, LPIPS of a window."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from gsac.avatar.lpips import Lpips
 from numba import njit
 
+WINDOW = 256
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
 
 
@@ -32,6 +34,31 @@ def dice(alpha: np.ndarray, pixels: np.ndarray, outside: int, weight: float, gra
     either = max(either, 1e-9)
     grad_alpha += np.float32(2 * weight / either) * t - np.float32(2 * weight * both / either**2)
     return weight * (1 - 2 * both / either)
+
+
+def perceptual(network: Lpips, image: np.ndarray, target: np.ndarray, background: np.ndarray, corner: np.ndarray,
+               frame: tuple[int, int], centre: np.ndarray, weight: float, gradient: np.ndarray) -> float:
+    """weight * LPIPS of a window of the frame, WINDOW px or less a side, about `centre` and moved into the frame.
+
+    image, target: (h, w, 3) of a box at `corner` (x, y px) of the frame (width, height px), which is `background` (3,) outside of
+    it. Images go to the network in 0..1. Adds the gradient with respect to the image to `gradient`.
+    """
+    size = np.minimum(WINDOW, frame)
+    x, y = np.floor(np.clip(centre - size / 2, 0, np.asarray(frame) - size)).astype(int) - corner
+    low, high = np.maximum([y, x], 0), np.minimum([y + size[1], x + size[0]], image.shape[:2])
+    if (high <= low).any():
+        return 0.0
+    in_box = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
+    in_window = tuple(slice(a - at, b - at) for a, b, at in zip(low, high, (y, x), strict=True))
+    shown = []
+    for part in (image, target):
+        window = np.empty((size[1], size[0], 3), np.float32)
+        window[:] = background
+        window[in_window] = part[in_box]
+        shown.append(window)
+    value, slope = network.gradient(*shown, scaled=False)
+    gradient[in_box] += np.float32(weight) * slope[in_window]
+    return weight * value
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)

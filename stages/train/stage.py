@@ -11,6 +11,7 @@ from gsac.avatar import rotation
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
 from gsac.avatar.body import BodyParams
 from gsac.avatar.cuda import why_not
+from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import psnr, summary
 from gsac.avatar.turn import turn_seen
 from gsac.avatar.workspace import Workspace
@@ -68,6 +69,9 @@ def run(job: Job) -> None:
     if turn < LEAST_TURN:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
+    if config.recipe == "paper" and job.device == "cuda" and "lpips-vgg" in job.models:
+        job.warn("LPIPS takes no part in the loss on cuda; set train.device to cpu where it must (days instead of minutes).")
+
     run = Run(job, Poses(body, params), views, trained, held)
     run.fit()
     unseen = float((~run.result.seen).mean())
@@ -108,11 +112,12 @@ class Run:
         self.workspace = Workspace()
         self.checkpoints = Checkpoints(job.scratch, job.warn)
         self.resumed_at: int | None = None
+        self.lpips = {name: Lpips.read(name, job.models[name]) for name in job.config.wishes() if name in job.models}
 
     def fit(self) -> None:
         self.began = now()
         task = Task(self.views, self.trained, self.held, self.poses, self.job.config, self.job.progress, self.checkpoint,
-                    self.marks, self.keep)
+                    self.marks, self.keep, lpips=self.lpips.get("lpips-vgg"))
         state = self.checkpoints.read()
         if state is not None:
             self.restore(state)
@@ -175,19 +180,19 @@ class Run:
 
     def metrics(self, gaussians, poses: Poses, folder) -> dict:
         config, held = self.job.config, self.held
-        rows = judge(gaussians, poses, held, self.views, folder, self.workspace, config.flip)
+        rows = judge(gaussians, poses, held, self.views, folder, self.workspace, config.flip, self.lpips)
         fitted = poses.copy()
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
         aligned = poses.copy()
         if config.pose_test_steps:
             ALIGN[self.job.device](gaussians, aligned, held, self.views, config.pose_test_steps)
-            ttpo = judge(gaussians, aligned, held, self.views, None, self.workspace, config.flip)
+            ttpo = judge(gaussians, aligned, held, self.views, None, self.workspace, config.flip, self.lpips)
         else:
             ttpo = []
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
         figures = summary(rows)
         return figures | {
-            **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips"},
+            **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips_net"},
             "psnr_fg_fit": self.psnr_fg(gaussians, fitted, held),
             "psnr_fg_train": self.psnr_fg(gaussians, poses, sample),
             "pose_at_test": {

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.lpips import Lpips
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.poses import Poses
@@ -37,6 +38,8 @@ class Task:
     die. Poses are kept by the caller. Not on the GPU, where a training takes seconds."""
     resumed: State | None = None
     """What the recipe gave to `keep` in a run that was stopped; the poses are as they were then."""
+    lpips: Lpips | None = None
+    """The network that recipe paper judges by (VGG), where the user has brought it."""
     gpu_seconds: float = 0.0
     """On the GPU before the steps: the rounds that move the poses."""
 

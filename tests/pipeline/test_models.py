@@ -3,8 +3,10 @@
 import hashlib
 import zipfile
 
+import numpy as np
 import pytest
 from gsac.avatar import models as table
+from gsac.avatar.lpips import Lpips, shapes
 from gsac.cache.store import Store
 from gsac.pipeline import models
 from gsac.pipeline.models import Models
@@ -85,6 +87,24 @@ def test_a_brought_file_may_not_take_the_name_of_another_network(store, tmp_path
     file.write_bytes(b"fake")
     with pytest.raises(BadInput, match="pose_detection must have sha256"):
         Models(store).add("pose_detection", file)
+
+
+def test_weights_of_lpips_come_as_one_file_or_two_and_are_kept_as_the_same_file(store, tmp_path):
+    arrays = {own: np.full(shape, 0.5, np.float32) for own, shape in shapes("lpips-alex").items()}
+    heads = {f"{own}.model.1.weight": values[None, :, None, None] for own, values in arrays.items() if own.startswith("lin")}
+    np.savez(tmp_path / "network.npz", **{own: values for own, values in arrays.items() if not own.startswith("lin")})
+    np.savez(tmp_path / "heads.npz", **heads)
+    np.savez(tmp_path / "all.npz", **arrays)
+    kept = [Models(store).add("lpips-alex", *(tmp_path / file for file in files))
+            for files in (["all.npz"], ["heads.npz", "network.npz"], ["network.npz", "heads.npz"])]
+    assert len(set(kept)) == 1
+    assert Models(store).need(["lpips-alex"], lambda message: None) == {"lpips-alex": kept[0]}
+    assert Lpips.read("lpips-alex", kept[0]).distance(np.zeros((64, 64, 3)), np.zeros((64, 64, 3))) == 0
+    with pytest.raises(BadInput, match="network.npz: lin0 is missing and 4 more: the heads"):
+        Models(store).add("lpips-alex", tmp_path / "network.npz")
+    with pytest.raises(BadInput, match="mine is one file; 2 were given"):
+        Models(store).add("mine", tmp_path / "network.npz", tmp_path / "heads.npz")
+    assert not list((store.root / "models").glob("add-*"))
 
 
 @pytest.mark.parametrize("name", ["", "a/b", ".hidden"])

@@ -25,6 +25,19 @@ def test_a_changed_parameter_reruns_exactly_that_stage_and_what_depends_on_it(to
     assert toy.result == "ALPHA GAMMA"
 
 
+def test_a_model_file_that_a_stage_only_wishes_for_reruns_it_once_it_is_brought_and_when_it_changes(toy):
+    toy.edit("right/__init__.py", "models=lambda config: (config.model,) if config.model else ()", 'wishes=lambda config: ("net",)')
+    toy.edit("right/stage.py", "job.models[job.config.model].read_text() if job.config.model else",
+             'job.models["net"].read_text() if "net" in job.models else')
+    toy.ran()
+    assert toy.result == "ALPHA ALPHA"
+    for text in (" one", " two"):
+        (toy.root / "net.bin").write_text(text)
+        assert toy.gsac("models", "add", "net", toy.root / "net.bin").code == 0
+        assert toy.ran() == ["right", "join"] and toy.result == f"ALPHA ALPHA{text}"
+        assert toy.ran() == []
+
+
 def test_a_changed_model_file_reruns_exactly_that_stage_and_what_depends_on_it(toy):
     model = toy.root / "net.bin"
     model.write_text("one")

@@ -4,11 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.camera import Camera
+from gsac.avatar.lpips import NETS, shapes
 from gsac.avatar.raster import render, render_backward, screen_gradients
-from gsac.stages.train import densify, neighbours
+from gsac.stages.train import densify, neighbours, paper
 from gsac.stages.train.densify import Densifier, children
-from gsac.stages.train.paper_losses import dice, sobel_magnitude
+from gsac.stages.train.paper_losses import dice, perceptual, sobel_magnitude
 from gsac.stages.train.stage import run
 
 
@@ -38,6 +40,44 @@ def test_dice_counts_the_pixels_outside_of_the_box_and_has_the_gradient_that_it_
     whole_alpha.flat[:48], whole.reshape(-1, 4)[:48] = alpha.ravel(), pixels.reshape(-1, 4)
     assert dice(whole_alpha, whole, 0, 0.1, np.zeros_like(whole_alpha)) == pytest.approx(value)
     assert dice(pixels[..., 3] * 0.0, pixels * np.uint8(0), 0, 0.1, np.zeros_like(alpha)) == pytest.approx(0)
+
+
+class Squares:
+    """A network whose distance is a weighed sum of squares, so that places matter."""
+
+    @staticmethod
+    def weights(shape):
+        return np.arange(np.prod(shape), dtype=np.float32).reshape(shape) / np.prod(shape)
+
+    def gradient(self, image, target, scaled):
+        assert not scaled, "the paper's code hands its images over as they are"
+        weights = self.weights(image.shape)
+        return float((weights * (image - target) ** 2).sum()), 2 * weights * (image - target)
+
+
+@pytest.mark.parametrize("centre", [(150.0, 140.0), (0.0, 0.0), (400.0, 300.0), (399.0, 5.0)])
+def test_the_perceptual_window_is_that_of_the_whole_frame(centre):
+    rng = np.random.default_rng(5)
+    background, corner, frame = rng.random(3).astype(np.float32), np.array([90, 30]), (400, 300)
+    image, target = rng.random((2, 200, 120, 3)).astype(np.float32)
+    gradient = np.ones_like(image)
+    value = perceptual(Squares(), image, target, background, corner, frame, np.array(centre), 0.5, gradient)
+    whole = np.tile(background, (2, 300, 400, 1))
+    whole[:, 30:230, 90:210] = image, target
+    x, y = np.clip(np.array(centre).astype(int) - 128, 0, [400 - 256, 300 - 256])
+    window = np.s_[y:y + 256, x:x + 256]
+    expected, slopes = Squares().gradient(*(part[window] for part in whole), False)
+    assert value == pytest.approx(0.5 * expected, rel=1e-4) and value > 0
+    on_frame = np.zeros((300, 400, 3))
+    on_frame[window] = slopes
+    np.testing.assert_allclose(gradient, 1 + 0.5 * on_frame[30:230, 90:210], rtol=1e-5)
+
+
+def test_a_perceptual_window_beside_the_person_costs_nothing():
+    gradient = np.zeros((10, 10, 3), np.float32)
+    image = np.ones_like(gradient)
+    assert perceptual(Squares(), image, 0 * image, np.zeros(3), np.array([900, 0]), (1000, 300), np.zeros(2), 1.0, gradient) == 0
+    assert not gradient.any()
 
 
 def test_the_neighbour_term_has_the_gradient_of_its_definition():
@@ -132,7 +172,34 @@ def test_the_recipe_learns_poses_and_betas_and_says_that_the_perceptual_loss_is_
     judged = [row["psnr_fg"] for row in figures["curve"] if "psnr_fg" in row]
     assert len(judged) == 3 and judged[-1] > judged[0] > 0
     assert figures["lpips_in_loss"] is False and figures["n_gaussians"] == 27420 and figures["steps"] == 60
-    from gsac.avatar.artifacts import read_arrays
-
     before, after = read_arrays(made.inputs["smplx/body.npz"]), read_arrays(made.out / "body.npz")
     assert 0 < np.abs(after["betas"] - before["betas"]).max() < 60 * 2e-4 * 1.5
+
+
+@pytest.fixture
+def networks(tmp_path):
+    """Files of both networks with random weights."""
+    rng, files = np.random.default_rng(6), {}
+    for name in NETS:
+        files[name] = tmp_path / name
+        with files[name].open("wb") as file:
+            np.savez(file, **{own: np.float32(abs(rng.normal(size=shape)) / np.sqrt(np.prod(shape[1:])))
+                              for own, shape in shapes(name).items()})
+    return files
+
+
+@pytest.mark.slow
+def test_brought_networks_are_judged_by_and_take_part_in_the_loss_of_the_paper(job, networks, monkeypatch):
+    monkeypatch.setattr(paper, "BATCH", 1)
+    seen = []
+    for name, models in (("with", networks), ("without", {})):
+        made = job(name, frames=6, recipe="paper", steps=2, pose_test_steps=2)
+        made.models = models
+        run(made)
+        seen.append(json.loads((made.out / "metrics.json").read_text()))
+    one, two = seen
+    assert one["lpips_in_loss"] and not two["lpips_in_loss"]
+    assert one["lpips"] == one["lpips_alex"] > 0 and one["lpips_net"] == "lpips-alex" and one["lpips_vgg_ttpo"] > 0
+    assert one["lpips_alex_unscaled"] != one["lpips_alex"] and all(row["lpips_vgg"] > 0 for row in one["heldout"])
+    assert one["curve"][0]["loss"] > two["curve"][0]["loss"]
+    assert two["lpips"] is two["lpips_net"] is two["lpips_vgg"] is two["lpips_ttpo"] is None

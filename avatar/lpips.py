@@ -1,0 +1,170 @@
+"""LPIPS: how different two images look, by the features of a network (Zhang et al. 2018, v0.1 of the weights).
+
+Both images run through the network; where it is tapped, features are brought to length one in every place, their squared
+differences are weighed by channel and averaged over the places; the taps are added up. The weights belong to others and are
+brought by the user: the network's from torchvision, the heads' from the authors' repository.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from gsac.avatar.weight_file import WeightsError, read_weights
+
+
+class Layer(NamedTuple):
+    """A convolution and ReLU; the layer's number is torchvision's."""
+
+    number: int
+    channels: int
+    kernel: int = 3
+    stride: int = 1
+    padding: int = 1
+    pool: int = 0
+    """Size of the max pooling before it, by steps of 2; 0: none."""
+    tap: bool = False
+
+
+NETS = {
+    "lpips-vgg": (
+        Layer(0, 64), Layer(2, 64, tap=True), Layer(5, 128, pool=2), Layer(7, 128, tap=True), Layer(10, 256, pool=2),
+        Layer(12, 256), Layer(14, 256, tap=True), Layer(17, 512, pool=2), Layer(19, 512), Layer(21, 512, tap=True),
+        Layer(24, 512, pool=2), Layer(26, 512), Layer(28, 512, tap=True)),
+    "lpips-alex": (
+        Layer(0, 64, 11, 4, 2, tap=True), Layer(3, 192, 5, 1, 2, pool=3, tap=True), Layer(6, 384, pool=3, tap=True),
+        Layer(8, 256, tap=True), Layer(10, 256, tap=True)),
+}
+"""Name of the model file -> the convolutions of torchvision's vgg16 and alexnet."""
+SOURCES = {"lpips-vgg": "torchvision's vgg16 and lpips/weights/v0.1/vgg.pth of the authors",
+           "lpips-alex": "torchvision's alexnet and lpips/weights/v0.1/alex.pth of the authors"}
+SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
+TINY = 1e-10
+LEAST_SIDE = 64
+"""px; a smaller image has nothing left after the poolings."""
+
+NETWORK = re.compile(r"(?:.*\.)?(?:features|slice\d)\.(\d+)\.(weight|bias)")
+HEAD = re.compile(r"(?:.*\.)?(?:lin|lins\.)(\d)(?:\.model\.\d)?\.weight")
+
+
+def shapes(name: str) -> dict[str, tuple[int, ...]]:
+    """Array -> shape, of the file of that name: what torchvision calls it, and `lin0` to `lin4` for the heads."""
+    found, before, taps = {}, 3, 0
+    for layer in NETS[name]:
+        found[f"features.{layer.number}.weight"] = layer.channels, before, layer.kernel, layer.kernel
+        found[f"features.{layer.number}.bias"] = (layer.channels,)
+        if layer.tap:
+            found[f"lin{taps}"] = (layer.channels,)
+            taps += 1
+        before = layer.channels
+    return found
+
+
+def gather(name: str, files: Iterable[Path]) -> dict[str, np.ndarray]:
+    """The arrays of `shapes(name)` out of the user's files: one with all of them, or network and heads apart.
+
+    Known are the names of torchvision, of the `lpips` package, of its head files, and our own. Raises WeightsError.
+    """
+    files, wanted, found = list(files), shapes(name), {}
+    for path in files:
+        for called, values in read_weights(path).items():
+            own = _own_name(called)
+            if own not in wanted:
+                continue
+            if own.startswith("lin") and values.ndim == 4 and values.shape[::2] == (1, 1) and values.shape[3] == 1:
+                values = values[0, :, 0, 0]
+            if values.shape != wanted[own]:
+                raise WeightsError(f"{path}: {called} has shape {values.shape}, {name} has {wanted[own]} there; "
+                                   f"{name} is made of {SOURCES[name]}")
+            if not np.isfinite(values).all():
+                raise WeightsError(f"{path}: {called} is not finite")
+            found[own] = values
+    missing = [own for own in wanted if own not in found]
+    if missing:
+        heads = sum(own.startswith("lin") for own in missing)
+        lacks = "the heads" if heads == len(missing) else "the network" if not heads else "network and heads"
+        raise WeightsError(f"{', '.join(map(str, files))}: {missing[0]} is missing"
+                           f"{f' and {len(missing) - 1} more' if len(missing) > 1 else ''}: {lacks} of {name}, which is made of "
+                           f"{SOURCES[name]}; both files may be given one after the other")
+    return {own: found[own] for own in wanted}
+
+
+def _own_name(called: str) -> str:
+    if network := NETWORK.fullmatch(called):
+        return f"features.{network[1]}.{network[2]}"
+    if head := HEAD.fullmatch(called):
+        return f"lin{head[1]}"
+    return called
+
+
+class Lpips:
+    """LPIPS by one network. Images are (H, W, 3) in 0..1."""
+
+    def __init__(self, name: str, arrays: dict[str, np.ndarray]):
+        """arrays: as `shapes(name)`."""
+        import torch
+
+        self.layers = NETS[name]
+        self.weights = {own: torch.from_numpy(np.ascontiguousarray(values, np.float32)) for own, values in arrays.items()}
+
+    @classmethod
+    def read(cls, name: str, path: Path) -> Lpips:
+        """From the store's file. Raises WeightsError where its arrays are not those of `shapes(name)`."""
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+        if {own: values.shape for own, values in arrays.items()} != shapes(name):
+            raise WeightsError(f"{path} does not hold the arrays of {name}; run `gsac models add {name} FILE` again")
+        return cls(name, arrays)
+
+    def distance(self, a: np.ndarray, b: np.ndarray, scaled: bool = True) -> float:
+        """scaled: images are brought to -1..1, as the network's own input is; False: left in 0..1, as many papers score.
+
+        NaN for images of fewer than LEAST_SIDE px.
+        """
+        import torch
+
+        if min(a.shape[:2]) < LEAST_SIDE:
+            return float("nan")
+        with torch.no_grad():
+            return float(self._distance(*(_tensor(np.asarray(image, np.float32), scaled) for image in (a, b))))
+
+    def gradient(self, image: np.ndarray, target: np.ndarray, scaled: bool = True) -> tuple[float, np.ndarray]:
+        """The distance, and its gradient (H, W, 3) with respect to the image."""
+        import torch
+
+        moved = torch.from_numpy(np.ascontiguousarray(image)).requires_grad_()
+        value = self._distance(_tensor(moved, scaled), _tensor(target, scaled))
+        return value.item(), torch.autograd.grad(value, moved)[0].numpy()
+
+    def _distance(self, a, b):
+        taps = zip(self._features(a), self._features(b), strict=True)
+        return sum((self.weights[f"lin{k}"][:, None, None] * (x - y) ** 2).sum(0).mean() for k, (x, y) in enumerate(taps))
+
+    def _features(self, x) -> list:
+        """Of the taps, (C, h, w) each of length one. x: (3, H, W) about -1..1."""
+        import torch
+        from torch.nn import functional
+
+        shift, scale = (x.new_tensor(values)[:, None, None] for values in (SHIFT, SCALE))
+        x, taps = ((x - shift) / scale)[None], []
+        for layer in self.layers:
+            if layer.pool:
+                x = functional.max_pool2d(x, layer.pool, 2)
+            weight, bias = (self.weights[f"features.{layer.number}.{part}"].to(x.dtype) for part in ("weight", "bias"))
+            x = functional.relu(functional.conv2d(x, weight, bias, layer.stride, layer.padding))
+            if layer.tap:
+                # The root's slope at zero is infinite: where all features are zero, so shall the gradient be.
+                taps.append(x[0] / (torch.sqrt((x[0] ** 2).sum(0) + TINY**2) + TINY))
+        return taps
+
+
+def _tensor(image, scaled: bool):
+    """(3, H, W), float32 unless it is float64."""
+    import torch
+
+    image = torch.as_tensor(image)
+    image = image.permute(2, 0, 1).to(torch.float64 if image.dtype == torch.float64 else torch.float32)
+    return 2 * image - 1 if scaled else image

@@ -1,0 +1,74 @@
+"""Weights of networks as users have them: .safetensors, .npz, or a state_dict that torch saved; arrays only, no code is run."""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+TORCH = (".pth", ".pt", ".ckpt", ".bin")
+SUFFIXES = (".safetensors", ".npz", *TORCH)
+SAFETENSORS = {"F64": "<f8", "F32": "<f4", "F16": "<f2", "BF16": "<u2"}
+LARGEST_HEADER = 100 << 20
+
+
+class WeightsError(ValueError):
+    """A file of weights is not what it should be. The message names the file, the array and what was expected."""
+
+
+def read_weights(path: Path) -> dict[str, np.ndarray]:
+    """Name -> float32 array; what is not of floats is left out. Raises WeightsError."""
+    try:
+        if path.suffix == ".safetensors":
+            return _safetensors(path)
+        if path.suffix == ".npz":
+            with np.load(path, allow_pickle=False) as file:
+                return {name: np.asarray(file[name], np.float32) for name in file.files if file[name].dtype.kind == "f"}
+        if path.suffix in TORCH:
+            return _torch(path)
+    except FileNotFoundError as error:
+        raise WeightsError(f"{path}: no such file") from error
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise WeightsError(f"{path} cannot be read as {path.suffix}: {error}") from error
+    raise WeightsError(f"{path}: unknown kind of file; give one of {', '.join(SUFFIXES)}")
+
+
+def _safetensors(path: Path) -> dict[str, np.ndarray]:
+    """The format's own words: 8 bytes of length, a JSON header, the arrays' bytes."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[:8], "little")
+    if len(data) < 8 or length > min(len(data) - 8, LARGEST_HEADER):
+        raise ValueError("the file ends within its header")
+    found, start = {}, 8 + length
+    for name, entry in json.loads(data[8:start]).items():
+        if name == "__metadata__" or entry["dtype"] not in SAFETENSORS:
+            continue
+        kind = np.dtype(SAFETENSORS[entry["dtype"]])
+        begin, end = (start + int(x) for x in entry["data_offsets"])
+        if not start <= begin <= end <= len(data) or end - begin != kind.itemsize * math.prod(entry["shape"]):
+            raise ValueError(f"{name} lies outside of the file or has another size than its shape says")
+        values = np.frombuffer(data[begin:end], kind).reshape(entry["shape"])
+        if entry["dtype"] == "BF16":  # the upper half of a float32
+            values = (values.astype(np.uint32) << 16).view(np.float32)
+        found[name] = values.astype(np.float32)
+    return found
+
+
+def _torch(path: Path) -> dict[str, np.ndarray]:
+    import torch
+
+    try:
+        state = torch.load(path, map_location="cpu", weights_only=True)
+    except (pickle.UnpicklingError, RuntimeError) as error:
+        raise WeightsError(f"{path} is no plain state_dict; save it with torch.save(model.state_dict(), FILE) "
+                           f"({str(error).splitlines()[0]})") from error
+    if isinstance(state, dict) and isinstance(state.get("state_dict"), dict):
+        state = state["state_dict"]
+    if not isinstance(state, dict):
+        raise ValueError(f"it holds a {type(state).__name__}, not a state_dict")
+    return {str(name): value.float().numpy() for name, value in state.items()
+            if isinstance(value, torch.Tensor) and value.is_floating_point()}
