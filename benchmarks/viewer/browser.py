@@ -13,6 +13,10 @@ FLAGS = ["--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsa
          "--remote-debugging-pipe", "--hide-scrollbars"]
 
 
+WEBGPU = ("--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader")
+"""Flags with which WebGPU, too, is drawn by software, and shown."""
+
+
 def find_chromium():
     """Path of the program that Debian's package `chromium` brings, or None."""
     return shutil.which("chromium") or shutil.which("chromium-browser")
@@ -21,7 +25,7 @@ def find_chromium():
 class Browser:
     """One page. `errors` collects what the page threw or logged as an error; `requests` every address it asked for."""
 
-    def __init__(self, width=640, height=640):
+    def __init__(self, width=640, height=640, flags=()):
         self.home = tempfile.mkdtemp()
         to_browser, self.writing = os.pipe()
         self.reading, from_browser = os.pipe()
@@ -32,7 +36,7 @@ class Browser:
             for fd, place in zip(ours, (3, 4), strict=True):
                 os.dup2(fd, place)
 
-        self.process = subprocess.Popen([find_chromium(), *FLAGS, f"--user-data-dir={self.home}"], preexec_fn=pipes,
+        self.process = subprocess.Popen([find_chromium(), *FLAGS, *flags, f"--user-data-dir={self.home}"], preexec_fn=pipes,
                                         pass_fds=(3, 4), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(to_browser)
         os.close(from_browser)
@@ -51,6 +55,10 @@ class Browser:
         """Opens the page and waits until it says that it is ready."""
         self.call("Page.navigate", url=address)
         self.until("document.documentElement?.dataset.ready === 'yes'")
+
+    def has_webgpu(self):
+        """Whether a page that is open finds an adapter."""
+        return self.run("navigator.gpu?.requestAdapter().then(Boolean) ?? false")
 
     def until(self, condition, timeout=120):
         """Waits for a JavaScript condition; AssertionError when the page throws or time is up."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gsac.benchmarks.viewer.browser import Browser
+from gsac.benchmarks.viewer.browser import WEBGPU, Browser
 from gsac.stages.contract import StageError
 
 WARM_S = 2.0
@@ -21,11 +21,17 @@ WATCH = """
   if (window.drawn !== undefined) return;
   window.drawn = 0;
   document.body.classList.add("bare");
-  const { gl } = gsac.painter, pixel = new Uint8Array(4), draw = gsac.draw.bind(gsac);
+  const { gl, device } = gsac.painter, pixel = new Uint8Array(4), draw = gsac.draw.bind(gsac);
+  let waiting = false;
   gsac.draw = () => {
+    if (waiting) return;
     draw();
     if (gl) gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-    window.drawn += 1;
+    if (!device) window.drawn += 1;
+    else {
+      waiting = true;
+      device.queue.onSubmittedWorkDone().then(() => { waiting = false; window.drawn += 1; });
+    }
   };
 })()
 """
@@ -71,7 +77,7 @@ def processor_s(pid: int) -> float:
 
 def count(address: str, size: int, seconds: float, picture: Path | None) -> Count:
     """A page at an address; picture: where to keep what it shows."""
-    page = Browser(size, size)
+    page = Browser(size, size, WEBGPU if "draw=webgpu" in address else ())
     try:
         page.open(address)
         page.run(WATCH)

@@ -12,9 +12,9 @@ from gsac.avatar.motion import names
 HERE = Path(__file__).parent
 PAGE, STYLE = "viewer/page.html", "viewer/style.css"
 SCRIPTS = ("viewer/gsac.js", "viewer/math.js", "viewer/skin.js", "viewer/bind.js", "viewer/sort.js", "viewer/draw.js",
-           "viewer/soft.js", "viewer/camera.js", "viewer/quat.js", "viewer/source.js", "viewer/names.js", "viewer/bvh.js",
-           "viewer/gltf.js", "viewer/retarget.js", "viewer/files.js", "viewer/rate.js", "viewer/viewer.js", "viewer/xr.js",
-           "viewer/drawer.js", "viewer/ui.js")
+           "viewer/soft.js", "viewer/shaders.js", "viewer/pack.js", "viewer/gpu.js", "viewer/painter.js", "viewer/camera.js",
+           "viewer/quat.js", "viewer/source.js", "viewer/names.js", "viewer/bvh.js", "viewer/gltf.js", "viewer/retarget.js",
+           "viewer/files.js", "viewer/rate.js", "viewer/viewer.js", "viewer/xr.js", "viewer/drawer.js", "viewer/ui.js")
 """Plain scripts, in the order in which they lean on each other. Whole names, so that the cache sees these files."""
 
 

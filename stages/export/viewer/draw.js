@@ -98,8 +98,9 @@ class Painter {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: false,
       powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser offers no WebGL2, which the viewer draws with");
-    Object.assign(this, { gl, canvas, avatar, binding, sort });
+    Object.assign(this, { kind: "webgl", gl, canvas, avatar, binding, sort, onLost: () => {} });
     const { low_pass_px2: lowPass = 0.3, alpha_max: most = 0.999, alpha_min: least = 1 / 255 } = avatar.head.blend || {};
+    canvas.addEventListener("webglcontextlost", () => this.onLost("the graphics driver stopped"));
     this.blend = [lowPass, most, least];
     const constants = { ORDER_ROW: DepthSort.PER_ROW, DATA_ROW: Binding.PER_ROW, NEAR: NEAR.toFixed(3), WIDE: WIDE.toFixed(3) };
     const vertex = Object.entries(constants).reduce((text, [name, value]) => text.replaceAll(name, value), SPLAT_VERTEX);

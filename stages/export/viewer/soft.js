@@ -6,7 +6,7 @@ const FULL = 1e-3;
 class SoftPainter {
   constructor(canvas, avatar, binding, sort) {
     this.context = canvas.getContext("2d", { alpha: false });
-    Object.assign(this, { canvas, avatar, binding, sort, width: 0, height: 0 });
+    Object.assign(this, { kind: "software", canvas, avatar, binding, sort, width: 0, height: 0 });
     const { low_pass_px2: lowPass = 0.3, alpha_max: most = 0.999, alpha_min: least = 1 / 255 } = avatar.head.blend || {};
     Object.assign(this, { lowPass, most, least, background: [0, 0, 0] });
   }
@@ -119,19 +119,4 @@ class SoftPainter {
     }
     this.context.putImageData(this.image, 0, 0);
   }
-}
-
-// Whether this browser's WebGL2 is missing or runs without a graphics card.
-function hasNoGraphicsCard() {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  if (!gl) return true;
-  const names = gl.getExtension("WEBGL_debug_renderer_info"), name = gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
-  gl.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
-}
-
-// asked: "webgl", "software", or whatever suits the device.
-function makePainter(asked, ...what) {
-  const software = asked === "software" || (asked !== "webgl" && hasNoGraphicsCard());
-  return software ? new SoftPainter(...what) : new Painter(...what);
 }

@@ -2,7 +2,7 @@
 // Address: #pose=T|A or #clip=NAME, t=SECONDS, yaw, pitch, dist, fov (degrees, m), target=x,y,z, bg=rrggbb,
 // expression=NAME:WEIGHT,..., joints=NAME:x,y,z;... (axis-angle, degrees), light=off, turntable,
 // still (one frame, no controls, no floor);
-// draw=webgl|software, when the page opens.
+// draw=webgpu|webgl|software, when the page opens.
 
 const NOTE_MS = 9000;
 
@@ -37,11 +37,12 @@ class Controls {
       e.target.value = "";
     });
     listenForDrops(find("drop"), (files) => this.open(files));
-    viewer.camera.listen(viewer.canvas, () => {
+    viewer.camera.listen(viewer.stage, () => {
       viewer.turntable = false;
       this.show();
     });
     viewer.onRate = (rate) => this.showRate(rate);
+    viewer.onChange = (text) => this.note(text);
     this.drawers = { joints: jointSliders(viewer, find("joint-rows")), faces: faceSliders(viewer, find("face-rows")) };
     for (const name of Object.keys(this.drawers)) {
       this.onClick(`show-${name}`, () => this.openDrawer(find(name).hidden ? name : null));
@@ -142,7 +143,7 @@ function tell(error) {
 }
 
 async function main() {
-  const viewer = new Viewer(readAvatar(await inlinedAvatar()), new URLSearchParams(location.hash.slice(1)).get("draw"));
+  const viewer = await Viewer.open(readAvatar(await inlinedAvatar()), new URLSearchParams(location.hash.slice(1)).get("draw"));
   window.gsac = viewer;
   const controls = new Controls(viewer);
   const follow = () => {
@@ -151,9 +152,6 @@ async function main() {
   };
   follow();
   window.addEventListener("hashchange", follow);
-  viewer.canvas.addEventListener("webglcontextlost", () => {
-    tell(new Error("the graphics driver stopped; please reload the page"));
-  });
   await offerHeadset(viewer, find("tools"), (text) => controls.note(text));
   viewer.run();
   document.documentElement.dataset.ready = "yes";

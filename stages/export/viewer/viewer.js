@@ -4,18 +4,26 @@ const FADE_S = 0.35;
 const FOLLOW_S = 0.6;
 const BACKGROUND = "#2b303b";
 const MAX_PIXEL_RATIO = 2;
+// What a browser takes to start its graphics process again.
+const RECOVER_MS = 1000;
 
 class Viewer {
   // asked: how to draw, for makePainter.
-  constructor(avatar, asked) {
+  static async open(avatar, asked) {
+    const viewer = new Viewer(avatar);
+    await viewer.drawBy(asked);
+    return viewer;
+  }
+
+  constructor(avatar) {
     this.avatar = avatar;
     this.pose = new Pose(avatar);
     this.before = new Pose(avatar);
     this.skin = new Skin(avatar);
     this.binding = new Binding(avatar);
     this.sort = new DepthSort(this.binding.count);
-    this.canvas = document.getElementById("stage");
-    this.painter = makePainter(asked, this.canvas, avatar, this.binding, this.sort);
+    this.stage = document.getElementById("stage");
+    this.painter = null;
     this.camera = new OrbitCamera();
     [this.low, this.high] = bounds(avatar.vertices);
     this.rate = new FrameRate();
@@ -30,8 +38,29 @@ class Viewer {
     this.still = false;
     this.background = BACKGROUND;
     this.session = null;
-    // Called with {fps, p95} a few times a second.
+    // Called with {fps, p95} a few times a second, and with a sentence when the way of drawing had to change.
     this.onRate = () => {};
+    this.onChange = () => {};
+  }
+
+  get canvas() {
+    return this.stage.firstElementChild;
+  }
+
+  // asked: for makePainter. A painter that stops later is followed by the next plainer one.
+  async drawBy(asked) {
+    const painter = await makePainter(asked, this.canvas, this);
+    painter.onLost = async (why) => {
+      if (this.painter !== painter) return;
+      this.painter = null;
+      freshCanvas(this.canvas);
+      await new Promise((done) => setTimeout(done, RECOVER_MS));
+      await this.drawBy(painter.kind === "webgpu" ? "webgl" : "software");
+      this.move();
+      this.draw();
+      this.onChange(`${why || "The graphics driver stopped"}: now drawn ${this.painter.kind === "webgl" ? "by WebGL" : "without the graphics card"}.`);
+    };
+    this.painter = painter;
   }
 
   play(what) {
@@ -77,8 +106,18 @@ class Viewer {
     }
     const share = 1 - Math.exp(-seconds / FOLLOW_S), { walked } = this.camera;
     for (const i of [0, 2]) walked[i] += share * (this.pose.transl[i] - walked[i]);
-    this.skin.update(this.pose, this.expression);
-    this.binding.update(this.skin.vertices);
+    this.move();
+  }
+
+  // Brings the gaussians to the pose: on the graphics card where that can, else here.
+  move() {
+    if (this.painter?.move && !this.session) {
+      this.skin.moveBones(this.pose);
+      this.painter.move(this.expression);
+    } else {
+      this.skin.update(this.pose, this.expression);
+      this.binding.update(this.skin.vertices);
+    }
   }
 
   get shadow() {
@@ -87,6 +126,7 @@ class Viewer {
   }
 
   draw() {
+    if (!this.painter) return;
     if (this.resize() && !this.camera.moved) this.frame();
     const eye = this.camera.eye(this.canvas.width, this.canvas.height);
     this.painter.prepare(eye.view);
@@ -96,7 +136,7 @@ class Viewer {
 
   // Returns whether the room for the figure has another size than before.
   resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, this.painter.gl ? MAX_PIXEL_RATIO : 1);
+    const ratio = Math.min(window.devicePixelRatio || 1, this.painter?.kind === "software" ? 1 : MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     const { offsetHeight, offsetTop } = document.getElementById("panel"), panel = offsetHeight ? window.innerHeight - offsetTop : 0;
@@ -171,6 +211,7 @@ class Viewer {
   // The whole figure as it stands.
   frame() {
     this.resize();
+    this.skin.update(this.pose, this.expression);
     const { walked } = this.camera, [low, high] = bounds(this.skin.vertices);
     for (const i of [0, 2]) walked[i] = this.pose.transl[i];
     this.camera.frame(low.map((x, i) => x - walked[i]), high.map((x, i) => x - walked[i]), this.canvas.width / this.canvas.height);

@@ -6,7 +6,7 @@ const XR_DISTANCE = 1.6;
 
 // Adds a button for each mode that the device has.
 async function offerHeadset(viewer, place, tell) {
-  if (!navigator.xr || !viewer.painter.gl) return;
+  if (!navigator.xr) return;
   for (const [mode, label] of XR_MODES) {
     if (!await navigator.xr.isSessionSupported(mode).catch(() => false)) continue;
     const button = document.createElement("button");
@@ -20,7 +20,8 @@ async function offerHeadset(viewer, place, tell) {
 }
 
 async function enter(viewer, mode, button) {
-  const session = await navigator.xr.requestSession(mode, { optionalFeatures: ["local-floor"] }), { gl } = viewer.painter;
+  const session = await navigator.xr.requestSession(mode, { optionalFeatures: ["local-floor"] });
+  const painter = headsetPainter(viewer), { gl } = painter;
   session.addEventListener("end", () => {
     viewer.session = null;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -49,15 +50,21 @@ async function enter(viewer, mode, button) {
       const seen = xrFrame.getViewerPose(space);
       if (!seen) return;
       gl.bindFramebuffer(gl.FRAMEBUFFER, layer.framebuffer);
-      viewer.painter.prepare(viewRows(seen.transform.inverse.matrix, stand));
-      viewer.painter.clear(background);
-      for (const view of seen.views) viewer.painter.paint(eyeOf(view, layer.getViewport(view), stand), viewer.shadow);
+      painter.prepare(viewRows(seen.transform.inverse.matrix, stand));
+      painter.clear(background);
+      for (const view of seen.views) painter.paint(eyeOf(view, layer.getViewport(view), stand), viewer.shadow);
     };
     session.requestAnimationFrame(frame);
   } catch (error) {
     await session.end();
     throw error;
   }
+}
+
+// A headset is drawn by WebGL2; where the page is not, by a painter of its own.
+function headsetPainter(viewer) {
+  if (viewer.painter.gl) return viewer.painter;
+  return viewer.headset ??= new Painter(document.createElement("canvas"), viewer.avatar, viewer.binding, viewer.sort);
 }
 
 // 3x4 row by row, OpenCV axes, of a column-major OpenGL view matrix; stand: the avatar's place in the room, m.

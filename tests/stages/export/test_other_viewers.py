@@ -81,7 +81,7 @@ def test_spark_shows_the_spz_the_right_way_round(exported, node_package):
     (folder / "show.html").write_text(SHOW_SPZ.replace("HEIGHT", f"{height:.4f}").replace("DISTANCE", str(CAMERA["dist"])))
     with served(folder) as address:
         got = shown(f"{address}/show.html")
-        want = shown(f"{address}/{pages(avatar)['viewer.html'].replace('clip=walk', 'pose=A')}&still")
+        want = shown(f"{address}/{pages(avatar)['software'].replace('clip=walk', 'pose=A')}&still")
     a, b = person(got), person(want)
     assert (a & b).sum() / (a | b).sum() > 0.93
     red = (got[..., 0] > 150) & (got[..., 1:].max(-1) < 110)

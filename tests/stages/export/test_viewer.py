@@ -21,18 +21,20 @@ SIZE, FOV, BACKGROUND = 512, 30, (0x3A, 0x60, 0x80)
 
 @pytest.fixture(scope="module")
 def browser():
-    it = chromium.Browser(SIZE, SIZE)
+    it = chromium.Browser(SIZE, SIZE, chromium.WEBGPU)
     yield it
     it.close()
 
 
-@pytest.fixture(scope="module", params=["webgl", "software"])
+@pytest.fixture(scope="module", params=["webgpu", "webgl", "software"])
 def page(request, browser, exported):
-    """The page drawn by WebGL2 and by its own software."""
+    """The page drawn by WebGPU, by WebGL2 and by its own software."""
     browser.call("Page.navigate", url="about:blank")
     browser.requests.clear()
     browser.open(f"{(exported / 'viewer.html').as_uri()}#draw={request.param}")
-    assert browser.run("gsac.painter.gl ? 'webgl' : 'software'") == request.param
+    if request.param == "webgpu" and not browser.has_webgpu():
+        pytest.skip("this chromium has no WebGPU")
+    assert browser.run("gsac.painter.kind") == request.param
     return browser
 
 
@@ -142,7 +144,7 @@ def test_it_plays_and_the_buttons_answer(page):
 def test_on_a_phone_the_controls_are_inside_the_screen_and_below_the_feet(page):
     page.resize(390, 844, 2, True)
     page.run("location.hash = 'pose=A&x'")
-    page.until("!gsac.still && gsac.playing.pose === 'A' && gsac.canvas.width === (gsac.painter.gl ? 780 : 390)")
+    page.until("!gsac.still && gsac.playing.pose === 'A' && gsac.canvas.width === (gsac.painter.kind === 'software' ? 390 : 780)")
     boxes = page.run("[...document.querySelectorAll('button, select, input')].filter((e) => e.offsetParent)"
                      ".map((e) => e.getBoundingClientRect()).map((r) => [r.left, r.top, r.right, r.bottom])")
     left, top, right, bottom = np.array(boxes).T

@@ -24,7 +24,7 @@ LIGHT = np.float32([[.8, .75, .7], [.3, .2, -.1], [.2, .1, .3], [.25, -.6, .2]])
 
 @pytest.fixture(scope="module")
 def browser():
-    it = chromium.Browser(SIZE, SIZE)
+    it = chromium.Browser(SIZE, SIZE, chromium.WEBGPU)
     yield it
     it.close()
 
@@ -57,10 +57,12 @@ def psnr(a, b):
     return -10 * math.log10(max(((a - b) ** 2).mean(), 1e-12))
 
 
-@pytest.mark.parametrize("draw", ["webgl", "software"])
+@pytest.mark.parametrize("draw", ["webgpu", "webgl", "software"])
 def test_in_its_light_the_person_looks_as_the_trainers_renderer_shows_from_every_side(browser, lit, address, draw):
     assert shade(LIGHT, np.float32([[0, 0, 1]])).min() == np.float32(DARKEST), "the front reaches the darkest that is drawn"
     browser.open(f"{address}?{draw}#draw={draw}")
+    if draw == "webgpu" and not browser.has_webgpu():
+        pytest.skip("this chromium has no WebGPU")
     for pose, yaw in (("A", 20), ("T", 160), ("A", -80)):
         pictures = []
         for words, avatar in (("", lit), ("&light=off", replace(lit, light=None))):
