@@ -7,8 +7,8 @@ using UnityEngine;
 namespace Gsac
 {
     /// <summary>
-    /// Poses and expressions that come live over UDP, one JSON message a datagram (GsacPoseMessage), smoothed. Listens to
-    /// this machine only, unless `Any Address` is on. Whatever is not a message is counted and left.
+    /// Poses and expressions that come live over UDP, a JSON message or an OSC packet each datagram (GsacPoseMessage), smoothed.
+    /// Listens to this machine only, unless `Any Address` is on. Whatever is not a message is counted by its fault and left.
     /// </summary>
     [AddComponentMenu("Gsac/Gsac Pose Stream")]
     [DefaultExecutionOrder(8000)]
@@ -16,7 +16,7 @@ namespace Gsac
     public sealed class GsacPoseStream : MonoBehaviour
     {
         const int LargestDatagram = 65536;
-        const int TimeoutMs = 200;
+        const int PatienceUs = 100000;
 
         [SerializeField] int port = 9000;
         [SerializeField, Tooltip("Listen to other machines too.")] bool anyAddress = false;
@@ -24,7 +24,9 @@ namespace Gsac
 
         readonly object padlock = new object();
         readonly byte[] datagram = new byte[LargestDatagram];
+        readonly int[] refused = new int[Enum.GetValues(typeof(GsacMessageFault)).Length];
         GsacAvatar avatar;
+        GsacData data;
         GsacPoseMessage message;
         GsacPose incoming;
         float[] incomingWeights;
@@ -33,9 +35,17 @@ namespace Gsac
         volatile bool listening;
         bool fresh;
 
-        /// <summary>Messages understood, and datagrams that were none.</summary>
+        /// <summary>Messages taken, and datagrams that were none.</summary>
         public int Received { get; private set; }
         public int Refused { get; private set; }
+
+        /// <summary>Why the last one was refused; None where all were taken.</summary>
+        public GsacMessageFault LastFault { get; private set; }
+
+        public int RefusedFor(GsacMessageFault fault)
+        {
+            return refused[(int)fault];
+        }
 
         public float Smoothing
         {
@@ -52,11 +62,8 @@ namespace Gsac
         void OnEnable()
         {
             avatar = GetComponent<GsacAvatar>();
-            GsacData data = avatar.Data;
-            message = new GsacPoseMessage(data);
-            incoming = new GsacPose(data.JointCount);
-            incomingWeights = new float[data.Expressions.Length];
-            socket = new Socket(AddressFamily.InterNetwork, SocketType.Dgram, ProtocolType.Udp) { ReceiveTimeout = TimeoutMs };
+            Prepare();
+            socket = new Socket(AddressFamily.InterNetwork, SocketType.Dgram, ProtocolType.Udp);
             try
             {
                 socket.Bind(new IPEndPoint(anyAddress ? IPAddress.Any : IPAddress.Loopback, port));
@@ -71,6 +78,16 @@ namespace Gsac
             listening = true;
             thread = new Thread(Listen) { IsBackground = true, Name = "Gsac pose stream" };
             thread.Start();
+        }
+
+        /// <summary>For the avatar's file as it is now.</summary>
+        void Prepare()
+        {
+            data = avatar.Data;
+            message = new GsacPoseMessage(data);
+            incoming = new GsacPose(data.JointCount);
+            incomingWeights = new float[data.Expressions.Length];
+            fresh = false;
         }
 
         void OnDisable()
@@ -89,12 +106,13 @@ namespace Gsac
                 int length;
                 try
                 {
+                    // a timeout would be an exception, and garbage, several times a second
+                    if (!socket.Poll(PatienceUs, SelectMode.SelectRead)) continue;
                     length = socket.Receive(datagram);
                 }
                 catch (SocketException e)
                 {
-                    if (e.SocketErrorCode == SocketError.TimedOut || e.SocketErrorCode == SocketError.WouldBlock
-                        || e.SocketErrorCode == SocketError.ConnectionReset || e.SocketErrorCode == SocketError.MessageSize) continue;
+                    if (e.SocketErrorCode == SocketError.ConnectionReset || e.SocketErrorCode == SocketError.MessageSize) continue;
                     return;
                 }
                 catch (ObjectDisposedException)
@@ -103,10 +121,16 @@ namespace Gsac
                 }
                 lock (padlock)
                 {
-                    bool good = message.Read(datagram, length, incoming, incomingWeights);
-                    fresh |= good;
-                    if (good) Received++;
-                    else Refused++;
+                    GsacMessageFault fault = message.Read(datagram, length, incoming, incomingWeights);
+                    if (fault == GsacMessageFault.None)
+                    {
+                        fresh = true;
+                        Received++;
+                        continue;
+                    }
+                    LastFault = fault;
+                    Refused++;
+                    refused[(int)fault]++;
                 }
             }
         }
@@ -115,6 +139,7 @@ namespace Gsac
         {
             lock (padlock)
             {
+                if (!ReferenceEquals(data, avatar.Data)) Prepare();
                 if (!fresh) return;
                 if (avatar.Source != GsacSource.Script) avatar.Source = GsacSource.Script;
                 avatar.Pose.Approach(incoming, Time.deltaTime, smoothing);

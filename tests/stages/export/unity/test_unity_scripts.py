@@ -1,9 +1,7 @@
 """The C# of the Unity package, compiled by mcs over stubs of Unity and run under Mono."""
 
 import json
-import random
 import re
-import socket
 from dataclasses import replace
 
 import numpy as np
@@ -59,68 +57,6 @@ def test_6000_frames_of_each_source_collect_no_garbage(play, files):
     lines = play("garbage", files / "figure.gsac", collector=",nursery-size=128k").split("\n")
     assert int(lines[3].split()[1]) > 0, "the control: one small object a frame is seen"
     assert lines[:3] == [f"{source} 12000 6000 0" for source in ("Animator", "Script", "Clip")]
-
-
-def test_a_pose_stream_is_taken_from_the_network_and_smoothed(play, files):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    lines = play("stream", files / "figure.gsac", port).splitlines()
-    assert lines[0] == "1 1", "one message understood, one datagram refused"
-    degrees, weight = np.array([line.split() for line in lines[1:]], float).T
-    assert 5 < degrees[0] < 40 and (np.diff(degrees) > 0).all(), "softly"
-    assert abs(degrees[-1] - np.degrees(1.5)) < .1 and abs(weight[-1] - .8) < 1e-3
-
-
-def test_pose_messages_are_read_in_every_form_and_nonsense_leaves_the_pose(play, mono, files, tmp_path):
-    rng = np.random.default_rng(4)
-    body, hand, orient = rng.normal(size=63), rng.normal(size=45), np.array([3.0, .2, -.1])
-    good = {
-        "arrays": {"body_pose": list(body), "left_hand_pose": list(hand), "transl": [1, 2, 3], "who": {"a": [None, True]}},
-        "names": {"joints": {"head": [.1, .2, .3], "tail": [9]}, "expression": {"jawOpen": .25, "sneeze": 1}},
-        "row": {"expression": [.1, .2]}, "empty": {},
-        "camera": {"global_orient": list(orient), "transl": [.1, .2, 3], "camera": True}}
-    bad = {"b_number": "{\"transl\": [1, 2, \"3\"]}", "b_short": "{\"body_pose\": [1, 2]}", "b_end": "{\"transl\": [1, 2, 3]",
-           "b_huge": "{\"transl\": [1e9, 0, 0]}", "b_nan": "{\"transl\": [NaN, 0, 0]}", "b_after": "{} x", "b_nothing": "",
-           "b_deep": "{\"x\": " + "[" * 60000, "b_text": "{\"x", "b_slash": "{\"x\\",
-           "b_long": "{\"transl\": [" + "9" * 60000 + ",0,0]}"}
-    folder = tmp_path / "messages"
-    folder.mkdir()
-    for name, message in good.items():
-        (folder / name).write_text(json.dumps(message))
-    for name, message in bad.items():
-        (folder / name).write_text(message)
-    damage = random.Random(1)
-    for n in range(300):
-        raw = bytearray(json.dumps(good["arrays"]).encode())
-        for _ in range(3):
-            raw[damage.randrange(len(raw))] = damage.randrange(256)
-        (folder / f"f_{n}").write_bytes(bytes(raw[:damage.randrange(len(raw))] if n % 3 else raw))
-    words = dict(line.split() for line in play("messages", files / "figure.gsac", folder, tmp_path / "out").splitlines())
-    got = mono.arrays(tmp_path / "out")
-    assert [n for n in good if words[n] != "True"] == [] and [n for n in bad if words[n] != "False"] == []
-    for name, word in words.items():
-        assert np.isfinite(got[f"{name}.rotation"]).all()
-        if word == "False":
-            np.testing.assert_array_equal(got[f"{name}.rotation"].reshape(-1, 4), np.tile([0, 0, 0, 1], (55, 1)))
-            assert not got[f"{name}.weights"].any()
-
-    def turns(name):
-        return Rotation.from_quat(got[f"{name}.rotation"].reshape(-1, 4)).as_matrix()
-
-    def smplx(vector):
-        return MIRROR @ Rotation.from_rotvec(vector).as_matrix() @ MIRROR
-
-    np.testing.assert_allclose(turns("arrays")[1:22], [smplx(v) for v in body.reshape(-1, 3)], atol=1e-5)
-    np.testing.assert_allclose(turns("arrays")[25:40], [smplx(v) for v in hand.reshape(-1, 3)], atol=1e-5)
-    np.testing.assert_allclose(got["arrays.transl"], [-1, 2, 3])
-    np.testing.assert_allclose(turns("names")[15], smplx([.1, .2, .3]), atol=1e-5)
-    np.testing.assert_allclose(got["names.weights"], [.25, 0])
-    np.testing.assert_allclose(got["row.weights"], [.1, .2])
-    avatar, upright = RiggedAvatar.read(files / "figure.gsac"), np.diag([1.0, -1, -1])
-    np.testing.assert_allclose(turns("camera")[0], MIRROR @ upright @ Rotation.from_rotvec(orient).as_matrix() @ MIRROR, atol=1e-5)
-    pelvis = avatar.joints[0]
-    np.testing.assert_allclose(got["camera.transl"], MIRROR @ (upright @ (pelvis + [.1, .2, 3]) - pelvis), atol=1e-5)
 
 
 def test_the_benchmark_shows_three_poses_and_writes_the_percentiles(play, files, tmp_path):

@@ -66,16 +66,20 @@ namespace Gsac
         }
 
         /// <summary>
-        /// After the root was set from numbers of a camera's frame (x right, y down, z ahead), as fits give them: turns the
-        /// person about the x axis so that it stands upright. pelvis: rest place of joint 0 in Unity's axes.
+        /// After the root's rotation, its shift or both were set from numbers of a camera's frame (x right, y down, z ahead), as
+        /// fits give them: turns the person about the x axis so that it stands upright. pelvis: rest place of joint 0 in Unity's axes.
         /// </summary>
-        public void UprightFromCamera(float pelvisX, float pelvisY, float pelvisZ)
+        public void UprightFromCamera(bool rotation, bool shift, float pelvisY, float pelvisZ)
         {
-            float x = Rotation[0], y = Rotation[1], z = Rotation[2], w = Rotation[3];
-            Rotation[0] = w;
-            Rotation[1] = -z;
-            Rotation[2] = y;
-            Rotation[3] = -x;
+            if (rotation)
+            {
+                float x = Rotation[0], y = Rotation[1], z = Rotation[2], w = Rotation[3];
+                Rotation[0] = w;
+                Rotation[1] = -z;
+                Rotation[2] = y;
+                Rotation[3] = -x;
+            }
+            if (!shift) return;
             // the turn goes about the origin, the root turns about the pelvis
             Transl[1] = -(Transl[1] + pelvisY) - pelvisY;
             Transl[2] = -(Transl[2] + pelvisZ) - pelvisZ;

@@ -162,6 +162,7 @@ public static class Play
         Player.OnDraw = (asked, indices, count) => draws++;
         Action frame = Player.Frame(new[] { avatar.gameObject });
         var message = new GsacPoseMessage(avatar.Data);
+        byte[] osc = Bundle(Osc("/gsac/joint/left_knee", 0.1f, 0, 0), Osc("/gsac/expression/jawOpen", 0.25f), Osc("/other", 1));
         byte[] text = Encoding.UTF8.GetBytes("{\"joints\":{\"left_elbow\":[0.1,-1.25e-1,0]},\"expression\":{\"jawOpen\":0.5},\"other\":[1,{\"a\":\"b\"}]}");
         foreach (GsacSource source in new[] { GsacSource.Animator, GsacSource.Script, GsacSource.Clip })
         {
@@ -173,7 +174,8 @@ public static class Play
             for (int i = 0; i < 6000; i++)
             {
                 camera.transform.SetPositionAndRotation(new Vector3(0, 1, 3 + i * 1e-4f), Quaternion.Euler(0, 180, 0));
-                if (message.Read(text, text.Length, avatar.Pose, avatar.Weights)) understood++;
+                byte[] sent = i % 2 == 0 ? text : osc;
+                if (message.Read(sent, sent.Length, avatar.Pose, avatar.Weights) == GsacMessageFault.None) understood++;
                 frame();
             }
             Console.WriteLine(source + " " + draws + " " + understood + " " + (GC.CollectionCount(0) - before));
@@ -311,7 +313,7 @@ public static class Play
         }
     }
 
-    /// <summary>A datagram through the real socket: how far the elbow got, frame by frame.</summary>
+    /// <summary>Datagrams through the real socket: how far the elbow and the jaw got, frame by frame.</summary>
     static void Stream(string file, int port)
     {
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
@@ -319,14 +321,13 @@ public static class Play
         var stream = new GameObject("none").AddComponent<Probe>();
         stream.Attach(holder, port);
         var sender = new UdpClient();
-        string[] words = { "not a message", "{\"joints\":{\"left_elbow\":[0,-1.5,0]},\"expression\":{\"jawOpen\":0.8}}" };
-        foreach (string word in words)
-        {
-            byte[] raw = Encoding.UTF8.GetBytes(word);
-            sender.Send(raw, raw.Length, new IPEndPoint(IPAddress.Loopback, port));
-        }
-        for (int i = 0; i < 200 && stream.Stream.Received + stream.Stream.Refused < 2; i++) System.Threading.Thread.Sleep(10);
-        Console.WriteLine(stream.Stream.Received + " " + stream.Stream.Refused);
+        byte[] osc = Osc("/gsac/expression/jawOpen", 0.8f), cut = new byte[osc.Length - 4];
+        Array.Copy(osc, cut, cut.Length);
+        byte[][] sent = { Encoding.UTF8.GetBytes("not a message"), cut, Encoding.UTF8.GetBytes("{\"joints\":{\"left_elbow\":[0,-1.5,0]}}"), osc };
+        foreach (byte[] raw in sent) sender.Send(raw, raw.Length, new IPEndPoint(IPAddress.Loopback, port));
+        for (int i = 0; i < 200 && stream.Stream.Received + stream.Stream.Refused < sent.Length; i++) System.Threading.Thread.Sleep(10);
+        new GsacPoseStreamEditor { target = stream.Stream }.OnInspectorGUI();
+        Console.WriteLine(string.Join(", ", Player.Labels));
         Action frame = Player.Frame(new[] { holder });
         int elbow = avatar.Data.Joint("left_elbow"), jaw = Array.IndexOf(avatar.Data.Expressions, "jawOpen");
         for (int i = 0; i < 40; i++)
@@ -336,7 +337,39 @@ public static class Play
             double degrees = 2 * Math.Atan2(r[elbow * 4 + 1], r[elbow * 4 + 3]) * 180 / Math.PI;
             Console.WriteLine(degrees.ToString(CultureInfo.InvariantCulture) + " " + avatar.Weights[jaw].ToString(CultureInfo.InvariantCulture));
         }
+        // another file while the stream runs
+        avatar.Use((byte[])File.ReadAllBytes(file).Clone());
+        frame();
         Player.Call(stream.Stream, "OnDisable");
+    }
+
+    static byte[] Osc(string address, params float[] numbers)
+    {
+        var bytes = new List<byte>();
+        foreach (string word in new[] { address, "," + new string('f', numbers.Length) })
+        {
+            bytes.AddRange(Encoding.ASCII.GetBytes(word));
+            do bytes.Add(0); while (bytes.Count % 4 != 0);
+        }
+        foreach (float number in numbers) bytes.AddRange(BigEndian(BitConverter.GetBytes(number)));
+        return bytes.ToArray();
+    }
+
+    static byte[] Bundle(params byte[][] messages)
+    {
+        var bytes = new List<byte>(Encoding.ASCII.GetBytes("#bundle\0\0\0\0\0\0\0\0\u0001"));
+        foreach (byte[] message in messages)
+        {
+            bytes.AddRange(BigEndian(BitConverter.GetBytes(message.Length)));
+            bytes.AddRange(message);
+        }
+        return bytes.ToArray();
+    }
+
+    static byte[] BigEndian(byte[] number)
+    {
+        Array.Reverse(number);
+        return number;
     }
 
     /// <summary>Adds a stream whose port is set before it is enabled.</summary>
@@ -365,8 +398,7 @@ public static class Play
                 var pose = new GsacPose(data.JointCount);
                 var weights = new float[data.Expressions.Length];
                 byte[] raw = File.ReadAllBytes(name);
-                bool taken = message.Read(raw, raw.Length, pose, weights);
-                Console.WriteLine(Path.GetFileName(name) + " " + taken);
+                Console.WriteLine(Path.GetFileName(name) + " " + message.Read(raw, raw.Length, pose, weights));
                 dump.Put(Path.GetFileName(name) + ".rotation", pose.Rotation);
                 dump.Put(Path.GetFileName(name) + ".transl", pose.Transl);
                 dump.Put(Path.GetFileName(name) + ".weights", weights);

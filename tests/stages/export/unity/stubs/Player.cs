@@ -14,6 +14,7 @@ namespace UnityEngine
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;
         public static int UpdatesAsked;
+        public static readonly List<string> Labels = new List<string>();
         public static readonly Dictionary<string, float> Slides = new Dictionary<string, float>();
 
         public static void Mouse(EventType type, float x, float deltaX, float deltaY)

@@ -12,6 +12,7 @@ namespace UnityEditor
     {
         public UnityEngine.Object target { get; set; }
         public virtual void OnInspectorGUI() { }
+        public virtual bool RequiresConstantRepaint() { return false; }
         public bool DrawDefaultInspector() { return false; }
     }
 
@@ -26,6 +27,7 @@ namespace UnityEditor
     {
         public static void Space() { }
         public static void LabelField(string label, GUIStyle style, params GUILayoutOption[] options) { }
+        public static void LabelField(string label, string label2, params GUILayoutOption[] options) { Player.Labels.Add(label + " = " + label2); }
         public static Rect BeginHorizontal(params GUILayoutOption[] options) { return new Rect(); }
         public static void EndHorizontal() { }
         public static int Popup(string label, int selectedIndex, string[] displayedOptions, params GUILayoutOption[] options)
