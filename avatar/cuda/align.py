@@ -10,7 +10,7 @@ from gsac.avatar.cuda.scene import PLAN
 from gsac.avatar.cuda.trainer import CudaTrainer
 
 
-@dataclass
+@dataclass(kw_only=True)
 class AlignRecipe(Recipe):
     """`steps` are those of all frames, each its share of them in one go; over it the rate falls to `pose_end` of `pose_rate`."""
 

@@ -13,6 +13,7 @@ using std::sin; using std::sqrt;
 #endif
 
 constexpr double NEAR_PLANE = 0.01, BLUR = 0.3, FRUSTUM = 0.3, MAX_ALPHA = 0.999, STOP = 1e-4;
+constexpr double DARKEST = 0.25, BRIGHTEST = 2.5;
 
 template <class real> struct Vec { real x, y, z; };
 template <class real> FORMULA Vec<real> operator+(Vec<real> a, Vec<real> b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -151,6 +152,12 @@ FORMULA BindGradient<real> bind_backward(const Face<real> &f, const Turn<real> &
 }
 
 template <class real> struct Lens { real fx, fy, cx, cy, width, height; };
+
+// What the clip's light makes of a colour channel on a face (avatar/light.py); light: 4 rows of 3; n: normal, camera frame.
+template <class real> FORMULA real shade_of(const real *light, Vec<real> n, int channel) {
+    const real *l = light + channel;
+    return fmin(fmax(l[0] + l[3] * n.x - l[6] * n.y + l[9] * fmax(n.z, -n.z), real(DARKEST)), real(BRIGHTEST));
+}
 
 // Slopes of the projection at a point clamped to the grown frustum, and the rows of A = J R diag(s).
 template <class real> struct Rows { real jx, jy, u, v, a[3], b[3]; bool inside_u, inside_v; };

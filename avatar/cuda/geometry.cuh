@@ -103,7 +103,7 @@ struct Posed {
     Face<float> face;
     Turn<float> turn;
     Vec<float> mu;
-    float log_scale[3], opacity;
+    float log_scale[3], opacity, shade[3];
     Bound<float> bound;
     Lens<float> lens;
 };
@@ -124,6 +124,7 @@ FORMULA Posed posed(const Scene &s, int b, int i) {
     }
     g.opacity = 1 / (1 + __expf(-s.logit[i]));
     g.bound = bind(g.face, g.turn, g.mu, g.log_scale);
+    for (int c = 0; c < 3; ++c) g.shade[c] = s.clip_light ? shade_of(s.clip_light, g.face.n, c) : 1;
     return g;
 }
 
@@ -147,7 +148,7 @@ extern "C" __global__ void __launch_bounds__(128) project(Scene s) {
                 float4 *splat = (float4 *)s.splat + 3 * at;
                 splat[0] = {p.x, p.y, p.ha, p.b};
                 splat[1] = {p.hc, p.s_max, g.opacity, p.wide};
-                splat[2] = {s.rgb[3 * i], s.rgb[3 * i + 1], s.rgb[3 * i + 2], p.high};
+                splat[2] = {g.shade[0] * s.rgb[3 * i], g.shade[1] * s.rgb[3 * i + 1], g.shade[2] * s.rgb[3 * i + 2], p.high};
                 s.depth[at] = g.bound.mean.z;
             }
         }

@@ -1,7 +1,7 @@
 // Clothes and hair: a smooth displacement of the rest vertices (Nicolet et al. 2021), every few steps. The two solves with
 // I + lambda L (L: the mesh's uniform Laplacian) are Chebyshev iterations inside one kernel, with a barrier over its blocks.
 
-constexpr int OFFSET_EVERY = 4, ITERATIONS = 72;
+constexpr int ITERATIONS = 72;
 
 struct Barrier {
     int *arrived, target;
@@ -61,21 +61,21 @@ extern "C" __global__ void __launch_bounds__(256) offset_step(Scene s) {
     float rate = s.now[0].plan.offset;
     if (rate == 0) return;
     State &state = *s.state;
-    int v = blockIdx.x * 256 + threadIdx.x, step = state.step - 1;
+    int v = blockIdx.x * 256 + threadIdx.x, step = state.step - 1, every = s.offset_every;
     bool mine = v < s.vertex_count;
     Vec<float> sum = {0, 0, 0};
     if (mine) {
         for (int b = 0; b < s.batch; ++b) sum = sum + vec(s.grad_rest + 3 * (size_t(b) * s.vertex_count + v));
         sum = sum * (1.0f / s.batch);
-        if (step % OFFSET_EVERY) sum = sum + vec(s.gathered + 3 * v);
+        if (step % every) sum = sum + vec(s.gathered + 3 * v);
         s.gathered[3 * v] = sum.x;
         s.gathered[3 * v + 1] = sum.y;
         s.gathered[3 * v + 2] = sum.z;
     }
-    if (step % OFFSET_EVERY != OFFSET_EVERY - 1) return;
+    if (step % every != every - 1) return;
     Barrier barrier = {&state.barrier, 0};
     float least = 1 / (1 + s.smoothness * s.most_near);
-    Vec<float> smooth = solve(s, barrier, v, sum * ((mine ? s.offset_share[v] : 0) / OFFSET_EVERY), least);
+    Vec<float> smooth = solve(s, barrier, v, sum * ((mine ? s.offset_share[v] : 0) / every), least);
     float peak = fmaxf(fabsf(smooth.x), fmaxf(fabsf(smooth.y), fabsf(smooth.z)));
     for (int stride = 16; stride > 0; stride /= 2) peak = fmaxf(peak, __shfl_xor_sync(~0u, peak, stride));
     if (threadIdx.x % 32 == 0) peaks[threadIdx.x / 32] = peak;
@@ -86,7 +86,7 @@ extern "C" __global__ void __launch_bounds__(256) offset_step(Scene s) {
     }
     barrier.wait();
     peak = __int_as_float(*(volatile int *)&state.peak);
-    float n = step / OFFSET_EVERY + 1, second = *s.offset_second;
+    float n = step / every + 1, second = *s.offset_second;
     second += 0.01f * (peak * peak - second);
     float scale = 1 / (1 - powf(0.9f, n)) / (sqrtf(second / (1 - powf(0.99f, n))) + 1e-20f);
     Vec<float> first = {0, 0, 0};

@@ -17,11 +17,11 @@ ROWS = {"mu": slice(0, 3), "quat": slice(3, 7), "scale": slice(7, 10), "rgb": sl
 """Of Adam's moments on the device."""
 
 
-@dataclass
+@dataclass(kw_only=True)
 class PaperRecipe(Recipe):
-    """Rates are constant but for that of the places, which falls to `mu_decay`. No default is this recipe's: give them all."""
+    """Rates are constant but for that of the places, which falls to `mu_decay`."""
 
-    mu_decay: float = 0.0
+    mu_decay: float = 1.0
     edges: float = 0.0
     """Weight of the grey edges' strength."""
     dice: float = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -9,53 +10,55 @@ import numpy as np
 from gsac.avatar.cuda.scene import MOST_BATCH, PLAN
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Recipe:
-    """As `stages.train.config.TrainConfig` where the names agree; the defaults are those of recipe `fast`."""
+    """No number here is a recipe's own: what is not given is not learned (rates), not counted (weights) and not limited."""
 
-    steps: int = 1600
+    steps: int
     batch: int = 1
     """Frames of one step, at most as many as there are."""
     seed: int = 0
     begin: float = 0.0
     """Share of its way at which the training begins, for the rates: a refit begins late."""
-    coarse_share: float = 0.45
+    coarse_share: float = 0.0
     """Part of the steps that run on the first of two levels."""
-    mu_rate: float = 1.5e-3
-    rgb_rate: float = 1e-2
-    quat_rate: float = 1e-2
-    scale_rate: float = 1e-2
-    opacity_rate: float = 3e-2
-    pose_rate: float = 1e-3
-    pose_pull: float = 1e-4
-    ssim: float = 0.1
+    mu_rate: float = 0.0
+    rgb_rate: float = 0.0
+    quat_rate: float = 0.0
+    scale_rate: float = 0.0
+    opacity_rate: float = 0.0
+    pose_rate: float = 0.0
+    pose_pull: float = 0.0
+    ssim: float = 0.0
     sobel: float = 0.0
-    mask: float = 0.3
-    needle: float = 4.0
-    largest: float = 0.025
+    mask: float = 0.0
+    needle: float = math.inf
+    largest: float = math.inf
     """Longest axis of a gaussian, m at rest."""
-    reach: float = 0.08
-    place_pull: float = 1e-3
-    turn_unit: float = 0.05
+    reach: float = math.inf
+    place_pull: float = 0.0
+    turn_unit: float = 1.0
     """rad in which a pose's distance from the fit is measured."""
-    shift_unit: float = 0.02
+    shift_unit: float = 1.0
     """m, likewise."""
     offset_rate: float = 0.0
-    """m of a step of the body's displacement at rest, falls to a tenth over its share of the steps; 0 learns none."""
-    offset_share: float = 0.6
+    """m of a step of the body's displacement at rest, falls to a tenth over its share of the steps."""
+    offset_share: float = 1.0
     """Part of the steps that move it; then `CudaTrainer.replace` takes the gaussians that it was folded into."""
+    offset_every: int = 1
+    """Steps whose gradients are gathered for one of the displacement."""
     beta_rate: float = 0.0
-    """Adam rate of the betas, which all frames share; 0 learns none."""
+    """Adam rate of the betas, which all frames share."""
     gain_rate: float = 0.0
-    """Step of each frame's gain per colour channel at the start, falls to a tenth; 0 learns none."""
-    smoothness: float = 30.0
+    """Step of each frame's gain per colour channel at the start, falls to a tenth."""
+    smoothness: float = 0.0
     """lambda of the displacement's smoothing."""
-    hand_share: float = 0.1
+    hand_share: float = 1.0
     """Pose rate of the fingers relative to the body's; jaw and eyes stay."""
 
     @classmethod
     def of(cls, config, **more) -> Recipe:
-        """From a `TrainConfig`: the fields that both have, `more` on top."""
+        """The fields that `config` has by the same name and not as None, `more` on top."""
         given = {f.name: getattr(config, f.name, None) for f in fields(cls)}
         return cls(**({name: value for name, value in given.items() if value is not None} | more))
 

@@ -30,7 +30,7 @@ POINTERS = {
     "joint_start": "int", "joint_vertex": "int", "joint_weight": "float",
     "pose": "double", "fit": "double", "pose_first": "double", "pose_second": "double", "pose_share": "double", "pose_steps": "int",
     "mu": "float", "quat": "float", "log_scale": "float", "rgb": "float", "logit": "float", "first": "float", "second": "float",
-    "start": "float", "face_scale": "float", "seen": "int",
+    "start": "float", "face_scale": "float", "seen": "int", "clip_light": "float", "resting": "unsigned char",
     "local": "float", "transform": "float", "vertices": "float", "grad_vertices": "float", "corner_grad": "float",
     "joint_grad": "float", "splat": "float", "box": "unsigned short", "slot_start": "int", "depth": "float", "rank": "int",
     "list": "unsigned long long", "moments": "float", "tile_count": "int", "tile_start": "int", "tile_check": "int",
@@ -48,8 +48,8 @@ POINTERS = {
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
            "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
-           "most_near": INT, "beta_count": INT, "area": FLOAT, "half_width": FLOAT, "half_height": FLOAT, "edges": FLOAT,
-           "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT}
+           "most_near": INT, "offset_every": INT, "beta_count": INT, "area": FLOAT, "half_width": FLOAT,
+           "half_height": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT}
 """area: pixels that a frame's losses are a mean over, 0: its own; the last eight are recipe `paper`'s (paper.cuh)."""
 
 

@@ -58,7 +58,7 @@ class CudaTrainer:
                  recipe: Recipe, device: Device | None = None, pair_room: int | None = None):
         self.device = device or Device()
         self.recipe, self.body, self.face = recipe, body, np.asarray(gaussians.face, np.int32)
-        self.frames, self.count = len(levels[0]), len(gaussians)
+        self.frames, self.count, self.light = len(levels[0]), len(gaussians), gaussians.light
         self.buffers: dict[str, Buffer] = {}
         self.scene, self._graph = Scene(), None
         self.seconds = 0.0
@@ -118,7 +118,7 @@ class CudaTrainer:
         b = self.buffers
         opacity = 1 / (1 + np.exp(-b["logit"].read().astype(np.float64)))
         return Gaussians(self.face.copy(), b["mu"].read(), b["quat"].read(), b["log_scale"].read(), b["rgb"].read(),
-                         opacity.astype(np.float32))
+                         opacity.astype(np.float32), self.light)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Pose (T, 55, 3) and translation (T, 3), float64."""
@@ -141,11 +141,12 @@ class CudaTrainer:
         """(V, 3) m, what the learned betas do to the vertices at rest."""
         return (self.body.shape @ self.betas()).astype(np.float32) if self.recipe.beta_rate else 0.0
 
-    def replace(self, gaussians: Gaussians) -> None:
-        """From here on these places, rotations and sizes (`stages.train.offsets.fold`) on the plain body."""
-        for name in ("mu", "quat", "log_scale"):
-            self.buffers[name].write(getattr(gaussians, name))
-        self.buffers["start"].write(gaussians.mu)
+    def replace(self, gaussians: Gaussians, resting: np.ndarray | None = None) -> None:
+        """From here on as these are, on the plain body (`stages.train.offsets.fold`). resting: (N,) bool, what moves no more."""
+        for name, array in self._values(gaussians).items():
+            self.buffers[name].write(array)
+        if resting is not None:
+            self.buffers["resting"].write(resting)
         self.buffers["offset"].write(np.zeros((self.scene.vertex_count, 3), np.float32) + self._shaped())
 
     def losses(self) -> np.ndarray:
@@ -187,7 +188,7 @@ class CudaTrainer:
         scene.vertex_count = self.body.rest.shape[1]
         scene.max_pixels = max(h * w for h, w in sizes)
         scene.max_tiles = max(-(-h // TILE) * -(-w // TILE) for h, w in sizes)
-        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach"):
+        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach", "offset_every"):
             setattr(scene, name, getattr(recipe, name))
 
     def _upload_shots(self, levels) -> None:
@@ -250,18 +251,24 @@ class CudaTrainer:
             self._empty(name, len(shape), np.float64).fill(0)
 
     def _upload_gaussians(self, gaussians: Gaussians) -> None:
-        opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
         scale = face_frames(self.body.rest[0], self.body.faces).k[self.face]
-        for name, array in (("mu", gaussians.mu), ("quat", gaussians.quat), ("log_scale", gaussians.log_scale),
-                            ("rgb", gaussians.rgb), ("logit", np.log(opacity / (1 - opacity))), ("start", gaussians.mu),
-                            ("face_scale", scale)):
+        for name, array in (*self._values(gaussians).items(), ("face_scale", scale)):
             self._upload(name, array, np.float32)
+        if self.light is not None:
+            self._upload("clip_light", self.light, np.float32)
         start, item = vertices_of(self.body.faces, self.face, self.scene.vertex_count)
         for name, array in (("corner", np.asarray(self.body.faces)[self.face]), ("vertex_start", start), ("vertex_item", item)):
             self._upload(name, array, np.int32)
         for name in ("first", "second"):
             self._empty(name, (14, self.count), np.float32).fill(0)
         self._empty("seen", self.count, np.int32).fill(0)
+        self._empty("resting", self.count, np.uint8).fill(0)
+
+    def _values(self, gaussians: Gaussians) -> dict[str, np.ndarray]:
+        """Buffers' names and what they are to hold."""
+        opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
+        return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
+                "logit": np.log(opacity / (1 - opacity)), "start": gaussians.mu}
 
     def _scratch(self) -> None:
         batch, n, v = self.batch, self.count, self.scene.vertex_count

@@ -32,7 +32,7 @@ FORMULA Slopes slopes_of(const Scene &s, int i) {
             corners[3 * c + 1] = grad.corner[c].y;
             corners[3 * c + 2] = grad.corner[c].z;
             g.log_scale[c] += share * grad.log_scale[c];
-            g.rgb[c] += share * m[6 + c];
+            g.rgb[c] += share * own.shade[c] * m[6 + c];
         }
         g.mu[0] += share * grad.mu.x;
         g.mu[1] += share * grad.mu.y;
@@ -72,6 +72,7 @@ extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
     const Plan plan = s.now[0].plan;
     Slopes g = slopes_of(s, i);
     if (plan.mu + plan.quat + plan.log_scale + plan.rgb + plan.opacity == 0) return;  // only poses move: the limits wait too
+    if (s.resting[i]) g = {};
     int n = s.seen[i];
     if (g.rgb[0] != 0 || g.rgb[1] != 0 || g.rgb[2] != 0) s.seen[i] = ++n;
     // moments of Adam by number, so that a warp's loads lie together

@@ -9,6 +9,14 @@ import numpy as np
 from gsac.avatar.cuda import why_not
 
 
+def paper_losses(count: int = 25000, **more):
+    """Recipe `fast` with the Sobel term and without the displaced surface."""
+    from gsac.stages.train.config import TrainConfig
+    from gsac.stages.train.cuda import recipe_of
+
+    return recipe_of(TrainConfig(sobel=0.1), count, **({"offset_rate": 0.0} | more))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer frames, no long training")
@@ -16,7 +24,6 @@ def main() -> None:
     if why := why_not():
         raise SystemExit(f"benchmarks.gpu: {why}")
     from gsac.avatar.cuda.device import Device
-    from gsac.avatar.cuda.recipe import Recipe
     from gsac.benchmarks.gpu.check import LIMIT, errors
     from gsac.benchmarks.gpu.figure import figure, start
 
@@ -31,7 +38,7 @@ def main() -> None:
 
     small = figure(3, 101, 67, 4000)
     done("small figure")
-    losses = Recipe(steps=5, ssim=0.1, sobel=0.1)
+    losses = paper_losses(steps=5)
     for count in (1, 17, 1000, 12000, 100000):
         report(f"101x67, {count}", errors(small, start(small.body, count), losses, device, 1024 if count < 2000 else None), LIMIT)
     inside = figure(3, 101, 67, 100)
@@ -44,6 +51,9 @@ def main() -> None:
     done("checks")
     measure(device, big, quick)
     done("times")
+    measure_paper(device, big)
+    measure_rounds(device, big)
+    done("times of recipe paper and of the rounds of poses")
     compare(big)
     done("all")
 
@@ -59,7 +69,6 @@ def compare(figure) -> None:
     """The same loop in torch + gsplat, where gsplat is installed."""
     from importlib.util import find_spec
 
-    from gsac.avatar.cuda.recipe import Recipe
     from gsac.benchmarks.gpu.figure import start
 
     if find_spec("torch") is None or find_spec("gsplat") is None:
@@ -68,13 +77,53 @@ def compare(figure) -> None:
     from gsac.benchmarks.gpu.baseline import seconds_per_step
 
     for compiled in (False, True):
-        took = seconds_per_step(figure, start(figure.body, 25000), Recipe(ssim=0.1, sobel=0.1), compiled)
+        took = seconds_per_step(figure, start(figure.body, 25000), paper_losses(), compiled)
         print(f"torch + gsplat, {'torch.compile' if compiled else 'eager'}: {took * 1e3:.2f} ms a step, "
               f"{took * 3000:.1f} s for 3000 steps of one frame", flush=True)
 
 
+def measure_paper(device, figure) -> None:
+    """Recipe `paper` kernel by kernel: one gaussian a face, four frames a step, betas learned."""
+    from types import SimpleNamespace
+
+    from gsac.avatar.body import Body
+    from gsac.avatar.cuda.paper import PaperTrainer
+    from gsac.benchmarks.gpu.timing import kernel_microseconds, nearest_milliseconds
+    from gsac.stages.train import paper_cuda
+    from gsac.stages.train.config import TrainConfig
+
+    model = Body.load()
+    body = figure.body._replace(shape=model.shapedirs, joint_shape=np.tensordot(model.J_regressor, model.shapedirs, 1))
+    recipe = paper_cuda.recipe_of(SimpleNamespace(config=TrainConfig(recipe="paper"), trained=figure.shots, views=figure.shots))
+    start = paper_cuda.start(len(body.faces), np.random.default_rng(0))
+    trainer = PaperTrainer(body, [figure.shots], figure.pose, figure.transl, start, recipe, device)
+    trainer.train(200)
+    print(f"recipe paper, {trainer.count} gaussians, batch {trainer.batch}, kernels in us: "
+          + ", ".join(f"{name} {us:.1f}" for name, us in kernel_microseconds(trainer).items())
+          + f"; neighbours searched in {nearest_milliseconds(trainer):.2f} ms", flush=True)
+    trainer.close()
+
+
+def measure_rounds(device, figure) -> None:
+    """A step of the rounds that move the poses: 3000 gaussians on an eighth of the size, the displaced surface learned."""
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.timing import kernel_microseconds, step_milliseconds
+    from gsac.stages.train import bundle, cuda, offsets
+
+    shots = figure.scaled(8)
+    for batch in (1, cuda.ROUND_BATCH):
+        recipe = paper_losses(bundle.COUNT, steps=600, batch=batch, sobel=0.0, pose_rate=0.0, offset_rate=1e-3, offset_share=1.0,
+                              offset_every=max(1, offsets.EVERY // batch))
+        trainer = CudaTrainer(figure.body, [shots], figure.pose, figure.transl, start(figure.body, bundle.COUNT), recipe, device)
+        steps = step_milliseconds(trainer)
+        trainer.scene.offset_every = 1
+        print(f"rounds of poses, batch {batch}: a step {np.median(steps) * 1e3:.0f} us; kernels in us, a step of the surface among "
+              "them: " + ", ".join(f"{name} {us:.1f}" for name, us in kernel_microseconds(trainer).items()), flush=True)
+        trainer.close()
+
+
 def measure(device, figure, quick: bool) -> None:
-    from gsac.avatar.cuda.recipe import Recipe
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import (
@@ -91,7 +140,7 @@ def measure(device, figure, quick: bool) -> None:
     copied, counted = copy_bandwidth(device), float_rate(device)
     print(f"ceilings: copy {copied / 1e12:.2f} TB/s, float32 {counted / 1e12:.1f} T operations/s")
     for count, batch in ((25000, 1), (25000, 4), (25000, 8), (10000, 1), (100000, 1)):
-        recipe = Recipe(steps=3000, batch=batch, ssim=0.1, sobel=0.1)
+        recipe = paper_losses(count, steps=3000, batch=batch)
         trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, count), recipe,
                               device)
         steps = step_milliseconds(trainer)
@@ -109,7 +158,7 @@ def measure(device, figure, quick: bool) -> None:
     if quick:
         return
     for batch, steps in ((1, 3000), (4, 750)):
-        recipe = Recipe(steps=steps, batch=batch, ssim=0.1, sobel=0.1, coarse_share=0)
+        recipe = paper_losses(steps=steps, batch=batch)
         results = []
         for _ in range(2):
             trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 25000), recipe,

@@ -13,9 +13,10 @@ from gsac.avatar.cuda.lists import joint_levels
 from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.cuda.trainer import BodyArrays, Shot
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.light import BRIGHTEST, DARKEST, FROM_CAMERA
 from gsac.benchmarks.gpu.figure import Figure
 from gsac.stages.train import bundle, fast
-from gsac.stages.train.cuda import body_arrays, learning
+from gsac.stages.train.cuda import body_arrays, learning, recipe_of
 from gsac.stages.train.poses import BODY, HAND_SHARE, JAW_EYES
 from gsac.stages.train.task import Fit, Task
 from torch.nn import functional
@@ -51,7 +52,8 @@ def fit(task: Task) -> Fit:
     """Recipe fast as the stage knows recipes, eager: frames, sizes, backgrounds and rates as on the GPU."""
     bundle.adjust(task, learning)
     fine, coarse = fast.crops(task)
-    recipe, gaussians = Recipe.of(task.config), fast.start(task, coarse, task.config.gaussians)
+    gaussians = fast.start(task, coarse, task.config.gaussians)
+    recipe = recipe_of(task.config, len(gaussians))
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]
     poses = task.poses
     loop = Loop(body_arrays(poses, task.trained, False), poses.pose[task.trained], poses.transl[task.trained], gaussians, recipe)
@@ -89,9 +91,9 @@ class Loop:
                  compiled: bool = False):
         from gsplat import rasterization
 
-        self.rasterization, self.face = rasterization, gaussians.face
+        self.rasterization, self.face, self.light = rasterization, gaussians.face, gaussians.light
         self.eye = torch.eye(4, device="cuda")[None]
-        self.geometry, self.loss = geometry_of(body, gaussians.face), loss_of(recipe)
+        self.geometry, self.loss = geometry_of(body, gaussians.face, gaussians.light), loss_of(recipe)
         if compiled:
             self.geometry, self.loss = torch.compile(self.geometry), torch.compile(self.loss)
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
@@ -111,20 +113,24 @@ class Loop:
         if rates is not None:
             for group, name in zip(self.optimiser.param_groups, RATES, strict=True):
                 group["lr"] = float(rates[name])
-        pixels, lens, width, height = shot
-        mu, quat, log_scale, rgb, opacity = self.values
-        means, covars = self.geometry(self.fitted[t] + self.share * self.moved[t], mu, quat, log_scale)
-        drawn, alpha, _ = self.rasterization(means, None, None, opacity.sigmoid(), rgb, self.eye, lens, width, height,
-                                             packed=False, covars=covars)
-        loss = self.loss(drawn[0], alpha[0], pixels, background)
+        loss, _, _ = self.seen(self.fitted[t] + self.share * self.moved[t], shot, background)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         self.optimiser.step()
         return loss.detach()
 
+    def seen(self, placed: torch.Tensor, shot: tuple, background: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Loss, rgb (h, w, 3) and alpha (h, w, 1) of a frame. placed: (56, 3), pose and translation."""
+        pixels, lens, width, height = shot
+        mu, quat, log_scale, rgb, opacity = self.values
+        means, covars, shade = self.geometry(placed, mu, quat, log_scale)
+        drawn, alpha, _ = self.rasterization(means, None, None, opacity.sigmoid(), shade * rgb, self.eye, lens, width, height,
+                                             packed=False, covars=covars)
+        return self.loss(drawn[0], alpha[0], pixels, background), drawn[0], alpha[0]
+
     def gaussians(self) -> Gaussians:
         mu, quat, log_scale, rgb, logit = (v.detach().cpu().numpy() for v in self.values)
-        return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), 1 / (1 + np.exp(-logit)))
+        return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), 1 / (1 + np.exp(-logit)), self.light)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Pose (T, 55, 3) and translation (T, 3)."""
@@ -132,8 +138,9 @@ class Loop:
         return both[:, :55], both[:, 55]
 
 
-def geometry_of(body: BodyArrays, face: np.ndarray) -> Callable:
-    """(pose and translation (56, 3), mu, quat, log_scale) -> means (N, 3), covariances (N, 3, 3), on the first rest shape."""
+def geometry_of(body: BodyArrays, face: np.ndarray, light: np.ndarray | None) -> Callable:
+    """(pose and translation (56, 3), mu, quat, log_scale) -> means (N, 3), covariances (N, 3, 3), shades (N, 3) or 1 without a
+    light (4, 3); on the first rest shape."""
     rest, joints = tensor(body.rest[0]), tensor(body.joints)
     parents = np.asarray(body.parents)
     levels = joint_levels(parents)
@@ -141,6 +148,13 @@ def geometry_of(body: BodyArrays, face: np.ndarray) -> Callable:
     corner = tensor(np.asarray(body.faces)[face], torch.long)
     by_level = [tensor(np.flatnonzero(levels == k), torch.long) for k in range(levels.max() + 1)]
     above = [tensor(parents[np.flatnonzero(levels == k)], torch.long) for k in range(levels.max() + 1)]
+
+    lamps = None if light is None else tensor(light * np.array([1, *FROM_CAMERA[:2], 1])[:, None])
+
+    def shade_of(n):
+        if lamps is None:
+            return 1.0
+        return (lamps[0] + n[:, :2] @ lamps[1:3] + n[:, 2:].abs() @ lamps[3:]).clamp(DARKEST, BRIGHTEST)
 
     def geometry(placed, mu, quat, log_scale):
         pose, transl = placed[:55], placed[55]
@@ -170,7 +184,7 @@ def geometry_of(body: BodyArrays, face: np.ndarray) -> Callable:
                            1 - 2 * (i * i + j * j)], 1).reshape(-1, 3, 3)
         half = axes @ own * (size[:, None] * log_scale.exp())[:, None]
         means = size[:, None] * (axes @ mu[..., None])[..., 0] + (v0 + v1 + v2) / 3
-        return means, half @ half.transpose(1, 2)
+        return means, half @ half.transpose(1, 2), shade_of(n.detach())
 
     return geometry
 

@@ -38,11 +38,13 @@ class Figure:
         transforms = joint_transforms(pose[None], b.joints.astype(np.float64), b.parents)[0].astype(np.float32)
         return skin(b.rest[0], transforms, b.skin_index, b.skin_weight) + transl.astype(np.float32)
 
-    def halved(self) -> list[Shot]:
+    def scaled(self, by: int) -> list[Shot]:
+        """The shots, so many times smaller."""
         import cv2
 
-        return [Shot(cv2.resize(s.pixels, (s.camera.width // 2, s.camera.height // 2), interpolation=cv2.INTER_AREA),
-                     s.camera.scaled(s.camera.width // 2, s.camera.height // 2)) for s in self.shots]
+        sizes = [(s.camera.width // by, s.camera.height // by) for s in self.shots]
+        return [Shot(cv2.resize(s.pixels, size, interpolation=cv2.INTER_AREA), s.camera.scaled(*size))
+                for s, size in zip(self.shots, sizes, strict=True)]
 
 
 def figure(frames: int, width: int, height: int, truth: int = 60000, seed: int = 0) -> Figure:

@@ -7,6 +7,7 @@ import ctypes
 import numpy as np
 from gsac.avatar.cuda.device import Buffer, Device, _call
 from gsac.avatar.cuda.kernels import compiled
+from gsac.avatar.cuda.paper import PaperTrainer
 from gsac.avatar.cuda.trainer import REPLAY, CudaTrainer
 from gsac.avatar.raster import render_bound
 
@@ -58,6 +59,17 @@ def kernel_microseconds(trainer: CudaTrainer, repeats: int = 40) -> dict[str, fl
         rows.append([device.milliseconds(a, b) * 1e3 for a, b in zip(marks[:-1], marks[1:], strict=True)])
     device.drop(graph)
     return dict(zip(trainer.grids, np.median(rows, 0).tolist(), strict=True))
+
+
+def nearest_milliseconds(trainer: PaperTrainer) -> float:
+    """Median time of the search of the neighbours."""
+    device, begin, end, times = trainer.device, trainer.device.event(), trainer.device.event(), []
+    for _ in range(5):
+        device.mark(begin)
+        device.launch("nearest", (-(-trainer.count // 128), 1), 128, trainer.scene)
+        device.mark(end)
+        times.append(device.milliseconds(begin, end))
+    return float(np.median(times))
 
 
 def copy_bandwidth(device: Device, size: int = 1 << 30) -> float:

@@ -51,7 +51,7 @@ class TrainConfig:
     pose_pull: float = 1e-4
     """Weight of the squared distance of a refined pose from the one it starts with, in units of 0.05 rad and 2 cm."""
     light: bool = True
-    """Whether the clip's light, which stays while the person turns, is told apart from the colours (fast, on the CPU)."""
+    """Whether the clip's light, which stays while the person turns, is told apart from the colours (fast)."""
     exposure: bool = False
     """Whether each frame gets a learned gain per colour channel."""
     ssim: float = 0.1

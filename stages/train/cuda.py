@@ -1,6 +1,6 @@
 """Recipe `fast` on the GPU: the CPU's start, the steps inside `CudaTrainer`, and a CPU trainer that takes the result over.
 
-Draws, rates and order of the steps are those of `fast.train`; what comes after the steps is the same code.
+Draws, rates and order of the steps are those of `fast.train`; what is not steps is the same code.
 """
 
 from __future__ import annotations
@@ -18,32 +18,44 @@ from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
 from gsac.avatar.cuda.trainer import BodyArrays, CudaTrainer, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import StageError
-from gsac.stages.train import bundle, fast, ladder
+from gsac.stages.train import bundle, fast, ladder, offsets
+from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.evaluate import TEST_END, TEST_MASK, TEST_RATE
-from gsac.stages.train.offsets import fold
-from gsac.stages.train.poses import Poses
+from gsac.stages.train.poses import HAND_SHARE, SHIFT, TURN, Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
+
+ROUND_BATCH = 4
+"""Frames of one step in the rounds that move the poses, where the CPU takes one: small images do not fill a GPU."""
+ROUND_RATE = 2.0
+"""Appearance's rates of such a step over those of the CPU's, of which it does the work of several."""
+APPEARANCE = ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate")
 
 
 def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[int, View]]:
     """As `fast.train`. Raises StageError where the GPU fails, or naming the step and the quantity that is not finite."""
     fine, coarse = fast.crops(task)
     gaussians = fast.start(task, coarse, count)
-    recipe = Recipe.of(task.config, offset_rate=fast.OFFSET_RATE, gain_rate=gain_rate(task))
+    recipe = recipe_of(task.config, count)
     with training(task.poses, task.trained, [coarse, fine], gaussians, recipe) as trainer:
         follow(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
         body = trainer.body
-        trainer.replace(fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces))
+        folded = offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
+        task.poses.offset = np.zeros_like(task.poses.offset)
+        middle = fast.Trainer(folded, task, settled=True)
+        middle.lay_unseen(coarse)
+        trainer.replace(middle.gaussians(), ~middle.seen)
         follow(trainer, task, recipe.steps)
         hand_back(trainer, task)
-        return settled(trainer, task), fine, coarse
+        kept = settled(trainer, task)
+        kept.seen = middle.seen
+        return kept, fine, coarse
 
 
 def refit(task: Task, gaussians: Gaussians, views: dict[int, View]) -> fast.Trainer:
     """As `ladder.refit`."""
-    recipe = Recipe.of(task.config, steps=ladder.REFIT, begin=ladder.REFIT_FROM, coarse_share=0.0, pose_rate=0.0,
-                       gain_rate=gain_rate(task))
+    recipe = recipe_of(task.config, len(gaussians), steps=ladder.REFIT, begin=ladder.REFIT_FROM, coarse_share=0.0, pose_rate=0.0,
+                       offset_rate=0.0)
     with training(task.poses, task.trained, [views], gaussians, recipe) as trainer:
         trainer.train(recipe.steps)
         return settled(trainer, task)
@@ -53,7 +65,7 @@ def align_poses(gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: l
     """As `evaluate.align_poses`."""
     if not len(frames):
         return
-    recipe = AlignRecipe(steps=steps * len(frames), pose_rate=TEST_RATE, pose_end=TEST_END, pose_pull=0.0, ssim=0.0, mask=TEST_MASK)
+    recipe = AlignRecipe(steps=steps * len(frames), pose_rate=TEST_RATE, pose_end=TEST_END, mask=TEST_MASK, hand_share=HAND_SHARE)
     with training(poses, frames, [{int(t): person_crop(views[t]) for t in frames}], gaussians, recipe, Aligner) as trainer:
         trainer.train(recipe.steps)
         poses.pose[frames], poses.transl[frames] = trainer.poses()
@@ -61,23 +73,39 @@ def align_poses(gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: l
 
 @contextmanager
 def learning(task: Task, views: dict[int, View], gaussians: Gaussians, plan: list[bundle.Round]):
-    """As `bundle.learning_on_cpu`."""
-    poses, where = task.poses, {int(t): k for k, t in enumerate(task.trained)}
-    rounds = [Round(np.array([where[int(t)] for t in one.frames]), one.backgrounds, one.done) for one in plan]
-    recipe = RoundsRecipe.of(task.config, steps=sum(len(one.frames) for one in rounds), offset_rate=fast.OFFSET_RATE,
-                             pose_rate=0.0, gain_rate=gain_rate(task), rounds=rounds)
+    """As `bundle.learning_on_cpu`, in larger steps."""
+    poses, rounds = task.poses, [in_batches(one, task.trained, ROUND_BATCH) for one in plan]
+    steps, batch = rounds[0].frames.shape
+    rate = ROUND_RATE if batch > 1 else 1.0
+    recipe = recipe_of(task.config, len(gaussians), RoundsRecipe, rounds=rounds, steps=steps * len(rounds),
+                       coarse_share=0.0, pose_rate=0.0, offset_every=max(1, offsets.EVERY // batch),
+                       **{name: rate * getattr(task.config, name) for name in APPEARANCE})
     with training(poses, task.trained, [views], gaussians, recipe, RoundsTrainer) as trainer:
         def learn(one: bundle.Round) -> None:
             trainer.place(poses.pose[task.trained], poses.transl[task.trained])
-            trainer.train(len(one.frames))
+            trainer.train(steps)
             poses.offset = trainer.offset()
 
         yield learn, trainer.gaussians, gaussians.face
         task.gpu_seconds += trainer.seconds
 
 
-def gain_rate(task: Task) -> float:
-    return fast.GAIN_RATE if task.config.exposure else 0.0
+def in_batches(one: bundle.Round, trained: np.ndarray, batch: int) -> Round:
+    """A round in steps of `batch` frames, no frame twice in a step: what is left of each pass over the frames is dropped."""
+    batch, where = min(batch, len(trained)), {int(t): k for k, t in enumerate(trained)}
+    frames = np.array([where[int(t)] for t in one.frames]).reshape(-1, len(trained))
+    whole = len(trained) // batch * batch
+    backgrounds = one.backgrounds.reshape(*frames.shape, 3)
+    return Round(frames[:, :whole].reshape(-1, batch), backgrounds[:, :whole].reshape(-1, batch, 3), one.done)
+
+
+def recipe_of(config: TrainConfig, count: int, kind: type[Recipe] = Recipe, **more) -> Recipe:
+    """Recipe `fast` for so many gaussians, `more` on top."""
+    given = {"steps": config.steps or fast.STEPS, "largest": fast.largest(config, count), "coarse_share": fast.COARSE_SHARE,
+             "offset_rate": fast.OFFSET_RATE, "offset_share": fast.OFFSET_SHARE, "offset_every": offsets.EVERY,
+             "smoothness": offsets.SMOOTHNESS, "gain_rate": fast.GAIN_RATE if config.exposure else 0.0, "turn_unit": TURN,
+             "shift_unit": SHIFT, "hand_share": HAND_SHARE}
+    return kind.of(config, **(given | more))
 
 
 def settled(trainer: CudaTrainer, task: Task) -> fast.Trainer:

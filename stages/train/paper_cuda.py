@@ -9,6 +9,7 @@ from gsac.stages.train import paper
 from gsac.stages.train.cuda import finite, follow, hand_back, training
 from gsac.stages.train.densify import LARGEST, Densifier, due
 from gsac.stages.train.neighbours import RENEW
+from gsac.stages.train.poses import HAND_SHARE
 from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import person_crop
 
@@ -33,10 +34,10 @@ def fit(task: Task) -> Fit:
 def recipe_of(task: Task) -> PaperRecipe:
     camera = task.views[0].camera
     return PaperRecipe(
-        steps=task.config.steps or paper.STEPS, batch=min(paper.BATCH, len(task.trained)), seed=task.config.seed, coarse_share=0.0,
+        steps=task.config.steps or paper.STEPS, batch=min(paper.BATCH, len(task.trained)), seed=task.config.seed,
         mu_rate=paper.MU_RATE, mu_decay=paper.MU_DECAY, rgb_rate=paper.RATES["rgb"], quat_rate=paper.RATES["quat"],
-        scale_rate=paper.RATES["scale"], opacity_rate=0.0, pose_rate=paper.POSE_RATE, beta_rate=paper.POSE_RATE, pose_pull=0.0,
-        ssim=paper.SSIM, sobel=0.0, mask=0.0, edges=paper.SOBEL, dice=paper.DICE, knn=paper.KNN, scale_limit=LARGEST,
+        scale_rate=paper.RATES["scale"], pose_rate=paper.POSE_RATE, beta_rate=paper.POSE_RATE, hand_share=HAND_SHARE,
+        ssim=paper.SSIM, edges=paper.SOBEL, dice=paper.DICE, knn=paper.KNN, scale_limit=LARGEST,
         frame_size=(camera.width, camera.height), renew=RENEW)
 
 

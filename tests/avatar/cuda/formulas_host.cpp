@@ -43,6 +43,10 @@ void bind_all(int n, const double *corners, const double *mu, const double *quat
     }
 }
 
+void shade_all(int n, const double *light, const double *normals, double *out) {
+    for (int i = 0; i < 3 * n; ++i) out[i] = shade_of(light, vec(normals + i / 3 * 3), i % 3);
+}
+
 void project_all(int n, const double *lens, const double *means, const double *rotations, const double *scales,
                  const double *opacity, double *splats, int *seen) {
     for (int i = 0; i < n; ++i) {

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gsac.avatar import binding, skinning
+from gsac.avatar import binding, light, skinning
 from gsac.avatar.camera import Camera
 from gsac.avatar.raster import render, render_backward
 from gsac.stages.train import kernels
@@ -70,6 +70,16 @@ def test_binding_and_its_gradient_are_those_of_the_cpu_path(host, degenerate):
     host("bind_all", n, vertices[faces].copy(), mu, quat, log_scale, *out, *grads, *got)
     for name, a, b in zip(("means", "rotations", "scales", *back._fields), (*out, *got), (*expected, *back), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11, err_msg=name)
+
+
+def test_the_light_on_a_face_is_that_of_the_cpu_path(host):
+    rng = np.random.default_rng(9)
+    normals, lamps, got = rng.normal(size=(60, 3)), rng.normal([[1], [0], [0], [0]], 0.6, (4, 3)), np.full((60, 3), np.nan)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    host("shade_all", 60, lamps, normals, got)
+    expected = light.shade(lamps, normals * light.FROM_CAMERA)
+    assert (expected == light.DARKEST).any() and (expected == light.BRIGHTEST).any()
+    np.testing.assert_allclose(got, expected, rtol=1e-12)
 
 
 def test_projection_compositing_and_their_gradients_are_those_of_the_cpu_path(host):
