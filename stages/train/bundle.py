@@ -19,6 +19,7 @@ from gsac.avatar.workspace import Workspace, available
 from gsac.stages.contract import StageError
 from gsac.stages.train import fast
 from gsac.stages.train.alignment import TURNING, UNKNOWNS, Normal, carriers, normal_equations
+from gsac.stages.train.guard import finite
 from gsac.stages.train.holdout import near
 from gsac.stages.train.poses import BODY, Poses
 from gsac.stages.train.task import Task
@@ -150,6 +151,7 @@ class Corrections:
 
         z = conjugate_gradients(apply, -known * pulled(gradient - np.einsum("tab,tb->ta", hessian, before)))
         self.values = before + np.clip((root @ z) * spread - before, -MOST, MOST)
+        finite("after a round of poses", {"correction of the poses": self.values})
         self.place()
 
     def equations(self, gaussians: Gaussians) -> list[tuple[int, Normal]]:

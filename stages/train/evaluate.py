@@ -16,6 +16,7 @@ from gsac.avatar.metrics import WHITE, composite, score
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
 from gsac.avatar.zbuffer import rasterise, visible_points
+from gsac.stages.train.guard import finite, pose
 from gsac.stages.train.kernels import on_background, through_background
 from gsac.stages.train.poses import Poses
 from gsac.stages.train.views import View, person_crop
@@ -49,7 +50,9 @@ def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder:
     workspace = workspace or Workspace()
     rows = []
     for t in map(int, frames):
+        finite("when it is judged", pose(poses, t))
         rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
+        finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
         true_rgb, mask = truth(views[t])
         rows.append({"frame": t} | score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips))
         if folder is not None:
@@ -107,6 +110,7 @@ def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: in
         through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK, grad_rgb,
                            grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
+        finite(f"at step {step} of its pose at test time", {f"gradient of frame {t}": grads.vertices})
         poses.step(t, grads.vertices, TEST_RATE * TEST_END ** (step / steps), 0.0)
 
 

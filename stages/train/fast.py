@@ -15,10 +15,10 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
-from gsac.stages.contract import StageError
 from gsac.stages.train.checkpoint import standing
 from gsac.stages.train.colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.guard import finite, gradients, pose
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.offsets import Offsets, fold
 from gsac.stages.train.task import Fit, Loop, Task
@@ -172,6 +172,7 @@ class Trainer:
         if config.exposure:
             gain = self.gains.get(t, np.ones(3))
             self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
+        finite(f"after step {number}", self.values | {"offset of the surface": self.poses.offset, **pose(self.poses, t)})
         return loss
 
     def gradients(self, t: int, view: View, background: np.ndarray, number: int):
@@ -189,7 +190,7 @@ class Trainer:
         loss += through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain,
                                    config.mask, grad_rgb, grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
-        self._guard(number, loss, grads)
+        finite(f"at step {number}", {"loss": loss, **gradients(grads)})
         return float(loss), grads, shown.opacity, grad_gain
 
     def fold_offsets(self) -> None:
@@ -233,15 +234,6 @@ class Trainer:
             loss += config.sobel * losses.sobel(image, target, factor=config.sobel, gradient=gradient,
                                                 workspace=self.losses).value
         return loss, gradient
-
-    def _guard(self, number: int, loss: float, grads) -> None:
-        for name, value in (("loss", loss), ("gradient of the vertices", grads.vertices),
-                            ("gradient of mu", grads.mu), ("gradient of quat", grads.quat),
-                            ("gradient of log_scale", grads.log_scale), ("gradient of rgb", grads.rgb),
-                            ("gradient of opacity", grads.opacity)):
-            if not np.isfinite(np.sum(value)):
-                raise StageError(f"train: the {name} is not finite at step {number}; look at smplx/body.npz, "
-                                 "or lower the rates (train.*_rate)")
 
     def _move(self, grads, opacity: np.ndarray, done: float) -> None:
         config, v = self.config, self.values

@@ -18,9 +18,9 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import LEAST_SIDE
 from gsac.avatar.raster import render_bound, render_bound_backward, screen_gradients
 from gsac.avatar.workspace import Workspace
-from gsac.stages.contract import StageError
 from gsac.stages.train.checkpoint import standing
 from gsac.stages.train.densify import LARGEST, Densifier
+from gsac.stages.train.guard import finite, gradients, pose
 from gsac.stages.train.kernels import adam, on_background, through_background
 from gsac.stages.train.neighbours import Neighbours
 from gsac.stages.train.paper_losses import dice, perceptual, sobel_magnitude
@@ -113,6 +113,7 @@ class Trainer:
         moves = {}
         for t, view in views.items():
             value, grads = self._image(t, view, shown, share)
+            finite(f"at step {number}", gradients(grads))
             loss += value
             total["mu"] += grads.mu
             total["quat"] += grads.quat
@@ -120,14 +121,16 @@ class Trainer:
             total["rgb"] += grads.rgb
             moves[t] = grads.vertices.copy()
         self._pull_together(total, number)
-        self._guard(number, loss, total)
+        finite(f"at step {number}", {"loss": loss, **{f"gradient of {name}": gradient for name, gradient in total.items()}})
         rates = RATES | {"mu": MU_RATE * MU_DECAY ** (number / steps)}
         for name, rate in rates.items():
             adam(self.values[name], total[name], self.first[name], self.second[name], number + 1, rate)
         betas = np.zeros(len(self.poses.betas))
         for t, grad_vertices in moves.items():
             betas += self.poses.shape_gradient(*self.poses.step(t, grad_vertices, POSE_RATE, 0.0))
+            finite(f"after step {number}", pose(self.poses, t))
         self.poses.step_betas(betas, POSE_RATE)
+        finite(f"after step {number}", self.values | {"betas": self.poses.betas})
         return float(loss)
 
     def append(self, parents: np.ndarray, new: dict[str, np.ndarray]) -> None:
@@ -177,8 +180,3 @@ class Trainer:
         total["scale"] += self.neighbours.spread(act, KNN) * act * (1 - act / LARGEST)
         for name in ("quat", "rgb"):
             total[name] += self.neighbours.spread(v[name], KNN)
-
-    def _guard(self, number: int, loss: float, total: dict[str, np.ndarray]) -> None:
-        for name, value in (("loss", loss), *((f"gradient of {name}", gradient) for name, gradient in total.items())):
-            if not np.isfinite(np.sum(value)):
-                raise StageError(f"train: the {name} is not finite at step {number}; look at smplx/body.npz")

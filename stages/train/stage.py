@@ -20,6 +20,7 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.evaluate import judge, turned
+from gsac.stages.train.guard import finite, result
 from gsac.stages.train.holdout import spaced_in_yaw
 from gsac.stages.train.novel import judge_novel
 from gsac.stages.train.poses import Poses, carried
@@ -70,7 +71,7 @@ def run(job: Job) -> None:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
     if config.recipe == "paper" and job.device == "cuda" and "lpips-vgg" in job.models:
-        job.warn("LPIPS takes no part in the loss on cuda; set train.device to cpu where it must (days instead of minutes).")
+        job.warn("LPIPS takes no part in the loss on cuda; set train.device to cpu where it must (hours).")
 
     run = Run(job, Poses(body, params), views, trained, held)
     run.fit()
@@ -124,6 +125,7 @@ class Run:
             task.resumed = state["recipe"]
         self.result = RECIPES[self.job.config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
+        finite("after the last step", result(self.result.gaussians, self.poses))
 
     def clock(self) -> np.ndarray:
         """Wall and CPU seconds of training, those before a stop among them."""
