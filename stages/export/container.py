@@ -120,7 +120,7 @@ def unpack(data: bytes, where: str = "avatar.gsac") -> tuple[dict, dict[str, np.
         array = np.frombuffer(data, dtype, count, start + entry["offset"]).reshape(shape)
         spans.append((entry["offset"], entry["offset"] + count * dtype.itemsize, name))
         if "scale" in entry:
-            array = array.astype(np.float32) * np.float32(entry["scale"])
+            array = np.asarray(array.astype(np.float32) * np.float32(entry["scale"]))  # a block without axes would be a bare number
         array.flags.writeable = False
         blocks[name] = array
     spans.sort()

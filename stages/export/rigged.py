@@ -20,6 +20,7 @@ MAX_JOINTS = 256
 MAX_LEVELS = 16
 BLEND = {"low_pass_px2": 0.3, "alpha_max": 0.999, "alpha_min": 1 / 255}
 """How a gaussian is drawn: added to the image covariance's diagonal; cap of one alpha; below this it is not drawn."""
+BLEND_RANGE = {"low_pass_px2": (0, 100), "alpha_max": (0, 1), "alpha_min": (1e-6, 1)}
 
 
 @dataclass
@@ -190,6 +191,14 @@ class _Reading:
             raise self.bad(Fault.VALUE, f"block {name!r} is not finite")
         return array
 
+    def drawing(self) -> None:
+        """Checks what the head says of drawing and this reader does not keep."""
+        blend = self.entry(self.head, "blend", dict) if "blend" in self.head else {}
+        found = [(self.head, "ground", (-1e6, 1e6))] + [(blend, key, span) for key, span in BLEND_RANGE.items()]
+        for table, key, (least, most) in found:
+            if key in table and not least <= self.entry(table, key, (int, float)) <= most:
+                raise self.bad(Fault.VALUE, f"`{key}` is out of range")
+
     def below(self, array: np.ndarray, limit: int, what: str) -> np.ndarray:
         if array.size and not (array.min() >= 0 and array.max() < limit):
             raise self.bad(Fault.VALUE, f"{what} points outside 0..{limit - 1}")
@@ -217,6 +226,7 @@ class _Reading:
         if start[0] != 0 or start[-1] != len(moved) or (np.diff(start) < 0).any():
             raise self.bad(Fault.VALUE, "expression.start must rise from 0 to the number of moved vertices")
         gaussians, *coarser = self.levels(len(faces))
+        self.drawing()
         return RiggedAvatar(
             vertices=vertices, faces=faces, joints=self.block("rest.joints", (J, 3)),
             parents=np.asarray(parents, np.int32), joint_names=joint_names,

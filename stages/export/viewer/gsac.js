@@ -197,6 +197,18 @@ function readAvatar(buffer) {
     if (keys === 0) throw new GsacError("value", "a clip has no keys");
     clips[clip.name] = { fps: clip.fps, loop: clip.loop, joints, keys, rotation, transl: finite(`clip.${clip.name}.transl`, keys, 3) };
   }
+  const within = (table, key, least, most) => {
+    if (!Object.hasOwn(table, key)) return;
+    if (typeof table[key] !== "number") throw new GsacError("head", `${key} is of the wrong kind`);
+    if (!(table[key] >= least && table[key] <= most)) throw new GsacError("value", `${key} is out of range`);
+  };
+  within(head, "ground", -1e6, 1e6);
+  if (Object.hasOwn(head, "blend")) {
+    if (!isTable(head.blend)) throw new GsacError("head", "blend is of the wrong kind");
+    within(head.blend, "low_pass_px2", 0, 100);
+    within(head.blend, "alpha_max", 0, 1);
+    within(head.blend, "alpha_min", 1e-6, 1);
+  }
   return {
     names, parents, vertices, faces, expressions, start, moved, clips, head,
     joints: finite("rest.joints", names.length, 3),

@@ -68,7 +68,8 @@ def files(data):
             {"offset": "0"}, {"shape": [1 << 40, 3]}, {"shape": [-1, 3]}, {"shape": [1 << 26] * 4}, {"shape": "x"},
             {"shape": [2] * 60}, {"shape": [1.5]}, {"shape": [True]}, {"dtype": "f128"}, {"dtype": "u16"}, {"dtype": None},
             {"dtype": []}, {"dtype": "__proto__"}, {"scale": 1e308}, {"scale": "1"}, {"scale": 0}, {"scale": None},
-            {"shape": [1 << 26, 0, 3]}, {"shape": [3]}, {"offset": head["blocks"]["gaussian.rgb"]["offset"]}]):
+            {"shape": [1 << 26, 0, 3]}, {"shape": [3]}, {"shape": [], "scale": 2},
+            {"offset": head["blocks"]["gaussian.rgb"]["offset"]}]):
         blocks = copy.deepcopy(head["blocks"])
         blocks["gaussian.mu"] |= change
         out[f"block{n}"] = built(head | {"blocks": blocks}, body), {"block"}
@@ -104,8 +105,15 @@ def files(data):
             {"clips": [head["clips"][0] | {"fps": 0}]}, {"clips": [head["clips"][0] | {"fps": "20"}]},
             {"clips": [head["clips"][0] | {"joints": ["tail"]}]}, {"clips": [head["clips"][0] | {"loop": 1}]},
             {"clips": [head["clips"][0] | {"name": "other"}]}, {"expressions": "abc"}, {"expressions": [1, 2]},
-            {"licence": {"x": 1}}, {"licence": []}, {"provenance": None}, {"format": "other"}, {"format": None}]):
+            {"licence": {"x": 1}}, {"licence": []}, {"provenance": None}, {"format": "other"}, {"format": None},
+            {"ground": "0"}, {"ground": None}, {"ground": True}, {"ground": 1e7}, {"blend": None}, {"blend": []},
+            {"blend": {"low_pass_px2": ""}}, {"blend": {"low_pass_px2": -1}}, {"blend": {"alpha_max": 1.5}},
+            {"blend": {"alpha_min": 0}}, {"blend": {"alpha_min": [1]}}]):
         out[f"head{n}"] = built(head | change, body), {"head", "value", "block"}
+    for n, change in enumerate([{"blend": {}}, {"blend": {"alpha_min": 1, "other": None}}, {"ground": 10 ** 6}, {"x": 10 ** 400},
+                                {"x": {"__proto__": [1e308, -10 ** 400]}}]):
+        out[f"odd{n}"] = built(head | change, body), {"ok"}
+    out["no_drawing"] = built({k: v for k, v in head.items() if k not in ("ground", "blend")}, body), {"ok"}
     return out
 
 
@@ -120,4 +128,41 @@ def fuzzed(data, count, seed=0):
             damaged[rng.randrange(HEADER.size, head_end if rng.random() < .8 else len(data))] = rng.randrange(256)
         damaged[24:28] = zlib.crc32(damaged[HEADER.size:]).to_bytes(4, "little")
         out[f"fuzz{n}"] = bytes(damaged)
+    return out
+
+
+ODD = [None, True, 0, -1, 1.5, -0.0, 1e308, 1e-320, 2 ** 31, 2 ** 53, 2 ** 63, 10 ** 400, "", "x", "__proto__", "\u0000", [], {}, [[]],
+       [None], {"a": 1}, [1] * 5]
+
+
+def places(node, above=()):
+    """The place of every value in a JSON document; of a list its first eight."""
+    yield above
+    rows = node.items() if isinstance(node, dict) else enumerate(node[:8]) if isinstance(node, list) else ()
+    for key, value in rows:
+        yield from places(value, (*above, key))
+
+
+def rewritten(data, count, seed=0):
+    """Well-formed files in whose head one value is an odd one, another place's, gone, or there under a strange name."""
+    rng, (head, body) = random.Random(seed), parts(data)
+    everywhere, out = [place for place in places(head) if place], {}
+
+    def at(document, place):
+        for key in place:
+            document = document[key]
+        return document
+
+    for n in range(count):
+        changed, place = copy.deepcopy(head), rng.choice(everywhere)
+        holder, key, kind = at(changed, place[:-1]), place[-1], rng.random()
+        if kind < .6:
+            holder[key] = rng.choice(ODD)
+        elif kind < .75:
+            holder[key] = copy.deepcopy(at(head, rng.choice(everywhere)))
+        elif kind < .85 or not isinstance(holder, dict):
+            del holder[key]
+        else:
+            holder[rng.choice(["__proto__", "constructor", "blocks", "light", "x"])] = rng.choice(ODD)
+        out[f"rewritten{n}"] = built(changed, body)
     return out

@@ -84,7 +84,8 @@ def collection(figure):
 
 @pytest.fixture(scope="module")
 def fuzzed(figure):
-    return beside("hostile.py").fuzzed(replace(figure, light=np.full((4, 3), .5, np.float32)).to_bytes(), 300)
+    hostile, data = beside("hostile.py"), replace(figure, light=np.full((4, 3), .5, np.float32)).to_bytes()
+    return hostile.fuzzed(data, 300) | hostile.rewritten(data, 300)
 
 
 def folder_of(files, folder):

@@ -177,8 +177,9 @@ namespace Gsac
             long integer;
             if (!real && long.TryParse(word, NumberStyles.AllowLeadingSign, CultureInfo.InvariantCulture, out integer)) return integer;
             double number;
-            if (!double.TryParse(word, NumberStyles.Float, CultureInfo.InvariantCulture, out number)) throw Bad("number out of range");
-            return number;
+            if (double.TryParse(word, NumberStyles.Float, CultureInfo.InvariantCulture, out number)) return number;
+            // its form is right: it is beyond a double, which newer runtimes give as infinity without a word
+            return word[0] == '-' ? double.NegativeInfinity : double.PositiveInfinity;
         }
 
         void Digits()

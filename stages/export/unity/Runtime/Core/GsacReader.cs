@@ -165,9 +165,8 @@ namespace Gsac
         void ReadBlend(GsacData data)
         {
             data.Ground = Optional(file.Head, "ground", 0, -1e6, 1e6);
-            object found;
-            var blend = file.Head.TryGetValue("blend", out found) ? found as Dictionary<string, object> : null;
-            if (blend == null) return;
+            if (!file.Head.ContainsKey("blend")) return;
+            Dictionary<string, object> blend = Table(file.Head, "blend");
             data.LowPass = Optional(blend, "low_pass_px2", data.LowPass, 0, 100);
             data.AlphaMax = Optional(blend, "alpha_max", data.AlphaMax, 0, 1);
             data.AlphaMin = Optional(blend, "alpha_min", data.AlphaMin, 1e-6, 1);
