@@ -14,6 +14,9 @@ from gsac.avatar.lpips import Lpips
 
 WHITE, BLACK = 1.0, 0.0
 BOXES = ("face", "left_hand", "right_hand")
+NAMES = {"mse_white": "psnr_full", "mse_black": "psnr_full_black", "mse_fg": "psnr_fg",
+         **{f"mse_{name}": f"psnr_{name}" for name in BOXES}}
+"""Mean squared errors that are told as PSNR."""
 LPIPS = {"lpips_alex": ("lpips-alex", True), "lpips_alex_unscaled": ("lpips-alex", False), "lpips_vgg": ("lpips-vgg", True)}
 """Figure -> network, and whether images are handed to it in -1..1 as it was made for, or in 0..1 as many papers' scorers do."""
 
@@ -86,6 +89,12 @@ def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarra
 def _in_box(error: np.ndarray, box: tuple[int, int, int, int] | None) -> float:
     x0, y0, x1, y1 = box or (0, 0, 0, 0)
     return float(error[y0:y1, x0:x1].mean()) if x1 > x0 and y1 > y0 else float("nan")
+
+
+def figures(scores: dict[str, float]) -> dict[str, float | None]:
+    """One image's figures under the names of `summary`, the hands apart; None for what was not measured."""
+    known = {name: float(value) if np.isfinite(value) else None for name, value in scores.items()}
+    return {NAMES.get(name, name): psnr(value) if name in NAMES else value for name, value in known.items()}
 
 
 def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:

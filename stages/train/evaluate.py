@@ -46,7 +46,7 @@ def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
 
 def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
           workspace: Workspace | None = None, flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
-    """One row of `metrics.score` a frame; with a folder also %06d_truth, _render and _error PNGs on white."""
+    """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
     workspace = workspace or Workspace()
     rows = []
     for t in map(int, frames):
@@ -54,7 +54,7 @@ def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder:
         rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
         finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
         true_rgb, mask = truth(views[t])
-        rows.append({"frame": t} | score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips))
+        rows.append(score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips))
         if folder is not None:
             render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
             error = np.abs(render - real).mean(2) / ERROR_FULL

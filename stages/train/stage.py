@@ -12,7 +12,7 @@ from gsac.avatar.artifacts import Clip, frame_paths, write_frame
 from gsac.avatar.body import BodyParams
 from gsac.avatar.cuda import why_not
 from gsac.avatar.lpips import Lpips
-from gsac.avatar.metrics import psnr, summary
+from gsac.avatar.metrics import figures, summary
 from gsac.avatar.turn import turn_seen
 from gsac.avatar.workspace import Workspace
 from gsac.stages.body_choice import load_body
@@ -95,11 +95,6 @@ def now() -> np.ndarray:
 def due(step: int, steps: int, times: int) -> bool:
     """Whether one of `times` even marks of a run is reached by this step (from 1)."""
     return step * times // steps > (step - 1) * times // steps
-
-
-def known(row: dict) -> dict:
-    """The row with what was not measured (NaN) as None: JSON has no NaN."""
-    return {name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in row.items()}
 
 
 class Run:
@@ -192,8 +187,7 @@ class Run:
         else:
             ttpo = []
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
-        figures = summary(rows)
-        return figures | {
+        return summary(rows) | {
             **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips_net"},
             "psnr_fg_fit": self.psnr_fg(gaussians, fitted, held),
             "psnr_fg_train": self.psnr_fg(gaussians, poses, sample),
@@ -209,9 +203,9 @@ class Run:
             "image_size": [self.views[0].camera.width, self.views[0].camera.height],
             "seconds": round(float(self.seconds), 3), "cpu_seconds": round(float(self.cpu_seconds), 3),
             "trained_frames": len(self.trained), "heldout_frames": [int(t) for t in held],
-            "heldout": [known(row) | {"psnr_fg": psnr(row["mse_fg"]), "psnr_full": psnr(row["mse_white"]),
-                               "psnr_fg_ttpo": psnr(other["mse_fg"])}
-                        for row, other in zip(rows, ttpo or [{"mse_fg": None}] * len(rows), strict=True)],
+            "heldout": [{"frame": t, **figures(row), **{f"{name}_ttpo": value for name, value in figures(other).items()}}
+                        for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
+                                                 strict=True)],
             "resumed_at_step": self.resumed_at,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses, self.workspace),

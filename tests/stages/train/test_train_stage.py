@@ -38,6 +38,28 @@ def test_held_out_frames_are_rendered_better_as_training_goes_on_and_poses_come_
     np.testing.assert_array_equal(before["betas"], after["betas"])
 
 
+EVERY_IMAGE = {"psnr_full", "psnr_full_black", "psnr_fg", "ssim", "lpips_alex", "lpips_vgg", "flip", "alpha_iou", "psnr_face",
+               "detail"}
+TOGETHER = EVERY_IMAGE | {"psnr_full_pooled", "psnr_full_black_pooled", "psnr_fg_pooled", "psnr_hands", "lpips"}
+
+
+@pytest.mark.slow
+def test_every_figure_is_told_of_all_images_and_of_each_with_and_without_the_pose_moved_to_the_image(job):
+    made = job(steps=10, flip=True)
+    run(made)
+    figures = metrics(made)
+    for names, told in ((TOGETHER, figures), (EVERY_IMAGE | {"psnr_left_hand", "psnr_right_hand"}, figures["heldout"][0])):
+        for name in {*names, *(f"{name}_ttpo" for name in names)}:
+            assert name in told, name
+            assert told[name] is None if "lpips" in name else np.isfinite(told[name]) or "hand" in name, name
+    assert {"stray_alpha", "needle_share", "psnr_fg_fit"} <= set(figures) and set(figures["pose_at_test"])
+    mean = np.mean([row["psnr_full_black_ttpo"] for row in figures["heldout"]])
+    assert figures["psnr_full_black_ttpo"] == pytest.approx(mean)
+    assert figures["psnr_fg_pooled"] <= figures["psnr_fg"]
+    assert 0 < figures["flip_ttpo"] <= figures["flip"] * 1.05 < 1
+    assert all(0 < row["flip"] < 1 for row in figures["heldout"])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("values", [{"steps": 40}, {"steps": 4, "recipe": "paper"}], ids=["fast", "paper"])
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_avatar(job, monkeypatch, values):
@@ -80,15 +102,6 @@ def test_masks_that_are_all_empty_stop_the_stage(job):
     made = job(frames=2, blank=(0, 1), steps=5)
     with pytest.raises(StageError, match="every mask is empty"):
         run(made)
-
-
-@pytest.mark.slow
-def test_flip_is_measured_where_it_is_asked_for_with_and_without_the_pose_moved_to_the_image(job):
-    made = job(steps=10, flip=True)
-    run(made)
-    figures = metrics(made)
-    assert 0 < figures["flip_ttpo"] <= figures["flip"] * 1.05 < 1
-    assert all(0 < row["flip"] < 1 for row in figures["heldout"])
 
 
 @pytest.mark.slow
