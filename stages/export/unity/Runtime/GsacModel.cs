@@ -27,6 +27,9 @@ namespace Gsac
         public GraphicsBuffer Quads { get; private set; }
         public Level[] Levels { get; private set; }
 
+        /// <summary>Keys to sort at the finest level.</summary>
+        public int KeyCount { get; private set; }
+
         readonly object source;
         int users;
 
@@ -89,6 +92,7 @@ namespace Gsac
                     Local = Structured(GsacPacking.Local(level), 4), Colours = Structured(GsacPacking.Colours(level), 4),
                 };
             }
+            foreach (Level level in Levels) KeyCount = Math.Max(KeyCount, level.Sort.KeyCount);
             uint[] quads = GsacPacking.Quads(Math.Max(most, 1));
             Quads = new GraphicsBuffer(GraphicsBuffer.Target.Index, quads.Length, 4);
             Quads.SetData(quads);

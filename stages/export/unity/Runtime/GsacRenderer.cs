@@ -119,7 +119,11 @@ namespace Gsac
         /// <summary>Buffers of the avatar that is there now. False where this device cannot draw it.</summary>
         bool Ready()
         {
-            if (model != null && ReferenceEquals(model, avatar.Model)) return true;
+            return model != null && ReferenceEquals(model, avatar.Model) || Prepare();
+        }
+
+        bool Prepare()
+        {
             if (!SystemInfo.supportsComputeShaders || SystemInfo.maxComputeBufferInputsVertex < 3)
             {
                 Complain("this graphics API (" + SystemInfo.graphicsDeviceType + ") has no compute shaders or no buffers in vertex shaders;"
@@ -190,13 +194,18 @@ namespace Gsac
         static int Cameras()
         {
             int most = Camera.allCamerasCount + ExtraCameras.Count;
-            if (cameras.Length < most) cameras = new Camera[most * 2];
+            if (cameras.Length < most) Grow(most * 2);
             int count = Camera.GetAllCameras(cameras);
             for (int i = 0; i < ExtraCameras.Count; i++)
             {
                 if (ExtraCameras[i] != null) cameras[count++] = ExtraCameras[i];
             }
             return count;
+        }
+
+        static void Grow(int most)
+        {
+            cameras = new Camera[most];
         }
 
         /// <summary>Level of detail for the nearest camera.</summary>
@@ -218,6 +227,11 @@ namespace Gsac
                 views[i].Dispose();
                 views.RemoveAt(i);
             }
+            return NewView(camera);
+        }
+
+        GsacView NewView(Camera camera)
+        {
             var view = new GsacView(camera, material);
             views.Add(view);
             return view;

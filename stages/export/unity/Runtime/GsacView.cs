@@ -95,6 +95,7 @@ namespace Gsac
         /// <summary>Sorts for this camera and asks Unity to draw.</summary>
         public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, GsacModel model, Transform root, float low, float high)
         {
+            if (keys == null || keys.count != model.KeyCount) Resize(model.KeyCount);
             Sort(kernels, splats, level, low, high);
             Matrix4x4 m = root.localToWorldMatrix;
             for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], m.GetRow(r));
@@ -112,13 +113,14 @@ namespace Gsac
             Graphics.RenderPrimitivesIndexed(draw, MeshTopology.Triangles, model.Quads, level.Count * 6);
         }
 
+        void Resize(int count)
+        {
+            Dispose();
+            keys = GsacModel.Empty(count, 1);
+        }
+
         void Sort(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, float low, float high)
         {
-            if (keys == null || keys.count != level.Sort.KeyCount)
-            {
-                Dispose();
-                keys = GsacModel.Empty(level.Sort.KeyCount, 1);
-            }
             if (!found)
             {
                 for (int i = 0; i < 3; i++) sortKernels[i] = kernels.FindKernel(SortNames[i]);

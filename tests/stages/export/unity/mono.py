@@ -41,7 +41,8 @@ def compile_package(package, out):
     compile_csharp([editor], out / "UnityEditor.dll", *options)
     options += [f"-r:{out / 'UnityEditor.dll'}", f"-r:{out / 'Gsac.dll'}"]
     compile_csharp(sorted((package / "Editor").rglob("*.cs")), out / "Gsac.Editor.dll", *options)
-    return compile_csharp(sorted((HERE / "programs").glob("[DP]*.cs")), out / "Play.exe", *options, f"-r:{out / 'Gsac.Editor.dll'}")
+    options.append(f"-r:{out / 'Gsac.Editor.dll'}")
+    return compile_csharp(sorted((HERE / "programs").glob("[ADP]*.cs")), out / "Play.exe", *options)
 
 
 def arrays(path):

@@ -13,6 +13,12 @@ from scipy.spatial.transform import Rotation
 pytestmark = pytest.mark.slow
 
 MIRROR = np.diag([-1.0, 1, 1])
+ONCE = {
+    "GsacAvatar.Open": "a file is read", "GsacAvatar.Unknown": "an error", "GsacRenderer.Prepare": "a model's first frame",
+    "GsacRenderer.Complain": "an error", "GsacRenderer.Grow": "more cameras than ever",
+    "GsacRenderer.NewView": "a camera's first frame", "GsacView.Resize": "another file", "GsacPoseStream.Prepare": "another file",
+    "GsacBenchmark.Finish": "the end"}
+"""What a frame may call and most frames do not: why."""
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
 
 
@@ -51,6 +57,18 @@ def test_clips_are_sampled_between_keys_and_go_round(play, mono, files, tmp_path
         np.testing.assert_allclose(quat * np.sign((quat * truth).sum(1, keepdims=True)), truth, atol=2e-5)
         transl = clip.transl[k] * (1 - t) + clip.transl[after] * t
         np.testing.assert_allclose(got[f"transl.{name}"], transl * (-1, 1, 1), atol=1e-5)
+
+
+def test_the_compiled_code_of_a_frame_makes_no_object(play):
+    lines = [line.split(" ", 1) for line in play("allocations", *ONCE).splitlines()]
+    assert {name for kind, name in lines if kind == "frame"} == {
+        "GsacAvatar.LateUpdate", "GsacRenderer.LateUpdate", "GsacPoseStream.LateUpdate", "GsacPoseStream.Listen",
+        "GsacBenchmark.Update", "GsacDemo.LateUpdate"}
+    assert {name for kind, name in lines if kind == "once"} == ONCE.keys()
+    assert [name for kind, name in lines if kind == "makes"] == []
+    assert int(lines[-1][1]) > 80, "methods walked"
+    unguarded = play("allocations", *(ONCE.keys() - {"GsacRenderer.NewView", "GsacView.Resize"}))
+    assert "makes GsacRenderer.NewView new GsacView" in unguarded and "makes GsacModel.Empty new GraphicsBuffer" in unguarded
 
 
 def test_6000_frames_of_each_source_collect_no_garbage(play, files):

@@ -20,6 +20,7 @@ public static class Play
             case "frame": Frame(args[1], args[2], args[3]); break;
             case "sort": Sort(args); break;
             case "pose": Pose(args[1], args[2], args[3]); break;
+            case "allocations": Allocations.Print(typeof(GsacAvatar).Assembly, args); break;
             case "garbage": Garbage(args[1]); break;
             case "stream": Stream(args[1], int.Parse(args[2])); break;
             case "messages": Messages(args[1], args[2], args[3]); break;
