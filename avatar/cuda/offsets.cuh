@@ -1,7 +1,7 @@
-// Clothes and hair: a smooth displacement of the rest vertices (Nicolet et al. 2021), every few steps. The two solves with
-// I + lambda L (L: the mesh's uniform Laplacian) are Chebyshev iterations inside one kernel, with a barrier over its blocks.
+// Clothes and hair: a smooth displacement of the rest vertices (Nicolet et al. 2021), every few steps. What the mesh's smoothing
+// makes of the gradient, once and twice over, are series (smoothing.py) inside one kernel, with a barrier over its blocks.
 
-constexpr int ITERATIONS = 72;
+constexpr int CLOSE = 8;  // neighbours whose numbers are kept in registers
 
 struct Barrier {
     int *arrived, target;
@@ -11,47 +11,47 @@ struct Barrier {
         __syncthreads();
         target += gridDim.x;
         if (threadIdx.x == 0) {
-            __threadfence();
-            atomicAdd(arrived, 1);
-            while (*(volatile int *)arrived < target) {}
-            __threadfence();
+            int seen;
+            asm volatile("red.release.gpu.global.add.s32 [%0], 1;" ::"l"(arrived) : "memory");
+            do asm volatile("ld.acquire.gpu.global.s32 %0, [%1];" : "=r"(seen) : "l"(arrived) : "memory");
+            while (seen < target);
         }
         __syncthreads();
     }
 };
 
-// This vertex's row of (I + lambda L)^-1 b; eigenvalues of the matrix over its diagonal lie in [least, 2].
-FORMULA Vec<float> solve(const Scene &s, Barrier &barrier, int v, Vec<float> b, float least) {
-    int begin = 0, end = 0;
-    float inverse = 0;
+struct Smoothed { Vec<float> once, twice; };
+
+// This vertex's rows of S b and S S b, S = (I + lambda L)^-1: sums of T_k(t) b, t the matrix I + lambda L brought to -1..1.
+FORMULA Smoothed smoothed(const Scene &s, Barrier &barrier, int v, Vec<float> b) {
+    int begin = 0, end = 0, near[CLOSE];
     if (v < s.vertex_count) {
         begin = s.near_start[v];
         end = s.near_start[v + 1];
-        inverse = 1 / (1 + s.smoothness * (end - begin));
     }
-    float theta = (2 + least) / 2, delta = (2 - least) / 2, sigma = theta / delta, rho = 1 / sigma;
-    Vec<float> x = {0, 0, 0}, r = b * inverse, d = r * (1 / theta);
-    for (int i = 0; i < ITERATIONS; ++i) {
-        float *step = s.solve_step + size_t(i % 2) * s.vertex_count * 3;
-        if (v < s.vertex_count) {
-            __stcg(step + 3 * v, d.x);
-            __stcg(step + 3 * v + 1, d.y);
-            __stcg(step + 3 * v + 2, d.z);
-        }
+    for (int e = 0; e < CLOSE; ++e) near[e] = begin + e < end ? s.near_vertex[begin + e] : -1;
+    float own = (1 + s.smoothness * (end - begin) - s.series_middle) / s.series_half, beside = -s.smoothness / s.series_half;
+    Vec<float> now = b, before = {0, 0, 0};
+    Smoothed out = {b * s.series[0], b * s.series[1]};
+    for (int k = 1; k < s.series_terms; ++k) {
+        float4 *term = (float4 *)s.solve_step + size_t(k % 2) * s.vertex_count;
+        if (v < s.vertex_count) __stcg(term + v, float4{now.x, now.y, now.z, 0});
         barrier.wait();
         Vec<float> sum = {0, 0, 0};
-#pragma unroll 4
-        for (int e = begin; e < end; ++e) {
-            const float *from = step + 3 * s.near_vertex[e];
-            sum = sum + Vec<float>{__ldcg(from), __ldcg(from + 1), __ldcg(from + 2)};
+        float4 other[CLOSE];
+        for (int e = 0; e < CLOSE; ++e) other[e] = near[e] < 0 ? float4{0, 0, 0, 0} : __ldcg(term + near[e]);
+        for (int e = 0; e < CLOSE; ++e) sum = sum + Vec<float>{other[e].x, other[e].y, other[e].z};
+        for (int e = begin + CLOSE; e < end; ++e) {
+            float4 far = __ldcg(term + s.near_vertex[e]);
+            sum = sum + Vec<float>{far.x, far.y, far.z};
         }
-        x = x + d;
-        r = r - d + sum * (s.smoothness * inverse);
-        float next = 1 / (2 * sigma - rho);
-        d = d * (next * rho) + r * (2 * next / delta);
-        rho = next;
+        Vec<float> next = (now * own + sum * beside) * (k == 1 ? 1.0f : 2.0f) - before;
+        before = now;
+        now = next;
+        out.once = out.once + now * s.series[2 * k];
+        out.twice = out.twice + now * s.series[2 * k + 1];
     }
-    return x + d;
+    return out;
 }
 
 // (blocks of vertices), after the step's pose update: gathers the gradients at rest, and every few steps moves the offsets.
@@ -74,9 +74,8 @@ extern "C" __global__ void __launch_bounds__(256) offset_step(Scene s) {
     }
     if (step % every != every - 1) return;
     Barrier barrier = {&state.barrier, 0};
-    float least = 1 / (1 + s.smoothness * s.most_near);
-    Vec<float> smooth = solve(s, barrier, v, sum * ((mine ? s.offset_share[v] : 0) / every), least);
-    float peak = fmaxf(fabsf(smooth.x), fmaxf(fabsf(smooth.y), fabsf(smooth.z)));
+    Smoothed found = smoothed(s, barrier, v, sum * ((mine ? s.offset_share[v] : 0) / every));
+    float peak = fmaxf(fabsf(found.once.x), fmaxf(fabsf(found.once.y), fabsf(found.once.z)));
     for (int stride = 16; stride > 0; stride /= 2) peak = fmaxf(peak, __shfl_xor_sync(~0u, peak, stride));
     if (threadIdx.x % 32 == 0) peaks[threadIdx.x / 32] = peak;
     __syncthreads();
@@ -88,21 +87,17 @@ extern "C" __global__ void __launch_bounds__(256) offset_step(Scene s) {
     peak = __int_as_float(*(volatile int *)&state.peak);
     float n = step / every + 1, second = *s.offset_second;
     second += 0.01f * (peak * peak - second);
-    float scale = 1 / (1 - powf(0.9f, n)) / (sqrtf(second / (1 - powf(0.99f, n))) + 1e-20f);
-    Vec<float> first = {0, 0, 0};
+    float scale = rate / (1 - powf(0.9f, n)) / (sqrtf(second / (1 - powf(0.99f, n))) + 1e-20f);
     if (mine) {
-        float *kept = s.offset_first + 3 * v;
-        first = vec(kept);
-        first = first + (smooth - first) * 0.1f;
+        float *kept = s.offset_first + 3 * v;  // Adam's first moment, smoothed once more: smoothing is linear
+        Vec<float> first = vec(kept);
+        first = first + (found.twice - first) * 0.1f;
         kept[0] = first.x;
         kept[1] = first.y;
         kept[2] = first.z;
-    }
-    Vec<float> move = solve(s, barrier, v, first * scale, least);
-    if (mine) {
-        s.offset[3 * v] -= rate * move.x;
-        s.offset[3 * v + 1] -= rate * move.y;
-        s.offset[3 * v + 2] -= rate * move.z;
+        s.offset[3 * v] -= scale * first.x;
+        s.offset[3 * v + 1] -= scale * first.y;
+        s.offset[3 * v + 2] -= scale * first.z;
     }
     if (v == 0) *s.offset_second = second;
 }

@@ -12,9 +12,9 @@ from gsac.avatar.cuda.trainer import CudaTrainer
 
 class Round(NamedTuple):
     frames: np.ndarray
-    """(n, batch) indices of the trainer's frames, in the order of the steps; none twice in a step."""
+    """(n,) indices of the trainer's frames, in the order of the steps."""
     backgrounds: np.ndarray
-    """(n, batch, 3)."""
+    """(n, 3)."""
     done: float
     """Share of the way that the rates are those of."""
 
@@ -32,8 +32,8 @@ class RoundsTrainer(CudaTrainer):
     def plan(self, levels) -> Drawn:
         rounds = self.recipe.rounds
         done = np.repeat([r.done for r in rounds], [len(r.frames) for r in rounds])
-        return Drawn(np.concatenate([r.frames for r in rounds]).astype(np.int32),
-                     np.concatenate([r.backgrounds for r in rounds]).astype(np.float32), rates_of(self.recipe, done))
+        return Drawn(np.concatenate([r.frames for r in rounds]).astype(np.int32)[:, None],
+                     np.concatenate([r.backgrounds for r in rounds]).astype(np.float32)[:, None], rates_of(self.recipe, done))
 
     def place(self, pose: np.ndarray, transl: np.ndarray) -> None:
         """The poses (T, 55, 3) and translations (T, 3) from here on."""

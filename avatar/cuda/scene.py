@@ -37,7 +37,7 @@ POINTERS = {
     "tile_done": "int", "near_flag": "unsigned char", "heavy": "int", "light": "int", "near": "int", "segment": "int",
     "checkpoint": "float", "image": "float", "grad_image": "float", "slopes": "float", "tile_loss": "float", "losses": "float",
     "near_start": "int", "near_vertex": "int", "offset_share": "float", "offset": "float", "grad_rest": "float",
-    "gathered": "float", "offset_first": "float", "offset_second": "float", "solve_step": "float",
+    "gathered": "float", "offset_first": "float", "offset_second": "float", "solve_step": "float", "series": "float",
     "shape": "float", "joint_shape": "float", "betas": "double", "beta_first": "double", "beta_second": "double",
     "beta_part": "float", "beta_move": "float", "grad_joints": "float",
     "gain": "float", "gain_part": "float", "overlap": "float", "dice": "float",
@@ -48,8 +48,9 @@ POINTERS = {
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
            "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
-           "most_near": INT, "offset_every": INT, "beta_count": INT, "area": FLOAT, "half_width": FLOAT,
-           "half_height": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT}
+           "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
+           "area": FLOAT, "half_width": FLOAT, "half_height": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT,
+           "scale_limit": FLOAT}
 """area: pixels that a frame's losses are a mean over, 0: its own; the last eight are recipe `paper`'s (paper.cuh)."""
 
 

@@ -12,6 +12,7 @@ from gsac.avatar.cuda.device import Buffer, Device
 from gsac.avatar.cuda.lists import children, joint_levels, joints_of, neighbours, vertices_of
 from gsac.avatar.cuda.recipe import Drawn, Recipe, draw
 from gsac.avatar.cuda.scene import FRAME, POINTERS, Scene, State
+from gsac.avatar.cuda.smoothing import series
 from gsac.avatar.gaussians import Gaussians
 
 TILE, SEGMENT, JOINTS = 16, 128, 55
@@ -226,7 +227,11 @@ class CudaTrainer:
                 ("fit", both, np.float64), ("pose_share", share, np.float64)):
             self._upload(name, array, kind)
         near_start, near_vertex = neighbours(np.asarray(body.faces), body.rest.shape[1])
-        self.scene.smoothness, self.scene.most_near = self.recipe.smoothness, int(np.diff(near_start).max())
+        if self.recipe.offset_rate:
+            found = series(body.faces, body.rest.shape[1], self.recipe.smoothness)
+            self.scene.smoothness, self.scene.series_terms = self.recipe.smoothness, len(found.factors)
+            self.scene.series_middle, self.scene.series_half = found.middle, found.half
+            self._upload("series", found.factors, np.float32)
         on_fingers = np.where(np.asarray(body.skin_index) >= FINGERS, body.skin_weight, 0).sum(1)
         for name, array, kind in (("near_start", near_start, np.int32), ("near_vertex", near_vertex, np.int32),
                                   ("offset_share", 1 - on_fingers, np.float32)):
@@ -277,7 +282,7 @@ class CudaTrainer:
             "local": (batch, JOINTS, 9), "transform": (batch, JOINTS, 12), "vertices": (batch, v, 3),
             "grad_vertices": (batch, v, 3),
             "corner_grad": (batch, n, 9), "joint_grad": (batch, JOINTS, 12), "splat": (batch, n, 12), "depth": (batch, n),
-            "grad_rest": (batch, v, 3), "solve_step": (2, v, 3), "image": (pixels, 4), "grad_image": (pixels, 4),
+            "grad_rest": (batch, v, 3), "solve_step": (2, v, 4), "image": (pixels, 4), "grad_image": (pixels, 4),
             "tile_loss": tiles}
         if self.recipe.ssim:
             shapes["slopes"] = (9, pixels)

@@ -25,12 +25,6 @@ from gsac.stages.train.poses import HAND_SHARE, SHIFT, TURN, Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
 
-ROUND_BATCH = 4
-"""Frames of one step in the rounds that move the poses, where the CPU takes one: small images do not fill a GPU."""
-ROUND_RATE = 2.0
-"""Appearance's rates of such a step over those of the CPU's, of which it does the work of several."""
-APPEARANCE = ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate")
-
 
 def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[int, View]]:
     """As `fast.train`. Raises StageError where the GPU fails, or naming the step and the quantity that is not finite."""
@@ -73,30 +67,19 @@ def align_poses(gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: l
 
 @contextmanager
 def learning(task: Task, views: dict[int, View], gaussians: Gaussians, plan: list[bundle.Round]):
-    """As `bundle.learning_on_cpu`, in larger steps."""
-    poses, rounds = task.poses, [in_batches(one, task.trained, ROUND_BATCH) for one in plan]
-    steps, batch = rounds[0].frames.shape
-    rate = ROUND_RATE if batch > 1 else 1.0
-    recipe = recipe_of(task.config, len(gaussians), RoundsRecipe, rounds=rounds, steps=steps * len(rounds),
-                       coarse_share=0.0, pose_rate=0.0, offset_every=max(1, offsets.EVERY // batch),
-                       **{name: rate * getattr(task.config, name) for name in APPEARANCE})
+    """As `bundle.learning_on_cpu`."""
+    poses, where = task.poses, {int(t): k for k, t in enumerate(task.trained)}
+    rounds = [Round(np.array([where[int(t)] for t in one.frames]), one.backgrounds, one.done) for one in plan]
+    recipe = recipe_of(task.config, len(gaussians), RoundsRecipe, rounds=rounds, steps=sum(len(one.frames) for one in rounds),
+                       pose_rate=0.0)
     with training(poses, task.trained, [views], gaussians, recipe, RoundsTrainer) as trainer:
         def learn(one: bundle.Round) -> None:
             trainer.place(poses.pose[task.trained], poses.transl[task.trained])
-            trainer.train(steps)
+            trainer.train(len(one.frames))
             poses.offset = trainer.offset()
 
         yield learn, trainer.gaussians, gaussians.face
         task.gpu_seconds += trainer.seconds
-
-
-def in_batches(one: bundle.Round, trained: np.ndarray, batch: int) -> Round:
-    """A round in steps of `batch` frames, no frame twice in a step: what is left of each pass over the frames is dropped."""
-    batch, where = min(batch, len(trained)), {int(t): k for k, t in enumerate(trained)}
-    frames = np.array([where[int(t)] for t in one.frames]).reshape(-1, len(trained))
-    whole = len(trained) // batch * batch
-    backgrounds = one.backgrounds.reshape(*frames.shape, 3)
-    return Round(frames[:, :whole].reshape(-1, batch), backgrounds[:, :whole].reshape(-1, batch, 3), one.done)
 
 
 def recipe_of(config: TrainConfig, count: int, kind: type[Recipe] = Recipe, **more) -> Recipe:

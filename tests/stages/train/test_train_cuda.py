@@ -2,13 +2,12 @@
 
 from dataclasses import fields
 
-import numpy as np
 import pytest
 from gsac.avatar.cuda import why_not
 from gsac.stages.contract import BadInput, make_config
-from gsac.stages.train import STAGE, bundle, config, fast
+from gsac.stages.train import STAGE, config, fast
 from gsac.stages.train.config import TrainConfig
-from gsac.stages.train.cuda import in_batches, recipe_of
+from gsac.stages.train.cuda import recipe_of
 from gsac.stages.train.recipes import RECIPES
 from gsac.stages.train.stage import check_device
 
@@ -39,17 +38,3 @@ def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
     shared = {f.name for f in fields(TrainConfig)} & {f.name for f in fields(made)}
     config = TrainConfig(steps=9)
     assert {n: getattr(recipe_of(config, 12000), n) for n in shared} == {n: getattr(config, n) for n in shared}
-
-
-def test_a_round_in_batches_shows_every_frame_as_often_and_none_twice_in_a_step():
-    trained = np.array([1, 3, 4, 8, 9, 11, 12])
-    one = bundle.drawn(list(trained), 2, np.random.default_rng(0))[1]
-    found = in_batches(one, trained, 3)
-    assert found.frames.shape == (2 * bundle.EPOCHS, 3) and found.backgrounds.shape == (2 * bundle.EPOCHS, 3, 3)
-    assert all(len(set(step)) == 3 for step in found.frames) and found.done == one.done
-    for first in range(0, len(found.frames), 2):
-        assert len(set(found.frames[first:first + 2].ravel())) == 6
-    single = in_batches(one, trained, 1)
-    assert trained[single.frames[:, 0]].tolist() == one.frames.tolist()
-    assert np.array_equal(single.backgrounds[:, 0], one.backgrounds)
-    assert in_batches(one, trained, 99).frames.shape == (bundle.EPOCHS, 7)

@@ -1,0 +1,41 @@
+"""(I + lambda L)^-1 of a mesh, L its uniform Laplacian, once and twice over, as series of Chebyshev polynomials in it.
+
+A term costs the kernels one look at the neighbours, and both series share their terms.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from gsac.avatar.cuda.lists import neighbours
+from numpy.polynomial.chebyshev import chebvander
+from scipy.sparse import csr_matrix, diags
+from scipy.sparse.linalg import eigsh
+
+TERMS = 72
+"""At lambda 30 on the open body the series are right to 0.2 and 2 percent in the worst mode, and to a tenth of that in most."""
+MARGIN = 1.03
+"""Of the largest eigenvalue, which is found to a percent."""
+
+
+class Series(NamedTuple):
+    factors: np.ndarray
+    """(TERMS, 2) of the polynomials, once and twice over."""
+    middle: float
+    """Of the eigenvalues of I + lambda L; the polynomials are in (I + lambda L - middle) / half."""
+    half: float
+
+
+def series(faces: np.ndarray, vertices: int, smoothness: float) -> Series:
+    """faces: (F, 3) int; smoothness: lambda."""
+    start, near = neighbours(np.asarray(faces), vertices)
+    laplacian = diags(np.diff(start).astype(float)) - csr_matrix((np.ones(len(near)), near, start), (vertices, vertices))
+    begin = np.sin(np.arange(vertices, dtype=float))
+    top = eigsh(laplacian, k=1, which="LA", tol=1e-2, v0=begin, return_eigenvectors=False)[0]
+    half = smoothness * MARGIN * top / 2
+    at = np.cos((np.arange(1000) + 0.5) * np.pi / 1000)
+    eigenvalue = 1 + half + half * at
+    terms = chebvander(at, TERMS - 1)
+    factors = [np.linalg.lstsq(terms * eigenvalue[:, None] ** power, np.ones(len(at)), rcond=None)[0] for power in (1, 2)]
+    return Series(np.stack(factors, 1), 1 + half, half)
