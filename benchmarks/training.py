@@ -51,7 +51,10 @@ def of_run(folder: Path) -> Case:
 
 
 def train(case: Case, folder: Path, **values) -> dict:
-    """metrics.json of one training, and `peak_gb`, the most memory that its process held. folder: written anew."""
+    """metrics.json of one training, and `peak_gb`, the most memory that its process held. folder: written anew.
+
+    LPIPS is measured where its weights are in the store, but is in no loss: on the CPU recipe `paper` would take hours.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -62,9 +65,18 @@ def train(case: Case, folder: Path, **values) -> dict:
 def _train(inputs: dict[str, Path], folder: Path, values: dict) -> float:
     from gsac.stages.train.stage import run
 
-    config = make_config(STAGE, values)
-    run(Job(inputs, folder, config, device="cuda" if config.device == "cuda" else "cpu"))
+    config = make_config(STAGE, {"lpips": "judge"} | values)
+    run(Job(inputs, folder, config, networks(config), device="cuda" if config.device == "cuda" else "cpu"))
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+
+
+def networks(config) -> dict[str, Path]:
+    """Files of what the stage only wishes for, as far as the user has brought them."""
+    from gsac.cache.store import Store
+    from gsac.pipeline.models import Models
+
+    models = Models(Store.open())
+    return models.need([name for name in config.wishes() if name in models.brought], print)
 
 
 def _rendered(seed: int, options: argparse.Namespace, say) -> Case:

@@ -11,6 +11,7 @@ RECIPES = ("fast", "paper")
 AUTO = "auto"
 """`gaussians` that the ladder of sizes chooses; `device` that the engine chooses."""
 DEVICES = (AUTO, "cpu", "cuda")
+LPIPS = ("none", "judge", "loss")
 NETWORKS = ("lpips-vgg", "lpips-alex")
 
 
@@ -73,8 +74,8 @@ class TrainConfig:
     flip: bool = False
     """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
-    lpips: bool = True
-    """Whether LPIPS is judged by, and part of the loss of recipe paper (cpu), where `gsac models add` has brought its weights."""
+    lpips: str = "loss"
+    """Of weights that `gsac models add` brought: none, judge: measured, or loss: also in recipe paper's loss (cpu; hours)."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
@@ -82,13 +83,15 @@ class TrainConfig:
 
     def wishes(self) -> tuple[str, ...]:
         """Names of the model files that are used where they are here."""
-        return NETWORKS if self.lpips else ()
+        return () if self.lpips == "none" else NETWORKS
 
     def check(self) -> None:
         if self.recipe not in RECIPES:
             raise BadInput(f"train.recipe is {self.recipe!r}; choices: {', '.join(RECIPES)}")
         if self.device not in DEVICES:
             raise BadInput(f"train.device is {self.device!r}; choices: {', '.join(DEVICES)}")
+        if self.lpips not in LPIPS:
+            raise BadInput(f"train.lpips is {self.lpips!r}; choices: {', '.join(LPIPS)}")
         if self.recipe == "paper" and self.exposure:
             raise BadInput("train.exposure is learned by recipe fast only; set train.recipe to fast, or train.exposure to false")
         if isinstance(self.gaussians, str) and self.gaussians != AUTO:

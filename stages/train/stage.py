@@ -70,7 +70,7 @@ def run(job: Job) -> None:
     if turn < LEAST_TURN:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
-    if config.recipe == "paper" and job.device == "cuda" and "lpips-vgg" in job.models:
+    if config.recipe == "paper" and config.lpips == "loss" and job.device == "cuda" and "lpips-vgg" in job.models:
         job.warn("LPIPS takes no part in the loss on cuda; set train.device to cpu where it must (hours).")
 
     run = Run(job, Poses(body, params), views, trained, held)
@@ -113,7 +113,7 @@ class Run:
     def fit(self) -> None:
         self.began = now()
         task = Task(self.views, self.trained, self.held, self.poses, self.job.config, self.job.progress, self.checkpoint,
-                    self.marks, self.keep, lpips=self.lpips.get("lpips-vgg"))
+                    self.marks, self.keep, lpips=self.lpips.get("lpips-vgg") if self.job.config.lpips == "loss" else None)
         state = self.checkpoints.read()
         if state is not None:
             self.restore(state)

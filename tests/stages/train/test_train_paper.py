@@ -192,12 +192,13 @@ def networks(tmp_path):
 def test_brought_networks_are_judged_by_and_take_part_in_the_loss_of_the_paper(job, networks, monkeypatch):
     monkeypatch.setattr(paper, "BATCH", 1)
     seen = []
-    for name, models in (("with", networks), ("without", {})):
-        made = job(name, frames=6, recipe="paper", steps=2, pose_test_steps=2)
+    for name, models, lpips in (("with", networks, "loss"), ("judged", networks, "judge"), ("without", {}, "loss")):
+        made = job(name, frames=6, recipe="paper", steps=2, pose_test_steps=2, lpips=lpips)
         made.models = models
         run(made)
         seen.append(json.loads((made.out / "metrics.json").read_text()))
-    one, two = seen
+    one, judged, two = seen
+    assert judged["lpips_vgg"] > 0 and not judged["lpips_in_loss"] and judged["curve"][0]["loss"] == two["curve"][0]["loss"]
     assert one["lpips_in_loss"] and not two["lpips_in_loss"]
     assert one["lpips"] == one["lpips_alex"] > 0 and one["lpips_net"] == "lpips-alex" and one["lpips_vgg_ttpo"] > 0
     assert one["lpips_alex_unscaled"] != one["lpips_alex"] and all(row["lpips_vgg"] > 0 for row in one["heldout"])

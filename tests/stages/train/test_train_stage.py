@@ -149,7 +149,7 @@ def test_a_number_that_is_not_finite_stops_with_step_and_quantity(job, monkeypat
         run(made)
 
 
-@pytest.mark.parametrize("name, value", [("recipe", "magic"), ("holdout", 1), ("gaussians", 3), ("steps", 0),
+@pytest.mark.parametrize("name, value", [("recipe", "magic"), ("lpips", "on"), ("holdout", 1), ("gaussians", 3), ("steps", 0),
                                          ("pose_rate", -1.0), ("curve", -1), ("pose_rate", float("nan"))])
 def test_wrong_parameters_are_named(name, value):
     with pytest.raises(BadInput, match=f"train.{name}"):
