@@ -5,6 +5,7 @@
 // draw=webgpu|webgl|software, when the page opens.
 
 const NOTE_MS = 9000;
+const WAYS = { webgpu: "WebGPU", webgl: "WebGL", software: "no graphics card" };
 
 async function inlinedAvatar() {
   if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old: it cannot unpack the avatar");
@@ -66,7 +67,7 @@ class Controls {
     element.textContent = text;
     Object.assign(element.dataset, what);
     element.addEventListener("click", () => {
-      this.viewer.play(what);
+      this.viewer.choose(what);
       this.show();
     });
     find("poses").append(element);
@@ -84,7 +85,7 @@ class Controls {
     try {
       const added = await addMotions(this.viewer.avatar, files);
       for (const clip of added) this.addButton(clip, { clip });
-      this.viewer.play({ clip: added[0] });
+      this.viewer.choose({ clip: added[0] });
       this.note(`${added.join(", ")}: put on this avatar`);
     } catch (error) {
       if (!(error instanceof MotionError)) throw error;
@@ -113,7 +114,7 @@ class Controls {
 
   showRate({ fps, p95 }) {
     const { viewer } = this, count = viewer.binding.count.toLocaleString("en");
-    find("fps").textContent = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms · ${count} gaussians`;
+    find("fps").textContent = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms · ${count} gaussians · ${WAYS[viewer.painter?.kind] ?? "…"}`;
     if (viewer.length) {
       if (document.activeElement !== find("time") || !viewer.paused) find("time").value = viewer.clock / viewer.length;
       find("clock").textContent = `${viewer.clock.toFixed(1)} / ${viewer.length.toFixed(1)} s`;
@@ -153,6 +154,7 @@ async function main() {
   follow();
   window.addEventListener("hashchange", follow);
   await offerHeadset(viewer, find("tools"), (text) => controls.note(text));
+  find("message").hidden = true;
   viewer.run();
   document.documentElement.dataset.ready = "yes";
 }

@@ -4,6 +4,8 @@ const FADE_S = 0.35;
 const FOLLOW_S = 0.6;
 const BACKGROUND = "#2b303b";
 const MAX_PIXEL_RATIO = 2;
+// So many places of a clip are looked at for the frame that holds them all.
+const FRAME_LOOKS = 16;
 // What a browser takes to start its graphics process again.
 const RECOVER_MS = 1000;
 
@@ -71,6 +73,12 @@ class Viewer {
     this.paused = false;
   }
 
+  // As play, with the camera where it sees all of it, unless somebody has moved it.
+  choose(what) {
+    this.play(what);
+    if (!this.camera.moved) this.frame();
+  }
+
   // Seconds of the clip that plays; 0 for a still pose.
   get length() {
     const clip = this.avatar.clips[this.playing.clip];
@@ -96,17 +104,26 @@ class Viewer {
         }
         this.clock %= length;
       }
-      this.pose.clip(this.playing.clip, this.clock);
-    } else {
-      this.pose.still(this.playing.pose);
     }
+    this.take(this.pose, this.clock);
     if (this.fade < 1) this.pose.fadeFrom(this.before, this.fade * this.fade * (3 - 2 * this.fade));
-    for (const [joint, degrees] of Object.entries(this.turned)) {
-      this.pose.turn(this.avatar.names.indexOf(joint), ...degrees.map((d) => d * Math.PI / 180));
-    }
+    this.turn(this.pose);
     const share = 1 - Math.exp(-seconds / FOLLOW_S), { walked } = this.camera;
     for (const i of [0, 2]) walked[i] += share * (this.pose.transl[i] - walked[i]);
     this.move();
+  }
+
+  // pose: Pose, set to what plays at a place in the clip, s.
+  take(pose, seconds) {
+    if (this.playing.clip) pose.clip(this.playing.clip, seconds);
+    else pose.still(this.playing.pose);
+  }
+
+  // Adds the turns by hand.
+  turn(pose) {
+    for (const [joint, degrees] of Object.entries(this.turned)) {
+      pose.turn(this.avatar.names.indexOf(joint), ...degrees.map((d) => d * Math.PI / 180));
+    }
   }
 
   // Brings the gaussians to the pose: on the graphics card where that can, else here.
@@ -140,6 +157,7 @@ class Viewer {
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     const { offsetHeight, offsetTop } = document.getElementById("panel"), panel = offsetHeight ? window.innerHeight - offsetTop : 0;
+    document.documentElement.style.setProperty("--panel", `${panel}px`);
     const covered = Math.min(0.5, panel / window.innerHeight), same = this.canvas.width === width && this.canvas.height === height;
     const other = !same || Math.abs(covered - this.camera.covered) > 0.01;
     if (!same) Object.assign(this.canvas, { width, height });
@@ -208,13 +226,24 @@ class Viewer {
     this.draw();
   }
 
-  // The whole figure as it stands.
+  // The whole figure, wherever its clip takes the limbs; the camera walks along by itself.
   frame() {
     this.resize();
-    this.skin.update(this.pose, this.expression);
-    const { walked } = this.camera, [low, high] = bounds(this.skin.vertices);
+    const { walked } = this.camera, pose = new Pose(this.avatar), low = Array(3).fill(Infinity), high = Array(3).fill(-Infinity);
+    const clip = this.avatar.clips[this.playing.clip], looks = clip ? Math.min(clip.keys, FRAME_LOOKS) : 1;
+    for (let n = 0; n < looks; n++) {
+      this.take(pose, clip ? Math.floor(n * clip.keys / looks) / clip.fps : 0);
+      this.turn(pose);
+      this.skin.update(pose, this.expression);
+      const [least, most] = bounds(this.skin.vertices), off = [pose.transl[0], 0, pose.transl[2]];
+      off.forEach((x, i) => {
+        low[i] = Math.min(low[i], least[i] - x);
+        high[i] = Math.max(high[i], most[i] - x);
+      });
+    }
     for (const i of [0, 2]) walked[i] = this.pose.transl[i];
-    this.camera.frame(low.map((x, i) => x - walked[i]), high.map((x, i) => x - walked[i]), this.canvas.width / this.canvas.height);
+    this.camera.frame(low, high, this.canvas.width / this.canvas.height);
+    this.move();
   }
 }
 

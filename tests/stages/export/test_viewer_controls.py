@@ -180,6 +180,46 @@ def test_another_size_of_the_page_frames_the_figure_again_unless_it_was_moved_by
     assert page.errors == []
 
 
+def test_a_motion_that_leaps_stays_in_the_picture_unless_the_camera_was_moved_by_hand(page):
+    page.run("location.hash = 'pose=A&leap'")
+    page.until("gsac.playing.pose === 'A' && !gsac.camera.moved")
+    near = page.run("gsac.camera.distance")
+    page.run("""(() => {
+      const rotation = new Float32Array(3 * 3), transl = Float32Array.from([0, 0, 0, 0, 0.9, 0, 3, 0, 0]);
+      gsac.avatar.clips.leap = { fps: 2, loop: false, joints: [0], keys: 3, rotation, transl };
+      gsac.choose({ clip: 'leap' });
+      gsac.seek(0.5);
+      gsac.paused = true;
+      gsac.step(5);
+    })()""")
+    tops = page.run("""[0, 1].map((k) => {
+      if (k) gsac.camera.distance = %s;
+      const { view, focal, centre } = gsac.camera.eye(SIZE, SIZE), p = [0, bounds(gsac.skin.vertices)[1][1], 0];
+      const c = [4, 8].map((r) => view[r] * p[0] + view[r + 1] * p[1] + view[r + 2] * p[2] + view[r + 3]);
+      return focal[1] * c[0] / c[1] + centre[1] + SIZE / 2;
+    })""".replace("SIZE", str(SIZE)) % near)
+    assert tops[0] > 0 > tops[1], "as near as for a pose it would leave the picture"
+    page.run("gsac.camera.moved = true; gsac.camera.distance = 2; gsac.choose({ pose: 'T' })")
+    assert page.run("gsac.camera.distance") == 2 and page.errors == []
+    page.run("delete gsac.avatar.clips.leap")
+
+
+def test_the_open_drawer_leaves_the_buttons_free(page):
+    for size in (SIZE, 1100):
+        page.resize(size, 700)
+        page.run("document.getElementById('faces').hidden = false; for (let i = 0; i < 40; i++)"
+                 "document.getElementById('face-rows').append(document.querySelector('#face-rows .row').cloneNode(true))")
+        page.until(f"gsac.canvas.clientWidth === {size} && parseInt(getComputedStyle(document.documentElement)"
+                   ".getPropertyValue('--panel')) > 0")
+        page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        bottom, top = page.run("[document.getElementById('faces').getBoundingClientRect().bottom,"
+                               "document.getElementById('poses').getBoundingClientRect().top]")
+        assert bottom <= top
+    page.run("document.getElementById('faces').hidden = true;"
+             "document.querySelectorAll('#face-rows .row').forEach((row, i) => i > 1 && row.remove())")
+    page.resize(SIZE, SIZE)
+
+
 def test_on_a_phone_the_open_drawer_is_inside_the_screen_and_leaves_room_for_the_figure(page):
     page.resize(390, 844, 1, True)
     page.run("location.hash = 'pose=A&phone'")
