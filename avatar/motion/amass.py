@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from gsac.avatar.artifacts import ArtifactError, read_arrays
 from gsac.avatar.motion import quat
-from gsac.avatar.motion.source import MotionError, Source
+from gsac.avatar.motion.source import LARGEST, MotionError, Source
 
 FPS = 30.0
 """Where the file names no rate."""
@@ -84,6 +84,6 @@ def _numbers(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...], w
         array = array.reshape(())
     if array.shape != shape:
         raise MotionError(f"{where}: array {name} has shape {arrays[name].shape}, expected {shape}")
-    if not np.isfinite(array).all():
-        raise MotionError(f"{where}: array {name} is not finite")
+    if not (np.abs(array.astype(float)) <= LARGEST).all():
+        raise MotionError(f"{where}: array {name} is not finite, or has numbers beyond {LARGEST:g}")
     return array.astype(float)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from gsac.avatar.motion import quat
-from gsac.avatar.motion.source import MotionError, Source
+from gsac.avatar.motion.source import LARGEST, MotionError, Source
 
 MAX_BYTES = 256 << 20
 MAX_JOINTS = 1000
@@ -57,14 +57,14 @@ class _Reader:
             raise self.bad(f"{found[:40]!r} stands where {' or '.join(wanted)} is expected")
         return found
 
-    def number(self) -> float:
+    def number(self, most: float = LARGEST) -> float:
         word = self.word()
         try:
             value = float(word)
         except ValueError:
             raise self.bad(f"{word[:40]!r} stands where a number is expected") from None
-        if not np.isfinite(value):
-            raise self.bad(f"{word!r} is not a finite number")
+        if not np.isfinite(value) or abs(value) > most:
+            raise self.bad(f"{word[:40]!r} is not a finite number, or is beyond {most:g}")
         return value
 
     def source(self) -> Source:
@@ -74,7 +74,7 @@ class _Reader:
         if self.word("MOTION", "ROOT").lower() == "root":
             raise self.bad("a second ROOT; files with one skeleton are read")
         self.word("Frames:")
-        frames = self.number()
+        frames = self.number(np.inf)
         if frames < 1 or frames != int(frames):
             raise self.bad(f"{frames:g} frames; at least one is expected")
         self.word("Frame")
@@ -139,8 +139,8 @@ class _Reader:
                 out[k] = values
             except ValueError:
                 raise self.bad("something other than numbers") from None
-            if not np.isfinite(out[k]).all():
-                raise self.bad("a number that is not finite")
+            if not (np.abs(out[k]) <= LARGEST).all():
+                raise self.bad(f"a number that is not finite, or beyond {LARGEST:g}")
         if len(rows) < frames:
             raise self.bad(f"the file ends after {len(rows)} of {frames} frames; was it cut off?")
         return out

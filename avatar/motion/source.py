@@ -8,6 +8,9 @@ import numpy as np
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.motion import quat
 
+LARGEST = 1e9
+"""Of any number in a motion file: beyond it sums and products leave float32."""
+
 
 class MotionError(ArtifactError):
     """A motion cannot be read or does not fit a person. Names the file and the line, array or joint."""

@@ -2,7 +2,8 @@
 
 Right, up, back axes, which are the canonical ones: y up, the person faces +z. A gzipped header of 16 bytes, then one array
 after the other: positions as 24-bit fixed point, opacity, colour, logarithm of the scale in steps of 1/16, and the rotation's
-three smaller components with 9 bits and a sign each (format: github.com/nianticlabs/spz, MIT).
+three smaller components with 9 bits and a sign each (format: github.com/nianticlabs/spz, MIT). Version 3 and not 4, because
+more programs read it; PlayCanvas' own parser wants 4, which splat-transform makes of it.
 """
 
 from __future__ import annotations

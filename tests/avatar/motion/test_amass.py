@@ -54,6 +54,7 @@ def test_smpl_poses_leave_the_fingers_still(tmp_path, skeleton, dance):
 @pytest.mark.parametrize(("arrays", "name", "why"), [
     ({}, "", "pose_body"), ({"poses": np.zeros((3, 70))}, "poses", "72"), ({"poses": np.zeros((0, 165))}, "poses", "(0, 165)"),
     ({"poses": np.full((3, 165), np.nan)}, "poses", "finite"), ({"poses": np.full((3, 165), "x")}, "poses", "numbers"),
+    ({"poses": np.full((3, 165), 1e300)}, "poses", "beyond"),
     ({"poses": np.zeros((3, 165)), "trans": np.zeros((4, 3))}, "trans", "(3, 3)"),
     ({"poses": np.zeros((3, 165)), "fps": np.array(0)}, "fps", "frames a second"),
     ({"pose_body": np.zeros((3, 63)), "pose_hand": np.zeros((3, 60))}, "pose_hand", "(3, 90)")])

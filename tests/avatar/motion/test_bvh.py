@@ -57,7 +57,8 @@ def test_windows_line_ends_tabs_and_names_with_spaces_are_read():
     ("Frames: 2", "Frames: 0", 17, "frames"), ("Frames: 2", "Frames: 3", 20, "cut off"), ("Frames: 2", "Frames: 1", 20, "more"),
     ("Frames: 2", "Frames: 1e300", 20, "cut off"), ("0.05", "0", 18, "frame time"),
     ("90 0 0 0 0 0", "90 0 0 0 0", 19, "9 channels"),
-    ("30 20 10", "30 x 10", 20, "numbers"), ("30 20 10", "30 inf 10", 20, "finite"), ("MOTION", "ROOT x", 16, "second ROOT"),
+    ("30 20 10", "30 x 10", 20, "numbers"), ("30 20 10", "30 inf 10", 20, "finite"), ("30 20 10", "30 1e300 10", 20, "beyond"),
+    ("0 90 0", "0 -1e300 0", 4, "beyond"), ("MOTION", "ROOT x", 16, "second ROOT"),
     ("OFFSET 0 10 0\n    }", "OFFSET 0 10 0", 15, "MOTION"), ("JOINT Chest", "JOINT", 7, "name")])
 def test_a_fault_names_the_file_and_the_line(tmp_path, old, new, line, why):
     path = tmp_path / "dance.bvh"

@@ -108,6 +108,25 @@ def test_points_are_the_gaussians_in_linear_units(figure, gltf):
     np.testing.assert_array_equal(a["_GSAC_FACE"], g["face"])
 
 
+def test_points_keep_the_rules_of_the_ratified_extension(figure, gltf):
+    primitive = gltf.doc["meshes"][1]["primitives"][0]
+    assert primitive["mode"] == 0 and gltf.doc["extensionsUsed"] == ["KHR_gaussian_splatting"]
+    assert "extensionsRequired" not in gltf.doc, "tools without it show points"
+    said = primitive["extensions"]["KHR_gaussian_splatting"]
+    assert said == {"kernel": "ellipse", "colorSpace": "srgb_rec709_display", "projection": "perspective",
+                    "sortingMethod": "cameraDistance"}
+    kinds = {"ROTATION": "VEC4", "SCALE": "VEC3", "OPACITY": "SCALAR", "SH_DEGREE_0_COEF_0": "VEC3"}
+    for name, kind in kinds.items():
+        accessor = gltf.doc["accessors"][primitive["attributes"][f"KHR_gaussian_splatting:{name}"]]
+        assert (accessor["type"], accessor["componentType"]) == (kind, 5126), name
+    a = {name: gltf.attributes(1)[f"KHR_gaussian_splatting:{name}"] for name in kinds}
+    np.testing.assert_allclose(np.linalg.norm(a["ROTATION"], axis=1), 1, atol=1e-5)
+    assert a["SCALE"].min() >= 0 and 0 <= a["OPACITY"].min() and a["OPACITY"].max() <= 1
+    np.testing.assert_allclose(a["SH_DEGREE_0_COEF_0"] * .2820947917738781 + .5, figure.gaussians["rgb"], atol=1e-6)
+    node = gltf.doc["nodes"][gltf.node["gaussians"]]
+    assert not {"scale", "matrix", "rotation"} & node.keys()
+
+
 def test_points_move_with_the_skin(figure, gltf):
     elbow = gltf.node["left_elbow"]
     turned = gltf.skinned(1, {elbow: Rotation.from_rotvec([0, -1.2, 0]).as_quat()}, {})
