@@ -277,6 +277,29 @@ def test_no_headset_no_button_and_each_eye_sees_the_avatar_from_its_place(addres
         page.close()
 
 
+def test_where_the_page_draws_without_webgl_the_headset_gets_one_of_its_own(address):
+    page = chromium.Browser(SIZE, SIZE)
+    try:
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=HEADSET)
+        page.open(address + "?own#pose=T&bg=204060&draw=software")
+        click(page, "xr-vr")
+        page.until("gsac.session !== null && Headset.session.next instanceof Function")
+        eye = [1.2, 0, 0, 0, 0, 1.2, 0, 0, 0, 0, -1, -1, 0, 0, -0.1, 0]
+        page.run(f"Headset.at(0, 1.0, 0, [{{x: 0, y: 0, width: 150, height: 150}}], [{eye}])")
+        pixels = np.array(page.run("""(() => {
+          Headset.session.show();
+          const { gl } = gsac.headset, pixels = new Uint8Array(150 * 150 * 4);
+          gl.readPixels(0, 0, 150, 150, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+          return Array.from(pixels);
+        })()""")).reshape(150, 150, 4)[..., :3]
+        assert np.abs(pixels[2, 2] - (0x20, 0x40, 0x60)).max() <= 1 and red(pixels).any()
+        page.run("Headset.session.end()")
+        page.until("gsac.session === null")
+        assert page.errors == []
+    finally:
+        page.close()
+
+
 SHADOWED = """(() => {
   gsac.still = true;
   document.body.classList.add('bare');

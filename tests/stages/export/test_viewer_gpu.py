@@ -1,5 +1,6 @@
 """viewer.html on WebGPU: its shaders are Unity's, it is taken where there is a graphics card, and what stops is followed up."""
 
+import re
 import shutil
 
 import numpy as np
@@ -40,6 +41,22 @@ def test_the_hlsl_gives_these_very_shaders(node_package):
     if f"glslang {wgsl.glslang_version()}," not in written:
         pytest.skip("shaders.js was written with another version of glslang")
     assert wgsl.script(wgsl.wgsl(node_package(wgsl.NAGA) / "node_modules")) == written
+
+
+@pytest.mark.slow
+def test_the_other_browsers_compiler_takes_them_too():
+    """naga, which Firefox has; chromium has tint."""
+    wgpu = pytest.importorskip("wgpu", reason="needs the package wgpu (pip install gsac[dev])")
+    adapters = wgpu.gpu.enumerate_adapters_sync()
+    if not adapters:
+        pytest.skip("needs a Vulkan device (Debian package mesa-vulkan-drivers)")
+    device = adapters[0].request_device_sync()
+    shaders = re.findall(r"^  (\w+): \{ bindings.*?code: `\n(.*?)` \},$", wgsl.WRITTEN.read_text(), re.S | re.M)
+    assert [entry for entry, _ in shaders] == list(wgsl.ENTRIES)
+    for entry, code in shaders:
+        module = device.create_shader_module(code=code)
+        if wgsl.ENTRIES[entry] == "comp":
+            device.create_compute_pipeline(layout="auto", compute={"module": module, "entry_point": entry})
 
 
 def test_parameters_stand_where_wgsl_lays_them():
