@@ -2,8 +2,8 @@
 
 Mesh: 55 joints with identity rest rotations, at most 4 weights a vertex, y up, facing +z, feet at y = 0; expressions are
 morph targets by their ARKit names.
-Gaussians: a POINTS primitive in T-pose with KHR_gaussian_splatting as ratified (linear scales, opacities after the sigmoid), on the
-same skin, each with the mesh face that it is bound to in `_GSAC_FACE`.
+Gaussians: a POINTS primitive in T-pose with KHR_gaussian_splatting (its release candidate: linear scales, opacities after the
+sigmoid), on the same skin, each with the mesh face that it is bound to in `_GSAC_FACE`.
 """
 
 from __future__ import annotations

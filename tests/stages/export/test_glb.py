@@ -108,7 +108,7 @@ def test_points_are_the_gaussians_in_linear_units(figure, gltf):
     np.testing.assert_array_equal(a["_GSAC_FACE"], g["face"])
 
 
-def test_points_keep_the_rules_of_the_ratified_extension(figure, gltf):
+def test_points_keep_the_rules_of_the_extensions_release_candidate(figure, gltf):
     primitive = gltf.doc["meshes"][1]["primitives"][0]
     assert primitive["mode"] == 0 and gltf.doc["extensionsUsed"] == ["KHR_gaussian_splatting"]
     assert "extensionsRequired" not in gltf.doc, "tools without it show points"
