@@ -23,7 +23,7 @@ class SmplxConfig:
     focal_px: float | None = None
     """Focal length when the clip does not carry it; None estimates it."""
     rounds: int = 2
-    """How often the silhouette's correspondences are renewed."""
+    """How often the silhouette's correspondences are renewed, and what the clip keeps to."""
     iterations: int = 8
     """Levenberg-Marquardt steps a round, at most."""
     silhouette: float = 1.0

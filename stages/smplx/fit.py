@@ -1,4 +1,4 @@
-"""The Levenberg-Marquardt fit of one clip: start, body, outline rounds, fingers."""
+"""The Levenberg-Marquardt fit of one clip: start, body, rounds that renew outlines and what is held, fingers."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     seen.repeats = repeats(state.local[:, 0])
     take_off_habits(seen, sightings, detector, BODY_POINTS, state)
     problem.limit = FAR_OFF * ROBUST
-    free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1, bool)
+    free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1 + len(state.held), bool)
     trunk_only = free.copy()
     trunk_only[3:-3] = True
     state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, START_STEPS)
@@ -111,10 +111,12 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, 3 * config.iterations)
     steps, iou = trace.steps + more.steps, np.full(len(sightings.xy), np.nan)
     problem.outline_weight, problem.limit, seen.depth_spread = config.silhouette, ROBUST, DEPTH_TRUST
-    for r in range(config.rounds if config.silhouette > 0 else 0):
+    for r in range(config.rounds):
         progress(r, config.rounds + 1, "rounds")
         take_off_habits(seen, sightings, detector, BODY_POINTS, state)
-        iou = renew_outlines(problem, state, sightings)
+        if config.silhouette > 0:
+            iou = renew_outlines(problem, state, sightings)
+        state.held = problem.held.learn(state.local[:, problem.active], state.held)
         state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, config.iterations)
         steps += more.steps
     state, more = fit_fingers(sightings, detector, problem, state, config)
@@ -176,7 +178,7 @@ def starting_state(body: Body, sightings: Sightings, focal: float, center: np.nd
         transl[:], known[:] = [0, 0, focal * 1.7 / sightings.person_height], True
     for c in range(3):
         transl[:, c] = np.interp(np.arange(frames), np.nonzero(known)[0], transl[known, c])
-    return State(local, transl, np.zeros(body.num_betas), float(np.log(focal)))
+    return State(local, transl, np.zeros(body.num_betas), float(np.log(focal)), np.zeros(3 * len(BODY_JOINTS) + 2))
 
 
 def repeats(turns: np.ndarray) -> float:
@@ -222,7 +224,7 @@ def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, stat
     pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS], detector.offsets[FINGER_POINTS])
     seen = observations(sightings, detector, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, [])
     fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, 0.0)
-    state = State(state.local.copy(), state.transl, state.betas, state.log_focal)
+    state = State(state.local.copy(), state.transl, state.betas, state.log_focal, np.zeros(0))
     state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)
     frozen = np.zeros(fingers.size, bool)
     frozen[-3:] = True

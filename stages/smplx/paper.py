@@ -84,7 +84,7 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     local, transl, betas, joint_offset = unknowns.found()
     if sightings.seconds is not None:
         local, transl = smooth_rotations(local), smooth_linear(transl)
-    state = State(local, transl, betas, start.log_focal)
+    state = State(local, transl, betas, start.log_focal, np.zeros(0))
     notes = ("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's regression",)
     if objective.head is None:
         notes += ("face.npz holds no head mesh; the paper's face terms (vertex, Laplacian, edge) are off",)

@@ -1,7 +1,7 @@
 """The fit as one least-squares problem: state, residuals, cost and normal equations.
 
 Residuals are in units of their own spread, so that weights are probabilities and not taste. Data terms are robust
-(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = B + 1 shared ones.
+(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = B + 1 + H shared ones.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.smplx import prior
+from gsac.stages.smplx.held import Held
 from gsac.stages.smplx.points import Chain, Pairs, Skeleton, positions, pulled_back
 from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.solver import System
@@ -34,6 +35,8 @@ class State:
     transl: np.ndarray  # (T, 3) m
     betas: np.ndarray  # (B,)
     log_focal: float
+    held: np.ndarray
+    """(H,) what the clip keeps to, as in held.py; empty where that is not sought."""
 
 
 @dataclass
@@ -76,6 +79,7 @@ class Problem:
         self.speed_spread, self.acceleration_spread = speed, acceleration
         self.smoothness, self.outline_weight = smoothness, outline_weight
         self.limit = ROBUST
+        self.held = Held(active)
         self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
         self.size = 3 * len(active) + 3
         top, sole = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
@@ -86,7 +90,9 @@ class Problem:
         """step: (T, n); shared: (s,)."""
         local = state.local.copy()
         local[:, self.active] = local[:, self.active] @ rotation.exp(step[:, :-3].reshape(len(step), -1, 3))
-        return State(local, state.transl + step[:, -3:], state.betas + shared[:-1], state.log_focal + float(shared[-1]))
+        b = len(state.betas)
+        return State(local, state.transl + step[:, -3:], state.betas + shared[:b], state.log_focal + float(shared[b]),
+                     state.held + shared[b + 1:])
 
     def project(self, state: State, x: np.ndarray) -> np.ndarray:
         return np.exp(state.log_focal) * x[..., :2] / np.maximum(x[..., 2:], 0.05) + self.seen.center
@@ -103,19 +109,24 @@ class Problem:
             total += self._outline_share(len(x)) * robust(scaled, OUTLINE_ROBUST)[0].sum()
         vector = rotation.log(state.local[:, self.active])
         total += (self._prior_residual(vector) ** 2).sum() + (self._limit_residual(vector)[0] ** 2).sum()
+        if len(state.held):
+            total += (self.held.residual(state.local[:, self.active], vector, state.held) ** 2).sum()
         total += sum((r**2).sum() for r in self._temporal_residuals(state, self._turns(state)[0]))
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
     def linearise(self, state: State) -> System:
         system = self.of_each_frame(state)
         self._add_temporal(system, state)
+        if len(state.held):
+            local = state.local[:, self.active]
+            self.held.add(system, local, rotation.log(local), state.held, len(state.betas) + 1)
         residual, jacobian = self._shared_residual(state)
         system.add_shared(jacobian, residual)
         return system
 
     def of_each_frame(self, state: State) -> System:
         """Normal equations of what each frame shows by itself, and of the pose prior."""
-        system = System.zeros(len(state.local), self.size, len(state.betas) + 1)
+        system = System.zeros(len(state.local), self.size, len(state.betas) + 1 + len(state.held))
         chain = self.skeleton.pose(state.local, state.betas)
         self._add_points(system, state, chain)
         for t, x in self.outline_points(chain, state):
@@ -280,14 +291,16 @@ class Problem:
                 system.band[frames, block, columns] += left.transpose(0, 2, 1) @ right
 
     def _shared_residual(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Shape, focal and height priors: residuals (R,) and rows (R, s).
+        """Shape, focal and height priors, and those of what is held: residuals (R,) and rows (R, s).
 
         Frames of one view share their errors (clothes, the detector's habits), so that the priors count once for each repeat.
         """
         b, (focal, focal_spread), (metres, spread) = len(state.betas), self.seen.focal_prior, self.seen.height
-        rows = np.concatenate([np.eye(b + 1), np.append(self.height_dirs, 0)[None]])
-        rows[b:] /= np.array([[focal_spread], [spread]])
+        spreads = np.concatenate([np.ones(b), [focal_spread], self.held.mean_spread[:len(state.held)]])
+        rows = np.concatenate([np.diag(1 / spreads), np.zeros((1, len(spreads)))])
+        rows[-1, :b] = self.height_dirs / spread
         tall = self.height + self.height_dirs @ state.betas
-        residual = np.array([*state.betas, (state.log_focal - np.log(focal)) / focal_spread, (tall - metres) / spread])
+        away = np.concatenate([state.betas, [state.log_focal - np.log(focal)], state.held - self.held.mean[:len(state.held)]])
+        residual = np.append(away / spreads, (tall - metres) / spread)
         count = np.sqrt(self.seen.repeats)
         return residual * count, rows * count

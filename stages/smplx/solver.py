@@ -28,15 +28,15 @@ class System:
                    np.zeros((frames, size)), np.zeros(shared))
 
     def add(self, frames: slice, jacobian: np.ndarray, residual: np.ndarray) -> None:
-        """Rows (F, R, n + s) and residuals (F, R) of F frames."""
-        n = self.gradient.shape[1]
+        """Rows (F, R, n + s') and residuals (F, R) of F frames, by the first s' shared unknowns."""
+        n, shared = self.gradient.shape[1], slice(jacobian.shape[2] - self.gradient.shape[1])
         across = jacobian.swapaxes(1, 2)
         square, slope = across @ jacobian, (across @ residual[..., None])[..., 0]
         self.band[frames, :, :n] += square[:, :n, :n]
-        self.arrow[frames] += square[:, :n, n:]
-        self.shared += square[:, n:, n:].sum(0)
+        self.arrow[frames, :, shared] += square[:, :n, n:]
+        self.shared[shared, shared] += square[:, n:, n:].sum(0)
         self.gradient[frames] += slope[:, :n]
-        self.shared_gradient += slope[:, n:].sum(0)
+        self.shared_gradient[shared] += slope[:, n:].sum(0)
 
     def add_shared(self, jacobian: np.ndarray, residual: np.ndarray) -> None:
         """Rows (R, s) on the shared unknowns alone."""

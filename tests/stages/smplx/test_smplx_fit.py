@@ -13,10 +13,12 @@ from gsac.stages.smplx import STAGE
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
 from gsac.stages.smplx.fit import BODY_POINTS, HIPS, Sightings, fit_clip, observations, to_params
+from gsac.stages.smplx.held import Held
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS
 from gsac.stages.smplx.problem import Problem, State
 from gsac.stages.smplx.silhouette import Outline, outline_points, read_outline
+from gsac.stages.smplx.solver import System
 from scipy.spatial.transform import Rotation
 
 WIDTH, HEIGHT, FOCAL = 360, 640, 700.0
@@ -140,7 +142,7 @@ def test_derivatives_agree_with_finite_differences(body, tmp_path):
     pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
     rng = np.random.default_rng(0)
     state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
-                  truth.transl.astype(float) + 0.02, rng.normal(0, 0.3, body.num_betas), float(np.log(FOCAL)))
+                  truth.transl.astype(float) + 0.02, rng.normal(0, 0.3, body.num_betas), float(np.log(FOCAL)), np.zeros(0))
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0)
     camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
     chain = problem.skeleton.pose(state.local, state.betas)
@@ -166,13 +168,56 @@ def check_gradient(problem: Problem, state: State, rng, h: float, tolerance: flo
         system = problem.linearise(state)
         for _ in range(4):
             step = rng.normal(0, 1, (len(state.local), problem.size))
-            shared = rng.normal(0, 1, len(state.betas) + 1) * 0.3
+            shared = rng.normal(0, 1, len(state.betas) + 1 + len(state.held)) * 0.3
             slope = (problem.cost(problem.move(state, h * step, h * shared))
                      - problem.cost(problem.move(state, -h * step, -h * shared))) / (2 * h)
             expected = 2 * ((system.gradient * step).sum() + system.shared_gradient @ shared)
             assert slope == pytest.approx(expected, rel=tolerance)
     finally:
         module.robust = robust
+
+
+def test_derivatives_of_what_is_held_agree_with_finite_differences(body):
+    """Gradient and, as these residuals have no outliers and hardly bend, the normal equations too."""
+    truth = turning_person(body, 4)
+    local = rotation.exp(truth.pose[:, :22].astype(float) + np.random.default_rng(2).normal(0, 0.05, (4, 22, 3)))
+    held = Held(BODY_JOINTS)
+    value = held.learn(local, np.zeros(68)) + np.random.default_rng(3).normal(0, 0.05, 68)
+    system = System.zeros(4, 69, 17 + 68)
+    held.add(system, local, rotation.log(local), value, 17)
+
+    def residual(step: np.ndarray, shared: np.ndarray) -> np.ndarray:
+        moved = local @ rotation.exp(step)
+        return held.residual(moved, rotation.log(moved), value + shared).ravel()
+
+    steps = np.concatenate([np.eye(4 * 66).reshape(-1, 4, 22, 3), np.zeros((68, 4, 22, 3))])
+    shared = np.concatenate([np.zeros((4 * 66, 68)), np.eye(68)])
+    columns = [(residual(1e-5 * a, 1e-5 * b) - residual(-1e-5 * a, -1e-5 * b)) / 2e-5 for a, b in zip(steps, shared, strict=True)]
+    jacobian = np.stack(columns, 1)
+    frames, clip = np.split(jacobian.T @ residual(0 * steps[0], 0 * shared[0]), [4 * 66])
+    assert np.allclose(system.gradient[:, :66].ravel(), frames, atol=1e-4)
+    assert np.allclose(system.shared_gradient[17:], clip, atol=1e-4)
+    normal = jacobian.T @ jacobian
+    assert np.allclose(system.shared[17:, 17:], normal[4 * 66:, 4 * 66:], atol=1e-3)
+    for t in range(4):
+        own = slice(66 * t, 66 * t + 66)
+        assert np.allclose(system.band[t, :66, :66], normal[own, own], atol=1e-3)
+        assert np.allclose(system.arrow[t, :66, 17:], normal[own, 4 * 66:], atol=1e-3)
+
+
+def test_who_turns_is_held_and_who_moves_is_let_go(body):
+    turning = rotation.exp(turning_person(body, 20).pose[:, :22].astype(float))
+    squatting = rotation.exp(np.zeros((20, 22, 3)) + np.eye(22)[[1, 2, 4, 5]].sum(0)[:, None] * [1, 0, 0]
+                             * np.linspace(0, 1.6, 20)[:, None, None])
+    waving = turning.copy()
+    waving[:, 16] = rotation.exp(np.linspace(-1, 1, 20)[:, None] * [0.0, 0, 1])
+    held = Held(BODY_JOINTS)
+    finite = {}
+    for name, local in (("turning", turning), ("squatting", squatting), ("waving", waving)):
+        held.learn(local, np.zeros(68))
+        finite[name] = np.isfinite(held.spread).any(1)
+    assert finite["turning"].all() and not finite["squatting"].any()
+    assert not finite["waving"][[13, 16, 18, 20]].any() and finite["waving"][[1, 4, 14, 17]].all()
 
 
 @pytest.mark.parametrize("values,name", [({"method": "magic"}, "smplx.method"), ({"height_m": 17.0}, "smplx.height_m"),
