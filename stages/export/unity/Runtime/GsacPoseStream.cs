@@ -94,8 +94,8 @@ namespace Gsac
         {
             listening = false;
             if (socket == null) return;
-            socket.Close();
             thread.Join();
+            socket.Close();
             socket = null;
         }
 
@@ -113,10 +113,6 @@ namespace Gsac
                 catch (SocketException e)
                 {
                     if (e.SocketErrorCode == SocketError.ConnectionReset || e.SocketErrorCode == SocketError.MessageSize) continue;
-                    return;
-                }
-                catch (ObjectDisposedException)
-                {
                     return;
                 }
                 lock (padlock)

@@ -15,6 +15,7 @@ namespace Gsac
     public sealed class GsacRenderer : MonoBehaviour
     {
         const int ThreadsPerGroup = 64;
+        const float Slack = 0.9f;
         static readonly int VertexCountId = Shader.PropertyToID("GsacVertexCount");
         static readonly int SplatCountId = Shader.PropertyToID("GsacSplatCount");
         static readonly int RestId = Shader.PropertyToID("GsacRest");
@@ -50,6 +51,7 @@ namespace Gsac
         Material material;
         GraphicsBuffer bones, weights, posed, splats;
         Vector4[] boneRows;
+        int drawn;
         string trouble;
 
         /// <summary>m: where an avatar with several levels of detail begins to use coarser ones.</summary>
@@ -208,13 +210,19 @@ namespace Gsac
             cameras = new Camera[most];
         }
 
-        /// <summary>Level of detail for the nearest camera.</summary>
+        /// <summary>Level of detail for the nearest camera; the one of before while the distance is about where they change.</summary>
         int Level(int count)
         {
             float nearest = float.MaxValue;
             for (int i = 0; i < count; i++) nearest = Math.Min(nearest, Vector3.Distance(cameras[i].transform.position, transform.position));
+            drawn = Math.Min(Math.Max(drawn, LevelAt(nearest * Slack)), LevelAt(nearest));
+            return drawn;
+        }
+
+        int LevelAt(float distance)
+        {
             int level = 0;
-            for (float within = finestWithin; level + 1 < model.Levels.Length && nearest > within; within *= 2) level++;
+            for (float within = finestWithin; level + 1 < model.Levels.Length && distance > within; within *= 2) level++;
             return level;
         }
 

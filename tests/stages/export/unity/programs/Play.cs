@@ -279,7 +279,7 @@ public static class Play
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
         Camera camera = Player.AddCamera("eye");
         Player.OnDraw = (asked, indices, count) => Console.WriteLine(count / 6);
-        foreach (float away in new[] { 3f, 12f, 30f, 300f })
+        foreach (float away in new[] { 3f, 12f, 30f, 300f, 3f, 8.5f, 9.2f, 8.5f, 7.9f })
         {
             camera.transform.SetPositionAndRotation(new Vector3(0, 1, away), Quaternion.Euler(0, 180, 0));
             Player.Frame(new[] { avatar.gameObject })();
