@@ -5,10 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import os
 import resource
 import shutil
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 
 from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.train import STAGE
@@ -21,6 +25,8 @@ class Case:
     name: str
     inputs: dict[str, Path]
     """Ports of `train`."""
+    novel: Path | None = None
+    """Folder of a truth clip of the same person in other poses."""
 
 
 def declare(parser: argparse.ArgumentParser, name: str) -> None:
@@ -34,11 +40,19 @@ def declare(parser: argparse.ArgumentParser, name: str) -> None:
     parser.add_argument("--out", type=Path, default=Path(f"bench-{name}"), metavar="DIR", help=f"default: ./bench-{name}")
 
 
-def cases(options: argparse.Namespace, say) -> list[Case]:
-    """Clips of the options, fitted where they are not yet."""
+def cases(options: argparse.Namespace, say, novel: int = 0, exact: bool = False) -> list[Case]:
+    """Clips of the options, fitted where they are not yet.
+
+    novel: frames of other poses of each rendered person; exact: each such clip also with the true poses, as `NAME_exact`.
+    """
     seeds = options.seeds if options.seeds is not None else [] if options.run else [31]
     found = [of_run(folder) for folder in options.run]
-    return found + [_rendered(seed, options, say) for seed in seeds]
+    for seed in seeds:
+        case = _rendered(seed, options, say)
+        if novel:
+            case.novel = clip(options.out, f"seed{seed}_novel_{novel}", say, seed=seed, frames=novel, poses="novel")
+        found += [case, _exact(case, options.out)] if exact else [case]
+    return found
 
 
 def of_run(folder: Path) -> Case:
@@ -50,19 +64,40 @@ def of_run(folder: Path) -> Case:
     return Case(folder.name, inputs)
 
 
-def train(case: Case, folder: Path, **values) -> dict:
-    """metrics.json of one training, and `peak_gb`, the most memory that its process held. folder: written anew.
+def side_by_side(work: Callable, calls: list[tuple], jobs: int) -> list:
+    """work(*call, cores=...) of every call, `jobs` at a time, each on its share of the cores; the results in order."""
+    cores = sorted(os.sched_getaffinity(0)) if jobs > 1 else None
+    shares: SimpleQueue = SimpleQueue()
+    for k in range(jobs):
+        shares.put(cores and cores[k * len(cores) // jobs:(k + 1) * len(cores) // jobs])
 
+    def one(call: tuple):
+        share = shares.get()
+        try:
+            return work(*call, cores=share)
+        finally:
+            shares.put(share)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        return list(pool.map(one, calls))
+
+
+def train(case: Case, folder: Path, cores: list[int] | None = None, **values) -> dict:
+    """metrics.json of one training, and `peak_gb`, the most memory that its process held.
+
+    folder: written anew; cores: those that it may use, all unless given.
     LPIPS is measured where its weights are in the store, but is in no loss: on the CPU recipe `paper` would take hours.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        peak = pool.apply(_train, (case.inputs, folder, values))
+        peak = pool.apply(_train, (case.inputs, folder, values, cores))
     return json.loads((folder / "metrics.json").read_text()) | {"peak_gb": peak}
 
 
-def _train(inputs: dict[str, Path], folder: Path, values: dict) -> float:
+def _train(inputs: dict[str, Path], folder: Path, values: dict, cores: list[int] | None) -> float:
+    if cores:
+        os.sched_setaffinity(0, cores)
     from gsac.stages.train.stage import run
 
     config = make_config(STAGE, {"lpips": "judge"} | values)
@@ -82,6 +117,18 @@ def networks(config) -> dict[str, Path]:
 def _rendered(seed: int, options: argparse.Namespace, say) -> Case:
     folder = clip(options.out, f"seed{seed}_{options.frames}", say, seed=seed, frames=options.frames)
     return fitted(options.out, folder, "", say)
+
+
+def _exact(case: Case, out: Path) -> Case:
+    """The case with the truth in the place of the body fit."""
+    from gsac.avatar.body import Body
+    from gsac.benchmarks.speed_accuracy.novel import true_params
+
+    name = f"{case.name}_exact"
+    path = out / "runs" / name / "smplx" / "body.npz"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    true_params(out / "clips" / case.name / "truth.npz", Body.load().digest).write(path)
+    return Case(name, case.inputs | {"smplx/body.npz": path}, case.novel)
 
 
 def clip(out: Path, name: str, say, **turntable) -> Path:

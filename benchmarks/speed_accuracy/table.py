@@ -6,11 +6,14 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, seconds_to
+from gsac.benchmarks.speed_accuracy.trial import NOVEL, Trial, hypervolume, seconds_to
 
 QUALITIES = (22.0, 24.0, 25.0, 26.0, 28.0)
-HEAD = ("clip", "recipe", "steps", "seeds", "gaussians", "CPU s", "psnr_fg", "+-", "aligned", "ssim", "detail", "peak GB",
-        *(f"s to {q:g}" for q in QUALITIES))
+HEAD = ("clip", "recipe", "steps", "seeds", "gaussians", "CPU s", "psnr_fg", "+-", "aligned", "ssim", "detail", "flip",
+        "novel", "aligned", "flip", "stray", "needles", "peak GB", *(f"s to {q:g}" for q in QUALITIES))
+DIFFERENCES = {"flip": "FLIP {:+.4f}", "psnr_novel": "novel poses {:+.2f} dB", "psnr_novel_aligned": "aligned {:+.2f} dB",
+               "flip_novel": "FLIP {:+.4f}"}
+"""What else the ends are compared by."""
 
 
 def text(trials: list[Trial]) -> str:
@@ -36,18 +39,22 @@ def compared(trials: list[Trial]) -> list[str]:
         first = (f"reaches paper's {goal:.2f} dB after {min(reached):.1f} CPU s, {cost / min(reached):.1f}x sooner than paper "
                  f"({cost:.0f} CPU s)" if reached else f"never reaches paper's {goal:.2f} dB")
         out.append(f"{clip}: fast {first}; its best end is {best.psnr_fg - goal:+.2f} dB, in {best.cpu_s:.1f} CPU s")
+        more = [words.format(getattr(best, name) - np.mean([getattr(t, name) for t in paper]))
+                for name, words in DIFFERENCES.items() if all(getattr(t, name) is not None for t in [best, *paper])]
+        out += [f"{clip}: that end against paper's: {', '.join(more)}"] if more else []
         out += [f"{clip}: hypervolume of {name} {hypervolume([p for t in some for p in t.curve]):.2f} decades x dB"
                 for name, some in (("fast", fast), ("paper", paper))]
     return out
 
 
 def write_csv(trials: list[Trial], path: Path) -> None:
-    """Every checkpoint, unrounded; the last of a training is its end."""
+    """Every checkpoint, unrounded; the last of a training is its end, and what stands behind `psnr_fg` is of the end."""
     with open(path, "w", newline="") as f:
         sheet = csv.writer(f)
-        sheet.writerow(["clip", "recipe", "steps", "seed", "n_gaussians", "peak_gb", "cpu_seconds", "psnr_fg"])
+        sheet.writerow(["clip", "recipe", "steps", "seed", "n_gaussians", "peak_gb", "cpu_seconds", "psnr_fg", *NOVEL])
         for t in trials:
-            sheet.writerows([t.clip, t.recipe, t.steps, t.seed, t.n_gaussians, t.peak_gb, s, q] for s, q in t.curve)
+            at_end = [getattr(t, name) for name in NOVEL]
+            sheet.writerows([t.clip, t.recipe, t.steps, t.seed, t.n_gaussians, t.peak_gb, s, q, *at_end] for s, q in t.curve)
 
 
 def _row(some: list[Trial]) -> tuple[str, ...]:
@@ -62,4 +69,5 @@ def _row(some: list[Trial]) -> tuple[str, ...]:
     spread = f"{np.std([t.psnr_fg for t in some], ddof=1):.2f}" if len(some) > 1 else "-"
     return (some[0].clip, some[0].recipe, str(some[0].steps), str(len(some)), mean("n_gaussians", ".0f"), mean("cpu_s", ".1f"),
             mean("psnr_fg", ".2f"), spread, mean("psnr_fg_ttpo", ".2f"), mean("ssim", ".4f"), mean("detail", ".2f"),
-            mean("peak_gb", ".2f"), *times)
+            mean("flip", ".4f"), mean("psnr_novel", ".2f"), mean("psnr_novel_aligned", ".2f"), mean("flip_novel", ".4f"),
+            mean("stray_alpha", ".4f"), mean("needle_share", ".4f"), mean("peak_gb", ".2f"), *times)

@@ -10,6 +10,8 @@ from gsac.stages.contract import BadInput
 WORST_S, WORST_DB = 3600.0, 20.0
 """Reference point of the hypervolume."""
 
+NOVEL = ("flip", "psnr_novel", "psnr_novel_aligned", "flip_novel", "stray_alpha", "needle_share")
+
 
 @dataclass
 class Trial:
@@ -26,6 +28,13 @@ class Trial:
     detail: float
     n_gaussians: int
     peak_gb: float
+    flip: float | None = None
+    psnr_novel: float | None = None
+    """In poses that no frame shows; None where no truth of them is at hand. `_aligned`: moved to each image first."""
+    psnr_novel_aligned: float | None = None
+    flip_novel: float | None = None
+    stray_alpha: float | None = None
+    needle_share: float | None = None
 
 
 def trial(clip: str, metrics: dict) -> Trial:
@@ -35,7 +44,8 @@ def trial(clip: str, metrics: dict) -> Trial:
         raise BadInput(f"{clip}: no frame is held out, there is nothing to compare by")
     curve.append((metrics["cpu_seconds"], metrics["psnr_fg"]))
     return Trial(clip, metrics["recipe"], metrics["steps"], metrics["seed"], curve, metrics["cpu_seconds"], metrics["psnr_fg"],
-                 metrics["psnr_fg_ttpo"], metrics["ssim"], metrics["detail"], metrics["n_gaussians"], metrics["peak_gb"])
+                 metrics["psnr_fg_ttpo"], metrics["ssim"], metrics["detail"], metrics["n_gaussians"], metrics["peak_gb"],
+                 **{name: metrics.get(name) for name in NOVEL})
 
 
 def seconds_to(trial: Trial, quality: float) -> float | None:

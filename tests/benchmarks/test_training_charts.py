@@ -1,13 +1,14 @@
 """What the training charts are made of, on made-up trainings."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from gsac.benchmarks import training
 from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart
-from gsac.benchmarks.speed_accuracy import chart, table
+from gsac.benchmarks.speed_accuracy import chart, novel, table
 from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto, seconds_to
 from gsac.pipeline.commands.bench import names
 from gsac.stages.contract import BadInput
@@ -57,6 +58,26 @@ def test_charts_and_csv_are_written(tmp_path):
     assert list(csv.reader(open(tmp_path / "n.csv")))[2][1] == "400" and size.text({"a": rungs}).splitlines()[2].endswith("*")
     for path in chart.draw([FAST, PAPER], tmp_path) + size_chart.draw({"a": rungs}, {"a": [(400, 24.0)]}, tmp_path):
         assert path.stat().st_size > 5000
+
+
+def test_ends_are_compared_in_novel_poses_where_both_were_judged_there():
+    fast, paper = replace(FAST, psnr_novel=21.5, flip_novel=0.2), replace(PAPER, psnr_novel=20.0, flip_novel=0.25)
+    assert "novel poses +1.50 dB, FLIP -0.0500" in table.text([fast, paper])
+    assert "novel poses" not in table.text([fast, PAPER])
+
+
+def test_trainings_side_by_side_share_the_cores_and_come_back_in_order(monkeypatch):
+    monkeypatch.setattr(training.os, "sched_getaffinity", lambda pid: set(range(5)))
+    used = training.side_by_side(lambda k, cores: (k, tuple(cores)), [(k,) for k in range(6)], 2)
+    assert [k for k, _ in used] == list(range(6)) and {cores for _, cores in used} <= {(0, 1), (2, 3, 4)}
+    assert training.side_by_side(lambda k, cores: cores, [(1,)], 1) == [None], "alone a training may use all cores"
+
+
+def test_joints_are_moved_onto_the_rays_of_the_truth():
+    rng = np.random.default_rng(0)
+    truth = rng.normal(0, 0.4, (22, 3)) + [0.2, 0.1, 4.0]
+    small, shift = 0.9 * truth, np.array([0.3, -0.2, 0.5])
+    assert novel.moved(small - shift, truth) == pytest.approx(shift, abs=1e-9), "nearer and smaller looks the same"
 
 
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):

@@ -1,0 +1,82 @@
+"""An avatar in poses that it was not trained on, against the same person's truth in these poses.
+
+The truth's joint rotations and expressions pose the avatar's own body. Its size differs from the truth's, since one camera
+cannot see scale: a frame's translation is the one that brings the avatar's joints closest to the truth's in the image.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from gsac.avatar.artifacts import frame_paths, read_arrays, read_frame
+from gsac.avatar.body import Body, BodyParams, J
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.metrics import summary
+from gsac.stages.train.evaluate import align_poses, judge
+from gsac.stages.train.poses import Poses
+from gsac.stages.train.views import View
+
+ALIGN_STEPS = 40
+BODY = slice(0, 22)
+"""Joints that are brought to the truth's: the fingers follow."""
+
+
+def true_params(truth: Path, model: str) -> BodyParams:
+    """The truth's poses, of a turntable's truth.npz. model: digest of the body that they are to pose."""
+    arrays = read_arrays(truth)
+    named = {name: arrays[name] for name in BodyParams.__dataclass_fields__ if name not in ("model", "sigma_joints")}
+    return BodyParams(**named, sigma_joints=np.full((len(arrays["transl"]), J), 1e-3, np.float32), model=model)
+
+
+def judge_poses(trained: Path, clip: Path, height: int, folder: Path) -> dict[str, float]:
+    """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first moved to its image.
+
+    trained: what `train` gave; clip: a turntable's folder of novel poses; folder: for truth, render and error images.
+    """
+    body, gaussians = Body.load(), Gaussians.read(trained / "avatar.npz")
+    truth = true_params(clip / "truth.npz", body.digest)
+    views = read_views(clip, truth, height)
+    params = carried_over(BodyParams.read(trained / "body.npz"), truth, body)
+    poses, frames = Poses(body, params), range(params.frames)
+    folder.mkdir(parents=True, exist_ok=True)
+    found = named(summary(judge(gaussians, poses, frames, views, folder, flip=True)), "novel")
+    align_poses(gaussians, poses, np.arange(params.frames), views, ALIGN_STEPS)
+    return found | named(summary(judge(gaussians, poses, frames, views, flip=True)), "novel_aligned")
+
+
+def named(figures: dict, ending: str) -> dict[str, float]:
+    return {f"{name.removesuffix('_fg')}_{ending}": figures[name] for name in ("psnr_fg", "ssim", "flip", "detail")}
+
+
+def read_views(clip: Path, truth: BodyParams, height: int) -> list[View]:
+    """Frames cut out with their masks, `height` px high."""
+    views = []
+    for path in frame_paths(clip / "frames"):
+        rgb, mask = read_frame(path), cv2.imread(str(clip / "mask" / path.name), cv2.IMREAD_GRAYSCALE)
+        camera = truth.camera(mask.shape[1], mask.shape[0])
+        pixels = np.dstack([rgb * (mask[..., None] / 255), mask])
+        width = max(1, round(mask.shape[1] * height / mask.shape[0]))
+        pixels = cv2.resize(pixels, (width, height), interpolation=cv2.INTER_AREA)
+        views.append(View(camera.scaled(width, height), np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0)))
+    return views
+
+
+def carried_over(own: BodyParams, truth: BodyParams, body: Body) -> BodyParams:
+    """The avatar's body in the truth's poses, before the truth's camera."""
+    params = BodyParams.from_pose(truth.pose, np.zeros_like(truth.transl), own.betas, truth.expression, truth.focal,
+                                  truth.center, own.joint_offset, own.model)
+    joints = body.posed(params)[1]
+    params.transl = np.stack([moved(at[BODY], to[BODY]) for at, to in zip(joints, truth.joints, strict=True)]).astype(np.float32)
+    params.joints = joints + params.transl[:, None]
+    return params
+
+
+def moved(joints: np.ndarray, goals: np.ndarray) -> np.ndarray:
+    """(3,) m, the shift of joints (n, 3) that brings them onto the rays of the goals (n, 3), by least squares."""
+    x, y = (goals[:, :2] / goals[:, 2:]).T
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    rows = np.concatenate([np.stack([one, zero, -x], 1), np.stack([zero, one, -y], 1)])
+    wanted = np.concatenate([x * joints[:, 2] - joints[:, 0], y * joints[:, 2] - joints[:, 1]])
+    return np.linalg.lstsq(rows, wanted, rcond=None)[0]
