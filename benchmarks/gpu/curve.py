@@ -54,7 +54,7 @@ def main() -> None:
         ends = {}
         for recipe, steps in [*(("fast", n) for n in options.budgets), ("paper", None)]:
             metrics = training.train(case, options.out / f"{case.name}_{recipe}{steps or ''}", recipe=recipe, device="cuda",
-                                     curve=CHECKPOINTS, **({"steps": steps} if steps else {}))
+                                     gaussians=12000, curve=CHECKPOINTS, **({"steps": steps} if steps else {}))
             ends[recipe, metrics["steps"]] = metrics
             rows += rows_of(case.name, "cuda", metrics)
         if options.torch_steps and gsplat_is_here():
@@ -145,7 +145,7 @@ def _in_torch(inputs: dict[str, Path], folder: Path, steps: int) -> None:
     from gsac.stages.train import recipes, stage
 
     recipes.RECIPES["fast", "cuda"] = baseline.fit
-    config = make_config(STAGE, {"device": "cuda", "steps": steps, "curve": CHECKPOINTS})
+    config = make_config(STAGE, {"device": "cuda", "gaussians": 12000, "steps": steps, "curve": CHECKPOINTS})
     stage.run(Job(inputs, folder, config, device="cuda"))
 
 

@@ -23,8 +23,8 @@ class TrainConfig:
     """Which optimisation fits the gaussians: fast, or paper: one gaussian a face and rates of its own."""
     device: str = AUTO
     """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
-    gaussians: int | str = 12000
-    """How many gaussians; auto: the fewest that the held-out frames cannot tell from the best; paper: one a face instead."""
+    gaussians: int | str = AUTO
+    """How many; auto: at most 12,000, as few as the held-out frames hardly tell from them; paper: one a face instead."""
     steps: int | None = None
     """Optimisation steps; null: the recipe's own, 1600 of one frame (fast), 3000 of four (paper)."""
     height: int = 540

@@ -46,13 +46,17 @@ def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[i
         return kept, fine, coarse
 
 
-def refit(task: Task, gaussians: Gaussians, views: dict[int, View]) -> fast.Trainer:
+def refit(task: Task, fewer: fast.Trainer, views: dict[int, View]) -> fast.Trainer:
     """As `ladder.refit`."""
-    recipe = recipe_of(task.config, len(gaussians), steps=ladder.REFIT, begin=ladder.REFIT_FROM, coarse_share=0.0, pose_rate=0.0,
-                       offset_rate=0.0)
+    gaussians = fewer.gaussians()
+    recipe = recipe_of(task.config, len(gaussians), steps=ladder.refit_steps(task), begin=ladder.REFIT_FROM, coarse_share=0.0,
+                       pose_rate=0.0, offset_rate=0.0)
     with training(task.poses, task.trained, [views], gaussians, recipe) as trainer:
+        trainer.replace(gaussians, ~fewer.seen)
         trainer.train(recipe.steps)
-        return settled(trainer, task)
+        kept = settled(trainer, task)
+        kept.seen = fewer.seen
+        return kept
 
 
 def align_poses(gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:

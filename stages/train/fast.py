@@ -202,12 +202,17 @@ class Trainer:
 
     def lay_unseen(self, views: dict[int, View]) -> None:
         """Gaussians that no frame shows are laid among their neighbours, and stay there. views: frame -> view at half the size."""
-        gaussians, self.seen = self.gaussians(), self._seen(views)
+        gaussians = self.rest_unseen(views)
         gaussians = laid(gaussians, self.seen, self.rest, self.faces)
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values |= {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
                         "opacity": np.log(opacity / (1 - opacity))[:, None].astype(np.float32)}
         self.start = gaussians.mu.copy()
+
+    def rest_unseen(self, views: dict[int, View]) -> Gaussians:
+        """The gaussians; from here on those that no frame shows stay as they are. views: frame -> view at half the size."""
+        self.seen = self._seen(views)
+        return self.gaussians()
 
     def recoloured(self, views: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
         """The gaussians, those that no frame shows in the colour of their neighbours unless laid already; seen (N,) bool."""

@@ -1,8 +1,8 @@
 """`train.gaussians: auto`: no more gaussians than the held-out frames can tell apart.
 
-The largest size is trained as always; each smaller one is a part of the one before, drawn by how much each gaussian shows,
-and fitted again for a short while. Sizes are judged on held-out frames whose pose is first moved to their image, once, with the
-largest avatar: a pose that is off would reward blur. The smallest size within one standard error of the best is taken.
+The largest size is trained as always; each smaller one is the one before with neighbours merged, fitted again for a short while.
+Sizes are judged on held-out frames whose pose is first moved to their image, once, with the largest avatar: a pose that is off
+would reward blur. The first size that these frames can tell from the best ends the walk, and the one before it is taken.
 """
 
 from __future__ import annotations
@@ -16,20 +16,18 @@ from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.workspace import Workspace
 from gsac.stages.train import fast
 from gsac.stages.train.evaluate import judge
+from gsac.stages.train.merging import merged
 from gsac.stages.train.poses import carried
-from gsac.stages.train.sizes import Rung, choose
+from gsac.stages.train.sizes import MOST_LOST, Rung, choose
 from gsac.stages.train.task import Fit, Loop, Task
+from gsac.stages.train.views import View
 
-SIZES = (24000, 16000, 12000, 8000, 6000, 4000, 2000, 1000)
+SIZES = (12000, 8000, 6000, 4000, 3000, 2000, 1000)
 UNJUDGED = 12000
 """Size where no frame is held out."""
-REFIT = 160
-"""Steps of a smaller size."""
-REFIT_FROM = 0.6
-"""Rates of the refit are those of a training from this share of its steps on."""
+REFIT, REFIT_FROM = 0.18, 0.3
+"""Steps of a smaller size, as a share of the training's; their rates are those of a training from this share of its steps on."""
 ALIGN_STEPS = 40
-EVENNESS = 0.5
-"""Power of what a gaussian shows in the chance to keep it: 1 would leave holes where many show little, 0 is blind."""
 
 
 def fit(task: Task, loop: Loop) -> Fit:
@@ -39,51 +37,47 @@ def fit(task: Task, loop: Loop) -> Fit:
     trainer, fine, coarse = loop.train(task, SIZES[0])
     poses, workspace = carried(task.poses, task.trained), Workspace()
     loop.align(trainer.gaussians(), poses, task.held, task.views, ALIGN_STEPS)
-    rungs, trainers = [], []
+    rungs: list[Rung] = []
+    kept = trainer
     for size in SIZES:
-        if size != SIZES[0]:
-            trainer = loop.refit(task, thinned(trainer.gaussians(), size, task, fine, workspace), fine)
+        if rungs:
+            gaussians = trainer.gaussians()
+            fewer = merged(gaussians, shown(gaussians, task, fine, workspace), size, task.poses.body, trainer.rest)
+            trainer = fast.Trainer(fewer, task, settled=True)
+            trainer.rest_unseen(coarse)
+            trainer = loop.refit(task, trainer, fine)
         rows = judge(trainer.gaussians(), poses, task.held, task.views, None, workspace)
         rungs.append(Rung(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
-        trainers.append(trainer)
+        if choose(rungs) is not rungs[-1]:
+            break
+        kept = trainer
     best = choose(rungs)
-    kept = trainers[rungs.index(best)]
     figures = {"size_curve": [asdict(rung) | rung.means() | {"chosen": rung is best} for rung in rungs],
-               "size_rule": "smallest within one standard error, and 0.3 dB, of the best held-out psnr_fg, and as sharp; the same "
-                            "frames give psnr_fg, so it is chosen on them"}
+               "size_rule": f"smallest within one standard error, and {MOST_LOST} dB, of the best held-out psnr_fg, and as sharp; "
+                            "the same frames give psnr_fg, so it is chosen on them"}
     return Fit(*kept.recoloured(coarse), dict(kept.gains), figures)
 
 
-def thinned(gaussians: Gaussians, size: int, task: Task, views, workspace: Workspace) -> Gaussians:
-    """`size` of the gaussians, grown so that they cover what all of them covered.
-
-    Systematic draws in the gaussians' own order, which follows the mesh: what is left is spread as evenly as it can be. The chance
-    to stay grows with what a gaussian shows, summed over some frames: its blend weights.
-    """
-    shown = np.zeros(len(gaussians))
+def shown(gaussians: Gaussians, task: Task, views: dict[int, View], workspace: Workspace) -> np.ndarray:
+    """(N,) pixels that each gaussian adds to some of the trained frames."""
+    total = np.zeros(len(gaussians))
     for t in task.trained[::-(-len(task.trained) // fast.COLOUR_FRAMES)]:
         rendering = render_bound(task.poses.vertices(int(t)), task.poses.body.faces, gaussians, views[int(t)].camera, workspace)
-        ones = np.ones_like(rendering.rgb)
-        shown += render_backward(rendering.state, ones, np.zeros_like(rendering.alpha)).rgb[:, 0]
-    chance = (shown + 1e-3 * shown.mean()) ** EVENNESS
-    share = np.minimum(1, size * chance / chance.sum())
-    for _ in range(20):  # chances above one are handed to the others
-        free = share < 1
-        share[free] = np.minimum(1, chance[free] * (size - (~free).sum()) / chance[free].sum())
-    up_to = np.cumsum(share) * (size / share.sum())
-    picked = np.flatnonzero(np.diff(np.floor(up_to + 0.5), prepend=0) > 0)
-    left = gaussians[picked]
-    left.log_scale = left.log_scale + np.float32(0.5 * np.log(len(gaussians) / max(len(left), 1)))
-    return left
+        total += render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0]
+    return total
 
 
-def refit(task: Task, gaussians: Gaussians, views) -> fast.Trainer:
-    """A short training of the gaussians with the poses as they are."""
-    trainer = fast.Trainer(gaussians, task, settled=True)
+def refit_steps(task: Task) -> int:
+    return max(1, round(REFIT * (task.config.steps or fast.STEPS)))
+
+
+def refit(task: Task, trainer: fast.Trainer, views: dict[int, View]) -> fast.Trainer:
+    """A short training of a trainer's gaussians with the poses as they are; those that it has not seen rest."""
     rng = np.random.default_rng(task.config.seed)
     order: list[int] = []
-    for step in range(REFIT):
+    steps = refit_steps(task)
+    for step in range(steps):
         order = order or [int(t) for t in rng.permutation(task.trained)]
         t = order.pop()
-        trainer.step(t, views[t], REFIT_FROM + (1 - REFIT_FROM) * step / REFIT, rng.random(3), step)
+        trainer.step(t, views[t], REFIT_FROM + (1 - REFIT_FROM) * step / steps, rng.random(3), step)
     return trainer

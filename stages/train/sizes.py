@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MOST_LOST = 0.3
+MOST_LOST = 0.15
 """dB below the best that no standard error excuses."""
+DETAIL_LOST = 0.05
+"""Share of the best's detail that may be lost however little the frames differ: less cannot be seen."""
 
 
 @dataclass
@@ -27,10 +29,10 @@ class Rung:
 
 
 def choose(rungs: list[Rung]) -> Rung:
-    """The smallest rung within one standard error of the best in PSNR (and `MOST_LOST`) and in detail."""
+    """The smallest rung within one standard error of the best in PSNR (and `MOST_LOST`) and in detail (or `DETAIL_LOST`)."""
     best = max(rungs, key=lambda r: np.mean(r.psnr_fg))
     least = np.mean(best.psnr_fg) - min(standard_error(best.psnr_fg), MOST_LOST)
-    least_detail = np.mean(best.detail) - standard_error(best.detail)
+    least_detail = np.mean(best.detail) - max(standard_error(best.detail), DETAIL_LOST * np.mean(best.detail))
     good = [r for r in rungs if np.mean(r.psnr_fg) >= least and np.mean(r.detail) >= least_detail]
     return min(good, key=lambda r: r.n_gaussians)
 

@@ -60,7 +60,7 @@ class Loop(NamedTuple):
 
     train: Callable[[Task, int], tuple[Any, dict[int, View], dict[int, View]]]
     """As `fast.train`."""
-    refit: Callable[[Task, Gaussians, dict[int, View]], Any]
+    refit: Callable[[Task, Any, dict[int, View]], Any]
     """As `ladder.refit`."""
     align: Callable[[Gaussians, Poses, np.ndarray, list[View], int], None]
     """As `evaluate.align_poses`."""

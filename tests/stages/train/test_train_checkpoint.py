@@ -35,7 +35,7 @@ run(Job({port: Path(path) for port, path in inputs.items()}, Path(out), make_con
 """
 
 
-FEW = {"ladder.SIZES": (2000, 1000), "ladder.REFIT": 12}
+FEW = {"ladder.SIZES": (2000, 1000), "ladder.REFIT": 0.4}
 GROWS_SOON = {"densify.FIRST": 1, "densify.EVERY": 4, "densify.PHASE": 2}
 
 
