@@ -1,6 +1,7 @@
 """gsac bench fit: the body fit by `lm` and `paper` on the same detections of truth clips, the hand gap by every method, in one run.
 
-Clips come from the turntable, with bodies outside the shape basis and seeds that measured nothing, and from `--clip` folders. What
+Clips come from the turntable, with bodies outside the shape basis and seeds that measured nothing, clothed and (`bare`, where a
+bare body can cover the silhouette as its bar asks) without clothes and hair, and from `--clip` folders. What
 the stages before `smplx` see is computed once and kept in the cache. Hand gaps are the ones of `gsac bench handgap`: windows masked
 in turning bodies; and windows masked in the truth clips' own detections, filled and then fitted, for the hidden wrist.
 """
@@ -13,12 +14,15 @@ from pathlib import Path
 
 SEEDS = (31, 32)
 """Not 11, 12 and 41 to 44: those measured the detector's offsets and habits."""
+BARE_SEEDS = (33,)
 GAP_SEEDS = (1, 2, 3)
 
 
 def parser() -> argparse.ArgumentParser:
     out = argparse.ArgumentParser(prog="gsac bench fit", description="The body fit against truth: error and seconds, both methods.")
     out.add_argument("--seeds", type=int, nargs="*", default=list(SEEDS), help="turntable clips (default: 31 32)")
+    out.add_argument("--bare-seeds", type=int, nargs="*", default=list(BARE_SEEDS),
+                     help="turntable clips without clothes (default: 33)")
     out.add_argument("--clip", type=Path, action="append", default=[], metavar="DIR",
                      help="another truth clip: a folder with clip.mp4, mask/ and truth.npz; may be repeated")
     out.add_argument("--gap-seeds", type=int, nargs="*", default=list(GAP_SEEDS),
@@ -44,6 +48,7 @@ def main(argv: list[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     kept = options.clips or options.out / "clips"
     folders = [clips.truth_folder(kept / f"seed{seed}", seed, say) for seed in options.seeds]
+    folders += [clips.truth_folder(kept / f"bare{seed}", seed, say, clothing=0.0) for seed in options.bare_seeds]
     cases = [clips.seen(f, store, options.out / "runs" / f.name, say) for f in [*folders, *options.clip]]
     trial.warm_up()
     trials = []

@@ -30,12 +30,12 @@ class Case:
     """keypoints.npz before the hand gaps are filled."""
 
 
-def truth_folder(folder: Path, seed: int, say: PlainReporter) -> Path:
-    """The turntable's clip of a seed, rendered unless it is there."""
+def truth_folder(folder: Path, seed: int, say: PlainReporter, clothing: float = 1.0) -> Path:
+    """The turntable's clip of a seed, rendered unless it is there; clothing: thickness of clothes and hair, a factor."""
     if not (folder / "truth.npz").is_file():
         from gsac.benchmarks.turntable.clip import make_clip
 
-        make_clip(folder, seed=seed, frames=FRAMES, height=HEIGHT,
+        make_clip(folder, seed=seed, frames=FRAMES, height=HEIGHT, clothing=clothing,
                   progress=lambda done, total, unit: say.progress(folder.name, done, total, unit))
     return folder
 

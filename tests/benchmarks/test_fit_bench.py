@@ -62,7 +62,19 @@ def test_a_folder_that_is_no_truth_clip_is_refused_by_name(tmp_path):
 
 
 def test_clips_that_measured_the_detector_are_not_what_is_reported():
-    assert not set(bench.parser().parse_args([]).seeds) & {11, 12, 41, 42, 43, 44}
+    options = bench.parser().parse_args([])
+    assert not {*options.seeds, *options.bare_seeds} & {11, 12, 41, 42, 43, 44}
+
+
+def test_a_bare_clip_is_rendered_without_clothes(tmp_path, monkeypatch):
+    from gsac.benchmarks.fit import clips
+    from gsac.benchmarks.turntable import clip
+
+    asked = []
+    monkeypatch.setattr(clip, "make_clip", lambda folder, **options: asked.append((folder.name, options["clothing"])))
+    clips.truth_folder(tmp_path / "seed5", 5, None)
+    clips.truth_folder(tmp_path / "bare5", 5, None, clothing=0.0)
+    assert asked == [("seed5", 1.0), ("bare5", 0.0)]
 
 
 def test_windows_of_one_hand_are_apart_and_as_long_as_they_say():
