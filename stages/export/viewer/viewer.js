@@ -55,12 +55,14 @@ class Viewer {
     painter.onLost = async (why) => {
       if (this.painter !== painter) return;
       this.painter = null;
+      painter.device?.destroy();
       freshCanvas(this.canvas);
       await new Promise((done) => setTimeout(done, RECOVER_MS));
       await this.drawBy(painter.kind === "webgpu" ? "webgl" : "software");
       this.move();
       this.draw();
-      this.onChange(`${why || "The graphics driver stopped"}: now drawn ${this.painter.kind === "webgl" ? "by WebGL" : "without the graphics card"}.`);
+      const way = this.painter.kind === "webgl" ? "by WebGL" : "without the graphics card";
+      this.onChange(`${why || "The graphics driver stopped"}: now drawn ${way}.`);
     };
     this.painter = painter;
   }
@@ -93,6 +95,12 @@ class Viewer {
 
   // seconds: since the last frame.
   step(seconds) {
+    this.advance(seconds);
+    this.move();
+  }
+
+  // The pose after some seconds, and the camera that follows it.
+  advance(seconds) {
     if (!this.paused) this.clock += seconds;
     this.fade = Math.min(1, this.fade + seconds / FADE_S);
     if (this.playing.clip) {
@@ -110,7 +118,14 @@ class Viewer {
     this.turn(this.pose);
     const share = 1 - Math.exp(-seconds / FOLLOW_S), { walked } = this.camera;
     for (const i of [0, 2]) walked[i] += share * (this.pose.transl[i] - walked[i]);
-    this.move();
+  }
+
+  // All that the picture depends on, in words; two equal ones need no new picture.
+  get state() {
+    this.camera.update();
+    const { pose, camera, stage, binding, painter, background, expression } = this, panel = document.getElementById("panel").offsetTop;
+    return [pose.quats, pose.transl, Array.from(camera.view, (x) => x.toFixed(5)), camera.fov, stage.clientWidth, stage.clientHeight,
+      window.devicePixelRatio, panel, binding.lit, painter?.kind, background, JSON.stringify(expression)].join(" ");
   }
 
   // pose: Pose, set to what plays at a place in the clip, s.
@@ -167,16 +182,21 @@ class Viewer {
 
   // Draws from now on; the headset has its own rhythm (xr.js).
   run() {
-    let last = null;
+    let last = null, shown = null;
     const frame = (now) => {
       if (this.still || this.session) {
-        last = null;
+        last = shown = null;
         this.rate.reset();
       } else {
         const seconds = last === null ? 0 : Math.min((now - last) / 1000, 0.25);
         if (this.turntable) this.camera.yaw += seconds * 30;
-        this.step(seconds);
-        this.draw();
+        this.advance(seconds);
+        const { state } = this;
+        if (state !== shown) {
+          this.move();
+          this.draw();
+        }
+        shown = state;
         this.tick(now);
         last = now;
       }

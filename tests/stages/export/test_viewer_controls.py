@@ -180,6 +180,24 @@ def test_another_size_of_the_page_frames_the_figure_again_unless_it_was_moved_by
     assert page.errors == []
 
 
+def test_a_figure_at_rest_is_drawn_once_and_again_after_each_change(page):
+    page.run("location.hash = 'pose=A&rest'")
+    page.until("gsac.playing.pose === 'A' && gsac.fade === 1")
+    page.run("(() => { const draw = gsac.draw.bind(gsac); gsac.draw = () => { draw(); window.drawn++; }; })()")
+    soon = "new Promise((done) => setTimeout(done, 250))"
+    page.run(soon)
+    for change in ("expression = { jawOpen: 1 }", "turned = { left_elbow: [0, -40, 0] }", "background = '#102030'",
+                   "camera.yaw += 10", "camera.zoom(0.9)", "binding.lit = !gsac.binding.lit", "choose({ pose: 'T' })"):
+        page.until("(() => { const now = gsac.state, still = window.before === now; window.before = now; return still; })()")
+        page.run("window.drawn = 0")
+        page.run(soon)
+        assert page.run("window.drawn") == 0, "nothing changes"
+        page.run(f"gsac.{change}")
+        page.until("window.drawn > 0")
+    page.run("delete gsac.draw")
+    assert page.errors == []
+
+
 def test_a_motion_that_leaps_stays_in_the_picture_unless_the_camera_was_moved_by_hand(page):
     page.run("location.hash = 'pose=A&leap'")
     page.until("gsac.playing.pose === 'A' && !gsac.camera.moved")

@@ -119,7 +119,7 @@ def test_the_mesh_stands_where_python_puts_it_and_a_raised_right_arm_is_at_the_l
     path.write_text(motion.bvh_text(skeleton, moved, unit=100))
     drop(page, path)
     page.run("gsac.seek(11 / 24), gsac.paused = true, gsac.step(0), gsac.frame(), gsac.draw();"
-             "document.getElementById('note').hidden = true")
+             "for (const id of ['note', 'status']) document.getElementById(id).hidden = true")
     got = np.array(page.run("Array.from(gsac.skin.vertices)")).reshape(-1, 3)
     want = onto(figure, read_bvh(path))
     np.testing.assert_allclose(got, figure.posed(want.rotation[11]) + want.transl[11], atol=2e-4)
