@@ -5,7 +5,7 @@ TORCH ?= torch==2.13.0
 BIN := .venv/bin
 READY := .venv/.gsac-ready
 
-.PHONY: setup demo test test-fast params lint debian
+.PHONY: setup demo test test-fast params shaders lint debian
 
 setup: $(READY)
 
@@ -34,6 +34,10 @@ debian:
 # Writes params.yaml from the stages' defaults.
 params: setup
 	$(BIN)/python -m gsac.pipeline.params
+
+# Writes the viewer page's shaders from the Unity package's HLSL; needs glslang-tools and npm.
+shaders: setup
+	$(BIN)/python -m gsac.stages.export.wgsl
 
 lint: setup
 	$(BIN)/ruff check

@@ -30,7 +30,7 @@ CARD = """(() => {
 
 
 def test_the_shaders_are_of_the_present_hlsl():
-    assert wgsl.digest() in wgsl.WRITTEN.read_text(), "run `python -m gsac.stages.export.wgsl`"
+    assert wgsl.digest() in wgsl.WRITTEN.read_text(), "run `make shaders`"
 
 
 @pytest.mark.slow
