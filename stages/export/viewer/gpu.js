@@ -7,14 +7,15 @@ const SKIN_THREADS = 64;
 const ACROSS_THREADS = 64;
 // Parameters of one dispatch; WebGPU wants them this far apart.
 const PARAMETER_BYTES = 256;
+// A driver that takes longer to answer is left alone.
+const ANSWER_MS = 10000;
 const PREMULTIPLIED = { srcFactor: "one", dstFactor: "one-minus-src-alpha", operation: "add" };
 
 class GpuPainter {
   // Returns null where there is no graphics card to reach; asked: a software one will do.
   static async open(canvas, avatar, skin, binding, asked) {
-    const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
-    if (!adapter || (!asked && isSoftware(adapter))) return null;
-    const device = await adapter.requestDevice();
+    const late = new Promise((done) => setTimeout(done, ANSWER_MS, null)), device = await Promise.race([reachDevice(asked), late]);
+    if (!device) return null;
     device.pushErrorScope("validation");
     const painter = new GpuPainter(device, canvas, avatar, skin, binding);
     await painter.build();
@@ -57,18 +58,17 @@ class GpuPainter {
 
   async build() {
     const { device } = this, module = (entry) => device.createShaderModule({ code: SHADERS[entry].code });
-    const kernels = {};
-    for (const { entry } of this.jobs) {
-      kernels[entry] ??= device.createComputePipelineAsync({ layout: "auto", compute: { module: module(entry), entryPoint: entry } });
-    }
+    const kernel = (entry) => device.createComputePipelineAsync({ layout: "auto", compute: { module: module(entry), entryPoint: entry } });
+    const entries = [...new Set(this.jobs.map(({ entry }) => entry))];
     const draw = (name, topology) => device.createRenderPipelineAsync({ layout: "auto",
       vertex: { module: module(`${name}Vertex`), entryPoint: `${name}Vertex` },
       fragment: { module: module(`${name}Fragment`), entryPoint: `${name}Fragment`,
         targets: [{ format: this.format, blend: { color: PREMULTIPLIED, alpha: PREMULTIPLIED } }] },
       primitive: { topology } });
-    const [splats, floor] = await Promise.all([draw("Splat", "triangle-list"), draw("Floor", "triangle-strip")]);
+    const drawers = [draw("Splat", "triangle-list"), draw("Floor", "triangle-strip")];
+    const [splats, floor, ...kernels] = await Promise.all([...drawers, ...entries.map(kernel)]);
     for (const [i, job] of this.jobs.entries()) {
-      job.pipeline = await kernels[job.entry];
+      job.pipeline = kernels[entries.indexOf(job.entry)];
       job.group = this.group(job.pipeline, job.entry, { buffer: this.jobBuffer, offset: i * PARAMETER_BYTES, size: PARAMETER_BYTES });
     }
     this.splats = { pipeline: splats, group: this.group(splats, "SplatVertex", { buffer: this.eyeBuffer }) };
@@ -152,6 +152,11 @@ class GpuPainter {
     pass.end();
     device.queue.submit([this.encoder.finish()]);
   }
+}
+
+async function reachDevice(asked) {
+  const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
+  return adapter && (asked || !isSoftware(adapter)) ? adapter.requestDevice() : null;
 }
 
 function isSoftware({ info }) {

@@ -1,7 +1,5 @@
 // Which way the page draws on this device: by WebGPU where there is a graphics card to reach, else by WebGL2, else by itself.
 
-// A driver that takes longer to begin is left alone.
-const ANSWER_MS = 15000;
 const SOFTWARE = /swiftshader|llvmpipe|lavapipe|softpipe|software|basic render/i;
 
 // Whether this browser's WebGL2 is missing or runs without a graphics card.
@@ -16,8 +14,7 @@ function hasNoGraphicsCard() {
 // asked: "webgpu", "webgl", "software", or whatever suits the device. What cannot draw makes room for the next.
 async function makePainter(asked, canvas, { avatar, skin, binding, sort }) {
   if (asked !== "webgl" && asked !== "software") {
-    const late = new Promise((_, fail) => setTimeout(() => fail(new Error("it does not answer")), asked === "webgpu" ? 1e6 : ANSWER_MS));
-    const gpu = await Promise.race([GpuPainter.open(canvas, avatar, skin, binding, asked === "webgpu"), late]).catch((error) => {
+    const gpu = await GpuPainter.open(canvas, avatar, skin, binding, asked === "webgpu").catch((error) => {
       console.info(`no WebGPU: ${error.message}`);
       return null;
     });

@@ -114,3 +114,21 @@ def test_what_stops_is_followed_by_the_next_way_with_the_same_picture(page, addr
         assert (np.abs(seen[0] - (0xA0, 0xB0, 0xC0)).max(-1) > 20).mean() > 0.03
     finally:
         page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=got["identifier"])
+
+
+@needs_chromium
+@pytest.mark.slow
+@pytest.mark.parametrize("broken", [
+    "GPUDevice.prototype.createComputePipelineAsync = async () => { throw new Error('no such thing'); }",
+    "GPUAdapter.prototype.requestDevice = async () => { throw new Error('no device'); }",
+    "GPU.prototype.requestAdapter = async () => null"])
+def test_a_webgpu_that_does_not_begin_makes_room_for_webgl(page, address, broken):
+    card = "HTMLCanvasElement.prototype.getContext = ((get) => function (...asked) { const gl = get.apply(this, asked);" \
+              "if (asked[0] === 'webgl2') gl.getParameter = () => 'a card'; return gl; })(HTMLCanvasElement.prototype.getContext);"
+    got = page.call("Page.addScriptToEvaluateOnNewDocument", source=f"if (window.GPU) {{ {CARD}; {broken}; }} {card}")
+    try:
+        page.open(f"{address}?{len(broken)}#pose=A&bg=a0b0c0&still")
+        assert page.run("gsac.painter.kind") == "webgl"
+        assert (np.abs(page.picture().astype(int) - (0xA0, 0xB0, 0xC0)).max(-1) > 20).mean() > 0.03 and page.errors == []
+    finally:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=got["identifier"])
