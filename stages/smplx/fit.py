@@ -24,7 +24,7 @@ HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17
 BODY_POINTS = np.array([*range(23), *HAND_ROOTS])
 FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(hand.start, hand.stop)])
 HIPS = (INDEX["left_hip"], INDEX["right_hip"])
-TOGETHER = 3.0
+TOGETHER = 2.0
 """What a detector gets wrong it gets wrong in many frames together: its spreads count so many times."""
 DEPTH_SPREAD = 0.08
 """Metres; the detector's depth decides which way a limb points."""

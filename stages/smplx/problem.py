@@ -20,10 +20,10 @@ from gsac.stages.smplx.solver import System
 
 ROBUST = 3.0
 """Residuals beyond so many spreads count less and less; `Problem.limit` may be wider while the body is still far off."""
-OUTLINE_ROBUST = 2.0
+OUTLINE_ROBUST = 3.0
 CLOTHES = 0.006
 """Metres that the silhouette is believed to stand off the skin: little enough for bare skin, half of what clothes and hair do."""
-OUTLINE_SIGHTINGS = 40
+OUTLINE_SIGHTINGS = 60
 """How many independent sightings one frame's outline is worth."""
 
 
