@@ -22,7 +22,7 @@ from gsac.stages.train.guard import finite, gradients, pose
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.offsets import Offsets, fold
 from gsac.stages.train.task import Fit, Loop, Task
-from gsac.stages.train.unseen import LEAST_SHOWN, laid, shown
+from gsac.stages.train.unseen import enough, laid, levelled, shown
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 1600
@@ -37,6 +37,8 @@ COLOUR_FRAMES = 24
 LARGEST_OF = 12000
 """Gaussians of an avatar whose longest axis may be `train.largest`; fewer must each cover more."""
 GAIN_RATE = 2e-3
+SETTLED_REACH = 0.25
+"""Share of `train.reach` that a gaussian may move once the surface stands: clothes and hair are in it by then."""
 KEPT = ("face", "values", "first", "second", "count", "start", "light", "seen")
 """Attributes of Trainer that go into a checkpoint as they are."""
 
@@ -134,6 +136,11 @@ class Trainer:
         """(N,) bool, once it is decided; the others are no longer moved."""
         self.workspace, self.losses = Workspace(), Workspace()
 
+    @property
+    def reach(self) -> float:
+        """m that a gaussian may lie from its start."""
+        return self.config.reach * (1 if self.seen is None else SETTLED_REACH)
+
     def state(self) -> dict:
         """For a checkpoint; poses aside."""
         return {name: getattr(self, name) for name in KEPT} | {
@@ -201,9 +208,12 @@ class Trainer:
         self.poses.offset, self.offsets = np.zeros_like(self.poses.offset), None
 
     def lay_unseen(self, views: dict[int, View]) -> None:
-        """Gaussians that no frame shows are laid among their neighbours, and stay there. views: frame -> view at half the size."""
+        """Gaussians that no frame shows are laid among their neighbours, and stay there; none stands off the others.
+
+        views: frame -> view at half the size.
+        """
         gaussians = self.rest_unseen(views)
-        gaussians = laid(gaussians, self.seen, self.rest, self.faces)
+        gaussians = levelled(laid(gaussians, self.seen, self.rest, self.faces), self.rest, self.faces)
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values |= {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
                         "opacity": np.log(opacity / (1 - opacity))[:, None].astype(np.float32)}
@@ -215,19 +225,19 @@ class Trainer:
         return self.gaussians()
 
     def recoloured(self, views: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
-        """The gaussians, those that no frame shows in the colour of their neighbours unless laid already; seen (N,) bool."""
+        """The gaussians, none off the others, and which are seen (N,); where none is laid, the unseen as their neighbours."""
         gaussians, seen = self.gaussians(), self.seen
         if seen is None:
             seen = self._seen(views)
             gaussians.rgb = fill_unseen(gaussians.rgb, seen, places(gaussians, self.rest, self.faces))
-        return gaussians, seen
+        return levelled(gaussians, self.rest, self.faces), seen
 
     def _seen(self, views: dict[int, View]) -> np.ndarray:
         """(N,) bool, whether the frames show the gaussian's front."""
         gaussians = self.gaussians()
         pixels = sum(shown(gaussians, self.poses.vertices(t), self.faces, view.camera, self.workspace)
                      for t, view in views.items())
-        return pixels > LEAST_SHOWN * len(views)
+        return enough(pixels / len(views), gaussians, self.rest, self.faces)
 
     def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:
         config = self.config
@@ -254,7 +264,7 @@ class Trainer:
         for name, rate in rates.items():
             adam_rows(v[name], by_name[name], self.first[name], self.second[name], self.count, rate)
         limit(v["mu"], v["quat"], v["log_scale"], v["rgb"], v["opacity"], self.start, self.face_scale, config.needle,
-              self.largest, config.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
+              self.largest, self.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
 
 
 def sigmoid(x: np.ndarray) -> np.ndarray:

@@ -10,16 +10,18 @@ from __future__ import annotations
 from dataclasses import asdict
 
 import numpy as np
+from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import psnr
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.workspace import Workspace
 from gsac.stages.train import fast
 from gsac.stages.train.evaluate import judge
-from gsac.stages.train.merging import merged
+from gsac.stages.train.merging import merged, skin_of
 from gsac.stages.train.poses import carried
 from gsac.stages.train.sizes import MOST_LOST, Rung, choose
 from gsac.stages.train.task import Fit, Loop, Task
+from gsac.stages.train.unseen import levelled
 from gsac.stages.train.views import View
 
 SIZES = (12000, 8000, 6000, 4000, 3000, 2000, 1000)
@@ -28,6 +30,8 @@ UNJUDGED = 12000
 REFIT, REFIT_FROM = 0.18, 0.3
 """Steps of a smaller size, as a share of the training's; their rates are those of a training from this share of its steps on."""
 ALIGN_STEPS = 40
+NEAR, CARE = [15, 20, 21, *range(22, 55)], 3.0
+"""Joints of head and hands, and what their pixels count for beside others."""
 
 
 def fit(task: Task, loop: Loop) -> Fit:
@@ -42,8 +46,9 @@ def fit(task: Task, loop: Loop) -> Fit:
     for size in SIZES:
         if rungs:
             gaussians = trainer.gaussians()
-            fewer = merged(gaussians, shown(gaussians, task, fine, workspace), size, task.poses.body, trainer.rest)
-            trainer = fast.Trainer(fewer, task, settled=True)
+            worth = shown(gaussians, task, fine, workspace) * care(gaussians, task.poses.body)
+            fewer = merged(gaussians, worth, size, task.poses.body, trainer.rest)
+            trainer = fast.Trainer(levelled(fewer, trainer.rest, trainer.faces), task, settled=True)
             trainer.rest_unseen(coarse)
             trainer = loop.refit(task, trainer, fine)
         rows = judge(trainer.gaussians(), poses, task.held, task.views, None, workspace)
@@ -65,6 +70,11 @@ def shown(gaussians: Gaussians, task: Task, views: dict[int, View], workspace: W
         rendering = render_bound(task.poses.vertices(int(t)), task.poses.body.faces, gaussians, views[int(t)].camera, workspace)
         total += render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0]
     return total
+
+
+def care(gaussians: Gaussians, body: Body) -> np.ndarray:
+    """(N,) how much more than its pixels a gaussian is worth: one meets an avatar's face and hands closer than the clip does."""
+    return 1 + (CARE - 1) * skin_of(gaussians.face, body)[:, NEAR].sum(1)
 
 
 def refit_steps(task: Task) -> int:

@@ -29,7 +29,7 @@ OPAQUE, WIDER = 0.95, 1.2
 def merged(gaussians: Gaussians, shown: np.ndarray, size: int, body: Body, rest: np.ndarray) -> Gaussians:
     """`size` gaussians in the place of more, or as few as neighbours allow.
 
-    shown: (N,) pixels that each adds to the images; rest: (V, 3) m, the body that they are merged on.
+    shown: (N,) pixels that each adds to the images, or what they are worth; rest: (V, 3) m, the body that they are merged on.
     """
     frames = face_frames(rest, body.faces)
     shown = np.asarray(shown, np.float64) + HIDDEN * np.mean(shown)

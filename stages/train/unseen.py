@@ -1,12 +1,13 @@
 """Gaussians that no frame shows from their front: laid on the surface that their neighbours make, in their neighbours' colour.
 
-Nothing in the images says where they belong, and training would leave them as fur at edges and ragged soles.
+Nothing in the images says where they belong, and training would leave them as fur at edges and ragged soles. What is shown from one
+side only says nothing of its depth either: no gaussian may stand off the surface that those around it make.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from gsac.avatar.binding import face_frames
+from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.avatar.raster import render_backward, render_bound
@@ -18,7 +19,11 @@ BEHIND, FRONT = -0.2, 0.3
 The first is below zero, since a limb's outline is made by what lies just behind its edge."""
 LEAST_SHOWN = 0.05
 """Pixels of a half-size frame, on average over the frames, that a gaussian must show of its front to be called seen."""
+LEAST_SHARE = 0.15
+"""The same in pixels for its size, of what half of the seen ones show: in armpits frames show less, and at a slant."""
 NEIGHBOURS = 8
+AROUND, STEP = 24, 0.02
+"""How many gaussians tell the surface's height at a place, and m that one may lie above or below it."""
 
 
 def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera, workspace: Workspace) -> np.ndarray:
@@ -32,6 +37,14 @@ def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera:
     normal, place = frames.R[gaussians.face, :, 1], frames.T[gaussians.face]
     facing = -(normal * place).sum(1) / np.maximum(np.linalg.norm(place, axis=1), 1e-9)
     return np.clip((facing - BEHIND) / (FRONT - BEHIND), 0, 1) * added
+
+
+def enough(pixels: np.ndarray, gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(N,) bool, whether gaussians are seen. pixels: (N,) that each shows of its front, mean over the frames; rest: (V, 3) m."""
+    bound = bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    share = pixels / np.maximum(np.sort(bound.scales, 1)[:, 1:].prod(1), 1e-12)
+    seen = pixels > LEAST_SHOWN
+    return seen & (share > LEAST_SHARE * np.median(share[seen])) if seen.any() else seen
 
 
 def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
@@ -54,4 +67,22 @@ def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.nda
     out.log_scale[poor] = np.stack([width, width + np.log(FLATNESS), width], 1)
     out.quat[poor] = [1, 0, 0, 0]
     out.rgb[poor] = gaussians.rgb[near].mean(1)
+    return out
+
+
+def levelled(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
+    """The gaussians, none of them more than STEP above or below the middle height of those around it. rest: (V, 3) m.
+
+    Neither is one thicker than that, measured along the face's normal as a standard deviation: it shrinks.
+    """
+    frames = face_frames(rest, faces)
+    size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
+    near = cKDTree(middle).query(middle, k=min(AROUND, len(gaussians)))[1].reshape(len(gaussians), -1)
+    height = size * gaussians.mu[:, 1]
+    usual = np.median(height[near], axis=1)
+    bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    axes = np.einsum("ni,nij->nj", frames.R[gaussians.face, :, 1], bound.rotations) * bound.scales
+    out = gaussians[np.arange(len(gaussians))]
+    out.mu[:, 1] = np.clip(height, usual - STEP, usual + STEP) / size
+    out.log_scale += np.minimum(0, np.log(STEP / np.maximum(np.linalg.norm(axes, axis=1), 1e-9)))[:, None].astype(np.float32)
     return out

@@ -86,3 +86,36 @@ def test_the_face_has_a_box_from_the_front_and_none_from_behind(body):
     x0, y0, x1, y1 = front["face"]
     assert 5 < x1 - x0 < 30 and 5 < y1 - y0 < 30
     assert "face" not in back
+
+
+def test_no_gaussian_stands_off_those_around_it_and_the_others_stay(body):
+    gaussians, at = covering(body)
+    off = np.arange(len(gaussians)) % 50 == 0
+    size = fast.face_frames(body.v_template, body.faces).k[gaussians.face]
+    gaussians.mu[off, 1] += 0.06 / size[off]
+    out = unseen.levelled(gaussians, body.v_template, body.faces)
+    assert (size * out.mu[:, 1])[off].max() < unseen.STEP + 0.005
+    np.testing.assert_allclose(out.mu[~off], gaussians.mu[~off], atol=1e-6)
+    np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
+
+
+def test_a_disc_that_sticks_out_of_the_surface_shrinks(body):
+    gaussians, _ = covering(body)
+    size = fast.face_frames(body.v_template, body.faces).k[gaussians.face]
+    out_of = np.arange(len(gaussians)) % 50 == 0
+    gaussians.quat[out_of] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
+    gaussians.log_scale[out_of, 2] = np.log(0.05 / size[out_of])
+    out = unseen.levelled(gaussians, body.v_template, body.faces)
+    assert (size * np.exp(out.log_scale[:, 2]))[out_of].max() == pytest.approx(unseen.STEP, rel=1e-4)
+
+
+def test_what_is_shown_little_for_its_size_is_not_seen(body):
+    gaussians, at = covering(body)
+    frames = fast.face_frames(body.v_template, body.faces)
+    area = (frames.k[gaussians.face] * np.exp(gaussians.log_scale[:, 0])) ** 2
+    pixels = 4000 * area
+    pixels[:100] *= 0.1
+    assert pixels[:100].max() > unseen.LEAST_SHOWN
+    seen = unseen.enough(pixels, gaussians, body.v_template, body.faces)
+    assert not seen[:100].any() and seen[100:][pixels[100:] > unseen.LEAST_SHOWN].all()
+    assert not unseen.enough(np.zeros(len(gaussians)), gaussians, body.v_template, body.faces).any()
