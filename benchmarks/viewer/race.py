@@ -16,6 +16,8 @@ from gsac.benchmarks.viewer.browser import WEBGPU, Browser
 from gsac.stages.contract import StageError
 
 WARM_S = 2.0
+UNCAPPED = ("--disable-frame-rate-limit", "--disable-gpu-vsync")
+"""Chromium draws as fast as it can: a screen's 60 frames a second would hide how much faster one page is."""
 WATCH = """
 (() => {
   if (window.drawn !== undefined) return;
@@ -77,7 +79,7 @@ def processor_s(pid: int) -> float:
 
 def count(address: str, size: int, seconds: float, picture: Path | None) -> Count:
     """A page at an address; picture: where to keep what it shows."""
-    page = Browser(size, size, WEBGPU if "draw=webgpu" in address else ())
+    page = Browser(size, size, UNCAPPED + (WEBGPU if "draw=webgpu" in address else ()))
     try:
         page.open(address)
         page.run(WATCH)

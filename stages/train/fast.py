@@ -26,7 +26,7 @@ from gsac.stages.train.unseen import enough, laid, levelled, shown
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 1600
-COARSE_SHARE = 0.45
+COARSE_SHARE = 0.3
 """Part of the steps that run at half the size."""
 OFFSET_SHARE = 0.6
 """Part of the steps that also move the body's surface out to clothes and hair."""
