@@ -12,8 +12,9 @@ class FrameRate {
     times.push(now);
     if (times.length > FrameRate.KEPT) times.shift();
     if (times.length < 3 || now - this.told < 250) return null;
-    this.told = now;
     const recent = times.findIndex((t) => t > now - 1000), first = Math.min(Math.max(recent - 1, 0), times.length - 2);
+    if (now === times[first]) return null; // a clock that stands still, as a screenshot's does
+    this.told = now;
     const lengths = times.slice(1).map((t, i) => t - times[i]).sort((a, b) => a - b);
     return { fps: 1000 * (times.length - 1 - first) / (now - times[first]), p95: lengths[Math.ceil(0.95 * lengths.length) - 1] };
   }
