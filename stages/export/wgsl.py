@@ -50,17 +50,18 @@ def glslang_version() -> str:
     return re.search(r"Glslang Version: \S*?([\d.]+)", words)[1]
 
 
-def spirv(source: Path, entry: str, stage: str, out: Path) -> Path:
-    """Compiles one entry point of HLSL for Vulkan 1.0; StageError with the compiler's words."""
+def spirv(source: Path, entry: str, stage: str, out: Path, *options: str) -> Path:
+    """Compiles one entry point of HLSL for Vulkan 1.0; StageError with the compiler's words. options: more of glslang's."""
     _run(["glslangValidator", "-D", "-V", "-S", stage, "-e", entry, "--source-entrypoint", entry, "--auto-map-bindings",
-          "--shift-ssbo-binding", "1", "--auto-map-locations", f"-I{source.parent}", str(source), "-o", str(out)])
+          "--auto-map-locations", *options, f"-I{source.parent}", str(source), "-o", str(out)])
     return out
 
 
 def wgsl(node_modules: Path) -> dict[str, str]:
     """Entry point -> WGSL without indents. node_modules: where naga-wasm is installed."""
     with tempfile.TemporaryDirectory(dir=node_modules.parent) as folder:
-        files = {entry: spirv(SOURCES[1] if stage == "comp" else SOURCES[3], entry, stage, Path(folder) / f"{entry}.spv")
+        files = {entry: spirv(SOURCES[1] if stage == "comp" else SOURCES[3], entry, stage, Path(folder) / f"{entry}.spv",
+                              "--shift-ssbo-binding", "1")
                  for entry, stage in ENTRIES.items()}
         script = Path(folder) / "translate.mjs"
         script.write_text(TRANSLATE)

@@ -21,6 +21,7 @@ from gsac.stages.contract import StageError
 from gsac.stages.train import bundle, fast, ladder, offsets
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.evaluate import TEST_END, TEST_MASK, TEST_RATE
+from gsac.stages.train.guard import finite, values
 from gsac.stages.train.poses import HAND_SHARE, SHIFT, TURN, Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
@@ -97,7 +98,9 @@ def recipe_of(config: TrainConfig, count: int, kind: type[Recipe] = Recipe, **mo
 
 def settled(trainer: CudaTrainer, task: Task) -> fast.Trainer:
     """A CPU trainer with the gaussians and gains as they stand on the GPU."""
-    kept = fast.Trainer(finite(trainer.gaussians(), trainer.recipe.steps), task, settled=True)
+    gaussians = trainer.gaussians()
+    finite(f"after step {trainer.recipe.steps}", values(gaussians))
+    kept = fast.Trainer(gaussians, task, settled=True)
     if trainer.recipe.gain_rate:
         kept.gains = dict(zip(task.trained.tolist(), trainer.gains().astype(np.float64), strict=True))
     return kept
@@ -144,9 +147,7 @@ def follow(trainer: CudaTrainer, task: Task, until: int) -> None:
     for stop in [*(mark for mark in task.marks(steps) if done < mark < until), until]:
         trainer.train(stop - done)
         losses = trainer.losses()[done:].mean(1)
-        if not np.isfinite(losses).all():
-            raise StageError(f"train: the loss is not finite at step {done + int(np.argmin(np.isfinite(losses)))}; look at "
-                             "smplx/body.npz, or lower the rates (train.*_rate)")
+        finite(f"at step {done + int(np.argmin(np.isfinite(losses)))}", {"loss": losses})
         hand_back(trainer, task)
         for step, loss in enumerate(losses, done + 1):
             task.checkpoint(step, steps, float(loss), trainer.gaussians, task.gpu_seconds + trainer.seconds)
@@ -161,13 +162,4 @@ def hand_back(trainer: CudaTrainer, task: Task) -> None:
     poses.offset = trainer.offset()
     if trainer.recipe.beta_rate:
         poses.betas = np.array(poses.params.betas, np.float64) + trainer.betas()
-        poses.shaped = None
-        poses.rests.clear()
-
-
-def finite(gaussians: Gaussians, step: int) -> Gaussians:
-    for name in ("mu", "quat", "log_scale", "rgb", "opacity"):
-        if not np.isfinite(getattr(gaussians, name)).all():
-            raise StageError(f"train: {name} is not finite after step {step}; look at smplx/body.npz, or lower the rates "
-                             "(train.*_rate)")
-    return gaussians
+        poses.forget_rests()

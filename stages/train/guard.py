@@ -20,6 +20,10 @@ def gradients(grads) -> dict[str, np.ndarray]:
     return {f"gradient of {name}": getattr(grads, name) for name in ("vertices", "mu", "quat", "log_scale", "rgb", "opacity")}
 
 
+def values(gaussians: Gaussians) -> dict[str, np.ndarray]:
+    return {name: getattr(gaussians, name) for name in EACH}
+
+
 def pose(poses: Poses, t: int) -> dict[str, np.ndarray]:
     """Of frame t."""
     return {f"pose of frame {t}": poses.pose[t], f"translation of frame {t}": poses.transl[t]}
@@ -28,5 +32,4 @@ def pose(poses: Poses, t: int) -> dict[str, np.ndarray]:
 def result(gaussians: Gaussians, poses: Poses) -> dict[str, np.ndarray | None]:
     """What a training gives."""
     every = {f"pose of frame {t}": poses.pose[t] for t in range(len(poses.pose))}
-    return {name: getattr(gaussians, name) for name in EACH} | {"light": gaussians.light, "betas": poses.betas,
-                                                               "translations": poses.transl, **every}
+    return values(gaussians) | {"light": gaussians.light, "betas": poses.betas, "translations": poses.transl, **every}

@@ -6,7 +6,7 @@ import numpy as np
 from gsac.avatar.cuda.paper import PaperRecipe, PaperTrainer
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train import paper
-from gsac.stages.train.cuda import finite, follow, hand_back, training
+from gsac.stages.train.cuda import follow, hand_back, training
 from gsac.stages.train.densify import LARGEST, Densifier, due
 from gsac.stages.train.neighbours import RENEW
 from gsac.stages.train.poses import HAND_SHARE
@@ -27,7 +27,7 @@ def fit(task: Task) -> Fit:
             densifier.after(event, Growing(trainer), rng)
         follow(trainer, task, recipe.steps)
         hand_back(trainer, task)
-        gaussians = finite(trainer.gaussians(), recipe.steps)
+        gaussians = trainer.gaussians()
     return Fit(gaussians, np.ones(len(gaussians), bool), figures={"lpips_in_loss": False})
 
 

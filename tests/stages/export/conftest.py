@@ -165,3 +165,17 @@ def node_package(tmp_path_factory):
         return folders[package]
 
     return folder
+
+
+@pytest.fixture(scope="session")
+def shadowed():
+    """Script that draws the page's picture as it stands, with its shadow and without its controls."""
+    return """(() => {
+  gsac.still = true;
+  document.body.classList.add('bare');
+  gsac.resize();
+  const eye = gsac.camera.eye(gsac.canvas.width, gsac.canvas.height);
+  gsac.painter.prepare(eye.view);
+  gsac.painter.clear([...colour(gsac.background), 1]);
+  gsac.painter.paint(eye, gsac.shadow);
+})()"""

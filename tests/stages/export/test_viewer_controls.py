@@ -318,25 +318,14 @@ def test_where_the_page_draws_without_webgl_the_headset_gets_one_of_its_own(addr
         page.close()
 
 
-SHADOWED = """(() => {
-  gsac.still = true;
-  document.body.classList.add('bare');
-  gsac.resize();
-  const eye = gsac.camera.eye(gsac.canvas.width, gsac.canvas.height);
-  gsac.painter.prepare(eye.view);
-  gsac.painter.clear([...colour(gsac.background), 1]);
-  gsac.painter.paint(eye, gsac.shadow);
-})()"""
-
-
 @pytest.mark.parametrize("place", [
     "yaw=20&pitch=12", "yaw=-70&pitch=30&dist=1.4&target=0,-0.8,0", "yaw=0&pitch=40&dist=0.9&target=0,-1,0.5"])
-def test_without_a_graphics_card_the_picture_and_its_shadow_are_the_same(page, address, place):
+def test_without_a_graphics_card_the_picture_and_its_shadow_are_the_same(page, address, shadowed, place):
     seen = []
     for draw in ("webgl", "software"):
         page.call("Page.navigate", url="about:blank")
         page.open(f"{address}#pose=A&bg=a0b0c0&draw={draw}&{place}")
-        page.run(SHADOWED)
+        page.run(shadowed)
         page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         seen.append(page.picture().astype(int))
     webgl, software = seen

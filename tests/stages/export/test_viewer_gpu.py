@@ -11,15 +11,6 @@ from gsac.stages.export.page import page_bytes
 
 SIZE = 300
 needs_chromium = pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")
-SHADOWED = """(() => {
-  gsac.still = true;
-  document.body.classList.add('bare');
-  gsac.resize();
-  const eye = gsac.camera.eye(gsac.canvas.width, gsac.canvas.height);
-  gsac.painter.prepare(eye.view);
-  gsac.painter.clear([...colour(gsac.background), 1]);
-  gsac.painter.paint(eye, gsac.shadow);
-})()"""
 CARD = """(() => {
   if (!window.GPUAdapter) return;
   const info = Object.getOwnPropertyDescriptor(GPUAdapter.prototype, 'info').get;
@@ -95,20 +86,20 @@ def test_a_software_adapter_is_left_alone(page, address):
 
 @needs_chromium
 @pytest.mark.slow
-def test_what_stops_is_followed_by_the_next_way_with_the_same_picture(page, address):
+def test_what_stops_is_followed_by_the_next_way_with_the_same_picture(page, address, shadowed):
     got = page.call("Page.addScriptToEvaluateOnNewDocument", source=CARD)
     try:
         page.open(f"{address}?card#pose=A&bg=a0b0c0&yaw=20&pitch=12&joints=left_elbow:0,-40,0&expression=jawOpen:1")
         if not page.has_webgpu():
             pytest.skip("this chromium has no WebGPU")
         assert page.run("gsac.painter.kind") == "webgpu", "a card is taken"
-        seen = [picture(page, SHADOWED)]
+        seen = [picture(page, shadowed)]
         for stop, kind in (("gsac.painter.device.destroy()", "webgl"),
                            ("gsac.painter.gl.getExtension('WEBGL_lose_context').loseContext()", "software")):
             page.run(stop)
             page.until(f"gsac.painter?.kind === '{kind}'")
             page.until("/now drawn/.test(document.getElementById('note').textContent)")
-            seen.append(picture(page, SHADOWED))
+            seen.append(picture(page, shadowed))
         for other in seen[1:]:
             assert np.abs(seen[0] - other).max() <= 12 and np.abs(seen[0] - other).mean() < 0.5
         assert (np.abs(seen[0] - (0xA0, 0xB0, 0xC0)).max(-1) > 20).mean() > 0.03

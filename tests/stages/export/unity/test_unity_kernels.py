@@ -138,6 +138,6 @@ def test_depths_outside_the_range_and_nans_are_still_a_permutation(gpu, kernels)
 
 
 def test_the_kernels_use_no_wave_operation_and_no_matrix_in_a_buffer(hlsl):
-    for path in hlsl.PACKAGE.iterdir():
+    for path in hlsl.CORE.iterdir():
         text = path.read_text()
         assert "Wave" not in text and "StructuredBuffer<float4x4>" not in text, path.name
