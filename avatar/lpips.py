@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -113,7 +114,7 @@ class Lpips:
         """arrays: as `shapes(name)`."""
         import torch
 
-        self.layers = NETS[name]
+        self.layers, self.one_at_a_time = NETS[name], Lock()
         self.weights = {own: torch.from_numpy(np.ascontiguousarray(values, np.float32)) for own, values in arrays.items()}
 
     @classmethod
@@ -134,7 +135,7 @@ class Lpips:
 
         if min(a.shape[:2]) < LEAST_SIDE:
             return float("nan")
-        with torch.no_grad():
+        with torch.no_grad(), self.one_at_a_time:  # torch brings its own threads, and the features of two images are large
             return float(self._distance(*(_tensor(np.asarray(image, np.float32), scaled) for image in (a, b))))
 
     def gradient(self, image: np.ndarray, target: np.ndarray, scaled: bool = True) -> tuple[float, np.ndarray]:

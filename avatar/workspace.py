@@ -8,9 +8,14 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
+from threadpoolctl import threadpool_limits
+
+Item, Result = TypeVar("Item"), TypeVar("Result")
 
 _pools: dict[int, ThreadPoolExecutor] = {}
 if hasattr(os, "register_at_fork"):
@@ -55,3 +60,23 @@ class Workspace:
         finally:
             for other in others:
                 other.result()
+
+
+def side_by_side(work: Callable[[Item, Workspace], Result], items: Iterable[Item]) -> list[Result]:
+    """[work(item, workspace)] in the order of the items, each by one thread: images too small to be shared among threads.
+
+    What `work` gives back must not live in its workspace, which the next item gets.
+    """
+    items = list(items)
+    many = min(available(), len(items))
+    if many <= 1:
+        workspace = Workspace(1) if available() == 1 else Workspace()
+        return [work(item, workspace) for item in items]
+
+    def part(k: int) -> list[Result]:
+        workspace = Workspace(1)
+        return [work(item, workspace) for item in items[k::many]]
+
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(many) as pool:
+        parts = list(pool.map(part, range(many)))
+    return [parts[i % many][i // many] for i in range(len(items))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import json
 import shutil
@@ -11,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache import objects
-from gsac.cache.errors import FULL, CacheFullError
+from gsac.cache.errors import FULL, CacheError, CacheFullError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store
-from gsac.pipeline.child import StageBugError, run_child, tail
+from gsac.pipeline.child import Child, StageBugError, tail
 from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
@@ -31,18 +32,66 @@ LITTLE_ROOM = 16 << 20
 
 
 @dataclass
+class Ready:
+    """A process that has loaded a stage's code."""
+
+    stage: str
+    code: dict[str, str]
+    """Digests of that code, before it was loaded."""
+    child: Child
+
+
+@dataclass
 class Actor:
-    """Does stages for one run."""
+    """Does stages for one run; as a context, it ends what it has started."""
 
     keys: Keys
     store: Store
     reporter: PlainReporter
     logs: Path
     """Folder for `<stage>.log`."""
+    ready: Ready | None = None
+
+    def __enter__(self) -> Actor:
+        return self
+
+    def __exit__(self, *exc) -> None:
+        self._drop()
+
+    def prepare(self, name: str) -> None:
+        """Starts a process that loads a stage's code, to be there when the stage's inputs are."""
+        self._drop()
+        with contextlib.suppress(CacheError, BadInput):  # it will be raised again when the stage's turn comes
+            code = self.keys.code(name)
+            self.ready = Ready(name, code, self._child(name, self._log(name, ".next")))
+
+    def _drop(self) -> None:
+        if self.ready is not None:
+            self.ready.child.close()
+            self.ready.child.log.unlink(missing_ok=True)
+            self.ready = None
+
+    def _child(self, name: str, log: Path) -> Child:
+        self.logs.mkdir(parents=True, exist_ok=True)
+        return Child(f"{self.keys.project.package}.{name}", self.keys.project.entry(name), log)
+
+    def _log(self, name: str, more: str = "") -> Path:
+        return self.logs / f"{name}.log{more}"
+
+    def _taken(self, parts: KeyParts) -> Child:
+        """A process for the stage: the one that is ready, if it has loaded the code that the key names, else a new one."""
+        ready, log = self.ready, self._log(parts.stage)
+        if ready is None or (ready.stage, ready.code) != (parts.stage, parts.code):
+            self._drop()
+            return self._child(parts.stage, log)
+        self.ready = None
+        ready.child.rename_log(log)
+        return ready.child
 
     def act(self, verdict: Verdict, inputs: dict[str, Path], forced: bool = False,
-            still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
-        """inputs: port -> read-only path. `still_valid` runs before publishing; it raises if inputs changed.
+            still_valid: Callable[[], None] = lambda: None, following: str | None = None) -> tuple[Outcome, Record]:
+        """inputs: port -> read-only path. `still_valid` runs before publishing; it raises if inputs changed. following: the stage
+        that comes next, whose code may be loaded meanwhile.
 
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
@@ -57,7 +106,7 @@ class Actor:
             if forced:
                 objects.remove(scratch)
             with self.store.private(name) as folder:
-                info = self._compute(parts, inputs, models, folder, scratch)
+                info = self._compute(parts, inputs, models, folder, scratch, following)
                 still_valid()
                 outputs = tuple(output.path for output in stage.outputs)
                 if METRICS_OUTPUT in outputs:
@@ -68,8 +117,8 @@ class Actor:
         return Outcome.RAN, record
 
     def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path,
-                 scratch: Path) -> RunInfo:
-        name, project = parts.stage, self.keys.project
+                 scratch: Path, following: str | None) -> RunInfo:
+        name = parts.stage
         now = datetime.datetime.now(datetime.UTC)
         info = RunInfo(started=now.isoformat(timespec="seconds"), device=parts.device or self.keys.device)
 
@@ -81,17 +130,18 @@ class Actor:
                 info.warnings.append(message)
                 self.reporter.warning(name, message)
 
-        self.logs.mkdir(parents=True, exist_ok=True)
-        log = self.logs / f"{name}.log"
         order = {
-            "declaration": f"{project.package}.{name}", "entry": project.entry(name),
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
             "scratch": str(scratch),
             "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
             "device": info.device,
         }
         try:
-            end = run_child(order, log, hear)
+            with self._taken(parts) as child:
+                child.order(order)
+                if following is not None:
+                    self.prepare(following)
+                end = child.follow(hear)
         except StageError as error:
             if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
                 raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
@@ -99,7 +149,7 @@ class Actor:
                 objects.remove(scratch)
             raise
         info.seconds, info.cpu_seconds, info.peak_rss_mb = end["seconds"], end["cpu_seconds"], end["peak_rss_mb"]
-        info.log_tail = tail(log)
+        info.log_tail = tail(self._log(name))
         return info
 
     def _waiting(self, name: str) -> None:

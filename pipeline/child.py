@@ -16,7 +16,7 @@ from typing import Any
 from gsac.stages.contract import BadInput, StageError
 
 GRACE_S = 2.0
-"""A stage that is done has this long to leave."""
+"""A process that says no more has this long to leave by itself, so that it can be seen how."""
 LOG_TAIL = 4000
 
 
@@ -24,40 +24,73 @@ class StageBugError(StageError):
     """A stage raised something it should not have; the log has the traceback."""
 
 
-def run_child(order: dict[str, Any], log: Path, on_event: Callable[[dict], None]) -> dict[str, Any]:
-    """Runs `gsac.pipeline.worker` on the order; its prints go to `log`. Returns the fields of the `done` event.
+class Child:
+    """A stage's process. It loads the stage's code at once and waits for its order; it ends with the context."""
 
-    BadInput, StageError or StageBugError as the stage failed. Whatever ends the wait (Ctrl-C too) ends the child, and
-    all that it started.
-    """
-    read, write = os.pipe()
-    try:
-        with log.open("wb") as log_stream:
-            process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "gsac.pipeline.worker"],
-                stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write,),
-                start_new_session=True, env=os.environ | {"PYTHONUNBUFFERED": "1"},
-            )
-    finally:
-        os.close(write)
-    end = None
-    try:
-        with os.fdopen(read) as events:
-            with contextlib.suppress(BrokenPipeError):  # died at once: seen below
-                process.stdin.write(json.dumps(order | {"events": write, "started": time.time()}).encode() + b"\n")
-                process.stdin.flush()
+    def __init__(self, declaration: str, entry: str, log: Path):
+        """declaration, entry: modules of the stage; log: where its prints go."""
+        self.log = log
+        self._events, write = os.pipe()
+        try:
+            with log.open("wb") as log_stream:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "gsac.pipeline.worker"],
+                    stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write,),
+                    start_new_session=True, env=os.environ | {"PYTHONUNBUFFERED": "1"},
+                )
+        except BaseException:
+            os.close(self._events)
+            raise
+        finally:
+            os.close(write)
+        self._tell({"declaration": declaration, "entry": entry, "events": write})
+
+    def __enter__(self) -> Child:
+        return self
+
+    def __exit__(self, *exc) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """The whole group goes at once: what it was writing is private and is dropped."""
+        if self._events >= 0:
+            os.close(self._events)
+            self._events = -1
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+
+    def order(self, order: dict[str, Any]) -> None:
+        """Once: lets it begin."""
+        self._tell(order | {"started": time.time()})
+
+    def follow(self, on_event: Callable[[dict], None]) -> dict[str, Any]:
+        """Waits until the order is done. Returns the fields of the `done` event; BadInput, StageError or StageBugError as the
+        stage failed."""
+        end, events = None, os.fdopen(self._events)
+        self._events = -1
+        with events:
             for line in events:
                 event = json.loads(line)
                 if event["event"] in ("done", "failed"):
                     end = event
                 else:
                     on_event(event)
-        if end is not None:
+        if end is None:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(GRACE_S)  # threads of libraries may keep it from leaving
-    finally:
-        _end(process)
-    return _judge(end, process.returncode, log)
+                self._process.wait(GRACE_S)
+        self.close()
+        return _judge(end, self._process.returncode, self.log)
+
+    def rename_log(self, log: Path) -> None:
+        self.log = self.log.replace(log)
+
+    def _tell(self, words: dict[str, Any]) -> None:
+        with contextlib.suppress(BrokenPipeError):  # died at once: `run` sees it
+            self._process.stdin.write(json.dumps(words).encode() + b"\n")
+            self._process.stdin.flush()
 
 
 def _judge(end: dict | None, code: int, log: Path) -> dict[str, Any]:
@@ -69,15 +102,6 @@ def _judge(end: dict | None, code: int, log: Path) -> dict[str, Any]:
         kind = {"bad input": BadInput, "stage": StageError, "bug": StageBugError}[end["kind"]]
         raise kind(end["message"])
     return end
-
-
-def _end(process: subprocess.Popen) -> None:
-    """The whole group goes at once: what it was writing is private and is dropped."""
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    with contextlib.suppress(OSError):
-        process.stdin.close()
 
 
 def tail(log: Path) -> str:

@@ -53,6 +53,10 @@ class Keys:
         """What the stage must have, and what it wishes for as far as it is here."""
         return [*stage.models(config), *(name for name in stage.wishes(config) if name in self.models.brought)]
 
+    def code(self, name: str) -> dict[str, str]:
+        """Digests of all that the stage's result depends on of our code."""
+        return code_parts(self.project.entry(name), self.project.stage(name).code, self.memo)
+
     def parts(self, name: str, inputs: dict[str, str]) -> KeyParts:
         """inputs: port -> tree digest."""
         stage = self.project.stage(name)
@@ -64,7 +68,7 @@ class Keys:
             stage=name,
             inputs=dict(inputs),
             params=params,
-            code=code_parts(self.project.entry(name), stage.code, self.memo),
+            code=self.code(name),
             models={model: self.models.sha256(model) for model in self._models(stage, config)},
             packages={package: package_version(package) for package in stage.packages},
             device=device,

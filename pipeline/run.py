@@ -137,9 +137,8 @@ class Chain:
         source = self._clip_digest(clip)
         digests = {CLIP: source}
         paths = {CLIP: clip}
-        actor = Actor(self.keys, self.store, self.reporter, self.workspace.root / "logs")
-        with in_use(self.store) as lease, self._kept(clip):
-            for name in steps:
+        with in_use(self.store) as lease, self._kept(clip), self._actor() as actor:
+            for name, following in zip(steps, [*steps[1:], None], strict=True):
                 inputs = {port: digests[port] for port in self.graph.step(name).deps}
                 lease.add(self.keys.parts(name, inputs).key())
                 verdict = self._judge(name, digests, options)
@@ -152,12 +151,16 @@ class Chain:
                     with self._failing(verdict, actor):
                         outcome, record = actor.act(
                             verdict, {port: paths[port] for port in inputs}, forced=name in options.force,
-                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
+                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None,
+                            following=following)
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
                 self._done(verdict, outcome, record)
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
+
+    def _actor(self) -> Actor:
+        return Actor(self.keys, self.store, self.reporter, self.workspace.root / "logs")
 
     def _judge(self, name: str, digests: dict[str, str], options: Options) -> Verdict:
         parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})

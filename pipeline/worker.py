@@ -1,11 +1,12 @@
 """The child process that does one stage: builds the Job, runs it, checks what it wrote, and says how it goes.
 
-Reads one JSON line from stdin (the order), writes events as JSON lines to the file descriptor that the order names.
+Reads two JSON lines from stdin: what to load and where to write events to, a file descriptor, and when there is work the order.
 Stdin stays open as long as the parent lives; when it closes, the child and its children go.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
 import os
@@ -48,10 +49,17 @@ class Voice:
 
 
 def main() -> None:
-    order = json.loads(sys.stdin.readline())
-    os.set_inheritable(order["events"], False)
-    voice = Voice(os.fdopen(order["events"], "w"))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    start = json.loads(sys.stdin.readline())
+    os.set_inheritable(start["events"], False)
+    voice = Voice(os.fdopen(start["events"], "w"))
+    for module in (start["declaration"], start["entry"]):
+        with contextlib.suppress(Exception):  # it will fail again, and be heard, when there is an order
+            importlib.import_module(module)
+    line = sys.stdin.readline()
+    if not line:
+        return
+    order = start | json.loads(line)
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     try:
         _work(order, voice)
@@ -60,6 +68,8 @@ def main() -> None:
         voice.say("failed", kind=_kind(error), message=_message(error))
     else:
         voice.say("done", seconds=time.time() - order["started"], **cost())
+    sys.stdout.flush()
+    os._exit(0)  # what is written is written: libraries that tidy up their threads and memory take seconds to
 
 
 def _work(order: dict[str, Any], voice: Voice) -> None:

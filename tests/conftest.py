@@ -227,7 +227,8 @@ class Toy:
     @property
     def env(self) -> dict[str, str]:
         return os.environ | {
-            "PYTHONPATH": str(self.root / "lib"), "GSAC_STAGES": "gsac.toy", "GSAC_CACHE": str(self.cache),
+            "PYTHONPATH": os.pathsep.join(filter(None, [str(self.root / "lib"), os.environ.get("PYTHONPATH")])),
+            "GSAC_STAGES": "gsac.toy", "GSAC_CACHE": str(self.cache),
             "TOY_RUNS": str(self.runs_file), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
             "PYTHONDONTWRITEBYTECODE": "1",
         }

@@ -200,7 +200,7 @@ class CudaTrainer:
             h, w = shot.pixels.shape[:2]
             rows, columns = -(-h // TILE), -(-w // TILE)
             shown = np.zeros((rows * TILE, columns * TILE), bool)
-            shown[:h, :w] = shot.pixels.any(2)
+            shown[:h, :w] = np.ascontiguousarray(shot.pixels).view(np.uint32)[..., 0] != 0
             frames[i] = (at, tiles, w, h, *shot.camera.focal, *shot.camera.center, self.body.rest_of[t], t, 0)
             pixels.append(shot.pixels.reshape(-1))
             flags.append(shown.reshape(rows, TILE, columns, TILE).any((1, 3)).reshape(-1))

@@ -8,14 +8,13 @@ Gaussian process: frames that are not trained on are corrected as those around t
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.workspace import Workspace, available
+from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.contract import StageError
 from gsac.stages.train import fast
 from gsac.stages.train.alignment import TURNING, UNKNOWNS, Normal, carriers, normal_equations
@@ -24,7 +23,6 @@ from gsac.stages.train.holdout import near
 from gsac.stages.train.poses import BODY, Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
-from threadpoolctl import threadpool_limits
 
 COUNT = 3000
 """Gaussians, at most as many as are asked for."""
@@ -123,7 +121,6 @@ class Corrections:
         self.spread = np.append(np.full(3 * TURNING, TURN), np.full(3, SHIFT))
         self.values = np.zeros((frames, UNKNOWNS))
         self.kept, self.error = self.values, np.inf
-        self.workspaces = [Workspace(1) for _ in range(min(available(), len(views)))]
 
     def solve(self) -> None:
         """One Gauss-Newton step of all frames. A step that made the images worse is taken back instead."""
@@ -155,15 +152,13 @@ class Corrections:
         self.place()
 
     def equations(self, gaussians: Gaussians) -> list[tuple[int, Normal]]:
-        """Of every frame, in the order of the views; a thread a frame, since one small image is not worth many."""
-        work, many = list(self.views.items()), len(self.workspaces)
+        """Of every frame, in the order of the views."""
 
-        def part(k: int) -> list[Normal]:
-            return [normal_equations(gaussians, self.share, self.poses, t, view, self.workspaces[k]) for t, view in work[k::many]]
+        def of_frame(frame: tuple[int, View], workspace: Workspace) -> tuple[int, Normal]:
+            t, view = frame
+            return t, normal_equations(gaussians, self.share, self.poses, t, view, workspace)
 
-        with threadpool_limits(1, "blas"), ThreadPoolExecutor(many) as pool:
-            parts = list(pool.map(part, range(many)))
-        return [(t, parts[i % many][i // many]) for i, (t, _) in enumerate(work)]
+        return side_by_side(of_frame, self.views.items())
 
     def place(self) -> None:
         """Poses as corrected."""

@@ -73,11 +73,20 @@ def mean_colours(sights: list[Sight], count: int, light: np.ndarray | None = Non
 
     Returns rgb (N, 3) float32 in 0..1, grey where unseen, and seen (N,) bool.
     """
-    total, weight = np.zeros((count, 3)), np.zeros((count, 3))
-    for sight in sights:
-        factor = np.ones_like(sight.colour) if light is None else shade(light, sight.normal)
-        total[sight.which] += sight.weight[:, None] * sight.colour * factor
-        weight[sight.which] += sight.weight[:, None] * factor**2
+    return _mean_colours(_joined(sights), count, light)
+
+
+def _joined(sights: list[Sight]) -> Sight:
+    """All that the frames show, as if one did."""
+    parts = zip(*((s.which, s.colour, s.normal, s.weight) for s in sights), strict=True)
+    return Sight(*map(np.concatenate, parts)) if sights else Sight(np.zeros(0, np.int64), *np.zeros((2, 0, 3)), np.zeros(0))
+
+
+def _mean_colours(sight: Sight, count: int, light: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    factor = np.ones_like(sight.colour) if light is None else shade(light, sight.normal)
+    weighted, square = sight.weight[:, None] * sight.colour * factor, sight.weight[:, None] * factor**2
+    total, weight = (np.stack([np.bincount(sight.which, channel, count) for channel in values.T], 1)
+                     for values in (weighted, square))
     seen = weight[:, 0] > 0
     rgb = np.full((count, 3), 0.5, np.float32)
     rgb[seen] = np.clip(total[seen] / weight[seen], 0, 1)
@@ -92,22 +101,18 @@ def find_light(sights: list[Sight], count: int) -> np.ndarray:
     are not looked for: a turn seen in part takes them for stains, and whole turns are drawn as well without.
     """
     light = np.concatenate([np.ones((1, 3)), np.zeros((3, 3))])
-    seen = sum(float(sight.weight.sum()) for sight in sights)
+    every = _joined(sights)
+    seen = float(every.weight.sum())
     if not seen:
         return light.astype(np.float32)
-    trust = TOLD * len(sights) / NOISE**2 / seen
+    trust, terms = TOLD * len(sights) / NOISE**2 / seen, basis(every.normal).astype(np.float64)
     for _ in range(ROUNDS):
-        rgb, _ = mean_colours(sights, count, light)
-        square, product, mean = np.zeros((4, 4)), np.zeros(4), 0.0
-        for sight in sights:
-            terms = basis(sight.normal)[:, :, None] * rgb[sight.which, None]
-            weighted = terms * sight.weight[:, None, None]
-            square += np.einsum("mac,mbc->ab", weighted, terms) / 3
-            product += np.einsum("mac,mc->a", weighted, sight.colour) / 3
+        rgb = _mean_colours(every, count, light)[0].astype(np.float64)[every.which]
+        square = terms.T @ (terms * (every.weight * (rgb**2).mean(1))[:, None])
+        product = terms.T @ (every.weight * (rgb * every.colour).mean(1))
         prior = np.diag([0, 1, 1, 1]) / EVEN**2
         white = np.linalg.solve(trust * square + prior, trust * product)
-        for sight in sights:
-            mean += float(sight.weight @ (basis(sight.normal) @ white))
+        mean = float(every.weight @ (terms @ white))
         light = np.tile((white * seen / mean)[:, None], 3)
     return light.astype(np.float32)
 

@@ -14,7 +14,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import WHITE, composite, score
 from gsac.avatar.raster import render_bound, render_bound_backward
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
 from gsac.stages.train.guard import finite, pose
 from gsac.stages.train.kernels import on_background, through_background
@@ -45,16 +45,15 @@ def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
-          workspace: Workspace | None = None, flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
+          flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
     """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
-    workspace = workspace or Workspace()
-    rows = []
-    for t in map(int, frames):
+
+    def row(t: int, workspace: Workspace) -> dict:
         finite("when it is judged", pose(poses, t))
         rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
         finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
         true_rgb, mask = truth(views[t])
-        rows.append(score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips))
+        scores = score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips)
         if folder is not None:
             render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
             error = np.abs(render - real).mean(2) / ERROR_FULL
@@ -62,7 +61,9 @@ def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder:
             write_frame(folder / f"{t:06d}_truth.png", np.uint8(np.round(real * 255)))
             write_frame(folder / f"{t:06d}_render.png", np.uint8(np.round(render * 255)))
             write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(heat, cv2.COLOR_BGR2RGB))
-    return rows
+        return scores
+
+    return side_by_side(row, map(int, frames))
 
 
 def boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:
@@ -120,13 +121,15 @@ def turned(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:
     middle = (vertices.min(0) + vertices.max(0)) / 2
     half = float(np.abs(vertices - middle).max()) * 1.1
     upright = np.diag([1.0, -1.0, -1.0])
-    tiles = []
-    for about_y, about_x in ((0, 0), (90, 0), (180, 0), (-90, 0), (20, -65), (20, 50)):
-        y, x = np.radians(about_y), np.radians(about_x)
+
+    def tile(degrees: tuple[int, int], workspace: Workspace) -> np.ndarray:
+        y, x = np.radians(degrees)
         turn = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
         tilt = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
         posed = (vertices - middle) @ (tilt @ upright @ turn).T + np.array([0, 0, 5 * half])
         camera = Camera((size * 2.4, size * 2.4), (size / 2, size / 2), size, size)
-        rendering = render_bound(posed.astype(np.float32), poses.body.faces, gaussians, camera)
-        tiles.append(np.uint8(np.round(composite(rendering.rgb, rendering.alpha, WHITE) * 255)))
+        rendering = render_bound(posed.astype(np.float32), poses.body.faces, gaussians, camera, workspace)
+        return np.uint8(np.round(composite(rendering.rgb, rendering.alpha, WHITE) * 255))
+
+    tiles = side_by_side(tile, ((0, 0), (90, 0), (180, 0), (-90, 0), (20, -65), (20, 50)))
     return np.vstack([np.hstack(tiles[:3]), np.hstack(tiles[3:])])

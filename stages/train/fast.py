@@ -14,7 +14,7 @@ from gsac.avatar import losses
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound, render_bound_backward
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.train.checkpoint import standing
 from gsac.stages.train.colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.config import TrainConfig
@@ -235,8 +235,12 @@ class Trainer:
     def _seen(self, views: dict[int, View]) -> np.ndarray:
         """(N,) bool, whether the frames show the gaussian's front."""
         gaussians = self.gaussians()
-        pixels = sum(shown(gaussians, self.poses.vertices(t), self.faces, view.camera, self.workspace)
-                     for t, view in views.items())
+
+        def added(frame: tuple[int, View], workspace: Workspace) -> np.ndarray:
+            t, view = frame
+            return shown(gaussians, self.poses.vertices(t), self.faces, view.camera, workspace)
+
+        pixels = sum(side_by_side(added, views.items()))
         return enough(pixels / len(views), gaussians, self.rest, self.faces)
 
     def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:

@@ -14,7 +14,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import psnr
 from gsac.avatar.raster import render_backward, render_bound
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.train import fast
 from gsac.stages.train.evaluate import judge
 from gsac.stages.train.merging import merged, skin_of
@@ -39,19 +39,19 @@ def fit(task: Task, loop: Loop) -> Fit:
     if not len(task.held):
         return fast.fit(task, loop, UNJUDGED)
     trainer, fine, coarse = loop.train(task, SIZES[0])
-    poses, workspace = carried(task.poses, task.trained), Workspace()
+    poses = carried(task.poses, task.trained)
     loop.align(trainer.gaussians(), poses, task.held, task.views, ALIGN_STEPS)
     rungs: list[Rung] = []
     kept = trainer
     for size in SIZES:
         if rungs:
             gaussians = trainer.gaussians()
-            worth = shown(gaussians, task, fine, workspace) * care(gaussians, task.poses.body)
+            worth = shown(gaussians, task, fine) * care(gaussians, task.poses.body)
             fewer = merged(gaussians, worth, size, task.poses.body, trainer.rest)
             trainer = fast.Trainer(levelled(fewer, trainer.rest, trainer.faces), task, settled=True)
             trainer.rest_unseen(coarse)
             trainer = loop.refit(task, trainer, fine)
-        rows = judge(trainer.gaussians(), poses, task.held, task.views, None, workspace)
+        rows = judge(trainer.gaussians(), poses, task.held, task.views)
         rungs.append(Rung(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
         if choose(rungs) is not rungs[-1]:
             break
@@ -63,13 +63,14 @@ def fit(task: Task, loop: Loop) -> Fit:
     return Fit(*kept.recoloured(coarse), dict(kept.gains), figures)
 
 
-def shown(gaussians: Gaussians, task: Task, views: dict[int, View], workspace: Workspace) -> np.ndarray:
+def shown(gaussians: Gaussians, task: Task, views: dict[int, View]) -> np.ndarray:
     """(N,) pixels that each gaussian adds to some of the trained frames."""
-    total = np.zeros(len(gaussians))
-    for t in task.trained[::-(-len(task.trained) // fast.COLOUR_FRAMES)]:
-        rendering = render_bound(task.poses.vertices(int(t)), task.poses.body.faces, gaussians, views[int(t)].camera, workspace)
-        total += render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0]
-    return total
+
+    def added(t: int, workspace: Workspace) -> np.ndarray:
+        rendering = render_bound(task.poses.vertices(t), task.poses.body.faces, gaussians, views[t].camera, workspace)
+        return render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0].copy()
+
+    return sum(side_by_side(added, map(int, task.trained[::-(-len(task.trained) // fast.COLOUR_FRAMES)])), np.zeros(len(gaussians)))
 
 
 def care(gaussians: Gaussians, body: Body) -> np.ndarray:

@@ -13,7 +13,7 @@ from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
 from gsac.avatar.skinning import joint_transforms, skin
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.poses import Poses
 
@@ -34,16 +34,15 @@ NEEDLE, LONG = 4.5, 0.02
 """Longest axis over the middle one, and m, above which a gaussian is a needle."""
 
 
-def judge_novel(gaussians: Gaussians, poses: Poses, workspace: Workspace | None = None) -> dict[str, float]:
+def judge_novel(gaussians: Gaussians, poses: Poses) -> dict[str, float]:
     """`stray_alpha`: alpha farther than OFF outside of the body's silhouette, over the silhouette, worst view; `needle_share`:
     share of gaussians that are needles in the worst pose."""
-    workspace = workspace or Workspace()
-    stray, needles = 0.0, 0.0
-    for turns in POSES.values():
+
+    def of_pose(turns: dict, workspace: Workspace) -> tuple[float, float]:
         posed = in_pose(poses, turns)
         bound = bind(face_frames(posed, poses.body.faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
         axes = np.sort(bound.scales, 1)
-        needles = max(needles, float(((axes[:, 2] > NEEDLE * axes[:, 1]) & (2 * axes[:, 2] > LONG)).mean()))
+        needles, stray = float(((axes[:, 2] > NEEDLE * axes[:, 1]) & (2 * axes[:, 2] > LONG)).mean()), 0.0
         for turn in TURNS:
             vertices, camera, metre = before_camera(posed, turn)
             body = rasterise(vertices, poses.body.faces, camera)[0] >= 0
@@ -51,6 +50,9 @@ def judge_novel(gaussians: Gaussians, poses: Poses, workspace: Workspace | None 
             near = cv2.dilate(np.uint8(body), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
             alpha = render_bound(vertices, poses.body.faces, gaussians, camera, workspace).alpha
             stray = max(stray, float(alpha[near == 0].sum() / max(body.sum(), 1)))
+        return stray, needles
+
+    stray, needles = map(max, zip(*side_by_side(of_pose, POSES.values()), strict=True))
     return {"stray_alpha": stray, "needle_share": needles}
 
 

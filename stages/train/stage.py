@@ -14,7 +14,6 @@ from gsac.avatar.cuda import why_not
 from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import figures, summary
 from gsac.avatar.turn import turn_seen
-from gsac.avatar.workspace import Workspace
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
@@ -105,7 +104,6 @@ class Run:
         self.curve: list[dict] = []
         self.losses: list[float] = []
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
-        self.workspace = Workspace()
         self.checkpoints = Checkpoints(job.scratch, job.warn)
         self.resumed_at: int | None = None
         self.lpips = {name: Lpips.read(name, job.models[name]) for name in job.config.wishes() if name in job.models}
@@ -163,7 +161,7 @@ class Run:
         return carried(self.poses, self.trained)
 
     def psnr_fg(self, gaussians, poses: Poses, frames) -> float | None:
-        return summary(judge(gaussians, poses, frames, self.views, None, self.workspace))["psnr_fg"]
+        return summary(judge(gaussians, poses, frames, self.views))["psnr_fg"]
 
     def write(self) -> None:
         job, gaussians = self.job, self.result.gaussians
@@ -177,13 +175,13 @@ class Run:
 
     def metrics(self, gaussians, poses: Poses, folder) -> dict:
         config, held = self.job.config, self.held
-        rows = judge(gaussians, poses, held, self.views, folder, self.workspace, config.flip, self.lpips)
+        rows = judge(gaussians, poses, held, self.views, folder, config.flip, self.lpips)
         fitted = poses.copy()
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
         aligned = poses.copy()
         if config.pose_test_steps:
             ALIGN[self.job.device](gaussians, aligned, held, self.views, config.pose_test_steps)
-            ttpo = judge(gaussians, aligned, held, self.views, None, self.workspace, config.flip, self.lpips)
+            ttpo = judge(gaussians, aligned, held, self.views, None, config.flip, self.lpips)
         else:
             ttpo = []
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
@@ -208,6 +206,6 @@ class Run:
                                                  strict=True)],
             "resumed_at_step": self.resumed_at,
             "unseen_gaussians": int((~self.result.seen).sum()),
-            **judge_novel(gaussians, poses, self.workspace),
+            **judge_novel(gaussians, poses),
             "curve": self.curve,
         } | self.result.figures

@@ -67,14 +67,14 @@ def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
                                   300.0, (64.0, 64.0))
     poses = Poses(body, params)
     gaussians, at = covering(body)
-    clean = novel.judge_novel(gaussians, poses, Workspace(1))
+    clean = novel.judge_novel(gaussians, poses)
     assert clean["stray_alpha"] < 1e-4 and clean["needle_share"] == 0
     armpit = int(np.argmin(np.linalg.norm(at - body.keypoint_matrix[5] @ body.v_template, axis=1)))
     gaussians.mu[armpit, 1] += 0.2 / fast.face_frames(body.v_template, body.faces).k[gaussians.face[armpit]]
     gaussians.log_scale[armpit] += 1.5
-    assert novel.judge_novel(gaussians, poses, Workspace(1))["stray_alpha"] > 10 * max(clean["stray_alpha"], 1e-4)
+    assert novel.judge_novel(gaussians, poses)["stray_alpha"] > 10 * max(clean["stray_alpha"], 1e-4)
     gaussians.log_scale[7] += [3, 0, 0]
-    assert novel.judge_novel(gaussians, poses, Workspace(1))["needle_share"] == pytest.approx(1 / 4000)
+    assert novel.judge_novel(gaussians, poses)["needle_share"] == pytest.approx(1 / 4000)
 
 
 def test_the_face_has_a_box_from_the_front_and_none_from_behind(body):

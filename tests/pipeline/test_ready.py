@@ -1,0 +1,46 @@
+"""The next stage's process loads its code while the stage before it is at work."""
+
+from pathlib import Path
+
+NOTES = """
+import os
+
+with open(os.environ["TOY_RUNS"] + ".loaded", "a") as log:
+    log.write("loaded\\n")
+"""
+
+
+def loaded(toy) -> int:
+    """How many processes have loaded the code that notes it."""
+    file = Path(f"{toy.runs_file}.loaded")
+    return len(file.read_text().split()) if file.exists() else 0
+
+
+def test_the_next_stages_code_is_loaded_while_the_stage_before_is_at_work(toy):
+    toy.edit("left/stage.py", "from gsac.toy", NOTES + "from gsac.toy")
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3")
+    toy.wait_for(lambda: loaded(toy))
+    assert toy.runs == ["cut"] and not (toy.out / "cut" / "words").exists()
+    assert process.wait(60) == 0
+    assert loaded(toy) == 1
+    assert (toy.out / "logs" / "left.log").read_text() == "left at work\n"
+    assert not list((toy.out / "logs").glob("*.next"))
+
+
+def test_code_that_was_edited_after_it_was_loaded_is_loaded_anew(toy):
+    toy.edit("left/stage.py", "from gsac.toy", NOTES + "from gsac.toy")
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3")
+    toy.wait_for(lambda: loaded(toy))
+    toy.edit("left/stage.py", "spell(word)", "spell(word)[::-1]")
+    assert process.wait(60) == 0
+    assert loaded(toy) == 2
+    assert (toy.out / "left" / "out.txt").read_text() == "AHPLA"
+    assert toy.ran() == ["cut"], "cut.pause_s is another parameter, and left has its result"
+
+
+def test_a_stage_whose_result_is_there_leaves_no_process_and_keeps_its_log(toy):
+    assert toy.run().code == 0
+    (toy.out / "logs" / "left.log").write_text("of the run that made it")
+    assert toy.ran("--set", "cut.pause_s=0.1") == ["cut"]
+    assert (toy.out / "logs" / "left.log").read_text() == "of the run that made it"
+    assert not list((toy.out / "logs").glob("*.next"))
