@@ -2,31 +2,40 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
+from threading import local
 
 import numpy as np
+from gsac.avatar.workspace import available
 
 
 class Network:
-    """One .tflite file; input and outputs lose their batch axis."""
+    """One .tflite file; input and outputs lose their batch axis. Each thread that calls has an interpreter of its own."""
 
     def __init__(self, path: Path, threads: int | None = None):
-        """threads: None takes the cores this process may use, at most four; more do not help nets this small."""
-        from ai_edge_litert.interpreter import Interpreter
+        """threads: of each interpreter; None takes the cores this process may use, at most four; more do not help nets this
+        small."""
+        self._path, self._threads, self._own = path, threads or min(4, available()), local()
+        interpreter = self._interpreter()
+        self._input = interpreter.get_input_details()[0]["index"]
+        self._outputs = [d["index"] for d in interpreter.get_output_details()]
+        _, self.height, self.width, _ = interpreter.get_input_details()[0]["shape"].tolist()
 
-        threads = threads or min(4, len(os.sched_getaffinity(0)))
-        self._interpreter = Interpreter(model_path=str(path), num_threads=threads)
-        self._interpreter.allocate_tensors()
-        self._input = self._interpreter.get_input_details()[0]["index"]
-        self._outputs = [d["index"] for d in self._interpreter.get_output_details()]
-        _, self.height, self.width, _ = self._interpreter.get_input_details()[0]["shape"].tolist()
+    def _interpreter(self):
+        """The calling thread's."""
+        if not hasattr(self._own, "interpreter"):
+            from ai_edge_litert.interpreter import Interpreter
+
+            self._own.interpreter = Interpreter(model_path=str(self._path), num_threads=self._threads)
+            self._own.interpreter.allocate_tensors()
+        return self._own.interpreter
 
     def __call__(self, image: np.ndarray) -> list[np.ndarray]:
         """image: (height, width, 3) float32 in the range the file asks for. Returns the outputs in the file's order."""
-        self._interpreter.set_tensor(self._input, np.ascontiguousarray(image[None], dtype=np.float32))
-        self._interpreter.invoke()
-        return [self._interpreter.get_tensor(i)[0] for i in self._outputs]
+        interpreter = self._interpreter()
+        interpreter.set_tensor(self._input, np.ascontiguousarray(image[None], dtype=np.float32))
+        interpreter.invoke()
+        return [interpreter.get_tensor(i)[0] for i in self._outputs]
 
 
 def sigmoid(x: np.ndarray) -> np.ndarray:

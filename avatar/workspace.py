@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -80,3 +81,14 @@ def side_by_side(work: Callable[[Item, Workspace], Result], items: Iterable[Item
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(many) as pool:
         parts = list(pool.map(part, range(many)))
     return [parts[i % many][i // many] for i in range(len(items))]
+
+
+def ahead(pool: ThreadPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item], most: int) -> Iterator[Result]:
+    """work(item) in the order of the items, done by the pool while the caller looks at earlier ones; at most `most` wait."""
+    waiting = deque()
+    for item in items:
+        waiting.append(pool.submit(work, item))
+        if len(waiting) > most:
+            yield waiting.popleft().result()
+    while waiting:
+        yield waiting.popleft().result()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -57,18 +58,26 @@ def _hash(workspace: Workspace, port: str, store: Store) -> dict[str, Any]:
     files = tree_files(path)
     sizes = sum(file.stat().st_size for file in files.values())
     entry = {"path": port, "hash": "md5"}
+    digests = dict(zip(files, _md5s(list(files.values()), store), strict=True))
     if "" in files:
-        return entry | {"md5": _md5(path, store), "size": sizes}
-    listing = [{"md5": _md5(files[name], store), "relpath": name} for name in sorted(files)]
+        return entry | {"md5": digests[""], "size": sizes}
+    listing = [{"md5": digests[name], "relpath": name} for name in sorted(files)]
     digest = hashlib.md5(json.dumps(listing, sort_keys=True).encode(), usedforsecurity=False).hexdigest()
     return entry | {"md5": f"{digest}.dir", "size": sizes, "nfiles": len(listing)}
 
 
-def _md5(path: Path, store: Store) -> str:
-    stat = path.stat()
-    digest = store.memo.get(MEMO_KIND, stat)
-    if digest is None:
-        with path.open("rb") as stream:
-            digest = hashlib.file_digest(stream, lambda: hashlib.md5(usedforsecurity=False)).hexdigest()
-        store.memo.put(MEMO_KIND, stat, digest)
-    return digest
+def _md5s(paths: list[Path], store: Store) -> list[str]:
+    stats = [path.stat() for path in paths]
+    known = [store.memo.get(MEMO_KIND, stat) for stat in stats]
+    unknown = [i for i, digest in enumerate(known) if digest is None]
+    if unknown:
+        with ThreadPoolExecutor() as pool:
+            for i, digest in zip(unknown, pool.map(_md5, [paths[i] for i in unknown]), strict=True):
+                store.memo.put(MEMO_KIND, stats[i], digest)
+                known[i] = digest
+    return known
+
+
+def _md5(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, lambda: hashlib.md5(usedforsecurity=False)).hexdigest()

@@ -142,12 +142,16 @@ class CudaTrainer:
         """(V, 3) m, what the learned betas do to the vertices at rest."""
         return (self.body.shape @ self.betas()).astype(np.float32) if self.recipe.beta_rate else 0.0
 
-    def replace(self, gaussians: Gaussians, resting: np.ndarray | None = None) -> None:
-        """From here on as these are, on the plain body (`stages.train.offsets.fold`). resting: (N,) bool, what moves no more."""
+    def replace(self, gaussians: Gaussians, resting: np.ndarray | None = None, reach: float | None = None) -> None:
+        """From here on as these are, on the plain body (`stages.train.offsets.fold`). resting: (N,) bool, what moves no more;
+        reach: instead of the recipe's."""
         for name, array in self._values(gaussians).items():
             self.buffers[name].write(array)
         if resting is not None:
             self.buffers["resting"].write(resting)
+        if reach is not None:
+            self.scene.reach = reach
+            self._forget_graph()
         self.buffers["offset"].write(np.zeros((self.scene.vertex_count, 3), np.float32) + self._shaped())
 
     def losses(self) -> np.ndarray:
@@ -158,10 +162,14 @@ class CudaTrainer:
         """Bytes of the device's memory that this training holds."""
         return sum(b.bytes for b in self.buffers.values())
 
-    def close(self) -> None:
+    def _forget_graph(self) -> None:
+        """To be called when the scene has changed: a graph keeps what it was when it was recorded."""
         if self._graph is not None:
             self.device.drop(self._graph)
             self._graph = None
+
+    def close(self) -> None:
+        self._forget_graph()
         for buffer in self.buffers.values():
             buffer.free()
         self.buffers.clear()
@@ -326,9 +334,7 @@ class CudaTrainer:
             self._empty(name, shape, kind)
         self.scratch = list(dict.fromkeys([*self.scratch, "rank", "list", "moments", "segment", "checkpoint"]))
         self.scene.pair_room = room
-        if self._graph is not None:
-            self.device.drop(self._graph)
-            self._graph = None
+        self._forget_graph()
         self._set_state(overflow=0)
 
     def _set_state(self, **values: int) -> None:

@@ -6,8 +6,10 @@ import datetime
 import functools
 import os
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
 from typing import Any
 from urllib.parse import quote
 
@@ -65,11 +67,21 @@ def render(results: Results) -> str:
 
 
 def sections_of(results: Results) -> list[Section]:
-    drawing = functools.cache(lambda: Draw(results))
+    """Drawn side by side: most of it is reading and writing pictures."""
+    draw, one_at_a_time = functools.cache(lambda: Draw(results)), Lock()
 
-    def section(*parts) -> Section:
-        return make_section(results, drawing, *parts)
+    def drawing() -> Draw:
+        with one_at_a_time:
+            return draw()
 
+    def section(*parts) -> Future[Section]:
+        return pool.submit(make_section, results, drawing, *parts)
+
+    with ThreadPoolExecutor() as pool:
+        return [future.result() for future in sections(section)]
+
+
+def sections(section: Callable[..., Future[Section]]) -> list[Future[Section]]:
     return [
         section("clip", "The clip", "Frames that the stages read, evenly through the clip.", "split/frames",
                 lambda draw: draw.sheets.contact_sheet(draw.footage)),
@@ -83,11 +95,11 @@ def sections_of(results: Results) -> list[Section]:
                 "white rings the body's own, lines their distance.", "smplx/body.npz",
                 lambda draw: draw.sheets.body_sheet(draw.footage)),
         section("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of "
-                "frames that training never saw.", "train/heldout", lambda draw: draw.sheets.heldout_sheet(results)),
+                "frames that training never saw.", "train/heldout", lambda draw: draw.sheets.heldout_sheet(draw.results)),
         section("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
-                "had.", "train/heldout/views.png", lambda draw: draw.sheets.views_sheet(results)),
+                "had.", "train/heldout/views.png", lambda draw: draw.sheets.views_sheet(draw.results)),
         section("training", "Training", "Loss and held-out quality over the seconds of training, without the time for "
-                "judging.", "train/metrics.json", None, lambda draw: curves(results, draw.charts)),
+                "judging.", "train/metrics.json", None, lambda draw: curves(draw.results, draw.charts)),
     ]
 
 
@@ -98,7 +110,7 @@ class Draw:
         from gsac.pipeline.report import charts, sheets
         from gsac.pipeline.report.pictures import Footage
 
-        self.charts, self.sheets, self.footage = charts, sheets, Footage(results)
+        self.results, self.charts, self.sheets, self.footage = results, charts, sheets, Footage(results)
 
 
 def make_section(results: Results, drawing: Callable[[], Draw], ident: str, title: str, lead: str, port: str,

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS, FaceMesh
 from gsac.avatar.wholebody import INDEX
+from gsac.avatar.workspace import available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face.actions import Actions, fill, smooth, solve
 from gsac.stages.face.landmarks import align, look
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
 DOUBT = 0.1
+MOST = 8
+"""Frames looked at side by side: each thread holds networks of its own."""
 
 
 def run(job: Job) -> None:
@@ -43,19 +48,23 @@ def run(job: Job) -> None:
 def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple[np.ndarray, ...]:
     """Returns landmarks (T, 468, 3) px, NaN where the face is turned away or not believed, and of those frames, aligned
     points (T, 468, 3) m, weights (T, 468) and where the face looks (T, 3); zeros elsewhere."""
-    mesh = FaceMesh(job.models)
+    mesh = FaceMesh(job.models, threads=1)
     T = len(paths)
     landmarks = np.full((T, POINTS, 3), np.nan)
     points, weight, direction = np.zeros((T, POINTS, 3)), np.zeros((T, POINTS)), np.zeros((T, 3))
     least = -np.cos(np.radians(job.config.angle))
-    for t, path in enumerate(paths):
+
+    def frame(t: int) -> None:
         seen = keypoints["face_mesh"][t]
         if np.isfinite(seen[0, 0]) and not turned_away(keypoints["world"][t], least):
-            face = look(mesh, read_frame(path), seen, actions.mirror)
+            face = look(mesh, read_frame(paths[t]), seen, actions.mirror)
             aligned, looks = align(face.points, actions.neutral, face.facing())
             if face.presence >= job.config.threshold and looks[2] >= least:
                 landmarks[t], points[t], weight[t], direction[t] = face.points, aligned, face.facing(), looks
-        job.progress(t + 1, T, "frames")
+
+    with ThreadPoolExecutor(min(available(), MOST)) as pool:
+        for done, _ in enumerate(pool.map(frame, range(T)), 1):
+            job.progress(done, T, "frames")
     return landmarks, points, weight, direction
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from gsac.avatar.region import Region
+from gsac.avatar.workspace import available
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.frame import Frame
 from gsac.stages.keypoints.pose import Person, Pose, PoseNetworks
@@ -22,7 +23,7 @@ class Follower:
 
     def __init__(self, models: dict[str, Path], config: KeypointsConfig):
         self._least = config.person_threshold
-        self._pose = PoseNetworks(models)
+        self._pose = PoseNetworks(models, threads=max(1, min(4, available() // 4)))  # the other cores have other frames
         self._last: Region | None = None
 
     def look(self, image: np.ndarray, frame: Frame) -> Pose | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,15 +33,16 @@ class Mediapipe:
     def __init__(self, models: dict[str, Path], config: KeypointsConfig):
         self._config = config
         self._follower = Follower(models, config)
-        self._hands = HandNetworks(models)
-        self._face = FaceMesh(models)
+        self._hands = HandNetworks(models, threads=1)
+        self._face = FaceMesh(models, threads=1)
 
-    def look(self, image: np.ndarray) -> Frame:
-        """image: (H, W, 3) uint8 RGB, the next frame of the clip."""
+    def follow(self, image: np.ndarray) -> Callable[[], Frame]:
+        """image: (H, W, 3) uint8 RGB, the next frame of the clip. What it gives finds the rest, in any thread."""
         frame = Frame()
         pose = self._follower.look(image, frame)
-        if pose is None:
-            return frame
+        return lambda: frame if pose is None else self._filled(frame, image, pose)
+
+    def _filled(self, frame: Frame, image: np.ndarray, pose: Pose) -> Frame:
         write_body(frame, pose)
         head = region_of_head(pose.points[:11])
         face = self._face.find(image, head, head_yaw(pose.world), self._config.face_threshold)

@@ -6,6 +6,7 @@ BlazePose finds the person and gives the metres, the face mesh network what `fac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.follow import Follower
 from gsac.stages.keypoints.frame import Frame
 from gsac.stages.keypoints.mediapipe import write_body
+from gsac.stages.keypoints.pose import Pose
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)
 DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)
@@ -65,14 +67,15 @@ class Wholebody:
         self._config = config
         self._network = SimccNetwork(models["onnx-wholebody"])
         self._follower = Follower(models, config)
-        self._face = FaceMesh(models)
+        self._face = FaceMesh(models, threads=1)
 
-    def look(self, image: np.ndarray) -> Frame:
-        """image: (H, W, 3) uint8 RGB, the next frame of the clip."""
+    def follow(self, image: np.ndarray) -> Callable[[], Frame]:
+        """As `Mediapipe.follow`."""
         frame = Frame()
         pose = self._follower.look(image, frame)
-        if pose is None:
-            return frame
+        return lambda: frame if pose is None else self._filled(frame, image, pose)
+
+    def _filled(self, frame: Frame, image: np.ndarray, pose: Pose) -> Frame:
         write_body(frame, pose)
         head = region_of_head(pose.points[:11])
         face = self._face.find(image, head, head_yaw(pose.world), self._config.face_threshold)

@@ -1,10 +1,18 @@
-"""Runs the detector over the clip, writes keypoints.npz and says what was not seen."""
+"""Runs the detector over the clip, writes keypoints.npz and says what was not seen.
+
+The person is followed from frame to frame; what is left of a frame is looked for beside that, some frames at a time.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
 from gsac.avatar.wholebody import FACE, HANDS
+from gsac.avatar.workspace import ahead, available
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.frame_names import name_frames
 from gsac.stages.keypoints.frame import ARRAYS, Frame
@@ -12,6 +20,8 @@ from gsac.stages.keypoints.mediapipe import Mediapipe
 from gsac.stages.keypoints.simcc import Wholebody
 
 DETECTORS = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody}
+MOST = 8
+"""Frames looked at side by side: each thread holds networks of its own, some 40 MB."""
 EDGE = 0.004
 """Width of the rim of the frame, as a part of its longer side, that counts as touching it."""
 
@@ -21,15 +31,29 @@ def run(job: Job) -> None:
     paths = frame_paths(job.inputs["split/frames"])
     detector = DETECTORS[job.config.detector](job.models, job.config)
     frames, at_edge = [], []
-    for t, path in enumerate(paths):
-        image = read_frame(path)
-        frame = detector.look(image)
-        frames.append(frame)
-        at_edge.append(frame.seen and touches_edge(frame, image.shape[1], image.shape[0]))
-        job.progress(t + 1, len(paths), "frames")
+    many = min(available(), MOST)
+    with ThreadPoolExecutor(many + 1) as pool:
+        looks = (Look(detector.follow(image), *image.shape[:2]) for image in ahead(pool, read_frame, paths, 2))
+        for frame, edge in ahead(pool, look, looks, many):
+            frames.append(frame)
+            at_edge.append(edge)
+            job.progress(len(frames), len(paths), "frames")
     say(job, clip, frames, at_edge)
     arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in ARRAYS}
     write_arrays(job.out / "keypoints.npz", detector=np.array(job.config.detector), **arrays)
+
+
+class Look(NamedTuple):
+    rest: Callable[[], Frame]
+    """Finds what is left to find of the frame."""
+    height: int
+    width: int
+
+
+def look(one: Look) -> tuple[Frame, bool]:
+    """A frame, and whether the person touches its edge."""
+    frame = one.rest()
+    return frame, frame.seen and touches_edge(frame, one.width, one.height)
 
 
 def touches_edge(frame: Frame, width: int, height: int) -> bool:

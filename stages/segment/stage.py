@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from threading import Lock
 
 import numpy as np
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
-from gsac.avatar.workspace import available
+from gsac.avatar.workspace import ahead, available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.segment.edge import soften
@@ -41,18 +41,20 @@ def run(job: Job) -> None:
     given = (frames / "plate.png").exists()
     (job.out / "alpha").mkdir()
     absent, other_scene = np.zeros((2, len(paths)), bool)
-    one_at_a_time = Lock()  # the network's interpreter holds one image
 
-    def frame(t: int) -> None:
-        image = read_frame(paths[t])
+    def looks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
+        """Frames, and what the network says of them: it has threads of its own, so all are put to it by one."""
+        for t, image in enumerate(ahead(pool, read_frame, paths, 2)):
+            region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
+            yield t, image, None if region is None else network(image, region)
+
+    def cut(look: tuple[int, np.ndarray, np.ndarray | None]) -> None:
+        t, image, probability = look
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
-        region = person_region(xy, score)
-        if region is None:
+        if probability is None:
             absent[t] = True
             alpha = np.zeros(image.shape[:2], np.float32)
         else:
-            with one_at_a_time:
-                probability = network(image, region)
             alpha, plate_fits = segment_frame(image, probability, xy, score, plate, job.config.iterations)
             if given and not plate_fits:
                 other_scene[t] = True
@@ -62,7 +64,7 @@ def run(job: Job) -> None:
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
     with ThreadPoolExecutor(available()) as pool:
-        for done, _ in enumerate(pool.map(frame, range(len(paths))), 1):
+        for done, _ in enumerate(ahead(pool, cut, looks(pool), available()), 1):
             job.progress(done, len(paths), "frames")
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")

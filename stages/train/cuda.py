@@ -39,7 +39,7 @@ def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[i
         task.poses.offset = np.zeros_like(task.poses.offset)
         middle = fast.Trainer(folded, task, settled=True)
         middle.lay_unseen(coarse)
-        trainer.replace(middle.gaussians(), ~middle.seen)
+        trainer.replace(middle.gaussians(), ~middle.seen, middle.reach)
         follow(trainer, task, recipe.steps)
         hand_back(trainer, task)
         kept = settled(trainer, task)
@@ -53,7 +53,7 @@ def refit(task: Task, fewer: fast.Trainer, views: dict[int, View]) -> fast.Train
     recipe = recipe_of(task.config, len(gaussians), steps=ladder.refit_steps(task), begin=ladder.REFIT_FROM, coarse_share=0.0,
                        pose_rate=0.0, offset_rate=0.0)
     with training(task.poses, task.trained, [views], gaussians, recipe) as trainer:
-        trainer.replace(gaussians, ~fewer.seen)
+        trainer.replace(gaussians, ~fewer.seen, fewer.reach)
         trainer.train(recipe.steps)
         kept = settled(trainer, task)
         kept.seen = fewer.seen

@@ -410,3 +410,22 @@ def test_resting_gaussians_keep_their_values_while_the_others_learn(figure):
     for name in ("mu", "quat", "log_scale", "rgb", "opacity"):
         moved = np.abs(getattr(after, name) - getattr(before, name)).reshape(1000, -1).max(1)
         assert moved[resting].max() < 1e-5 and np.median(moved[~resting]) > 1e-4, name
+
+
+@gpu
+def test_a_tighter_reach_holds_from_the_step_on_that_it_is_told(figure):
+    from gsac.avatar.binding import face_frames
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import start
+
+    trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 1000), fast(1000, steps=60))
+    trainer.train(20)
+    before, size = trainer.gaussians(), face_frames(figure.body.rest[0], figure.body.faces).k
+    ways = []
+    for reach in (None, 2e-4):
+        trainer.replace(before, reach=reach)
+        trainer.train(20)
+        after = trainer.gaussians()
+        ways.append((np.linalg.norm(after.mu - before.mu, axis=1) * size[after.face]).max())
+    trainer.close()
+    assert ways[0] > 4e-4 and 1.9e-4 < ways[1] < 2.1e-4
