@@ -7,7 +7,7 @@ import datetime
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -50,13 +50,19 @@ class Actor:
     reporter: PlainReporter
     logs: Path
     """Folder for `<stage>.log`."""
+    begun: Callable[[], None] = lambda: None
+    """Called when a stage's process has its order: what can be done meanwhile."""
     ready: Ready | None = None
+    done: list[Child] = field(default_factory=list)
+    """Processes that may still be leaving, which takes a while where they held much memory."""
 
     def __enter__(self) -> Actor:
         return self
 
     def __exit__(self, *exc) -> None:
         self._drop()
+        while self.done:
+            self.done.pop().close()
 
     def prepare(self, name: str) -> None:
         """Starts a process that loads a stage's code, to be there when the stage's inputs are."""
@@ -89,9 +95,8 @@ class Actor:
         return ready.child
 
     def act(self, verdict: Verdict, inputs: dict[str, Path], forced: bool = False,
-            still_valid: Callable[[], None] = lambda: None, following: str | None = None) -> tuple[Outcome, Record]:
-        """inputs: port -> read-only path. `still_valid` runs before publishing; it raises if inputs changed. following: the stage
-        that comes next, whose code may be loaded meanwhile.
+            still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
+        """inputs: port -> read-only path. `still_valid` runs before publishing; it raises if inputs changed.
 
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
@@ -106,7 +111,7 @@ class Actor:
             if forced:
                 objects.remove(scratch)
             with self.store.private(name) as folder:
-                info = self._compute(parts, inputs, models, folder, scratch, following)
+                info = self._compute(parts, inputs, models, folder, scratch)
                 still_valid()
                 outputs = tuple(output.path for output in stage.outputs)
                 if METRICS_OUTPUT in outputs:
@@ -117,7 +122,7 @@ class Actor:
         return Outcome.RAN, record
 
     def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path,
-                 scratch: Path, following: str | None) -> RunInfo:
+                 scratch: Path) -> RunInfo:
         name = parts.stage
         now = datetime.datetime.now(datetime.UTC)
         info = RunInfo(started=now.isoformat(timespec="seconds"), device=parts.device or self.keys.device)
@@ -137,11 +142,15 @@ class Actor:
             "device": info.device,
         }
         try:
-            with self._taken(parts) as child:
+            child = self._taken(parts)
+            self.done.append(child)
+            try:
                 child.order(order)
-                if following is not None:
-                    self.prepare(following)
+                self.begun()
                 end = child.follow(hear)
+            except BaseException:
+                child.close()  # before the folder goes that it writes to
+                raise
         except StageError as error:
             if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
                 raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error

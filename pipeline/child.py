@@ -76,12 +76,12 @@ class Child:
                 event = json.loads(line)
                 if event["event"] in ("done", "failed"):
                     end = event
-                else:
-                    on_event(event)
+                    break
+                on_event(event)
         if end is None:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(GRACE_S)
-        self.close()
+            self.close()
         return _judge(end, self._process.returncode, self.log)
 
     def rename_log(self, log: Path) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import contextlib
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
 
 from gsac.pipeline.outcomes import Outcome
 
@@ -13,7 +15,29 @@ if TYPE_CHECKING:
 REPORT = "report.html"
 
 
-def refresh_report(workspace: Workspace, results: list[StageResult]) -> str | None:
+class Early:
+    """Sections of the report that are drawn while the last stage is at work."""
+
+    def __init__(self, workspace: Workspace):
+        self.workspace, self._pool, self._drawn = workspace, ThreadPoolExecutor(1), None
+
+    def begin(self, running: str) -> None:
+        """running: the last stage."""
+        self._drawn = self._pool.submit(self._draw, running)
+
+    def _draw(self, running: str) -> dict[str, Any]:
+        from gsac.pipeline.report import draw_sections
+
+        return draw_sections(self.workspace.root, running)
+
+    def sections(self) -> dict[str, Any]:
+        """By name; what is not among them is still to be drawn."""
+        with contextlib.suppress(Exception):
+            return self._drawn.result() if self._drawn else {}
+        return {}
+
+
+def refresh_report(workspace: Workspace, results: list[StageResult], early: Early | None = None) -> str | None:
     """Writes the report if it is due. A report that fails does not spoil a run: the answer is a warning then."""
     page = workspace.root / REPORT
     if page.exists() and all(result.outcome is Outcome.CACHED for result in results):
@@ -21,7 +45,7 @@ def refresh_report(workspace: Workspace, results: list[StageResult]) -> str | No
     try:
         from gsac.pipeline.report import write_report
 
-        write_report(workspace.root)
+        write_report(workspace.root, early.sections() if early else None)
     except Exception as error:
         why = f"{type(error).__name__}: {error}"
         return f"{page} could not be written ({why}); `gsac report {workspace.root}` tries again"

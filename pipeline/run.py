@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -127,8 +128,8 @@ class Chain:
                 digests |= _ports(verdict.record)
         return verdicts
 
-    def run(self, clip: Path, options: Options) -> None:
-        """Runs what has to; fills `results` and `metrics` and the workspace.
+    def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
+        """Runs what has to; fills `results` and `metrics` and the workspace. at_last: told when the last stage has begun.
 
         Raises StageFailedError, NotUpToDateError, CacheError; run.json and finished stages are kept in any case.
         """
@@ -139,6 +140,7 @@ class Chain:
         paths = {CLIP: clip}
         with in_use(self.store) as lease, self._kept(clip), self._actor() as actor:
             for name, following in zip(steps, [*steps[1:], None], strict=True):
+                actor.begun = partial(actor.prepare, following) if following else partial(at_last, name)
                 inputs = {port: digests[port] for port in self.graph.step(name).deps}
                 lease.add(self.keys.parts(name, inputs).key())
                 verdict = self._judge(name, digests, options)
@@ -151,8 +153,7 @@ class Chain:
                     with self._failing(verdict, actor):
                         outcome, record = actor.act(
                             verdict, {port: paths[port] for port in inputs}, forced=name in options.force,
-                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None,
-                            following=following)
+                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
                 self._done(verdict, outcome, record)

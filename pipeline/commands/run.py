@@ -12,7 +12,7 @@ from gsac.pipeline.events import PlainReporter, reporter
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.report_hook import refresh_report
+from gsac.pipeline.report_hook import Early, refresh_report
 from gsac.pipeline.run import Chain, Options, StageFailedError
 from gsac.pipeline.workspace import OWN_STORE, Workspace
 from gsac.stages.contract import BadInput
@@ -50,9 +50,10 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 def carry_out(chain: Chain, clip: Path, options: Options, voice: PlainReporter, json: bool) -> ExitCode:
     """The run itself; what was done is in the JSON object whether it ends well or not."""
+    early = Early(chain.workspace)
     try:
-        chain.run(clip, options)
-        report(chain, voice)
+        chain.run(clip, options, early.begin)
+        report(chain, voice, early)
     except BaseException as error:
         error.summary = chain.summary()
         if isinstance(error, StageFailedError):
@@ -64,8 +65,8 @@ def carry_out(chain: Chain, clip: Path, options: Options, voice: PlainReporter, 
     return ExitCode.OK
 
 
-def report(chain: Chain, voice: PlainReporter) -> None:
-    if (warning := refresh_report(chain.workspace, chain.results)) is not None:
+def report(chain: Chain, voice: PlainReporter, early: Early | None = None) -> None:
+    if (warning := refresh_report(chain.workspace, chain.results, early)) is not None:
         voice.note(f"gsac: warning: {warning}")
 
 

@@ -74,7 +74,8 @@ def do_one(keys: Keys, store: Store, voice: PlainReporter, name: str, digests: d
         outcome, record = Outcome.CACHED, verdict.record
         if not verdict.current:
             try:
-                outcome, record = Actor(keys, store, voice, logs).act(verdict, paths, forced=force)
+                with Actor(keys, store, voice, logs) as actor:
+                    outcome, record = actor.act(verdict, paths, forced=force)
             except StageError as error:
                 raise StageFailedError(name, error, logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:

@@ -6,7 +6,7 @@ import datetime
 import functools
 import os
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
@@ -34,24 +34,30 @@ class Section:
     """Why there is nothing to see."""
 
 
-def write_report(out_dir: Path) -> Path:
-    """Writes `report.html` into a run's folder and returns its path; whole or not at all.
+def draw_sections(out_dir: Path, running: str) -> dict[str, Section]:
+    """By name, those sections that can be drawn while a stage still runs: of what the stages before it made."""
+    drawn = sections_of(Results(out_dir), without=running)
+    return {section.ident: section for section in drawn if not section.absent}
+
+
+def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path:
+    """Writes `report.html` into a run's folder and returns its path; whole or not at all. drawn: as `draw_sections`, of this run.
 
     Needs neither run.json nor any one artifact: what is missing is said on the page. Raises OSError only.
     """
     results = Results(out_dir)
     page = results.root / REPORT
-    text = render(results)
+    text = render(results, drawn or {})
     temp = page.with_name(f".{REPORT}-{os.getpid()}")
     temp.write_text(text, encoding="utf-8")
     os.replace(temp, page)
     return page
 
 
-def render(results: Results) -> str:
+def render(results: Results, drawn: dict[str, Section]) -> str:
     import jinja2
 
-    sections = sections_of(results)
+    sections = sections_of(results, drawn)
     shown = [section for section in sections if section.sheet]
     facts = {name: value for section in shown for name, value in section.sheet.facts.items()}
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True,
@@ -66,41 +72,20 @@ def render(results: Results) -> str:
     )
 
 
-def sections_of(results: Results) -> list[Section]:
-    """Drawn side by side: most of it is reading and writing pictures."""
+def sections_of(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:
+    """Drawn side by side: most of it is reading and writing pictures. drawn: by name, those that are; without: a stage whose
+    results are left out."""
     draw, one_at_a_time = functools.cache(lambda: Draw(results)), Lock()
 
     def drawing() -> Draw:
         with one_at_a_time:
             return draw()
 
-    def section(*parts) -> Future[Section]:
-        return pool.submit(make_section, results, drawing, *parts)
+    def section(ident: str, title: str, lead: str, port: str, *how: Callable | None) -> Section:
+        return (drawn or {}).get(ident) or make_section(results, drawing, ident, title, lead, port, *how)
 
     with ThreadPoolExecutor() as pool:
-        return [future.result() for future in sections(section)]
-
-
-def sections(section: Callable[..., Future[Section]]) -> list[Future[Section]]:
-    return [
-        section("clip", "The clip", "Frames that the stages read, evenly through the clip.", "split/frames",
-                lambda draw: draw.sheets.contact_sheet(draw.footage)),
-        section("keypoints", "Keypoints", "What the detector saw. A ring is a point filled by its neighbours in time; "
-                "a cross marks the wrist of a hand that is missing.", "keypoints/keypoints.npz",
-                lambda draw: draw.sheets.keypoint_sheet(draw.footage),
-                lambda draw: [draw.charts.strip_chart(draw.footage.keypoints, draw.footage.face_valid)]),
-        section("alpha", "Cut-out", "The person over magenta: what is pink inside the person, or not pink outside, is "
-                "wrong.", "segment/alpha", lambda draw: draw.sheets.alpha_sheet(draw.footage)),
-        section("body", "Fitted body", "The body model over the frames, half transparent. Dots are detected points, "
-                "white rings the body's own, lines their distance.", "smplx/body.npz",
-                lambda draw: draw.sheets.body_sheet(draw.footage)),
-        section("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of "
-                "frames that training never saw.", "train/heldout", lambda draw: draw.sheets.heldout_sheet(draw.results)),
-        section("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
-                "had.", "train/heldout/views.png", lambda draw: draw.sheets.views_sheet(draw.results)),
-        section("training", "Training", "Loss and held-out quality over the seconds of training, without the time for "
-                "judging.", "train/metrics.json", None, lambda draw: curves(draw.results, draw.charts)),
-    ]
+        return list(pool.map(lambda parts: section(*parts), [parts for parts in SECTIONS if parts[3].split("/")[0] != without]))
 
 
 class Draw:
@@ -258,3 +243,23 @@ def size(value: Any) -> str:
     return f"{value:.1f} GB"
 
 
+SECTIONS = (
+    ("clip", "The clip", "Frames that the stages read, evenly through the clip.", "split/frames",
+     lambda draw: draw.sheets.contact_sheet(draw.footage)),
+    ("keypoints", "Keypoints", "What the detector saw. A ring is a point filled by its neighbours in time; "
+     "a cross marks the wrist of a hand that is missing.", "keypoints/keypoints.npz",
+     lambda draw: draw.sheets.keypoint_sheet(draw.footage),
+     lambda draw: [draw.charts.strip_chart(draw.footage.keypoints, draw.footage.face_valid)]),
+    ("alpha", "Cut-out", "The person over magenta: what is pink inside the person, or not pink outside, is "
+     "wrong.", "segment/alpha", lambda draw: draw.sheets.alpha_sheet(draw.footage)),
+    ("body", "Fitted body", "The body model over the frames, half transparent. Dots are detected points, "
+     "white rings the body's own, lines their distance.", "smplx/body.npz",
+     lambda draw: draw.sheets.body_sheet(draw.footage)),
+    ("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of "
+     "frames that training never saw.", "train/heldout", lambda draw: draw.sheets.heldout_sheet(draw.results)),
+    ("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
+     "had.", "train/heldout/views.png", lambda draw: draw.sheets.views_sheet(draw.results)),
+    ("training", "Training", "Loss and held-out quality over the seconds of training, without the time for "
+     "judging.", "train/metrics.json", None, lambda draw: curves(draw.results, draw.charts)),
+)
+"""Name, title, what it shows, port, what draws pictures, and charts."""

@@ -16,7 +16,7 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.viewer import browser as chromium
-from gsac.pipeline.report import write_report
+from gsac.pipeline.report import draw_sections, write_report
 from gsac.pipeline.report.charts import curve_chart
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
 from gsac.pipeline.report.page import seconds, size
@@ -150,6 +150,14 @@ def test_a_whole_run_shows_every_section(whole):
     assert "The face is seen in 3 frames only." in page.text("warnings")
     assert "75.0 s" not in page.text("stages") and "1 min 15 s then" in page.text("stages")
     assert len([t for t, a in page.tags if t == "polyline"]) == 2
+
+
+def test_sections_drawn_while_the_last_stage_runs_are_those_of_the_stages_before_and_give_the_same_page(copied, whole):
+    early = draw_sections(copied, "train")
+    assert sorted(early) == ["alpha", "body", "clip", "keypoints"]
+    shutil.rmtree(copied / "segment" / "alpha")
+    page = Page(write_report(copied, early))
+    assert all(page.images(section) == Page(whole / "report.html").images(section) for section in PICTURES)
 
 
 def test_the_page_asks_for_nothing_outside_itself(whole):
