@@ -11,8 +11,8 @@ from gsac.benchmarks.speed_accuracy.trial import NOVEL, Trial, hypervolume, seco
 QUALITIES = (22.0, 24.0, 25.0, 26.0, 28.0)
 HEAD = ("clip", "recipe", "steps", "seeds", "gaussians", "CPU s", "psnr_fg", "+-", "aligned", "ssim", "detail", "flip",
         "novel", "aligned", "flip", "stray", "needles", "peak GB", *(f"s to {q:g}" for q in QUALITIES))
-DIFFERENCES = {"flip": "FLIP {:+.4f}", "psnr_novel": "novel poses {:+.2f} dB", "psnr_novel_aligned": "aligned {:+.2f} dB",
-               "flip_novel": "FLIP {:+.4f}"}
+DIFFERENCES = {"flip": "FLIP {:+.4f}", "psnr_novel": "novel poses {:+.2f} dB", "flip_novel": "FLIP {:+.4f}",
+               "psnr_novel_aligned": "aligned {:+.2f} dB", "flip_novel_aligned": "FLIP {:+.4f}"}
 """What else the ends are compared by."""
 
 

@@ -10,7 +10,7 @@ from gsac.stages.contract import BadInput
 WORST_S, WORST_DB = 3600.0, 20.0
 """Reference point of the hypervolume."""
 
-NOVEL = ("flip", "psnr_novel", "psnr_novel_aligned", "flip_novel", "stray_alpha", "needle_share")
+NOVEL = ("flip", "psnr_novel", "psnr_novel_aligned", "flip_novel", "flip_novel_aligned", "stray_alpha", "needle_share")
 
 
 @dataclass
@@ -33,6 +33,7 @@ class Trial:
     """In poses that no frame shows; None where no truth of them is at hand. `_aligned`: moved to each image first."""
     psnr_novel_aligned: float | None = None
     flip_novel: float | None = None
+    flip_novel_aligned: float | None = None
     stray_alpha: float | None = None
     needle_share: float | None = None
 

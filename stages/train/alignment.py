@@ -14,8 +14,9 @@ from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
 from gsac.avatar.workspace import Workspace
+from gsac.stages.train.guard import finite
 from gsac.stages.train.poses import BODY, Poses
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, person_crop
 from numba import njit
 
 TURNING = BODY.stop
@@ -30,6 +31,12 @@ CLEAR = 0.1
 """Least alpha that a pixel's slope is shared by."""
 FLAT = 1e-8
 """Slope below which a gaussian says nothing."""
+CORRELATED = 40.0
+"""Values (pixels times channels) that are wrong together."""
+SPREAD_TURN, SPREAD_SHIFT = 0.27, 0.09
+"""rad and m of a round's step that images which say nothing allow (`converge`)."""
+MOST = 0.12
+"""rad and m of a round's step, at most."""
 
 
 class Normal(NamedTuple):
@@ -79,6 +86,32 @@ def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: i
     _rows(means[used], tensors[used], share[used], *_axes(poses, t), np.array(view.camera.focal, np.float32), rows)
     return Normal(np.concatenate([turns.ravel(), grad_transl]), CURVATURE * (rows.T @ rows).astype(np.float64),
                   float((residual[person] ** 2).sum()), int(person.sum()))
+
+
+def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], rounds: int) -> None:
+    """Moves the poses of some frames to their images by damped Gauss-Newton, the avatar held still; views: of all T.
+
+    Each frame ends with the pose of its rounds that drew it best. Rounds are worth ten of Adam's steps each.
+    """
+    share, workspace = carriers(poses.body, gaussians.face), Workspace()
+    damping = np.append(np.full(3 * TURNING, SPREAD_TURN**-2), np.full(3, SPREAD_SHIFT**-2))
+    for t in map(int, frames):
+        view, least = person_crop(views[t]), np.inf
+        for number in range(rounds + 1):
+            normal = normal_equations(gaussians, share, poses, t, view, workspace)
+            error = normal.error / max(4 * normal.pixels, 1)
+            if error < least:
+                least, best = error, (poses.pose[t].copy(), poses.transl[t].copy())
+            if number == rounds:
+                break
+            known = 1 / (max(error, 1e-5) * CORRELATED)
+            move = np.linalg.solve(known * normal.hessian + np.diag(damping), -known * normal.gradient)
+            finite(f"in round {number} of its pose", {f"move of frame {t}": move})
+            move = np.clip(move, -MOST, MOST)
+            turns = rotation.exp(move[:-3].reshape(TURNING, 3))
+            poses.pose[t, BODY] = rotation.log(rotation.exp(poses.pose[t, BODY]) @ turns)
+            poses.transl[t] += move[-3:]
+        poses.pose[t], poses.transl[t] = best
 
 
 def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.contract import StageError
 from gsac.stages.train import fast
-from gsac.stages.train.alignment import TURNING, UNKNOWNS, Normal, carriers, normal_equations
+from gsac.stages.train.alignment import CORRELATED, TURNING, UNKNOWNS, Normal, carriers, normal_equations
 from gsac.stages.train.guard import finite
 from gsac.stages.train.holdout import near
 from gsac.stages.train.poses import BODY, Poses
@@ -38,8 +38,6 @@ SAME, NEAR, OWN = 0.3, 0.6, 0.03
 """Variance of what is the same in all frames, of what changes smoothly, and of a frame's own error."""
 SPAN = 0.038
 """Length of the smooth part, as a share of the clip."""
-CORRELATED = 40.0
-"""Values (pixels times channels) that are wrong together."""
 MOST = 0.15
 """rad and m of a round's step, at most."""
 WORSE = 1.1

@@ -29,7 +29,6 @@ UNJUDGED = 12000
 """Size where no frame is held out."""
 REFIT, REFIT_FROM = 0.18, 0.3
 """Steps of a smaller size, as a share of the training's; their rates are those of a training from this share of its steps on."""
-ALIGN_STEPS = 40
 NEAR, CARE = [15, 20, 21, *range(22, 55)], 3.0
 """Joints of head and hands, and what their pixels count for beside others."""
 
@@ -40,7 +39,7 @@ def fit(task: Task, loop: Loop) -> Fit:
         return fast.fit(task, loop, UNJUDGED)
     trainer, fine, coarse = loop.train(task, SIZES[0])
     poses = carried(task.poses, task.trained)
-    loop.align(trainer.gaussians(), poses, task.held, task.views, ALIGN_STEPS)
+    loop.align(trainer.gaussians(), poses, task.held, task.views)
     rungs: list[Rung] = []
     kept = trainer
     for size in SIZES:

@@ -90,3 +90,33 @@ def test_photos_far_apart_keep_the_poses_of_the_fit(job):
 def test_photos_far_apart_share_only_what_is_the_same_in_all():
     few, many = bundle.covariance(7), bundle.covariance(60)
     assert few[0, 1] < bundle.SAME + 0.05 and many[0, 1] > bundle.SAME + 0.9 * bundle.NEAR
+
+
+def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
+    task = task_of(job(frames=3))
+    views = {t: fast.person_crop(task.views[t]) for t in range(3)}
+    poses = task.poses
+    poses.transl[:, 0] -= TRUE_SHIFT
+    gaussians = fast.start(task, views, 3000)
+    right = half_error(gaussians, poses, 0, views[0], Workspace(1))
+    poses.transl[0, 0] += TRUE_SHIFT
+    poses.pose[0, 16, 2] += 0.2
+    before = poses.copy()
+    assert half_error(gaussians, poses, 0, views[0], Workspace(1)) > 1.3 * right
+    alignment.converge(gaussians, poses, [0], task.views, rounds=8)
+    assert half_error(gaussians, poses, 0, views[0], Workspace(1)) < right
+    assert abs(poses.transl[0, 0]) < 0.15 * TRUE_SHIFT and abs(poses.pose[0, 16, 2] - before.pose[0, 16, 2] + 0.2) < 0.07
+    np.testing.assert_array_equal(poses.pose[1:], before.pose[1:])
+    np.testing.assert_array_equal(poses.transl[1:], before.transl[1:])
+
+
+def test_no_round_makes_a_frame_worse_than_it_was(job):
+    task = task_of(job(frames=2))
+    views = {t: fast.person_crop(task.views[t]) for t in range(2)}
+    gaussians, poses = fast.start(task, views, 600), task.poses
+    alignment.converge(gaussians, poses, [0], task.views, rounds=8)
+    settled, error = poses.pose[0].copy(), half_error(gaussians, poses, 0, views[0], Workspace(1))
+    alignment.converge(gaussians, poses, [0], task.views, rounds=0)
+    np.testing.assert_array_equal(poses.pose[0], settled)
+    alignment.converge(gaussians, poses, [0], task.views, rounds=2)
+    assert half_error(gaussians, poses, 0, views[0], Workspace(1)) < 1.02 * error
