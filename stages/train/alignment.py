@@ -51,6 +51,11 @@ class Normal(NamedTuple):
     pixels: int
     """That show the person in render or mask."""
 
+    @property
+    def mean(self) -> float:
+        """Squared error of a pixel's channel."""
+        return self.error / max(4 * self.pixels, 1)
+
 
 def carriers(body, face: np.ndarray) -> np.ndarray:
     """(N, TURNING) float32: how much a turn of each joint carries the faces (N,) along."""
@@ -89,29 +94,30 @@ def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: i
 
 
 def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], rounds: int) -> None:
-    """Moves the poses of some frames to their images by damped Gauss-Newton, the avatar held still; views: of all T.
+    """Moves the poses of some frames to their images, the avatar held still; views: of all T.
 
-    Each frame ends with the pose of its rounds that drew it best. Rounds are worth ten of Adam's steps each.
+    Levenberg and Marquardt: a round that draws the frame worse is taken back, and the next one steps shorter.
     """
     share, workspace = carriers(poses.body, gaussians.face), Workspace()
-    damping = np.append(np.full(3 * TURNING, SPREAD_TURN**-2), np.full(3, SPREAD_SHIFT**-2))
+    spread = np.diag(np.append(np.full(3 * TURNING, SPREAD_TURN**-2), np.full(3, SPREAD_SHIFT**-2)))
     for t in map(int, frames):
-        view, least = person_crop(views[t]), np.inf
-        for number in range(rounds + 1):
-            normal = normal_equations(gaussians, share, poses, t, view, workspace)
-            error = normal.error / max(4 * normal.pixels, 1)
-            if error < least:
-                least, best = error, (poses.pose[t].copy(), poses.transl[t].copy())
-            if number == rounds:
-                break
-            known = 1 / (max(error, 1e-5) * CORRELATED)
-            move = np.linalg.solve(known * normal.hessian + np.diag(damping), -known * normal.gradient)
+        view, damping = person_crop(views[t]), 1.0
+        pose, transl = poses.pose[t].copy(), poses.transl[t].copy()
+        normal = normal_equations(gaussians, share, poses, t, view, workspace)
+        for number in range(rounds):
+            known = 1 / (max(normal.mean, 1e-5) * CORRELATED)
+            move = np.linalg.solve(known * normal.hessian + damping * spread, -known * normal.gradient)
             finite(f"in round {number} of its pose", {f"move of frame {t}": move})
             move = np.clip(move, -MOST, MOST)
             turns = rotation.exp(move[:-3].reshape(TURNING, 3))
-            poses.pose[t, BODY] = rotation.log(rotation.exp(poses.pose[t, BODY]) @ turns)
-            poses.transl[t] += move[-3:]
-        poses.pose[t], poses.transl[t] = best
+            poses.pose[t, BODY], poses.transl[t] = rotation.log(rotation.exp(pose[BODY]) @ turns), transl + move[-3:]
+            moved = normal_equations(gaussians, share, poses, t, view, workspace)
+            if moved.mean < normal.mean:
+                pose, transl, normal = poses.pose[t].copy(), poses.transl[t].copy(), moved
+                damping = max(damping / 2, 1.0)
+            else:
+                damping *= 8
+        poses.pose[t], poses.transl[t] = pose, transl
 
 
 def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:

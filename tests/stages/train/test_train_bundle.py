@@ -110,13 +110,21 @@ def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
     np.testing.assert_array_equal(poses.transl[1:], before.transl[1:])
 
 
-def test_no_round_makes_a_frame_worse_than_it_was(job):
+def test_no_round_makes_a_frame_worse_than_it_was(job, monkeypatch):
     task = task_of(job(frames=2))
     views = {t: fast.person_crop(task.views[t]) for t in range(2)}
     gaussians, poses = fast.start(task, views, 600), task.poses
-    alignment.converge(gaussians, poses, [0], task.views, rounds=8)
-    settled, error = poses.pose[0].copy(), half_error(gaussians, poses, 0, views[0], Workspace(1))
+
+    def error():
+        return alignment.normal_equations(gaussians, alignment.carriers(poses.body, gaussians.face), poses, 0, views[0],
+                                          Workspace(1)).mean
+
+    before, fitted = error(), poses.pose[0].copy()
     alignment.converge(gaussians, poses, [0], task.views, rounds=0)
-    np.testing.assert_array_equal(poses.pose[0], settled)
-    alignment.converge(gaussians, poses, [0], task.views, rounds=2)
-    assert half_error(gaussians, poses, 0, views[0], Workspace(1)) < 1.02 * error
+    np.testing.assert_array_equal(poses.pose[0], fitted)
+    monkeypatch.setattr(alignment, "SPREAD_TURN", 100.0)
+    monkeypatch.setattr(alignment, "CURVATURE", 0.01)
+    alignment.converge(gaussians, poses, [0], task.views, rounds=1)
+    np.testing.assert_array_equal(poses.pose[0], fitted)
+    alignment.converge(gaussians, poses, [0], task.views, rounds=25)
+    assert error() < before, "steps that are far too long become shorter until one helps"
