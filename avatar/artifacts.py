@@ -143,6 +143,8 @@ BODY_SHAPES = {
 }
 LIGHT_SHAPE = {"light": (4, 3)}
 AVATAR_SHAPES = {"face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": ("N", 3), "rgb": ("N", 3), "opacity": ("N",)}
+LEVEL_SHAPES = {"levels": ("L",), **{f"coarser_{name}": ("M", *shape[1:]) for name, shape in AVATAR_SHAPES.items()}}
+"""Of avatar.npz where it has coarser levels of detail: how many gaussians each has, then those of all of them, level by level."""
 
 
 def check_keypoints(path: Path) -> None:
@@ -168,12 +170,21 @@ def check_body(path: Path) -> None:
 
 
 def check_avatar(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of avatar.npz; `light` may be among them."""
+    """The arrays of avatar.npz; `light` and coarser levels may be among them."""
     arrays = check_arrays(path, AVATAR_SHAPES)
-    lit = check_arrays(path, LIGHT_SHAPE) if "light" in arrays else {}
-    for name in (*AVATAR_SHAPES, *(LIGHT_SHAPE if lit else ())):
+    shapes = dict(AVATAR_SHAPES)
+    for more in (LIGHT_SHAPE, LEVEL_SHAPES):
+        if next(iter(more)) in arrays:
+            check_arrays(path, more)
+            shapes |= more
+    for name in shapes:
         if not _finite(arrays[name]):
             raise ArtifactError(f"{path}: array {name} is not finite")
+    if "levels" in shapes:
+        counts = [len(arrays["face"]), *arrays["levels"].tolist()]
+        if sum(counts[1:]) != len(arrays["coarser_face"]) or any(b >= a or b < 1 for a, b in zip(counts, counts[1:], strict=False)):
+            raise ArtifactError(f"{path}: array levels is {counts[1:]}; each level must have fewer gaussians than the one before "
+                                f"({counts[0]} at first), {len(arrays['coarser_face'])} in all")
     return arrays
 
 

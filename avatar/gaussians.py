@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,17 +46,33 @@ class Gaussians:
         """The gaussians that an index array, mask or slice picks."""
         return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in EACH), self.light)
 
-    def write(self, path: Path) -> None:
-        """avatar.npz: float32, face int32; `light` where there is one."""
-        names = EACH if self.light is None else (*EACH, "light")
-        arrays = {name: np.asarray(getattr(self, name), np.float32) for name in names}
-        artifacts.write_arrays(path, **(arrays | {"face": np.asarray(self.face, np.int32)}))
+    def write(self, path: Path, coarser: Sequence[Gaussians] = ()) -> None:
+        """avatar.npz: float32, face int32; `light` where there is one; coarser levels of detail, finest first, where there are."""
+        arrays = self._arrays()
+        if self.light is not None:
+            arrays["light"] = np.asarray(self.light, np.float32)
+        if coarser:
+            arrays["levels"] = np.array([len(level) for level in coarser], np.int32)
+            parts = [level._arrays() for level in coarser]
+            arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in EACH}
+        artifacts.write_arrays(path, **arrays)
 
     @classmethod
     def read(cls, path: Path) -> Gaussians:
         """From avatar.npz; `artifacts.ArtifactError` where an array is missing or has another shape."""
+        return cls.read_levels(path)[0]
+
+    @classmethod
+    def read_levels(cls, path: Path) -> list[Gaussians]:
+        """The avatar and its coarser levels of detail, finest first; as `read`."""
         arrays = artifacts.check_avatar(path)
-        return cls(*(arrays[name] for name in EACH), arrays.get("light"))
+        light = arrays.get("light")
+        ends = np.cumsum(arrays.get("levels", np.zeros(0, np.int32)))
+        parts = [{name: arrays[f"coarser_{name}"][a:b] for name in EACH} for a, b in zip([0, *ends], ends, strict=False)]
+        return [cls(**part, light=light) for part in [{name: arrays[name] for name in EACH}, *parts]]
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in EACH}
 
     @classmethod
     def per_face(cls, vertices: np.ndarray, faces: np.ndarray, rgb=(0.5, 0.5, 0.5), opacity: float = 0.9) -> Gaussians:

@@ -1,4 +1,4 @@
-"""Coarser levels of detail: neighbouring gaussians that ride on the same bone become one with their moments."""
+"""Coarser levels of detail for an avatar that was trained without: neighbours on the same bone become one with their moments."""
 
 from __future__ import annotations
 

@@ -31,16 +31,17 @@ BODY_LICENCE = "the body model's own terms; the embedded open body is CC0-1.0"
 def run(job: Job) -> None:
     params = BodyParams.read(job.inputs["train/body.npz"])
     body = load_body(job, "export", params.model)
-    gaussians = Gaussians.read(job.inputs["train/avatar.npz"])
-    if not len(gaussians) or gaussians.face.min() < 0 or gaussians.face.max() >= len(body.faces):
-        raise BadInput(f"{job.inputs['train/avatar.npz']}: its {len(gaussians)} gaussians must be at least one and "
-                       f"lie on the faces 0..{len(body.faces) - 1} of the body; run again from the stage train")
+    gaussians, *trained = Gaussians.read_levels(job.inputs["train/avatar.npz"])
+    for level in (gaussians, *trained):
+        if not len(level) or level.face.min() < 0 or level.face.max() >= len(body.faces):
+            raise BadInput(f"{job.inputs['train/avatar.npz']}: its {len(level)} gaussians must be at least one and "
+                           f"lie on the faces 0..{len(body.faces) - 1} of the body; run again from the stage train")
     clip = Clip.read(job.inputs["split/clip.json"])
     avatar = rigged(body, params, gaussians)
     avatar.licence = {"avatar": job.config.licence, "body": BODY_LICENCE}
     avatar.provenance = {"gsac": version("gsac"), "body_model": body.digest, "clip_sha256": clip.source_sha256}
     add_motion(avatar, job.config.clip_names())
-    avatar.coarser = [coarser(avatar, members) for members in MEMBERS]
+    avatar.coarser = [arrays(level) for level in trained] or [coarser(avatar, members) for members in MEMBERS]
 
     container = avatar.to_bytes()
     pose = avatar.pose(job.config.ply_pose.upper())
@@ -75,9 +76,13 @@ def rigged(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar
         expression_vertex=np.concatenate([*moves, []]).astype(np.int32),
         expression_delta=np.concatenate([*(body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
         jaw_actions=body.jaw_actions.astype(np.float32),
-        gaussians={name: getattr(gaussians, name) for name in EACH},
+        gaussians=arrays(gaussians),
         light=gaussians.light,
     )
+
+
+def arrays(gaussians: Gaussians) -> dict[str, np.ndarray]:
+    return {name: getattr(gaussians, name) for name in EACH}
 
 
 def posed_gaussians(avatar: RiggedAvatar, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

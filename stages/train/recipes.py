@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from gsac.stages.train import bundle, cuda, fast, ladder, paper, paper_cuda
+from gsac.stages.train import bundle, cuda, fast, ladder, levels, paper, paper_cuda
 from gsac.stages.train.alignment import converge
 from gsac.stages.train.config import AUTO
 from gsac.stages.train.evaluate import align_poses
@@ -10,10 +10,12 @@ from gsac.stages.train.task import Fit, Loop, Task
 
 
 def fit_fast(loop: Loop, task: Task) -> Fit:
-    """Poses moved to the images; then the given number of gaussians, or the ladder."""
+    """Poses moved to the images; then the given number of gaussians, or the ladder; then coarser levels."""
     if task.resumed is None:
         bundle.adjust(task, loop.learning)
-    return ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
+    fit = ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
+    fit.coarser = levels.coarser(task, loop, fit)
+    return fit
 
 
 RECIPES = {

@@ -19,8 +19,9 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.evaluate import judge, turned
-from gsac.stages.train.guard import finite, result
+from gsac.stages.train.guard import finite, result, values
 from gsac.stages.train.holdout import spaced_in_yaw
+from gsac.stages.train.levels import judged
 from gsac.stages.train.novel import judge_novel
 from gsac.stages.train.poses import Poses, carried
 from gsac.stages.train.recipes import ALIGN, RECIPES
@@ -119,6 +120,8 @@ class Run:
         self.result = RECIPES[self.job.config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
         finite("after the last step", result(self.result.gaussians, self.poses))
+        for level in self.result.coarser:
+            finite("after the last step", values(level))
 
     def clock(self) -> np.ndarray:
         """Wall and CPU seconds of training, those before a stop among them."""
@@ -168,7 +171,7 @@ class Run:
         folder = job.out / "heldout"
         folder.mkdir()
         poses = self.carried()
-        gaussians.write(job.out / "avatar.npz")
+        gaussians.write(job.out / "avatar.npz", self.result.coarser)
         poses.refined().write(job.out / "body.npz")
         write_frame(folder / "views.png", turned(gaussians, poses))
         (job.out / "metrics.json").write_text(json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n")
@@ -205,6 +208,7 @@ class Run:
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
             "resumed_at_step": self.resumed_at,
+            "levels": judged(gaussians, self.result.coarser, poses, held, self.views, self.workspace),
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
             "curve": self.curve,

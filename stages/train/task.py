@@ -53,6 +53,8 @@ class Fit:
     """Frame -> (3,) learned gain per channel, where exposure is learned."""
     figures: dict = field(default_factory=dict)
     """What the recipe has to say in metrics.json."""
+    coarser: list[Gaussians] = field(default_factory=list)
+    """Levels of detail with ever fewer gaussians."""
 
 
 class Loop(NamedTuple):

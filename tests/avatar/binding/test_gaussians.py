@@ -78,3 +78,36 @@ def test_a_file_without_an_array_is_refused_by_name(mesh, tmp_path):
     artifacts.write_arrays(tmp_path / "avatar.npz", face=np.zeros(3, np.int32))
     with pytest.raises(artifacts.ArtifactError, match="mu"):
         Gaussians.read(tmp_path / "avatar.npz")
+
+
+def levels_of(mesh):
+    return [Gaussians.area(*mesh, count, seed=count) for count in (30, 10, 4)]
+
+
+def test_coarser_levels_come_back_in_order_and_readers_that_know_none_read_the_finest(mesh, tmp_path):
+    finest, *coarser = levels_of(mesh)
+    finest.light = np.ones((4, 3), np.float32)
+    finest.write(tmp_path / "avatar.npz", coarser)
+    again = Gaussians.read_levels(tmp_path / "avatar.npz")
+    assert [len(level) for level in again] == [30, 10, 4]
+    for level, wanted in zip(again, (finest, *coarser), strict=True):
+        for name in artifacts.AVATAR_SHAPES:
+            np.testing.assert_array_equal(getattr(level, name), getattr(wanted, name))
+        assert level.face.dtype == np.int32 and level.light.shape == (4, 3)
+    with np.load(tmp_path / "avatar.npz") as old:
+        np.testing.assert_array_equal(old["mu"], finest.mu)
+    np.testing.assert_array_equal(Gaussians.read(tmp_path / "avatar.npz").mu, finest.mu)
+    finest.write(tmp_path / "alone.npz")
+    assert len(Gaussians.read_levels(tmp_path / "alone.npz")) == 1
+
+
+@pytest.mark.parametrize(("name", "value", "words"), [
+    ("levels", np.int32([10, 5]), "levels"), ("levels", np.int32([4, 10]), "levels"), ("levels", np.int32([14, 0]), "levels"),
+    ("coarser_mu", np.zeros((3, 3), np.float32), "coarser_mu"), ("coarser_rgb", np.full((14, 3), np.nan, np.float32), "finite")])
+def test_levels_that_do_not_belong_together_are_refused_by_name(mesh, tmp_path, name, value, words):
+    finest, *coarser = levels_of(mesh)
+    finest.write(tmp_path / "avatar.npz", coarser)
+    arrays = artifacts.read_arrays(tmp_path / "avatar.npz")
+    artifacts.write_arrays(tmp_path / "avatar.npz", **(arrays | {name: value}))
+    with pytest.raises(artifacts.ArtifactError, match=words):
+        Gaussians.read_levels(tmp_path / "avatar.npz")

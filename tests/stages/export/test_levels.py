@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.export.config import ExportConfig
 from gsac.stages.export.levels import MEMBERS, coarser
 from gsac.stages.export.rigged import RiggedAvatar
+from gsac.stages.export.stage import run
 
 TALL = 120
 """px: a person of 1.7 m at 14 m on a screen of 1080 lines with 60 degrees."""
@@ -83,3 +87,23 @@ def test_gaussians_on_faces_without_area_and_a_single_gaussian_are_merged_withou
         assert len(level["face"]) >= 1
         assert all(np.isfinite(array).all() for array in level.values())
         np.testing.assert_allclose((level["quat"] ** 2).sum(1), 1, atol=1e-5)
+
+
+def test_levels_that_were_trained_are_carried_on_as_they_are(person, tmp_path):
+    finest = Gaussians.read(person["train/avatar.npz"])
+    finest.write(tmp_path / "avatar.npz", [finest[::4], finest[::16]])
+    (tmp_path / "out").mkdir()
+    run(Job(person | {"train/avatar.npz": tmp_path / "avatar.npz"}, tmp_path / "out", ExportConfig(animations="")))
+    levels = RiggedAvatar.read(tmp_path / "out" / "avatar.gsac").coarser
+    assert [len(level["face"]) for level in levels] == [1500, 375]
+    np.testing.assert_array_equal(levels[1]["face"], finest.face[::16])
+    np.testing.assert_allclose(levels[1]["rgb"], finest.rgb[::16], atol=1e-3)
+
+
+def test_a_coarser_level_on_no_face_is_refused_and_said(person, tmp_path):
+    finest = Gaussians.read(person["train/avatar.npz"])
+    off = finest[::4]
+    off.face[0] = 99999
+    finest.write(tmp_path / "avatar.npz", [off])
+    with pytest.raises(BadInput, match="its 1500 gaussians"):
+        run(Job(person | {"train/avatar.npz": tmp_path / "avatar.npz"}, tmp_path, ExportConfig()))
