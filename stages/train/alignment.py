@@ -13,7 +13,7 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.train.guard import finite
 from gsac.stages.train.poses import BODY, Poses
 from gsac.stages.train.views import View, person_crop
@@ -98,9 +98,10 @@ def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], roun
 
     Levenberg and Marquardt: a round that draws the frame worse is taken back, and the next one steps shorter.
     """
-    share, workspace = carriers(poses.body, gaussians.face), Workspace()
+    share = carriers(poses.body, gaussians.face)
     spread = np.diag(np.append(np.full(3 * TURNING, SPREAD_TURN**-2), np.full(3, SPREAD_SHIFT**-2)))
-    for t in map(int, frames):
+
+    def one(t: int, workspace: Workspace) -> None:
         view, damping = person_crop(views[t]), 1.0
         pose, transl = poses.pose[t].copy(), poses.transl[t].copy()
         normal = normal_equations(gaussians, share, poses, t, view, workspace)
@@ -118,6 +119,8 @@ def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], roun
             else:
                 damping *= 8
         poses.pose[t], poses.transl[t] = pose, transl
+
+    side_by_side(one, map(int, frames))
 
 
 def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:

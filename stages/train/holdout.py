@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 FEWEST = 5
 """Frames below which every one is needed for training."""
+LONG = 60
+"""Frames that must be left for training where some are kept to choose by that nothing else is judged on."""
 NEAR = np.radians(45)
 """Frames between which the body turns by more say nothing of each other's pose: photos of one turn, not a clip."""
 
@@ -23,6 +25,17 @@ def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> 
         return np.zeros(0, np.int64)
     every, yaws = min(every, len(frames)), yaw(rotation.exp(np.asarray(global_orient, np.float64)))[frames]
     return np.sort(frames[np.argsort(yaws, kind="stable")][every // 2::every])
+
+
+def to_choose_by(global_orient: np.ndarray, usable: np.ndarray, held: np.ndarray, every: int) -> np.ndarray:
+    """Indices of the frames that the number of gaussians is chosen by.
+
+    Others than `held` where the clip is long; a short one needs its frames for training, and those of `held` serve for both.
+    """
+    rest = usable.copy()
+    rest[held] = False
+    others = spaced_in_yaw(global_orient, rest, every)
+    return others if len(others) and int(rest.sum()) - len(others) >= LONG else held
 
 
 def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.ndarray, refined_transl: np.ndarray,

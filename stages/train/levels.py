@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
-from gsac.avatar.workspace import Workspace
 from gsac.stages.train import fast
 from gsac.stages.train.evaluate import judge
 from gsac.stages.train.ladder import care, shown
@@ -37,7 +36,7 @@ LEAST = 100
 
 def coarser(task: Task, loop: Loop, fit: Fit) -> list[Gaussians]:
     """Levels below fit.gaussians, the finest of them first; fewer than `LEVELS` where an avatar has few gaussians."""
-    rest, workspace = task.poses.rest(int(task.trained[0]))[0], Workspace()
+    rest = task.poses.rest(int(task.trained[0]))[0]
     views, halvings = fast.crops(task)[0], 0
     out, gaussians = [], fit.gaussians
     for level in LEVELS:
@@ -46,7 +45,7 @@ def coarser(task: Task, loop: Loop, fit: Fit) -> list[Gaussians]:
             break
         views = {t: halved(view, level.halvings - halvings) for t, view in views.items()}
         halvings = level.halvings
-        worth = shown(gaussians, task, views, workspace) * care(gaussians, task.poses.body)
+        worth = shown(gaussians, task, views) * care(gaussians, task.poses.body)
         fewer = merged(gaussians, worth, size, task.poses.body, rest)
         if len(fewer) >= len(gaussians):
             break
@@ -57,15 +56,14 @@ def coarser(task: Task, loop: Loop, fit: Fit) -> list[Gaussians]:
     return out
 
 
-def judged(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View],
-           workspace: Workspace) -> list[dict]:
+def judged(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View]) -> list[dict]:
     """For each level its number of gaussians, the height of its images, its held-out psnr_fg and ssim there, and the finest's."""
     rows = []
     for (_, halvings), level in zip(LEVELS, levels, strict=False):
         small = {int(t): halved(views[t], halvings) for t in held}
         row = {"n_gaussians": len(level), "image_height": halved(views[0], halvings).camera.height}
         for name, gaussians in (("", level), ("_finest", finest)):
-            figures = summary(judge(gaussians, poses, held, small, None, workspace))
+            figures = summary(judge(gaussians, poses, held, small))
             row |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}
         rows.append(row)
     return rows

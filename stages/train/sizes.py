@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MOST_LOST = 0.15
+MOST_LOST = 0.25
 """dB below the best that no standard error excuses."""
 DETAIL_LOST = 0.05
 """Share of the best's detail that may be lost however little the frames differ: less cannot be seen."""
@@ -35,6 +35,20 @@ def choose(rungs: list[Rung]) -> Rung:
     least_detail = np.mean(best.detail) - max(standard_error(best.detail), DETAIL_LOST * np.mean(best.detail))
     good = [r for r in rungs if np.mean(r.psnr_fg) >= least and np.mean(r.detail) >= least_detail]
     return min(good, key=lambda r: r.n_gaussians)
+
+
+def optimism(rungs: list[Rung]) -> float:
+    """dB by which the frames that chose flatter their choice: each judged with what all the others would have taken."""
+    frames = range(len(rungs[0].psnr_fg))
+    if len(frames) < 3:
+        return 0.0
+    best, found = choose(rungs), []
+    for f in frames:
+        rest = [t for t in frames if t != f]
+        others = [Rung(r.n_gaussians, [r.psnr_fg[t] for t in rest], [r.detail[t] for t in rest]) for r in rungs]
+        taken = rungs[others.index(choose(others))]
+        found.append(best.psnr_fg[f] - taken.psnr_fg[f])
+    return float(np.mean(found))
 
 
 def standard_error(values: list[float]) -> float:

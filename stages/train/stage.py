@@ -18,9 +18,10 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
+from gsac.stages.train.config import AUTO
 from gsac.stages.train.evaluate import judge, turned
 from gsac.stages.train.guard import finite, result, values
-from gsac.stages.train.holdout import spaced_in_yaw
+from gsac.stages.train.holdout import spaced_in_yaw, to_choose_by
 from gsac.stages.train.levels import judged
 from gsac.stages.train.novel import judge_novel
 from gsac.stages.train.poses import Poses, carried
@@ -65,7 +66,10 @@ def run(job: Job) -> None:
     if not len(held):
         job.warn(f"No frame is held out ({int(usable.sum())} usable frames, train.holdout is {config.holdout}): "
                  "the quality of this avatar is not measured.")
-    trained = np.setdiff1d(np.flatnonzero(usable), held)
+    choosing = held
+    if config.gaussians == AUTO and config.recipe == "fast":
+        choosing = to_choose_by(params.global_orient, usable, held, config.holdout)
+    trained = np.setdiff1d(np.flatnonzero(usable), np.union1d(held, choosing))
     turn = turn_seen(rotation.exp(params.global_orient[usable].astype(float)))
     if turn < LEAST_TURN:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
@@ -73,7 +77,7 @@ def run(job: Job) -> None:
     if config.recipe == "paper" and config.lpips == "loss" and job.device == "cuda" and "lpips-vgg" in job.models:
         job.warn("LPIPS takes no part in the loss on cuda; set train.device to cpu where it must (hours).")
 
-    run = Run(job, Poses(body, params), views, trained, held)
+    run = Run(job, Poses(body, params), views, trained, held, choosing)
     run.fit()
     unseen = float((~run.result.seen).mean())
     if unseen > MOST_UNSEEN:
@@ -100,8 +104,10 @@ def due(step: int, steps: int, times: int) -> bool:
 class Run:
     """One training: the recipe under a clock, and what is written of it."""
 
-    def __init__(self, job: Job, poses: Poses, views, trained: np.ndarray, held: np.ndarray):
+    def __init__(self, job: Job, poses: Poses, views, trained: np.ndarray, held: np.ndarray, choosing: np.ndarray):
+        """held: frames that are judged; choosing: those that the recipe chooses by."""
         self.job, self.poses, self.views, self.trained, self.held = job, poses, views, trained, held
+        self.choosing = choosing
         self.curve: list[dict] = []
         self.losses: list[float] = []
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
@@ -111,7 +117,7 @@ class Run:
 
     def fit(self) -> None:
         self.began = now()
-        task = Task(self.views, self.trained, self.held, self.poses, self.job.config, self.job.progress, self.checkpoint,
+        task = Task(self.views, self.trained, self.choosing, self.poses, self.job.config, self.job.progress, self.checkpoint,
                     self.marks, self.keep, lpips=self.lpips.get("lpips-vgg") if self.job.config.lpips == "loss" else None)
         state = self.checkpoints.read()
         if state is not None:
@@ -208,7 +214,7 @@ class Run:
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
             "resumed_at_step": self.resumed_at,
-            "levels": judged(gaussians, self.result.coarser, poses, held, self.views, self.workspace),
+            "levels": judged(gaussians, self.result.coarser, poses, held, self.views),
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
             "curve": self.curve,

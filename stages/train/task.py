@@ -23,7 +23,7 @@ class Task:
     trained: np.ndarray
     """Indices of the frames to train on."""
     held: np.ndarray
-    """Indices of the frames kept for judging; a recipe may choose by them, never fit to them."""
+    """Indices of frames that are not trained on: a recipe may choose by them, never fit to them."""
     poses: Poses
     """As fitted; the recipe refines those of `trained`."""
     config: TrainConfig

@@ -1,7 +1,7 @@
 """Held-out frames: spaced in yaw, and judged with their neighbours' pose correction."""
 
 import numpy as np
-from gsac.stages.train.holdout import carry_corrections, spaced_in_yaw
+from gsac.stages.train.holdout import carry_corrections, spaced_in_yaw, to_choose_by
 from scipy.spatial.transform import Rotation
 
 
@@ -54,3 +54,18 @@ def test_views_far_apart_do_not_correct_each_other():
     np.testing.assert_allclose(shift[1], [0.05, 0, 0])  # of the near one of its two neighbours alone
     got, shift = carry_corrections(pose[:2], transl[:2], pose[:2], transl[:2] + [[0.1, 0, 0], [0, 0, 0]], trained[:2])
     np.testing.assert_allclose(shift[1], 0)
+
+
+def test_frames_to_choose_by_are_others_only_where_the_clip_is_long():
+    def both(frames, usable=None):
+        orient = turning(np.linspace(-3, 3, frames))
+        usable = np.ones(frames, bool) if usable is None else usable
+        held = spaced_in_yaw(orient, usable, 8)
+        return held, to_choose_by(orient, usable, held, 8)
+
+    held, choosing = both(60)
+    np.testing.assert_array_equal(choosing, held)
+    held, choosing = both(90)
+    assert len(choosing) == 10 and not set(choosing) & set(held)
+    assert np.diff(choosing).max() < 20, "from all sides"
+    np.testing.assert_array_equal(*both(90, np.arange(90) < 60))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import BadInput, make_config
-from gsac.stages.train import STAGE, ladder
-from gsac.stages.train.sizes import Rung, choose, standard_error
+from gsac.stages.train import STAGE, holdout, ladder
+from gsac.stages.train.sizes import Rung, choose, optimism, standard_error
 from gsac.stages.train.stage import run
 
 
@@ -27,8 +27,18 @@ def test_a_blurred_size_is_not_chosen_however_good_its_psnr():
 
 
 def test_frames_that_differ_much_excuse_no_loss_above_the_bar():
-    rungs = [rung(8000, 26.0, spread=4), rung(4000, 25.9, spread=4), rung(2000, 25.8, spread=4)]
+    rungs = [rung(8000, 26.0, spread=4), rung(4000, 25.8, spread=4), rung(2000, 25.7, spread=4)]
     assert choose(rungs).n_gaussians == 4000
+
+
+def test_frames_that_would_have_chosen_as_the_others_do_flatter_nothing():
+    assert optimism([rung(8000, 26.0), rung(4000, 26.01), rung(2000, 25.0)]) == 0
+
+
+def test_a_choice_that_hangs_on_one_frame_flatters_it():
+    rungs = [Rung(8000, [26.0, 26.0, 26.0, 26.0], [0.9] * 4), Rung(4000, [25.9, 25.9, 25.9, 26.4], [0.9] * 4)]
+    assert choose(rungs).n_gaussians == 4000
+    assert optimism(rungs) == pytest.approx((26.4 - 26.0) / 4)
 
 
 def test_text_that_is_not_auto_is_refused():
@@ -49,6 +59,19 @@ def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job, monkey
     assert len(chosen) == 1 and len(Gaussians.read(made.out / "avatar.npz")) == pytest.approx(chosen[0], abs=1)
     assert curve[-1]["n_gaussians"] != chosen[0] and curve[-1]["psnr_fg_mean"] < curve[-2]["psnr_fg_mean"]
     assert curve[1]["psnr_fg_mean"] > curve[0]["psnr_fg_mean"] - 2, "what is left after merging covers the person"
+    assert figures["size_frames"] == figures["heldout_frames"], "a short clip needs its frames for training"
+
+
+@pytest.mark.slow
+def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job, monkeypatch):
+    monkeypatch.setattr(ladder, "SIZES", (500, 60))
+    monkeypatch.setattr(holdout, "LONG", 6)
+    made = job(gaussians="auto", frames=10, steps=8, holdout=4, pose_rounds=0, pose_test_steps=0)
+    run(made)
+    figures = json.loads((made.out / "metrics.json").read_text())
+    chose, judged = figures["size_frames"], figures["heldout_frames"]
+    assert len(chose) == len(judged) == 2 and not set(chose) & set(judged)
+    assert figures["trained_frames"] == 6
 
 
 @pytest.mark.slow
