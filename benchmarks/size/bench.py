@@ -1,6 +1,6 @@
 """gsac bench size: held-out quality against the number of gaussians, with the automatic choice marked.
 
-The line is the ladder of `train.gaussians: auto`; crosses are trainings that had the number from the start.
+The line is the whole ladder of `train.gaussians: auto`; crosses are trainings that had the number from the start.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def main(argv: list[str] | None = None) -> int:
     for case in training.cases(options, say):
         common = {"height": options.height, "steps": options.steps}
         folder = options.out / "trainings"
-        ladders[case.name] = training.train(case, folder / f"{case.name}_auto", gaussians="auto", **common)["size_curve"]
+        ladders[case.name] = training.train(case, folder / f"{case.name}_auto", gaussians="auto", every_size=True,
+                                         **common)["size_curve"]
         scratch[case.name] = []
         for count in options.scratch:
             metrics = training.train(case, folder / f"{case.name}_{count}", gaussians=count, **common)

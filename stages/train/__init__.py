@@ -1,7 +1,7 @@
 """train: gaussians bound to the body's faces, fitted to the frames; poses are refined on the way.
 
 takes  split/frames, split/clip.json, segment/alpha, smplx/body.npz
-gives  avatar.npz (the gaussians, and coarser levels of detail), body.npz (the refined poses), metrics.json, heldout/ (renders beside truth)
+gives  avatar.npz (the gaussians, with coarser levels), body.npz (the refined poses), metrics.json, heldout/ (renders beside truth)
 """
 
 from gsac.avatar.artifacts import check_avatar, check_body, check_folder, check_json

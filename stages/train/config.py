@@ -25,6 +25,8 @@ class TrainConfig:
     """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
     gaussians: int | str = AUTO
     """How many; auto: at most 12,000, as few as the held-out frames hardly tell from them; paper: one a face instead."""
+    every_size: bool = False
+    """Whether auto tries all sizes of its ladder, and not only those up to the first that is told apart: for `gsac bench size`."""
     steps: int | None = None
     """Optimisation steps; null: the recipe's own, 1600 of one frame (fast), 3000 of four (paper)."""
     height: int = 540

@@ -41,7 +41,7 @@ def fit(task: Task, loop: Loop) -> Fit:
     poses = carried(task.poses, task.trained)
     loop.align(trainer.gaussians(), poses, task.held, task.views)
     rungs: list[Rung] = []
-    kept = trainer
+    kept: list[fast.Trainer] = []
     for size in SIZES:
         if rungs:
             gaussians = trainer.gaussians()
@@ -52,16 +52,17 @@ def fit(task: Task, loop: Loop) -> Fit:
             trainer = loop.refit(task, trainer, fine)
         rows = judge(trainer.gaussians(), poses, task.held, task.views)
         rungs.append(Rung(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
-        if choose(rungs) is not rungs[-1]:
+        kept.append(trainer)
+        if choose(rungs) is not rungs[-1] and not task.config.every_size:
             break
-        kept = trainer
     best = choose(rungs)
+    taken = kept[rungs.index(best)]
     figures = {"size_curve": [asdict(rung) | rung.means() | {"chosen": rung is best} for rung in rungs],
                "size_rule": f"smallest within one standard error, and {MOST_LOST} dB, of the best psnr_fg of size_frames, their "
                             "poses moved to the images, and as sharp; size_optimism: by how many dB these frames flatter the "
                             "choice, since it was made by them; other heldout_frames do not",
                "size_frames": task.held.tolist(), "size_optimism": optimism(rungs)}
-    return Fit(*kept.recoloured(coarse), dict(kept.gains), figures)
+    return Fit(*taken.recoloured(coarse), dict(taken.gains), figures)
 
 
 def shown(gaussians: Gaussians, task: Task, views: dict[int, View]) -> np.ndarray:

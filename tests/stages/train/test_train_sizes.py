@@ -75,6 +75,18 @@ def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job, monkeypatch):
 
 
 @pytest.mark.slow
+def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules(job, monkeypatch):
+    monkeypatch.setattr(ladder, "SIZES", (400, 40, 20))
+    made = job(gaussians="auto", every_size=True, frames=6, steps=12, pose_rounds=0, pose_test_steps=0)
+    run(made)
+    curve = json.loads((made.out / "metrics.json").read_text())["size_curve"]
+    assert [row["n_gaussians"] for row in curve] == [400, 40, 20]
+    rungs = [Rung(row["n_gaussians"], row["psnr_fg"], row["detail"]) for row in curve]
+    assert [row["n_gaussians"] for row in curve if row["chosen"]] == [choose(rungs).n_gaussians]
+    assert len(Gaussians.read(made.out / "avatar.npz")) == pytest.approx(choose(rungs).n_gaussians, abs=1)
+
+
+@pytest.mark.slow
 def test_auto_without_held_out_frames_takes_a_fixed_size(job, monkeypatch):
     monkeypatch.setattr(ladder, "UNJUDGED", 700)
     made = job(gaussians="auto", frames=3, steps=5)
