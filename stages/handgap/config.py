@@ -12,9 +12,9 @@ METHODS = ("turning", "gp", "hermite", "paper", "paper-literal")
 @dataclass
 class HandgapConfig:
     method: str = "turning"
-    """How the arm moves through a gap: turning (Gaussian process in the frame of the turning body), gp (Gaussian process
-    in the image), hermite (cubic with the speeds at both ends), paper (constant rate of each segment's angle),
-    paper-literal (the same as printed)."""
+    """How the arm moves through a gap: turning (small rotations of the arm's joints, one Gaussian process in the frame of the
+    turning body), gp (Gaussian process in the image), hermite (cubic with the speeds at both ends), paper (constant rate of
+    each segment's angle), paper-literal (the same as printed)."""
     seen_score: float = 0.5
     """A hand counts as seen again from this score on."""
     lost_score: float = 0.3

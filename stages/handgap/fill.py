@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from gsac.stages.handgap import segments, turning
+from gsac.stages.handgap import chain, segments, turning
 from gsac.stages.handgap.find import SIDES, Found, torso_length
 
 
@@ -24,7 +24,7 @@ def fill_gaps(xy: np.ndarray, score: np.ndarray, world: np.ndarray, found: Found
             continue
         if body:
             unsure = np.stack([found.elbow[:, i], found.wrist[:, i], hand])
-            turning.fill_arm(xy, filled, drift, side, lost, unsure, body, config)
+            chain.fill_arm(xy, filled, drift, side, lost, unsure, body, config)
         else:
             segments.fill_arm(xy, filled, drift, side, lost, times, config)
     return xy, filled, drift

@@ -1,9 +1,9 @@
-"""A Gaussian process in the frame of the turning body: an arm that keeps its pose is nearly constant there.
+"""What is known of the turning body around the arms, and a Gaussian process in its frame for a hand's points about the palm.
 
 Seen sideways a point of the body at (x, z) in the body's frame lies at x cos y + z sin y for the turn y, so constant x and z
 of spread c have the covariance c^2 cos(y - y'), and x and z that stir in time that times a squared exponential of time.
-Up and down the point stays, but for the perspective that lets it sink and rise with the turn. Linear, so in closed form:
-the arm's pose in the body's frame is never named, and where nothing turns an ordinary Gaussian process is left.
+Up and down the point stays, but for the perspective that lets it sink and rise with the turn. Linear, so in closed form: where
+nothing turns an ordinary Gaussian process is left.
 """
 
 from __future__ import annotations
@@ -12,10 +12,8 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
-from gsac.avatar.wholebody import ARM, HANDS
 from gsac.stages.handgap.find import runs
-from gsac.stages.handgap.gp import noise_px
-from gsac.stages.handgap.yaw import body_centre, body_turn
+from gsac.stages.handgap.yaw import SEEN_SCORE, body_centre, body_turn, settled
 
 LENGTHS_S = (0.25, 0.4, 0.6, 0.9, 1.4)
 """Grid of the stirring's time constant."""
@@ -27,8 +25,6 @@ REACH, OFFSET = 0.8, 0.2
 """Torso lengths from the body's axis, and of the middle of the seen torso from that axis."""
 TILT, BEND = 0.1, 0.05
 """Torso lengths: perspective's share up and down, and its second harmonic of the turn."""
-LEVERS = (1.0, 1.5, 2.0)
-"""How many times as far as the joint above a point is taken to go: an arm swings from the shoulder."""
 LIKELY = 4.0
 """Log likelihood below the best of the grid from which on a process has no say."""
 BIAS_SHARE = 0.3
@@ -45,6 +41,7 @@ class Turner:
     turn: np.ndarray  # (T,) rad
     torso: float  # px
     times: np.ndarray  # (T,) s
+    shown: np.ndarray  # (T, 133) bool
     spectra: dict = field(default_factory=dict)
     """(axis, seen frames) -> eigenvalues and vectors of each process of the grid; parts of one arm share their frames."""
 
@@ -64,40 +61,8 @@ def watch(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.ndarra
     if not np.isfinite(size):
         seen = xy[score > 0]
         size = max(float(np.ptp(seen, axis=0).max()) / 3, 1.0) if len(seen) else 1.0
-    return Turner(body_centre(xy, score), body_turn(xy, score, world, times, size), size, times)
-
-
-def fill_arm(xy, filled, drift, side: str, lost, unsure, body: Turner, config) -> None:
-    """xy (T, 133, 2), filled (T, 133) and drift (T, 133) in place.
-
-    lost: (3, T) bool, frames of elbow, wrist and hand to fill; unsure: (3, T) bool, frames not to learn from. Each part is put
-    from the body's centre and from every joint above it that is seen, weighted by how sure they are.
-    """
-    measured, chain = xy.copy(), ARM[side]
-    hand = np.arange(133)[HANDS[side]]
-    all_seen = np.ones(len(xy), bool)
-    anchors = [[(body.centre, all_seen)]] + [
-        [(body.centre + lever * (measured[:, chain[i + 1]] - body.centre), ~unsure[i]) for lever in LEVERS] for i in range(2)]
-    for part, points in enumerate(([chain[1]], [chain[2]], hand)):
-        asked = lost[part] & within(lost[part], ~unsure[part], body.times, config)
-        if not asked.any() or unsure[part].all():
-            continue
-        lead = len(points) - 1 if part < 2 else int(np.flatnonzero(hand == chain[3])[0])
-        place, precision, answers = np.zeros((len(xy), len(points), 2)), np.zeros((len(xy), 2)), np.zeros((len(xy), 1))
-        for anchor, believed in sum(anchors[: part + 1], []):
-            here, learnt = asked & believed, ~unsure[part] & believed
-            if not here.any() or learnt.sum() < 3 and anchor is not body.centre:
-                continue
-            tracks = measured[:, points] - anchor[:, None]
-            mean, spread = predict(tracks, lead, learnt, here, body)
-            sure = 1 / (spread**2 + noise_px(anchor, believed) ** 2 + 1e-6)
-            place[here] += sure[:, None] * (mean + anchor[here, None])
-            precision[here] += sure
-            answers[here] += 1
-        xy[np.ix_(asked, points)] = place[asked] / precision[asked, None]
-        filled[np.ix_(asked, points)] = True
-        # The answers share most of what they know, so that several are hardly surer than one.
-        drift[np.ix_(asked, points)] = np.sqrt((answers[asked] / precision[asked]).mean(1))[:, None]
+    centre = settled(body_centre(xy, score), times, size)
+    return Turner(centre, body_turn(xy, score, world, times, size), size, times, score > SEEN_SCORE)
 
 
 def within(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config) -> np.ndarray:
@@ -114,20 +79,18 @@ def within(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config) -> np.
 
 
 def predict(tracks: np.ndarray, lead: int, seen: np.ndarray, asked: np.ndarray, body: Turner,
-            ) -> tuple[np.ndarray, np.ndarray]:
-    """tracks: (T, P, 2) px from the body's centre or a seen joint; lead: the one of the P that the grid is judged by;
-    seen, asked: (T,) bool.
+            ) -> np.ndarray:
+    """tracks: (T, P, 2) px from the palm; lead: the one of the P that the grid is judged by; seen, asked: (T,) bool.
 
-    Returns places (A, P, 2) px of the asked frames and their standard deviation (A, 2) px, the noise of a detection left out.
+    Returns places (A, P, 2) px of the asked frames.
     """
     known = chosen(seen, asked, body.times)
-    answers = [_along(axis, tracks[known][:, :, axis] / body.torso, lead, known, asked, body) for axis in range(2)]
-    places, variances = zip(*answers, strict=True)
-    return np.stack(places, 2) * body.torso, np.sqrt(np.stack(variances, 1)) * body.torso
+    places = [_along(axis, tracks[known][:, :, axis] / body.torso, lead, known, asked, body) for axis in range(2)]
+    return np.stack(places, 2) * body.torso
 
 
-def _along(axis: int, values, lead: int, known, asked, body: Turner) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (A, P) and variance (A,) along one axis: the processes of the grid, averaged by how likely they make the lead."""
+def _along(axis: int, values, lead: int, known, asked, body: Turner) -> np.ndarray:
+    """(A, P) along one axis: the processes of the grid, averaged by how likely they make the lead."""
     middle = values.mean(0) if axis else 0.0
     tried = []
     for length, stir, size, basis in body.spectrum(axis, known):
@@ -138,15 +101,11 @@ def _along(axis: int, values, lead: int, known, asked, body: Turner) -> tuple[np
     best = max(entry[0] for entry in tried)
     likely = [entry for entry in tried if entry[0] > best - LIKELY]
     weights = np.exp([entry[0] - best for entry in likely])
-    means, variances = [], []
+    means = []
     for _, length, stir, total, basis, along in likely:
         cross = covariance(axis, body.turn[asked], body.turn[known], body.times[asked], body.times[known], length, stir) @ basis
-        prior = covariance(axis, *np.zeros((4, 1)), length, stir)[0, 0]
         means.append(middle + cross / total @ along)
-        variances.append(np.maximum(prior - (cross**2 / total).sum(1), 0))
-    mean = np.average(means, 0, weights)
-    apart = np.average([(m[:, lead] - mean[:, lead]) ** 2 for m in means], 0, weights)
-    return mean, np.average(variances, 0, weights) + apart
+    return np.average(means, 0, weights)
 
 
 def covariance(axis: int, turn, turn2, time, time2, length: float, stir: float) -> np.ndarray:

@@ -21,8 +21,12 @@ RIDGE = 0.01
 """Torso lengths, squared: keeps the detector's noise out of the regression."""
 FULL_ENOUGH = np.radians(270)
 """Without 3D points the turn is only read where the clip shows at least this much of it."""
-SMOOTH_S, SMOOTH_NOISE, WANDER = (0.2, 0.35, 0.6, 1.0), (0.01, 0.02, 0.04, 0.08), 0.2
+SMOOTH_S, SMOOTH_NOISE, WANDER = (0.2, 0.35, 0.6, 1.0), (0.01, 0.02, 0.04, 0.08), (0.2,)
 """Grid of time constants (s) and noise (rad) for the turn about its straight line, and its spread (rad)."""
+SHAKES, DRIFTS = (0.002, 0.004, 0.008, 0.016), (0.05, 0.3)
+"""The same for the body's centre, torso lengths."""
+JUMP = 5.0
+"""Times the usual shaking."""
 
 
 def body_centre(xy: np.ndarray, score: np.ndarray) -> np.ndarray:
@@ -62,13 +66,23 @@ def body_turn(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.nd
     return smoothed(np.unwrap(np.arctan2(sine, cosine)), times)
 
 
-def smoothed(angle: np.ndarray, times: np.ndarray) -> np.ndarray:
+def settled(centre: np.ndarray, times: np.ndarray, torso: float) -> np.ndarray:
+    """(T, 2) px of the body's centre without the detector's shaking: a filled arm hangs from it. Frames that leave the smooth way
+    by far more than others did move, and stay."""
+    if len(times) < 3:
+        return centre
+    calm = np.stack([smoothed(c / torso, times, DRIFTS, SHAKES) for c in centre.T], 1) * torso
+    off = np.linalg.norm(centre - calm, axis=1)
+    return np.where((off > JUMP * max(np.median(off), SHAKES[0] * torso))[:, None], centre, calm)
+
+
+def smoothed(angle: np.ndarray, times: np.ndarray, wanders: tuple = WANDER, noises: tuple = SMOOTH_NOISE) -> np.ndarray:
     """(T,) a straight line and a Gaussian process about it, its time constant and noise the likeliest of a grid."""
     line = np.polyval(np.polyfit(times, angle, 1), times)
     rest = angle - line
     best = None
-    for length, noise in itertools.product(SMOOTH_S, SMOOTH_NOISE):
-        kernel = WANDER**2 * np.exp(-0.5 * ((times[:, None] - times) / length) ** 2)
+    for wander, length, noise in itertools.product(wanders, SMOOTH_S, noises):
+        kernel = wander**2 * np.exp(-0.5 * ((times[:, None] - times) / length) ** 2)
         factor = np.linalg.cholesky(kernel + noise**2 * np.eye(len(times)))
         white = np.linalg.solve(factor, rest)
         evidence = -0.5 * white @ white - np.log(np.diag(factor)).sum()
