@@ -135,6 +135,9 @@ def _finite(array: np.ndarray) -> bool:
 KEYPOINT_SHAPES = {"xy": ("T", 133, 2), "score": ("T", 133), "world": ("T", 133, 3), "detector": ()}
 FILLED_SHAPES = KEYPOINT_SHAPES | {"missing": ("T", 2), "filled": ("T", 133), "sigma": ("T", 133)}
 FACE_SHAPES = {"valid": ("T",), "expression": ("T", "E"), "jaw": ("T", 3), "shape": ("S",), "landmarks": ("T", "L", 3)}
+HEAD_SHAPES = {"head_template": ("N", 3), "head_vertices": ("N", 3), "head_faces": ("F", 3), "head_eyes": (2, 3),
+               "flame_expression": ("T", "X"), "flame_jaw": ("T", 3), "valid": ("T",)}
+"""What face.npz holds besides where a FLAME file was given: the person's resting head, m, and how FLAME's face moves."""
 BODY_SHAPES = {
     "betas": ("B",), "expression": ("T", "E"), "global_orient": ("T", 3), "body_pose": ("T", 63),
     "left_hand_pose": ("T", 45), "right_hand_pose": ("T", 45), "jaw_pose": ("T", 3), "leye_pose": ("T", 3),
@@ -159,7 +162,9 @@ def check_filled_keypoints(path: Path) -> None:
 
 
 def check_face(path: Path) -> None:
-    check_arrays(path, FACE_SHAPES)
+    arrays = check_arrays(path, FACE_SHAPES)
+    if "head_vertices" in arrays:
+        check_arrays(path, HEAD_SHAPES)
 
 
 def check_body(path: Path) -> None:

@@ -6,6 +6,7 @@ owns. Pickles are refused: they run code.
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ MOST_BETAS, MOST_EXPRESSIONS = 20, 10
 
 def read_body_file(path: Path) -> dict:
     """Fields of `Body` but its digest. Raises `ArtifactError`."""
-    if path.suffix != ".npz":
+    if path.suffix != ".npz" and not zipfile.is_zipfile(path):  # the model store keeps files under names without suffix
         raise ArtifactError(f"{path}: a body model must be an .npz file (pickles run code when read, so .pkl is refused); "
                             "SMPL-X is distributed as SMPLX_NEUTRAL.npz, SMPLX_MALE.npz and SMPLX_FEMALE.npz")
     a = read_arrays_of_body(path)

@@ -1,11 +1,13 @@
 """Reads a FLAME head model (Li et al. 2017) that a user owns, and says exactly what is wrong with a file that is not one.
 
 V = 5023 vertices, F = 9976 faces, 5 joints (root, neck, jaw, eyes), 300 shape and 100 expression directions. The official file is
-a pickle, which runs code when it is read: it is refused, and has to be saved as .npz with the same names once.
+a pickle, which runs code when it is read: it is refused, and has to be saved as .npz with the same names once. Where the points of
+a face network lie on the head says FLAME's own `mediapipe_landmark_embedding.npz`.
 """
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +17,10 @@ from gsac.avatar.artifacts import ArtifactError
 SHAPES, EXPRESSIONS = 300, 100
 ARRAYS = {"v_template": (5023, 3), "f": (9976, 3), "shapedirs": (5023, 3, SHAPES + EXPRESSIONS), "posedirs": (5023, 3, 36),
           "J_regressor": (5, 5023), "weights": (5023, 5), "kintree_table": (2, 5)}
+POINTS = {"landmark_indices": 1, "lmk_face_idx": 1, "lmk_b_coords": 2}
+"""Array of the landmarks' file -> number of dimensions."""
+MESH_POINTS = 468
+"""Of the face network; later numbers are of the iris, which no head carries."""
 
 
 @dataclass
@@ -38,13 +44,26 @@ class Flame:
         return vertices
 
 
+@dataclass
+class FlamePoints:
+    """Where L of the face network's 468 points lie on the head."""
+
+    index: np.ndarray  # (L,) which points
+    face: np.ndarray  # (L,) in which face of the head
+    bary: np.ndarray  # (L, 3) where in it
+
+    def on(self, flame: Flame, vertices: np.ndarray) -> np.ndarray:
+        """vertices: (5023, ...). Returns (L, ...) the same of the points."""
+        return np.einsum("lk,lk...->l...", self.bary, vertices[flame.faces[self.face]])
+
+
 def read_flame(path: Path | str) -> Flame:
     """Raises ArtifactError that names the array, what it is and what was expected."""
     path = Path(path)
-    if path.suffix != ".npz":
-        raise ArtifactError(f"{path}: a FLAME file must be .npz (pickles run code when read, so .pkl is refused); "
-                            f"save its arrays {', '.join(ARRAYS)} with numpy.savez once")
-    a = _arrays(path)
+    a = _arrays(path, ARRAYS)
+    for name, shape in ARRAYS.items():
+        if a[name].shape != shape:
+            raise ArtifactError(f"{path}: array {name} has shape {a[name].shape}, expected {shape}")
     if a["f"].min() < 0 or a["f"].max() >= 5023:
         raise ArtifactError(f"{path}: array f names vertex {a['f'].max()}, but there are 5023")
     if not np.allclose(np.asarray(a["weights"], np.float32).sum(1), 1, atol=2e-2):
@@ -60,20 +79,39 @@ def read_flame(path: Path | str) -> Flame:
                  np.asarray(a["weights"], np.float32), parents)
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of the table, whatever else the file holds."""
+def read_flame_points(path: Path | str) -> FlamePoints:
+    """Raises ArtifactError as `read_flame`."""
+    path = Path(path)
+    a = _arrays(path, POINTS)
+    count = len(a["lmk_face_idx"])
+    for name, dimensions in POINTS.items():
+        shape = (count, 3)[:dimensions]
+        if a[name].shape != shape:
+            raise ArtifactError(f"{path}: array {name} has shape {a[name].shape}, expected {shape}")
+    if count == 0 or a["lmk_face_idx"].min() < 0 or a["lmk_face_idx"].max() >= ARRAYS["f"][0]:
+        raise ArtifactError(f"{path}: array lmk_face_idx must name some of the {ARRAYS['f'][0]} faces")
+    if a["landmark_indices"].min() < 0 or not np.allclose(a["lmk_b_coords"].sum(1), 1, atol=1e-2):
+        raise ArtifactError(f"{path}: landmark_indices must not be negative and rows of lmk_b_coords must sum to one")
+    known = a["landmark_indices"] < MESH_POINTS
+    return FlamePoints(a["landmark_indices"][known].astype(int), a["lmk_face_idx"][known].astype(int),
+                       a["lmk_b_coords"][known].astype(np.float32))
+
+
+def _arrays(path: Path, names: dict) -> dict[str, np.ndarray]:
+    """The named arrays, whatever else the file holds."""
+    if path.suffix != ".npz" and not zipfile.is_zipfile(path):  # the model store keeps files under names without suffix
+        raise ArtifactError(f"{path}: a FLAME file must be .npz (pickles run code when read, so .pkl is refused); "
+                            f"save its arrays {', '.join(names)} with numpy.savez once")
     found = {}
     try:
         with np.load(path, allow_pickle=False) as z:
-            for name, shape in ARRAYS.items():
+            for name in names:
                 if name not in z.files:
-                    raise ArtifactError(f"{path}: array {name} is missing; a FLAME file has {', '.join(ARRAYS)}")
+                    raise ArtifactError(f"{path}: array {name} is missing; expected {', '.join(names)}")
                 try:
                     found[name] = z[name]
                 except ValueError as e:
                     raise ArtifactError(f"{path}: array {name} is a pickled object; save it as a plain array") from e
-                if found[name].shape != shape:
-                    raise ArtifactError(f"{path}: array {name} has shape {found[name].shape}, expected {shape}")
-    except (OSError, ValueError) as e:
+    except (OSError, ValueError, zipfile.BadZipFile) as e:
         raise ArtifactError(f"{path}: not a readable npz ({e})") from e
     return found

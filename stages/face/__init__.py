@@ -3,7 +3,9 @@
 takes  split/frames, split/clip.json, keypoints/keypoints.npz
 gives  face.npz: valid (T,) bool, expression (T,52) in 0..1 in the order of the body's expression_names, jaw (T,3) zeros
        (the open body opens its mouth by jawOpen), shape (1404,) m the person's resting points less the body's,
-       landmarks (T,468,3) px or NaN
+       landmarks (T,468,3) px or NaN; with a FLAME file also head_template and head_vertices (5023,3) m,
+       everybody's and the person's head at rest, head_faces (9976,3), the template's head_eyes (2,3) m, flame_expression (T,50)
+       and flame_jaw (T,3) rad
 """
 
 from gsac.avatar.artifacts import check_face
@@ -16,5 +18,5 @@ STAGE = Stage(
     outputs=(Output("face.npz", check_face),),
     config=FaceConfig,
     packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert"),
-    models=lambda config: ("face_detection_short_range", "face_landmark"),
+    models=lambda config: config.models(),
 )

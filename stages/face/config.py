@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from gsac.stages.contract import BadInput
 
+NONE = "none"
+
 
 @dataclass
 class FaceConfig:
@@ -28,6 +30,17 @@ class FaceConfig:
     """Standard deviation, s, of the smoothing over time; 0 is none. Photos have no time and are not smoothed."""
     rest_time: float = 0.2
     """Time, s, in which an unseen face falls back to rest by a factor e."""
+
+    flame: str = NONE
+    """The name under which `gsac models add NAME FLAME.npz` keeps your FLAME head, or none: smplx.method paper holds the body's
+    head to it, and an SMPL-X body takes its expression from it."""
+    flame_points: str = "flame-points"
+    """The same of FLAME's own mediapipe_landmark_embedding.npz; only with a FLAME head."""
+
+    def models(self) -> tuple[str, ...]:
+        """Names of the model files that this configuration needs."""
+        own = () if self.flame == NONE else (self.flame, self.flame_points)
+        return ("face_detection_short_range", "face_landmark", *own)
 
     def check(self) -> None:
         if not 90 <= self.angle < 180:

@@ -11,6 +11,7 @@ from gsac.avatar.wholebody import INDEX
 from gsac.avatar.workspace import available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face.actions import Actions, fill, smooth, solve
+from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.landmarks import align, look
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
@@ -26,7 +27,7 @@ def run(job: Job) -> None:
     if len(keypoints["score"]) != len(paths):
         raise StageError(f"keypoints.npz has {len(keypoints['score'])} frames but split has {len(paths)}; "
                          "run keypoints again")
-    actions = Actions.load()
+    actions, head = Actions.load(), FlameHead.of(job)
     landmarks, points, weight, direction = read_clip(job, paths, keypoints, actions)
     valid = np.isfinite(landmarks[:, 0, 0])
     times = None if clip.timestamps_s is None else np.array(clip.timestamps_s)
@@ -40,9 +41,10 @@ def run(job: Job) -> None:
         c, offset = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
         job.warn("The face was never seen from the front; the avatar's face stays at rest.")
     expression = fill(c, valid, times, config.rest_time)
+    own = head.arrays(offset, actions, expression) if head and valid.any() else {}
     write_arrays(job.out / "face.npz", valid=valid, expression=expression.astype(np.float32),
                  jaw=np.zeros((len(paths), 3), np.float32), shape=offset.ravel().astype(np.float32),
-                 landmarks=landmarks.astype(np.float32))
+                 landmarks=landmarks.astype(np.float32), **own)
 
 
 def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple[np.ndarray, ...]:

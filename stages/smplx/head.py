@@ -1,7 +1,9 @@
 """The face terms of the published method: the body's resting head against a head mesh that a face network found.
 
-The network's head (FLAME's, or any other) comes in face.npz: `head_vertices` (N, 3) m at rest, `head_index` (N,) the body's
-vertex that each stands for, `head_faces` (F, 3) over the N.
+The network's head (FLAME's, or any other) comes in face.npz in its own mesh: `head_template` and `head_vertices`, everybody's and
+the person's own at rest, m, y up and z out of the face, `head_faces` over both, and the template's `head_eyes` (2, 3), left and
+right. The template is laid on the body's by the eyes, then as it fits best; so each of the body's vertices, whichever body that
+is, has its place on the mesh.
 """
 
 from __future__ import annotations
@@ -10,23 +12,30 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, INDEX
 from gsac.stages.contract import StageError
+from scipy.spatial import cKDTree
 
 VERTEX, LAPLACIAN, EDGE = 10.0, 10000.0, 1.0
 """Weights of the paper's L_face."""
 VISIBLE = float(np.cos(np.radians(135)))
 EYES = [INDEX["left_eye"], INDEX["right_eye"]]
 EARS = [INDEX["left_ear"], INDEX["right_ear"]]
+HEAD_JOINTS, EYE_JOINTS = [15, 22], [23, 24]
+LAYINGS = 24
+"""Rounds in which the head mesh is laid on the body's head."""
+NEAR, LEAST_SHARE = 0.015, 0.3
+"""m within which a vertex lies on the head mesh, and how many of the head's must."""
 
 
 @dataclass
 class Head:
     """A head at rest, N vertices."""
 
-    vertices: np.ndarray  # (N, 3) m
-    index: np.ndarray  # (N,) the body's vertices
+    vertices: np.ndarray  # (N, 3) m, in any place
+    index: np.ndarray  # (N,) the body's vertices that they stand for
     faces: np.ndarray  # (F, 3)
 
     @classmethod
@@ -34,16 +43,76 @@ class Head:
         """The head of face.npz's arrays; None where the face method gives none. Raises StageError."""
         if "head_vertices" not in arrays:
             return None
-        for name in ("head_index", "head_faces"):
+        for name in ("head_template", "head_faces", "head_eyes"):
             if name not in arrays:
                 raise StageError(f"face.npz has head_vertices but no {name}")
-        head = cls(arrays["head_vertices"], arrays["head_index"].astype(int), arrays["head_faces"].astype(int))
-        n = len(head.vertices)
-        if head.index.shape != (n,) or head.index.max(initial=0) >= len(body.v_template):
-            raise StageError(f"face.npz: head_index must name one of the body's {len(body.v_template)} vertices for each of {n}")
-        if head.faces.ndim != 2 or head.faces.shape[1] != 3 or head.faces.max(initial=0) >= n:
-            raise StageError(f"face.npz: head_faces must be (F, 3) over the {n} head vertices")
-        return head
+        template, own, eyes = (arrays[name].astype(float) for name in ("head_template", "head_vertices", "head_eyes"))
+        faces = arrays["head_faces"].astype(int)
+        if faces.ndim != 2 or faces.shape[1] != 3 or faces.max(initial=0) >= len(own) or template.shape != own.shape:
+            raise StageError(f"face.npz: head_faces must be (F, 3) over the {len(own)} head vertices, and head_template like them")
+        index, corners, share, turn = laid_on(template, faces, eyes, body)
+        if len(index) < LEAST_SHARE * head_vertices(body).sum():
+            raise StageError(f"face.npz: only {len(index)} of the body's {head_vertices(body).sum()} head vertices lie on its head "
+                             "mesh; expected a head in metres, y up, z out of the face, with head_eyes its left and right eye")
+        places = np.einsum("nk,nkc->nc", share, own[corners]) @ turn.T
+        place = np.full(len(body.v_template), -1)
+        place[index] = np.arange(len(index))
+        kept = place[body.faces]
+        return cls(places, index, kept[(kept >= 0).all(1)])
+
+
+def head_vertices(body: Body) -> np.ndarray:
+    """(V,) bool: those that go with head and jaw; the eyes are left out."""
+    return body.weights[:, HEAD_JOINTS].sum(1) > 0.5
+
+
+def laid_on(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Body) -> tuple[np.ndarray, ...]:
+    """Index (n,) of the body's head vertices that lie on the head mesh, corners (n, 3) of the face where and their shares (n, 3),
+    and the turn (3, 3) from the mesh to the body."""
+    index = np.flatnonzero(head_vertices(body))
+    skin, around = body.v_template[index].astype(float), incident(faces, len(vertices))
+    own = (body.J_regressor[EYE_JOINTS] @ body.v_template).astype(float)
+    size = np.linalg.norm(own[0] - own[1]) / max(np.linalg.norm(eyes[0] - eyes[1]), 1e-6)
+    turn, shift = np.eye(3), own.mean(0) - size * eyes.mean(0)
+    for _ in range(LAYINGS):
+        found, corners, share = closest(skin, size * vertices @ turn.T + shift, faces, around)
+        far = np.linalg.norm(found - skin, axis=1)
+        near = far < max(NEAR, np.median(far))
+        source = np.einsum("nk,nkc->nc", share, vertices[corners])[near]
+        a, b = source - source.mean(0), skin[near] - skin[near].mean(0)
+        turn = rotation.align(a, b)
+        size = float((a @ turn.T * b).sum() / max((a**2).sum(), 1e-12))
+        shift = skin[near].mean(0) - size * turn @ source.mean(0)
+    near = far < NEAR
+    return index[near], corners[near], share[near], turn
+
+
+def incident(faces: np.ndarray, count: int) -> np.ndarray:
+    """(count, K) faces about each vertex, padded with repeats."""
+    vertex, face = faces.T.ravel(), np.tile(np.arange(len(faces)), 3)
+    order = np.argsort(vertex, kind="stable")
+    vertex, face = vertex[order], face[order]
+    first = np.searchsorted(vertex, np.arange(count))
+    number = np.bincount(vertex, minlength=count)
+    at = first[:, None] + np.minimum(np.arange(max(number.max(), 1)), np.maximum(number - 1, 0)[:, None])
+    return face[np.minimum(at, len(face) - 1)]
+
+
+def closest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, ...]:
+    """points: (n, 3). Nearest places (n, 3) on the faces about the nearest vertex, corners (n, 3) and their shares (n, 3)."""
+    tried = faces[around[cKDTree(vertices).query(points)[1]]]  # (n, K, 3)
+    a, b, c = (vertices[tried[..., k]] for k in range(3))
+    ab, ac, ap = b - a, c - a, points[:, None] - a
+    d00, d01, d11 = ((u * v).sum(-1) for u, v in ((ab, ab), (ab, ac), (ac, ac)))
+    d20, d21 = (ap * ab).sum(-1), (ap * ac).sum(-1)
+    area = np.maximum(d00 * d11 - d01**2, 1e-18)
+    v, w = (d11 * d20 - d01 * d21) / area, (d00 * d21 - d01 * d20) / area
+    share = np.clip(np.stack([1 - v - w, v, w], -1), 0, None)
+    share /= share.sum(-1, keepdims=True)
+    place = np.einsum("nfk,nfkc->nfc", share, vertices[tried])
+    best = np.linalg.norm(place - points[:, None], axis=-1).argmin(1)
+    row = np.arange(len(points))
+    return place[row, best], tried[row, best], share[row, best]
 
 
 class HeadTerms:

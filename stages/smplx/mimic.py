@@ -11,13 +11,19 @@ JAW_OPEN, JAW_ANGLE = 24, 0.38
 def mimic(body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
     """body: avatar.body.Body; face: arrays of face.npz. Returns expression (T, E), jaw_pose (T, 3) rad and what was lost, if any.
 
-    The open body acts the 52 actions as they are. An official file's expressions are principal components of its own, which no
-    action names: there only the jaw moves.
+    The open body acts the 52 actions as they are. An official file's expressions are FLAME's, which no action names: with a FLAME
+    head in face.npz they are there, without one only the jaw moves.
     """
     actions, jaw = face["expression"], face["jaw"].astype(np.float32)
     if actions.shape[1] == len(body.expression_names) and body.jaw_actions.any():
         return actions, jaw, ""
+    if "flame_expression" in face:
+        expression = np.zeros((len(actions), len(body.expression_names)), np.float32)
+        known = min(expression.shape[1], face["flame_expression"].shape[1])
+        expression[:, :known] = face["flame_expression"][:, :known]
+        return expression, face["flame_jaw"].astype(np.float32), ""
     jaw = jaw.copy()
     jaw[:, 0] += JAW_ANGLE * actions[:, JAW_OPEN]
     return np.zeros((len(actions), len(body.expression_names)), np.float32), jaw, (
-        "This body model has no named facial actions: of the face only the jaw is carried over.")
+        "This body model has no named facial actions: of the face only the jaw is carried over; a FLAME head (face.flame) "
+        "would bring the rest.")

@@ -87,7 +87,7 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     state = State(local, transl, betas, start.log_focal, np.zeros(0))
     notes = ("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's regression",)
     if objective.head is None:
-        notes += ("face.npz holds no head mesh; the paper's face terms (vertex, Laplacian, edge) are off",)
+        notes += ("face.npz holds no head mesh (face.flame brings one); the paper's face terms (vertex, Laplacian, edge) are off",)
     iou = overlap(body, state, joint_offset, outlines, center, sightings)
     return Fit(state, spread_of(body, sightings, state, config, center), iou,
                pixels_off(objective, sightings, state, joint_offset), total, joint_offset, notes)

@@ -1,7 +1,9 @@
+import pickle
+
 import numpy as np
 import pytest
 from gsac.avatar.artifacts import ArtifactError
-from gsac.avatar.flame_file import ARRAYS, read_flame
+from gsac.avatar.flame_file import ARRAYS, read_flame, read_flame_points
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +42,30 @@ def test_an_array_that_is_missing_or_misshapen_is_named(tmp_path, arrays, name):
 def test_pickles_are_refused_without_being_read(tmp_path):
     with pytest.raises(ArtifactError, match="run code"):
         read_flame(tmp_path / "generic_model.pkl")
+    (tmp_path / "kept-by-name").write_bytes(pickle.dumps({"v_template": 0}))
+    for read in (read_flame, read_flame_points):
+        with pytest.raises(ArtifactError, match="run code"):
+            read(tmp_path / "kept-by-name")
+
+
+def test_a_name_without_suffix_is_as_good(tmp_path, arrays):
+    """The model store keeps files under the user's own names."""
+    assert read_flame(written(tmp_path, arrays).rename(tmp_path / "my-head")).faces.shape == (9976, 3)
+
+
+def test_where_the_networks_points_lie_is_read_and_checked(tmp_path, arrays):
+    path = tmp_path / "mediapipe_landmark_embedding.npz"
+    good = {"landmark_indices": np.array([3, 470, 7]), "lmk_face_idx": np.array([5, 6, 9975]),
+            "lmk_b_coords": np.full((3, 3), 1 / 3)}
+    np.savez(path, **good)
+    points, flame = read_flame_points(path), read_flame(written(tmp_path, arrays))
+    assert points.index.tolist() == [3, 7]  # the iris is of no head
+    np.testing.assert_allclose(points.on(flame, flame.v_template)[1], flame.v_template[flame.faces[9975]].mean(0), atol=1e-6)
+    wrong = {"lmk_b_coords": np.ones((3, 3)), "lmk_face_idx": np.array([1, 2, 9976]), "landmark_indices": np.arange(4)}
+    for name, array in wrong.items():
+        np.savez(path, **good | {name: array})
+        with pytest.raises(ArtifactError, match=name):
+            read_flame_points(path)
 
 
 def test_pickled_objects_inside_are_refused(tmp_path, arrays):
