@@ -26,6 +26,7 @@ def main() -> None:
     from gsac.avatar.cuda.device import Device
     from gsac.benchmarks.gpu.check import LIMIT, errors
     from gsac.benchmarks.gpu.figure import figure, start
+    from gsac.benchmarks.gpu.timing import copy_bandwidth, float_rate
 
     began = time.perf_counter()
     device = Device()
@@ -49,9 +50,11 @@ def main() -> None:
     for count in (10000, 25000):
         report(f"1080x1080, {count}", errors(big, start(big.body, count), losses, device), LIMIT)
     done("checks")
-    measure(device, big, quick)
+    ceilings = copy_bandwidth(device), float_rate(device)
+    print(f"ceilings: copy {ceilings[0] / 1e12:.2f} TB/s, float32 {ceilings[1] / 1e12:.1f} T operations/s")
+    measure(device, big, quick, ceilings)
     done("times")
-    measure_paper(device, big)
+    measure_paper(device, big, ceilings)
     measure_rounds(device, big)
     done("times of recipe paper and of the rounds of poses")
     compare(big)
@@ -82,13 +85,13 @@ def compare(figure) -> None:
               f"{took * 3000:.1f} s for 3000 steps of one frame", flush=True)
 
 
-def measure_paper(device, figure) -> None:
+def measure_paper(device, figure, ceilings: tuple[float, float]) -> None:
     """Recipe `paper` kernel by kernel: one gaussian a face, four frames a step, betas learned."""
     from types import SimpleNamespace
 
     from gsac.avatar.body import Body
     from gsac.avatar.cuda.paper import PaperTrainer
-    from gsac.benchmarks.gpu.timing import kernel_microseconds, nearest_milliseconds
+    from gsac.benchmarks.gpu.timing import evaluations, kernel_microseconds, nearest_milliseconds
     from gsac.stages.train import paper_cuda
     from gsac.stages.train.config import TrainConfig
 
@@ -98,9 +101,10 @@ def measure_paper(device, figure) -> None:
     start = paper_cuda.start(len(body.faces), np.random.default_rng(0))
     trainer = PaperTrainer(body, [figure.shots], figure.pose, figure.transl, start, recipe, device)
     trainer.train(200)
-    print(f"recipe paper, {trainer.count} gaussians, batch {trainer.batch}, kernels in us: "
-          + ", ".join(f"{name} {us:.1f}" for name, us in kernel_microseconds(trainer).items())
-          + f"; neighbours searched in {nearest_milliseconds(trainer):.2f} ms", flush=True)
+    print(f"recipe paper, {trainer.count} gaussians, batch {trainer.batch}; neighbours searched in "
+          f"{nearest_milliseconds(trainer):.2f} ms, {8 * trainer.count**2 / ceilings[1] * 1e3:.2f} ms at the ceiling of operations")
+    kernels = kernel_microseconds(trainer)
+    print_kernels(trainer, kernels, trainer.batch * evaluations(figure, trainer.gaussians()), ceilings)
     trainer.close()
 
 
@@ -122,37 +126,38 @@ def measure_rounds(device, figure) -> None:
     trainer.close()
 
 
-def measure(device, figure, quick: bool) -> None:
+def print_kernels(trainer, kernels: dict[str, float], pairs: float, ceilings: tuple[float, float]) -> None:
+    """A line for each kernel, us, beside its floors. pairs: (gaussian, pixel) that are composited in the batch."""
+    from gsac.benchmarks.gpu.timing import least_bytes, useful_operations
+
+    least, useful = least_bytes(trainer), useful_operations(trainer, pairs)
+    for name, us in kernels.items():
+        floors = f"{least[name] / 1e6:7.2f} MB = {least[name] / ceilings[0] * 1e6:5.1f} us"
+        if name in useful:
+            floors += f", {useful[name] / 1e9:6.3f} G operations = {useful[name] / ceilings[1] * 1e6:5.1f} us"
+        print(f"    {name:16s} {us:7.1f} us; at the ceilings {floors}", flush=True)
+
+
+def measure(device, figure, quick: bool, ceilings: tuple[float, float]) -> None:
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import (
-        copy_bandwidth,
         evaluations,
-        float_rate,
         kernel_microseconds,
-        least_bytes,
         run_milliseconds,
         step_milliseconds,
-        useful_operations,
     )
 
-    copied, counted = copy_bandwidth(device), float_rate(device)
-    print(f"ceilings: copy {copied / 1e12:.2f} TB/s, float32 {counted / 1e12:.1f} T operations/s")
     for count, batch in ((25000, 1), (25000, 4), (25000, 8), (10000, 1), (100000, 1)):
         recipe = paper_losses(count, steps=3000, batch=batch)
         trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, count), recipe,
                               device)
         steps = step_milliseconds(trainer)
-        kernels, least, state = kernel_microseconds(trainer), least_bytes(trainer), trainer.state()
-        useful = useful_operations(trainer, batch * evaluations(figure, trainer.gaussians()))
+        kernels, state = kernel_microseconds(trainer), trainer.state()
         print(f"step {count} gaussians, batch {batch}: median {np.median(steps) * 1e3:.0f} us ({min(steps) * 1e3:.0f}-"
               f"{max(steps) * 1e3:.0f}), {np.median(steps) / batch * 1e3:.0f} us a frame; {trainer.memory() / 1e9:.2f} GB; "
               f"{state.pairs} pairs, {state.heavy}+{state.light} tiles, {state.segments} segments")
-        for name, us in kernels.items():
-            floors = f"{least[name] / 1e6:7.2f} MB = {least[name] / copied * 1e6:5.1f} us"
-            if name in useful:
-                floors += f", {useful[name] / 1e9:6.3f} G operations = {useful[name] / counted * 1e6:5.1f} us"
-            print(f"    {name:16s} {us:7.1f} us; at the ceilings {floors}")
+        print_kernels(trainer, kernels, batch * evaluations(figure, trainer.gaussians()), ceilings)
         trainer.close()
     if quick:
         return

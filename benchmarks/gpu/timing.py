@@ -141,12 +141,16 @@ def least_bytes(trainer: CudaTrainer) -> dict[str, float]:
     batch, n, v, pairs = trainer.batch, s.count, s.vertex_count, state.pairs
     active, near = (state.heavy + state.light) * 256, state.near * 256
     posed = v * 12 + n * (12 + 12 + 16 + 12 + 4)
+    slopes = pairs * 36 + batch * (posed + n * (12 + 36))
     return {
         "skin": batch * v * (12 + 12) + v * 32 + batch * s.max_tiles * 4,
         "project": batch * (posed + n * (48 + 8 + 8) + pairs / batch * 8),
         "allocate": batch * s.max_tiles * 14, "fill": batch * n * 16 + pairs * 12, "blend": pairs * (16 + 48) + active * 16,
         "compare": near * (16 + 4 + 36 * (s.ssim > 0)), "image_gradient": active * (16 + 4 + 16 + 36 * (s.ssim > 0)),
         "blend_backward": pairs * (8 + 48 + 12 + 36) + active * 32,
-        "gaussian_step": pairs * 36 + batch * (posed + n * (12 + 36)) + n * 4 * 14 * 6,
+        "gaussian_step": slopes + n * 4 * 14 * 6,
         "gather": batch * (n * 36 + v * 12) + n * 12,
-        "joint_step": batch * v * 24 + v * 32}
+        "joint_step": batch * v * 24 + v * 32,
+        "dice": batch * s.max_tiles + state.near * 12, "neighbourhood": n * (52 + 12 + 12 + 16 + 12 + 12 + 12 + 80),
+        "paper_step": slopes + n * (12 + 80 + 12 + 16 + 52 + 4 * 13 * 6),
+        "shape_gradient": batch * v * 12 + s.beta_count * v * 12, "shape_step": s.beta_count * v * 12 + v * 24}
