@@ -79,7 +79,8 @@ class Actor:
 
     def _child(self, name: str, log: Path) -> Child:
         self.logs.mkdir(parents=True, exist_ok=True)
-        return Child(f"{self.keys.project.package}.{name}", self.keys.project.entry(name), log)
+        project, device = self.keys.project, self.keys.device_of(name) or self.keys.device
+        return Child(f"{project.package}.{name}", project.entry(name), device, log)
 
     def _log(self, name: str, more: str = "") -> Path:
         return self.logs / f"{name}.log{more}"

@@ -27,8 +27,8 @@ class StageBugError(StageError):
 class Child:
     """A stage's process. It loads the stage's code at once and waits for its order; it ends with the context."""
 
-    def __init__(self, declaration: str, entry: str, log: Path):
-        """declaration, entry: modules of the stage; log: where its prints go."""
+    def __init__(self, declaration: str, entry: str, device: str, log: Path):
+        """declaration, entry: modules of the stage; device: what it will run on; log: where its prints go."""
         self.log = log
         self._events, write = os.pipe()
         try:
@@ -43,7 +43,7 @@ class Child:
             raise
         finally:
             os.close(write)
-        self._tell({"declaration": declaration, "entry": entry, "events": write})
+        self._tell({"declaration": declaration, "entry": entry, "device": device, "events": write})
 
     def __enter__(self) -> Child:
         return self

@@ -1,6 +1,6 @@
 """The child process that does one stage: builds the Job, runs it, checks what it wrote, and says how it goes.
 
-Reads two JSON lines from stdin: what to load and where to write events to, a file descriptor, and when there is work the order.
+Reads two JSON lines from stdin: what to load and where to write events to, a file descriptor; and when there is work the order.
 Stdin stays open as long as the parent lives; when it closes, the child and its children go.
 """
 
@@ -53,9 +53,11 @@ def main() -> None:
     start = json.loads(sys.stdin.readline())
     os.set_inheritable(start["events"], False)
     voice = Voice(os.fdopen(start["events"], "w"))
-    for module in (start["declaration"], start["entry"]):
-        with contextlib.suppress(Exception):  # it will fail again, and be heard, when there is an order
-            importlib.import_module(module)
+    with contextlib.suppress(Exception):  # it will fail again, and be heard, when there is an order
+        importlib.import_module(start["declaration"])
+        entry = importlib.import_module(start["entry"])
+        if hasattr(entry, "warm"):
+            entry.warm(start["device"])
     line = sys.stdin.readline()
     if not line:
         return

@@ -2,7 +2,8 @@
 
 A stage folder holds `__init__.py` with one `STAGE = Stage(...)` (light: no heavy import) and `stage.py` with one
 `run(job: Job) -> None`. The engine reads `STAGE`, builds the key, and calls `run` with read-only inputs and a private
-output folder. A stage never imports another stage, the engine or the cache.
+output folder. A stage never imports another stage, the engine or the cache. `stage.py` may hold `warm(device: str) -> None` too:
+what can be made ready before the inputs are there; it is called in the process that will run, and whether it was must not matter.
 """
 
 from __future__ import annotations

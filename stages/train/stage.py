@@ -9,8 +9,10 @@ from collections.abc import Callable
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
+from gsac.avatar.binding import face_frames
 from gsac.avatar.body import BodyParams
 from gsac.avatar.cuda import why_not
+from gsac.avatar.cuda.device import Device
 from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import figures, summary
 from gsac.avatar.turn import turn_seen
@@ -83,6 +85,13 @@ def run(job: Job) -> None:
     if unseen > MOST_UNSEEN:
         job.warn(f"{unseen:.0%} of the gaussians were shown from the front by no frame; they look like their neighbours.")
     run.write()
+
+
+def warm(device: str) -> None:
+    """Called while the stage before is at work: numba takes stock of what is compiled, and the GPU wakes up. Half a second each."""
+    face_frames(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
+    if device == "cuda":
+        Device()
 
 
 def check_device(device: str) -> None:

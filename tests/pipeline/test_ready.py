@@ -44,3 +44,17 @@ def test_a_stage_whose_result_is_there_leaves_no_process_and_keeps_its_log(toy):
     assert toy.ran("--set", "cut.pause_s=0.1") == ["cut"]
     assert (toy.out / "logs" / "left.log").read_text() == "of the run that made it"
     assert not list((toy.out / "logs").glob("*.next"))
+
+
+def test_a_stage_may_warm_up_for_its_device_before_its_order_and_one_that_cannot_runs_all_the_same(toy):
+    warm = """
+def warm(device):
+    with open(os.environ["TOY_RUNS"] + ".loaded", "a") as log:
+        log.write(device + "\\n")
+    raise RuntimeError("too cold")
+"""
+    toy.edit("left/stage.py", "from gsac.toy", "import os\n" + warm + "\n\nfrom gsac.toy")
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3", GSAC_DEVICE="cpu")
+    toy.wait_for(lambda: loaded(toy))
+    assert toy.runs == ["cut"] and Path(f"{toy.runs_file}.loaded").read_text() == "cpu\n"
+    assert process.wait(60) == 0 and toy.runs == ["cut", "left", "right", "join"]
