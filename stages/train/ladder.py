@@ -16,6 +16,7 @@ from gsac.avatar.metrics import psnr
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.train import fast
+from gsac.stages.train.alignment import converge
 from gsac.stages.train.evaluate import judge
 from gsac.stages.train.merging import merged, skin_of
 from gsac.stages.train.poses import carried
@@ -29,6 +30,8 @@ UNJUDGED = 12000
 """Size where no frame is held out."""
 REFIT, REFIT_FROM = 0.18, 0.3
 """Steps of a smaller size, as a share of the training's; their rates are those of a training from this share of its steps on."""
+ROUNDS = 5
+"""That move the held-out frames' poses, on any device: sizes are to be chosen alike."""
 NEAR, CARE = [15, 20, 21, *range(22, 55)], 3.0
 """Joints of head and hands, and what their pixels count for beside others."""
 
@@ -39,7 +42,7 @@ def fit(task: Task, loop: Loop) -> Fit:
         return fast.fit(task, loop, UNJUDGED)
     trainer, fine, coarse = loop.train(task, SIZES[0])
     poses = carried(task.poses, task.trained)
-    loop.align(trainer.gaussians(), poses, task.held, task.views)
+    converge(trainer.gaussians(), poses, task.held, task.views, ROUNDS)
     rungs: list[Rung] = []
     kept: list[fast.Trainer] = []
     for size in SIZES:

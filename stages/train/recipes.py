@@ -3,7 +3,6 @@
 from functools import partial
 
 from gsac.stages.train import bundle, cuda, fast, ladder, levels, paper, paper_cuda
-from gsac.stages.train.alignment import converge
 from gsac.stages.train.config import AUTO
 from gsac.stages.train.evaluate import align_poses
 from gsac.stages.train.task import Fit, Loop, Task
@@ -19,8 +18,8 @@ def fit_fast(loop: Loop, task: Task) -> Fit:
 
 
 RECIPES = {
-    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit, partial(converge, rounds=5), bundle.learning_on_cpu)),
-    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit, partial(cuda.align_poses, steps=40), cuda.learning)),
+    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, ladder.refit, bundle.learning_on_cpu)),
+    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit, cuda.learning)),
     ("paper", "cpu"): paper.fit,
     ("paper", "cuda"): paper_cuda.fit,
 }

@@ -64,7 +64,5 @@ class Loop(NamedTuple):
     """As `fast.train`."""
     refit: Callable[[Task, Any, dict[int, View]], Any]
     """As `ladder.refit`."""
-    align: Callable[[Gaussians, Poses, np.ndarray, list[View]], None]
-    """Moves the poses of some frames to their images, the avatar held still; views: of all T."""
     learning: Callable[..., AbstractContextManager]
     """As `bundle.learning_on_cpu`."""
