@@ -5,6 +5,7 @@ from functools import partial
 from gsac.stages.train import bundle, cuda, fast, ladder, levels, paper, paper_cuda
 from gsac.stages.train.config import AUTO
 from gsac.stages.train.evaluate import align_poses
+from gsac.stages.train.guard import finite, values
 from gsac.stages.train.task import Fit, Loop, Task
 
 
@@ -13,6 +14,7 @@ def fit_fast(loop: Loop, task: Task) -> Fit:
     if task.resumed is None:
         bundle.adjust(task, loop.learning)
     fit = ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
+    finite("after the last step", values(fit.gaussians))
     fit.coarser = levels.coarser(task, loop, fit)
     return fit
 
