@@ -28,7 +28,7 @@ class TrainConfig:
     every_size: bool = False
     """Whether auto tries all sizes of its ladder, and not only those up to the first that is told apart: for `gsac bench size`."""
     steps: int | None = None
-    """Optimisation steps; null: the recipe's own, 1600 of one frame (fast), 3000 of four (paper)."""
+    """Optimisation steps; null: the recipe's own, 1600 of one frame, 3200 on cuda (fast), 3000 of four (paper)."""
     height: int = 540
     """Height of the images that are trained on and judged, px; smaller frames are not enlarged."""
     seed: int = 0
@@ -37,19 +37,19 @@ class TrainConfig:
     """Every k-th frame in the order of the body's yaw is kept for judging, at least one; 0, or fewer than 5 frames, keep none."""
     curve: int = 0
     """How many times on the way the held-out frames are judged for the curve in metrics.json; that time is not counted."""
-    mu_rate: float = 1.5e-3
+    mu_rate: float = 3e-3
     """Adam rate of the places (face units) at the start; falls to a hundredth."""
     rgb_rate: float = 1e-2
     """Adam rate of the colours at the start; falls to a tenth, as do the three below."""
     quat_rate: float = 1e-2
     """Adam rate of the rotations."""
-    scale_rate: float = 1e-2
+    scale_rate: float = 2e-2
     """Adam rate of the log scales."""
     opacity_rate: float = 3e-2
     """Adam rate of the opacity logits."""
     pose_rounds: int = 6
-    """Rounds of Gauss-Newton that move all poses to small images before the steps (fast); 0 leaves the fit's."""
-    pose_rate: float = 1e-3
+    """Rounds of Gauss-Newton that move all poses to small images before the steps (fast); 0: none, nor in their midst."""
+    pose_rate: float = 2e-3
     """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; hands a tenth of it."""
     pose_pull: float = 1e-4
     """Weight of the squared distance of a refined pose from the one it starts with, in units of 0.05 rad and 2 cm."""
@@ -77,7 +77,7 @@ class TrainConfig:
     """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
     lpips: str = "loss"
-    """Of weights that `gsac models add` brought: none, judge: measured, or loss: also in recipe paper's loss (cpu; hours)."""
+    """By weights that `gsac models` pulled or added: none, judge: measured, or loss: also in recipe paper's loss (cpu; hours)."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""

@@ -1,12 +1,13 @@
 """Recipe `fast`: area-weighted placement, coarse to fine, one frame a step, poses refined on the way.
 
-Rates and their decay follow the measured tables of the project's own prototypes: half the size first, pose rate 1e-3
-decayed, one gaussian budget from the start (no densification). Gaussians are limited after every step instead of
-being punished in the loss: no needle, no giant and no floater can arise, whatever the weights.
+Half the size first, rates that decay, one gaussian budget from the start (no densification); all poses solved together before
+the steps (`bundle`) and in their midst (`corrections`). Gaussians are limited after every step instead of being punished in the
+loss: no needle, no giant and no floater can arise, whatever the weights.
 """
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
@@ -18,6 +19,7 @@ from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.train.checkpoint import standing
 from gsac.stages.train.colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.corrections import correct_midway
 from gsac.stages.train.guard import finite, gradients, pose
 from gsac.stages.train.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.offsets import Offsets, fold
@@ -26,8 +28,10 @@ from gsac.stages.train.unseen import enough, laid, levelled, shown
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 1600
-COARSE_SHARE = 0.3
-"""Part of the steps that run at half the size."""
+COARSE_SHARE = 0.15
+"""Part of the steps that run at half the size; no more of them in a longer training."""
+MIDWAY = 0.3
+"""Part of the steps after which the poses of all frames are corrected once more, together."""
 OFFSET_SHARE = 0.6
 """Part of the steps that also move the body's surface out to clothes and hair."""
 OFFSET_RATE = 1e-3
@@ -55,6 +59,7 @@ def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, V
     rng = np.random.default_rng(config.seed)
     fine, coarse = crops(task)
     steps = config.steps or STEPS
+    coarse_until = coarse_steps(steps)
     order: list[int] = []
     if task.resumed is None:
         trainer, first = Trainer(start(task, coarse, count), task), 0
@@ -62,20 +67,28 @@ def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, V
         trainer, first = Trainer.restored(task.resumed["trainer"], task), task.resumed["step"]
         order, rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
         task.resumed = None
+    midway = round(MIDWAY * steps) if config.pose_rounds else -1
     for step in range(first, steps):
+        if step == midway:
+            correct_midway(task.poses, task.trained, trainer.gaussians, trainer.face, coarse)
         if not order:
             order = [int(t) for t in rng.permutation(task.trained)]
         t, done = order.pop(), step / steps
         if trainer.offsets and done >= OFFSET_SHARE:
             trainer.fold_offsets()
             trainer.lay_unseen(coarse)
-        loss = trainer.step(t, (coarse if done < COARSE_SHARE else fine)[t], done, rng.random(3), step)
+        loss = trainer.step(t, (coarse if step < coarse_until else fine)[t], done, rng.random(3), step)
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
         task.keep(step + 1, steps, partial(standing, step + 1, order, rng, trainer))
         task.progress(step + 1, steps, "steps")
     if trainer.offsets:
         trainer.fold_offsets()
     return trainer, fine, coarse
+
+
+def coarse_steps(steps: int) -> int:
+    """How many of the steps, the first, run at half the size."""
+    return math.ceil(COARSE_SHARE * min(steps, STEPS))
 
 
 def crops(task: Task) -> tuple[dict[int, View], dict[int, View]]:

@@ -7,7 +7,7 @@ from gsac.avatar.artifacts import Clip
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.raster import render_bound
 from gsac.avatar.workspace import Workspace
-from gsac.stages.train import alignment, bundle, fast
+from gsac.stages.train import alignment, bundle, corrections, fast
 from gsac.stages.train.poses import BODY, Poses, carried
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
@@ -63,14 +63,30 @@ def test_a_step_that_made_the_images_worse_is_taken_back(job):
     task = task_of(job(frames=3))
     views = {t: fast.person_crop(task.views[t]).halved() for t in range(3)}
     trainer = fast.Trainer(fast.start(task, views, 600), task)
-    corrections = bundle.Corrections(task.poses, trainer.gaussians, trainer.face, views)
-    corrections.solve()
-    good = corrections.kept.copy()
-    corrections.values = np.full_like(good, 0.5)
-    corrections.place()
-    corrections.solve()
-    np.testing.assert_array_equal(corrections.values, good)
+    solving = corrections.Corrections(task.poses, trainer.gaussians, trainer.face, views)
+    solving.solve()
+    good = solving.kept.copy()
+    solving.values = np.full_like(good, 0.5)
+    solving.place()
+    solving.solve()
+    np.testing.assert_array_equal(solving.values, good)
     np.testing.assert_allclose(task.poses.transl, task.poses.fit_transl + good[:, -3:])
+
+
+def test_rounds_in_the_midst_correct_held_out_frames_too_and_become_the_base_of_what_follows(job):
+    task = task_of(job(), held=(3, 8))
+    poses, views = task.poses, {int(t): fast.person_crop(task.views[t]).halved() for t in task.trained}
+    poses.transl[:, 0] -= TRUE_SHIFT
+    trainer = fast.Trainer(fast.start(task, views, 3000), task)
+    trainer.pose_rate = 0.0
+    for step, t in enumerate(np.tile(task.trained, 6)):
+        trainer.step(int(t), views[int(t)], 0.3, np.ones(3), step)
+    poses.transl[:, 0] += TRUE_SHIFT / 2
+    corrections.correct_midway(poses, task.trained, trainer.gaussians, trainer.face, views)
+    off = np.abs(poses.transl[:, 0]) / (TRUE_SHIFT / 2)
+    assert off.max() < 0.9 and off[task.held].mean() < 0.85, "they are taken to be off by little, and so move little"
+    np.testing.assert_array_equal(poses.base_transl, poses.transl)
+    np.testing.assert_array_equal(poses.base_pose, poses.pose)
 
 
 def test_no_round_leaves_the_fit_as_it_came(job):
@@ -84,12 +100,14 @@ def test_photos_far_apart_keep_the_poses_of_the_fit(job):
     task = task_of(job(frames=6))
     bundle.adjust(task, bundle.learning_on_cpu)
     np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
-    assert not bundle.apart(task.poses.fit_pose[:1, 0])
+    corrections.correct_midway(task.poses, task.trained, None, None, {})
+    np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
+    assert not corrections.apart(task.poses.fit_pose[:1, 0])
 
 
 def test_photos_far_apart_share_only_what_is_the_same_in_all():
-    few, many = bundle.covariance(7), bundle.covariance(60)
-    assert few[0, 1] < bundle.SAME + 0.05 and many[0, 1] > bundle.SAME + 0.9 * bundle.NEAR
+    few, many = corrections.covariance(7), corrections.covariance(60)
+    assert few[0, 1] < corrections.SAME + 0.05 and many[0, 1] > corrections.SAME + 0.9 * corrections.NEAR
 
 
 def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):

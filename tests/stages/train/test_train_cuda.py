@@ -7,7 +7,7 @@ from gsac.avatar.cuda import why_not
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.train import STAGE, config, fast
 from gsac.stages.train.config import TrainConfig
-from gsac.stages.train.cuda import recipe_of
+from gsac.stages.train.cuda import STEPS, recipe_of
 from gsac.stages.train.recipes import RECIPES
 from gsac.stages.train.stage import check_device
 
@@ -31,9 +31,10 @@ def test_cuda_without_a_gpu_says_what_is_missing_and_what_to_do():
 
 def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
     made = recipe_of(TrainConfig(mask=0.5, mu_rate=2e-3, exposure=True), 3000, batch=3)
-    assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, fast.STEPS)
+    assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, STEPS)
     assert made.largest == fast.largest(TrainConfig(), 3000) == TrainConfig().largest * 2
-    assert (made.coarse_share, made.offset_share, made.gain_rate) == (fast.COARSE_SHARE, fast.OFFSET_SHARE, fast.GAIN_RATE)
+    assert made.coarse_share * STEPS == fast.coarse_steps(STEPS) == fast.coarse_steps(fast.STEPS) > fast.coarse_steps(400)
+    assert (made.offset_share, made.gain_rate) == (fast.OFFSET_SHARE, fast.GAIN_RATE)
     assert recipe_of(TrainConfig(steps=7), 12000).steps == 7 and recipe_of(TrainConfig(), 12000).gain_rate == 0
     shared = {f.name for f in fields(TrainConfig)} & {f.name for f in fields(made)}
     config = TrainConfig(steps=9)
