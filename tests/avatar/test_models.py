@@ -1,15 +1,14 @@
 import re
 
 import pytest
-from gsac.avatar.models import MODELS, WEIGHTS, ModelMissingError, model_path, store_path
+from gsac.avatar.models import MODELS, ModelMissingError, model_path, store_path
 
 
-def test_each_model_names_its_package_member_digest_and_licence():
-    files = MODELS | WEIGHTS
-    assert len({file.sha256 for file in files.values()}) == len(MODELS) + len(WEIGHTS)
-    for file in files.values():
-        assert re.fullmatch(r"[0-9a-f]{64}", file.sha256) and "==" in file.package.requirement
-        assert file.member and file.licence and file.what
+def test_each_model_names_its_wheel_member_digest_and_licence():
+    assert len({model.sha256 for model in MODELS.values()}) == len(MODELS)
+    for model in MODELS.values():
+        assert re.fullmatch(r"[0-9a-f]{64}", model.sha256)
+        assert model.wheel_member.endswith(".tflite") and model.licence == "Apache-2.0" and model.what
 
 
 def test_a_missing_model_file_says_what_to_run(tmp_path):

