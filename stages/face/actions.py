@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from gsac.avatar.artifacts import read_arrays
+from gsac.avatar.facemesh import LEFT_EYE, RIGHT_EYE
 
 TABLE = Path(__file__).with_name("actions.npz")
 """Written by `bake.py`."""
@@ -17,7 +18,11 @@ BLIND = ("eyeLook", "tongueOut", "cheekPuff", "mouthClose")
 """Actions whose names begin so leave no mark on the points that could tell them from others: they stay at 0."""
 AXES = np.array([1.0, 1.0, 0.3])
 """How far the network's x, y and z are trusted."""
-ROUNDS, SWEEPS = 30, 6
+ROUNDS, SWEEPS = 40, 6
+OWN_VIEW = 2.0
+"""mm: how far a person's resting points change with the square of yaw otherwise than the table's, at one radian."""
+LARGE_PX, EYES_M = 60.0, 0.063
+"""Between the eyes: from here on brows are read as all else; on a smaller face the little that they move is worth less."""
 
 
 @dataclass(frozen=True)
@@ -50,15 +55,17 @@ def view_terms(direction: np.ndarray) -> np.ndarray:
     return np.stack([y, p, y * y, y * p, p * p, y**3, y * y * p, y * p * p, p**3, y**4], axis=-1)
 
 
-def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, actions: Actions, ridge: float,
+def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, size: np.ndarray, actions: Actions, ridge: float,
           sparsity: float, symmetry: float, noise: float, identity: float) -> tuple[np.ndarray, np.ndarray]:
-    """points: (T, 468, 3) m aligned; weight: (T, 468); direction: (T, 3), where the face looks.
+    """points: (T, 468, 3) m aligned; weight: (T, 468); direction: (T, 3), where the face looks; size: (T,) px between the eyes.
 
     Returns coefficients c (T, E) in 0..1 and the person's own resting offset (468, 3) m. Minimises over c, wavering n
-    (T, K) and offset, residuals in mm: their weighted mean square + ridge |c|^2 + sparsity sum(c)
-    + symmetry |c_left - c_right|^2 + noise |n|^2 a frame, + |offset|^2 / identity^2 a point once. The problem is convex;
-    n is eliminated, and coordinate descent on c alternates with the closed form for the offset. What n has in all frames
-    is the person's too and is returned with the offset.
+    (T, K), offset and what of it changes with the view, residuals in mm: their weighted mean square + ridge |c|^2
+    + sparsity sum(c) + symmetry |c_left - c_right|^2 + noise |n|^2 a frame, + |offset|^2 / identity^2 a point once; of brows the
+    first two grow as a face gets smaller. The problem is convex; n is eliminated, and coordinate descent on c alternates with
+    the closed form for the offset, which is carried on by Nesterov's momentum: an action that lasts and the person's own
+    rest look alike, and plain alternation ends with brows raised for good. What n has in all frames is the person's too
+    and is returned with the offset.
     """
     T, E = len(points), len(actions.names)
     said = ((points - actions.neutral) * 1e3).reshape(T, -1) - view_terms(direction) @ actions.view.reshape(10, -1)
@@ -68,26 +75,52 @@ def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, actions
     both = np.concatenate([response, modes])
     hessian = (w @ (both[:, None] * both).reshape(-1, w.shape[1]).T).reshape(T, len(both), len(both))
     cc, cn, nn = hessian[:, :E, :E], hessian[:, :E, E:], hessian[:, E:, E:] + noise * np.eye(len(modes))
-    cc = cc + ridge * np.eye(E)
+    doubt = np.where([name.startswith("brow") for name in actions.names], np.maximum(LARGE_PX / size, 1)[:, None] ** 2, 1)
+    cc = cc + ridge * doubt[:, :, None] * np.eye(E)
     for left, right in actions.pairs():
         cc[:, [left, right], [left, right]] += symmetry
         cc[:, [left, right], [right, left]] -= symmetry
     schur = cc - cn @ np.linalg.solve(nn, cn.transpose(0, 2, 1))
     free = [k for k, name in enumerate(actions.names) if not name.startswith(BLIND)]
 
-    c, offset = np.zeros((T, E)), np.zeros(said.shape[1])
-    for _ in range(ROUNDS):
+    rest = Rest(w, direction, identity)
+    c, offset = np.zeros((T, E)), np.zeros_like(said)
+    before = offset
+    for turn in range(ROUNDS):
         pull = (w * (said - offset)) @ both.T
         toward_n = np.linalg.solve(nn, pull[:, E:, None])[..., 0]
-        toward_c = pull[:, :E] - sparsity / 2 - np.einsum("tek,tk->te", cn, toward_n)
+        toward_c = pull[:, :E] - sparsity / 2 * doubt - np.einsum("tek,tk->te", cn, toward_n)
         for _ in range(SWEEPS):
             for k in free:
                 step = (toward_c[:, k] - np.einsum("te,te->t", schur[:, k], c)) / schur[:, k, k]
                 c[:, k] = np.clip(c[:, k] + step, 0, 1)
         n = np.linalg.solve(nn, (pull[:, E:] - np.einsum("tek,te->tk", cn, c))[..., None])[..., 0]
-        left_over = said - c @ response - n @ modes
-        offset = (w * left_over).sum(axis=0) / (w.sum(axis=0) + 1 / (identity**2 * said.shape[1]))
-    return c, (offset + n.mean(axis=0) @ modes).reshape(-1, 3) / 1e3
+        found, always = rest.of(said - c @ response - n @ modes)
+        offset, before = found + turn / (turn + 3) * (found - before), found
+    return c, (always + n.mean(axis=0) @ modes).reshape(-1, 3) / 1e3
+
+
+class Rest:
+    """A person's resting points against the table's: an offset, and a share of it that goes with the square of yaw."""
+
+    def __init__(self, w: np.ndarray, direction: np.ndarray, identity: float):
+        """w: (T, D) weights that sum to one a frame; direction: (T, 3); identity: mm, spread of the offset."""
+        square = view_terms(direction)[:, 2]
+        self.w, self.basis = w, np.stack([np.ones_like(square), square - square.mean()], 1)
+        prior = np.diag([1 / identity**2, 1 / OWN_VIEW**2]) / w.shape[1]
+        self.normal = np.einsum("td,ta,tb->dab", w, self.basis, self.basis) + prior
+
+    def of(self, left_over: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """left_over: (T, D) mm. Returns the likeliest offset of each frame (T, D), and what all have (D,)."""
+        pull = np.einsum("td,ta->da", self.w * left_over, self.basis)
+        both = np.linalg.solve(self.normal, pull[..., None])[..., 0]
+        return self.basis @ both.T, both[:, 0]
+
+
+def between_eyes(points: np.ndarray, neutral: np.ndarray) -> np.ndarray:
+    """points: (T, 468, 3) px; neutral: (468, 3) m. (T,) px between the eyes of a face of usual size, however it is turned."""
+    wide = np.linalg.norm(points[:, LEFT_EYE] - points[:, RIGHT_EYE], axis=-1)
+    return EYES_M * wide / np.linalg.norm(neutral[LEFT_EYE] - neutral[RIGHT_EYE])
 
 
 def smooth(c: np.ndarray, times: np.ndarray, sigma: float) -> np.ndarray:

@@ -10,7 +10,7 @@ from gsac.avatar.facemesh import POINTS, FaceMesh
 from gsac.avatar.wholebody import INDEX
 from gsac.avatar.workspace import available
 from gsac.stages.contract import Job, StageError
-from gsac.stages.face.actions import Actions, fill, smooth, solve
+from gsac.stages.face.actions import Actions, between_eyes, fill, smooth, solve
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.landmarks import align, look
 
@@ -33,8 +33,8 @@ def run(job: Job) -> None:
     times = None if clip.timestamps_s is None else np.array(clip.timestamps_s)
     config = job.config
     if valid.any():
-        c, offset = solve(points[valid], weight[valid], direction[valid], actions, config.ridge, config.sparsity,
-                          config.symmetry, config.noise, config.identity)
+        c, offset = solve(points[valid], weight[valid], direction[valid], between_eyes(landmarks[valid], actions.neutral), actions,
+                          config.ridge, config.sparsity, config.symmetry, config.noise, config.identity)
         if times is not None and config.smooth > 0:
             c = smooth(c, times[valid], config.smooth)
     else:

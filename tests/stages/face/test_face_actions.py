@@ -20,9 +20,10 @@ def looking(yaw: np.ndarray, pitch: float = -0.1) -> np.ndarray:
     return np.stack([np.sin(yaw) * np.cos(pitch), np.full_like(yaw, np.sin(pitch)), np.cos(yaw) * np.cos(pitch)], axis=-1)
 
 
-def fit(points, weight, direction, actions):
+def fit(points, weight, direction, actions, eyes_px=70.0):
     c = CONFIG
-    return solve(points, weight, direction, actions, c.ridge, c.sparsity, c.symmetry, c.noise, c.identity)
+    size = np.full(len(points), eyes_px)
+    return solve(points, weight, direction, size, actions, c.ridge, c.sparsity, c.symmetry, c.noise, c.identity)
 
 
 def clip_of(actions: Actions, c: np.ndarray, offset: np.ndarray, seed: int = 0) -> tuple[np.ndarray, ...]:
@@ -70,6 +71,25 @@ def test_a_persons_own_resting_face_is_not_read_as_expression(actions):
     got, found = fit(*clip_of(actions, np.zeros((30, len(actions.names))), offset), actions)
     assert got.mean() < 0.01
     assert np.sqrt(((found - offset)[..., :2] ** 2).mean()) < 0.5 * np.sqrt((offset[..., :2] ** 2).mean())
+
+
+def test_brows_that_are_painted_high_are_the_persons_own_and_not_raised(actions):
+    """The same raise in all frames, whatever the view, is how the person looks."""
+    up = actions.names.index("browInnerUp")
+    painted = 0.8 * actions.response[up] / 1e3
+    c = np.zeros((30, len(actions.names)))
+    c[::3, up] = 0.6
+    got, _ = fit(*clip_of(actions, c, painted), actions)
+    assert got[c[:, up] == 0, up].mean() < 0.25 and np.corrcoef(got[:, up], c[:, up])[0, 1] > 0.85
+
+
+def test_brows_of_a_small_face_are_believed_less_and_all_else_as_much(actions):
+    c = np.zeros((30, len(actions.names)))
+    up, jaw = (actions.names.index(name) for name in ("browInnerUp", "jawOpen"))
+    c[::3, up], c[::2, jaw] = 0.5, 0.7
+    large, small = (fit(*clip_of(actions, c, np.zeros((468, 3))), actions, eyes_px)[0] for eyes_px in (60.0, 30.0))
+    assert small[:, up].mean() < 0.9 * large[:, up].mean()
+    np.testing.assert_allclose(small[:, jaw], large[:, jaw], atol=0.05)
 
 
 def test_hidden_points_do_not_count(actions):
