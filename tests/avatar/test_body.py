@@ -115,6 +115,15 @@ def test_a_wrong_body_file_is_refused_by_the_array_that_is_wrong(tmp_path, chang
         Body.load(official_file(tmp_path / "bad.npz", **changes))
 
 
+def test_an_official_file_is_as_good_under_a_name_without_suffix(tmp_path):
+    """The model store keeps files under the user's own names."""
+    kept = official_file(tmp_path / "SMPLX_NEUTRAL.npz", directions=400).rename(tmp_path / "my-body")
+    assert Body.load(kept).num_betas == 20
+    (tmp_path / "pickled").write_bytes(b"\x80\x04.")
+    with pytest.raises(ArtifactError, match="run code"):
+        Body.load(tmp_path / "pickled")
+
+
 def test_pickles_and_missing_files_are_refused_with_what_to_do(tmp_path):
     (tmp_path / "SMPLX_MALE.pkl").write_bytes(b"\x80\x04.")
     with pytest.raises(ArtifactError, match="npz"):

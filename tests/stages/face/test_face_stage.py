@@ -7,9 +7,10 @@ from gsac.avatar.artifacts import Clip, read_arrays, write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.models import ModelMissingError, model_path
 from gsac.benchmarks.perception import run_face, run_keypoints, score_expression, video_frames, write_split
-from gsac.stages.contract import StageError
+from gsac.stages.contract import Job, StageError
 from gsac.stages.face import STAGE
 from gsac.stages.face.config import FaceConfig
+from gsac.stages.face.stage import run
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
 
@@ -78,3 +79,22 @@ def test_photos_have_no_time_so_an_unseen_face_rests_at_once(tmp_path, store):
     assert face["valid"].tolist() == [True, False]
     assert not face["expression"][1].any() and np.isfinite(face["landmarks"][0]).all()
     assert notes["warnings"] == []
+
+
+@pytest.mark.footage
+def test_a_brought_flame_head_joins_the_face(tmp_path, store, flame_file, flame_points_file):
+    """Its own files lie in the store under names without suffix, as the user's do."""
+    frames = list(video_frames(need(FOOTAGE / "truth-a" / "clip.mp4")))
+    _, _, ports = run_keypoints(iter([frames[3], frames[30]]), "flame", tmp_path, store)
+    for name, file in (("mine", flame_file), ("flame-points", flame_points_file)):
+        (tmp_path / name).write_bytes(file.read_bytes())
+    models = {name: model_path(name, store) for name in STAGE.models(FaceConfig())}
+    models |= {name: tmp_path / name for name in ("mine", "flame-points")}
+    (tmp_path / "out").mkdir()
+    run(Job(ports, tmp_path / "out", FaceConfig(flame="mine"), models=models))
+    STAGE.outputs[0].check(tmp_path / "out" / "face.npz")
+    face = read_arrays(tmp_path / "out" / "face.npz")
+    assert face["head_vertices"].shape == face["head_template"].shape == (5023, 3) and face["head_faces"].shape == (9976, 3)
+    away = np.linalg.norm(face["head_vertices"] - face["head_template"], axis=1)
+    assert 1e-5 < away.mean() < 0.02
+    assert face["flame_expression"].shape == (2, 50) and face["flame_expression"][0].any()
