@@ -21,6 +21,9 @@ AXES = np.array([1.0, 1.0, 0.3])
 ROUNDS, SWEEPS = 40, 6
 OWN_VIEW = 2.0
 """mm: how far a person's resting points change with the square of yaw otherwise than the table's, at one radian."""
+BROWS_OWN, BROWS_SHARE = 6.0, 0.3
+"""How many times as far as others the points may differ that brows move, at least by this share of what all else does: how
+high brows sit, and how a picture shows them, is each person's own."""
 LARGE_PX, EYES_M = 60.0, 0.063
 """Between the eyes: from here on brows are read as all else; on a smaller face the little that they move is worth less."""
 
@@ -42,6 +45,11 @@ class Actions:
         return cls(a["neutral"].astype(float), a["mirror"].astype(int), a["view"].astype(float),
                    a["modes"].astype(float), a["response"].astype(float), tuple(str(n) for n in a["names"]))
 
+    def own(self) -> np.ndarray:
+        """(1404,) how far each coordinate of a person's resting face may differ, as a factor."""
+        reach, brows = np.linalg.norm(self.response, axis=2), np.array([name.startswith("brow") for name in self.names])
+        return np.where(reach[brows].max(0) > BROWS_SHARE * reach[~brows].max(0), BROWS_OWN, 1.0).repeat(3)
+
     def pairs(self) -> list[tuple[int, int]]:
         """Indices of left and right actions."""
         return [(i, self.names.index(n[:-4] + "Right")) for i, n in enumerate(self.names)
@@ -61,11 +69,11 @@ def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, size: n
 
     Returns coefficients c (T, E) in 0..1 and the person's own resting offset (468, 3) m. Minimises over c, wavering n
     (T, K), offset and what of it changes with the view, residuals in mm: their weighted mean square + ridge |c|^2
-    + sparsity sum(c) + symmetry |c_left - c_right|^2 + noise |n|^2 a frame, + |offset|^2 / identity^2 a point once; of brows the
-    first two grow as a face gets smaller. The problem is convex; n is eliminated, and coordinate descent on c alternates with
-    the closed form for the offset, which is carried on by Nesterov's momentum: an action that lasts and the person's own
-    rest look alike, and plain alternation ends with brows raised for good. What n has in all frames is the person's too
-    and is returned with the offset.
+    + sparsity sum(c) + symmetry |c_left - c_right|^2 + noise |n|^2 a frame, + |offset|^2 / identity^2 a point once (brows' points
+    may differ further); of brows the first two grow as a face gets smaller. The problem is convex; n is eliminated, and
+    coordinate descent on c alternates with the closed form for the offset, which is carried on by Nesterov's momentum: an action
+    that lasts and the person's own rest look alike, and plain alternation ends with brows raised for good. What n has in all
+    frames is the person's too and is returned with the offset.
     """
     T, E = len(points), len(actions.names)
     said = ((points - actions.neutral) * 1e3).reshape(T, -1) - view_terms(direction) @ actions.view.reshape(10, -1)
@@ -83,7 +91,7 @@ def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, size: n
     schur = cc - cn @ np.linalg.solve(nn, cn.transpose(0, 2, 1))
     free = [k for k, name in enumerate(actions.names) if not name.startswith(BLIND)]
 
-    rest = Rest(w, direction, identity)
+    rest = Rest(w, direction, identity * actions.own())
     c, offset = np.zeros((T, E)), np.zeros_like(said)
     before = offset
     for turn in range(ROUNDS):
@@ -103,12 +111,12 @@ def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, size: n
 class Rest:
     """A person's resting points against the table's: an offset, and a share of it that goes with the square of yaw."""
 
-    def __init__(self, w: np.ndarray, direction: np.ndarray, identity: float):
-        """w: (T, D) weights that sum to one a frame; direction: (T, 3); identity: mm, spread of the offset."""
+    def __init__(self, w: np.ndarray, direction: np.ndarray, identity: np.ndarray):
+        """w: (T, D) weights that sum to one a frame; direction: (T, 3); identity: (D,) mm, spread of the offset."""
         square = view_terms(direction)[:, 2]
         self.w, self.basis = w, np.stack([np.ones_like(square), square - square.mean()], 1)
-        prior = np.diag([1 / identity**2, 1 / OWN_VIEW**2]) / w.shape[1]
-        self.normal = np.einsum("td,ta,tb->dab", w, self.basis, self.basis) + prior
+        doubt = np.stack([identity**-2, np.full_like(identity, OWN_VIEW**-2)], 1) / w.shape[1]
+        self.normal = np.einsum("td,ta,tb->dab", w, self.basis, self.basis) + doubt[:, :, None] * np.eye(2)
 
     def of(self, left_over: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """left_over: (T, D) mm. Returns the likeliest offset of each frame (T, D), and what all have (D,)."""

@@ -24,8 +24,8 @@ class FaceConfig:
     """Pull of left and right actions together, mm^2."""
     noise: float = 0.0002
     """Price of the network's own wavering, mm^2: larger reads more of it as action."""
-    identity: float = 3.0
-    """How far, mm, the person's resting points may differ from the open body's."""
+    identity: float = 1.0
+    """How far, mm, the person's resting points may differ from the open body's; brows six times as far."""
     smooth: float = 0.04
     """Standard deviation, s, of the smoothing over time; 0 is none. Photos have no time and are not smoothed."""
     rest_time: float = 0.2
