@@ -111,6 +111,8 @@ class Body:
     parents: np.ndarray  # (55,) int, -1 for the pelvis
     joint_names: tuple[str, ...]
     expression_names: tuple[str, ...]
+    clothes: tuple[str, ...]
+    """What the last betas lift off the skin; empty where all betas are the figure's."""
     jaw_actions: np.ndarray  # (E, 3) expression that a jaw rotation stands for; zeros where the jaw has skin of its own
     keypoint_matrix: object  # (133, V) scipy CSR; an all-zero row is a keypoint that this body does not carry
     vt: np.ndarray | None  # (U, 2)
@@ -145,6 +147,11 @@ class Body:
     @property
     def num_betas(self) -> int:
         return self.shapedirs.shape[2]
+
+    @property
+    def num_figure(self) -> int:
+        """How many betas shape the person; those after them are the clothes."""
+        return self.num_betas - len(self.clothes)
 
     def rest(self, betas: np.ndarray, expression: np.ndarray | None = None,
              joint_offset: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -50,6 +50,7 @@ def read_body_file(path: Path) -> dict:
     from gsac.avatar.body import SMPLX_JOINTS
 
     return {
+        "clothes": tuple(str(n) for n in a.get("clothes", ())),
         "v_template": np.asarray(a["v_template"], np.float32), "faces": np.asarray(a["f"], np.int32),
         "shapedirs": np.ascontiguousarray(shapedirs), "exprdirs": np.ascontiguousarray(exprdirs),
         "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": four_heaviest(np.asarray(a["weights"], np.float32)),

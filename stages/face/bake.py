@@ -125,7 +125,7 @@ class Eye:
         self.head = Head(Body.load())
         self.names = list(self.head.body.expression_names)
         self.rest = np.zeros(len(self.names))
-        image = self.head.draw(0.0, self.rest, np.zeros(self.head.body.num_betas))
+        image = self.head.draw(0.0, self.rest, np.zeros(self.head.body.num_figure))
         front = self._find(image)
         self.mirror = mirror_of(_metres(front))
         neutral = _metres(look(self.mesh, image, front, self.mirror).points)
@@ -159,7 +159,7 @@ def measure_rest(eye: Eye) -> tuple[np.ndarray, np.ndarray]:
     random = np.random.default_rng(1)
     terms, points, body = [], [], []
     for k in range(REST_BODIES):
-        betas = random.normal(0, 1, eye.head.body.num_betas)
+        betas = random.normal(0, 1, eye.head.body.num_figure)
         for _ in range(REST_VIEWS):
             yaw, pitch = random.uniform(-REST_YAW, REST_YAW), random.uniform(-REST_PITCH, REST_PITCH)
             seen, looks = eye.read(eye.rest, betas, yaw, pitch, float(np.exp(random.uniform(np.log(REST_SIZE), 0))))
@@ -176,7 +176,7 @@ def measure_rest(eye: Eye) -> tuple[np.ndarray, np.ndarray]:
 
 def measure_actions(eye: Eye) -> np.ndarray:
     """`response` (E, 468, 3), mm, of `Actions`."""
-    bodies = np.random.default_rng(0).normal(0, 0.7, (BODIES, eye.head.body.num_betas))
+    bodies = np.random.default_rng(0).normal(0, 0.7, (BODIES, eye.head.body.num_figure))
     settings = [(betas, yaw, size) for betas in bodies for yaw in YAWS for size in SIZES]
     response = np.zeros((len(eye.names), POINTS, 3))
     for betas, yaw, size in settings:

@@ -81,6 +81,7 @@ class Points:
             span = slice(matrix.indptr[p], matrix.indptr[p + 1])
             vertices = matrix.indices[span]
             dirs[p] = np.einsum("v,vk,vcb->kcb", matrix.data[span], body.weights[vertices], body.shapedirs[vertices])
+        dirs[..., body.num_figure:] = 0  # clothes do not move a person's points
         self.mass = torch.tensor(mass, dtype=torch.float32)  # (P, J)
         self.moment = torch.tensor(moment, dtype=torch.float32).flatten(1)  # (P, 3 J)
         self.dirs = torch.tensor(dirs).flatten(1, 2)  # (P, 3 J, B)

@@ -32,7 +32,10 @@ class Pairs:
 
 
 def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None) -> Pairs:
-    """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m added in the axes of the heaviest joint."""
+    """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m added in the axes of the heaviest joint.
+
+    The points are the person's own: clothes do not move them.
+    """
     matrix = matrix.tocsr()
     start, joint, mass, moment, dirs = [0], [], [], [], []
     for p in range(matrix.shape[0]):
@@ -47,8 +50,9 @@ def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None =
             moment.append(w @ body.v_template[vertices] + (offsets[p] if offsets is not None and k == heaviest else 0))
             dirs.append(np.tensordot(w, body.shapedirs[vertices], 1))
         start.append(len(joint))
-    return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3),
-                 np.array(dirs).reshape(-1, 3, body.num_betas))
+    dirs = np.array(dirs).reshape(-1, 3, body.num_betas)
+    dirs[:, :, body.num_figure:] = 0
+    return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), dirs)
 
 
 def surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:

@@ -62,5 +62,16 @@ def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return speed, acceleration
 
 
+CLOTHES = {"chest": (4, 8), "belly": (4, 8), "upper arms": (3, 8), "sleeves": (1.5, 8), "forearms": (1.5, 6), "thighs": (4, 8),
+           "shanks": (4, 12), "cuffs": (2.5, 10), "feet": (2.5, 8), "soles": (5, 10), "hair": (5, 15), "nape": (1.5, 15)}
+"""How far clothes and hair stand off the skin, mm: mean and spread, of people in clothes and without."""
+
+
+def shape_prior(figure: int, clothes: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (B,) and spread (B,) of the betas: the figure's, then the clothes' (a centimetre a unit)."""
+    worn = np.array([CLOTHES[name] for name in clothes]).reshape(-1, 2) / 10
+    return np.append(np.zeros(figure), worn[:, 0]), np.append(np.ones(figure), worn[:, 1])
+
+
 TRANSL_ACCELERATION = 0.25
 """Spread of the body's acceleration, m/s^2."""

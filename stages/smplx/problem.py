@@ -15,14 +15,14 @@ from gsac.avatar.body import Body
 from gsac.stages.smplx import prior
 from gsac.stages.smplx.held import Held
 from gsac.stages.smplx.points import Chain, Pairs, Skeleton, positions, pulled_back
-from gsac.stages.smplx.silhouette import Outline
+from gsac.stages.smplx.silhouette import INSET, Outline
 from gsac.stages.smplx.solver import System
 
 ROBUST = 3.0
 """Residuals beyond so many spreads count less and less; `Problem.limit` may be wider while the body is still far off."""
 OUTLINE_ROBUST = 3.0
-CLOTHES = 0.006
-"""Metres that the silhouette is believed to stand off the skin: little enough for bare skin, half of what clothes and hair do."""
+CLOTHES = 0.003
+"""Metres that the silhouette is believed to stand off a body that has no clothes of its own (an official SMPL-X file)."""
 OUTLINE_SIGHTINGS = 60
 """How many independent sightings one frame's outline is worth."""
 
@@ -85,6 +85,9 @@ class Problem:
         top, sole = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
         self.height = float(body.v_template[top, 1] - body.v_template[sole, 1])
         self.height_dirs = (body.shapedirs[top, 1] - body.shapedirs[sole, 1]).astype(np.float64)
+        self.height_dirs[body.num_figure:] = 0
+        self.shape_mean, self.shape_spread = prior.shape_prior(body.num_figure, body.clothes)
+        self.clothes = 0.0 if body.clothes else CLOTHES
 
     def move(self, state: State, step: np.ndarray, shared: np.ndarray) -> State:
         """step: (T, n); shared: (s,)."""
@@ -105,7 +108,7 @@ class Problem:
         total += robust(self._depth_residual(x), self.limit)[0].sum()
         for t, x in self.outline_points(chain, state):
             distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
-            scaled = np.where(inside, (distance + self._clothes(state, x)) / self.seen.outline_spread, 0)
+            scaled = np.where(inside, (distance + self._stand_off(t, state, x)[0]) / self.seen.outline_spread, 0)
             total += self._outline_share(len(x)) * robust(scaled, OUTLINE_ROBUST)[0].sum()
         vector = rotation.log(state.local[:, self.active])
         total += (self._prior_residual(vector) ** 2).sum() + (self._limit_residual(vector)[0] ** 2).sum()
@@ -187,15 +190,16 @@ class Problem:
         """Weight of one outline point: neighbours along an edge are not independent sightings."""
         return self.outline_weight * OUTLINE_SIGHTINGS / max(count, 1)
 
-    def _clothes(self, state: State, x: np.ndarray) -> np.ndarray:
-        """(P,) px that the silhouette stands off outline points (P, 3)."""
-        return CLOTHES * np.exp(state.log_focal) / np.maximum(x[:, 2], 0.05)
+    def _stand_off(self, t: int, state: State, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(P,) px that the silhouette stands off outline points (P, 3); and the part of it that shrinks with their distance."""
+        clothes = self.clothes * np.exp(state.log_focal) / np.maximum(x[:, 2], 0.05)
+        return clothes + INSET * self.seen.outlines[t].scale, clothes
 
     def _add_outline(self, system: System, state: State, chain: Chain, t: int, x: np.ndarray) -> None:
         uv = self.project(state, x)
         distance, direction, inside = self.seen.outlines[t].at(uv)
-        clothes = self._clothes(state, x)
-        residual = np.where(inside, (distance + clothes) / self.seen.outline_spread, 0)
+        off, clothes = self._stand_off(t, state, x)
+        residual = np.where(inside, (distance + off) / self.seen.outline_spread, 0)
         shrink = robust(residual, OUTLINE_ROBUST)[1] * np.sqrt(self._outline_share(len(x)))
         weight = np.where(inside, shrink / self.seen.outline_spread, 0)
         along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x))  # (P, 3)
@@ -296,11 +300,12 @@ class Problem:
         Frames of one view share their errors (clothes, the detector's habits), so that the priors count once for each repeat.
         """
         b, (focal, focal_spread), (metres, spread) = len(state.betas), self.seen.focal_prior, self.seen.height
-        spreads = np.concatenate([np.ones(b), [focal_spread], self.held.mean_spread[:len(state.held)]])
+        spreads = np.concatenate([self.shape_spread, [focal_spread], self.held.mean_spread[:len(state.held)]])
         rows = np.concatenate([np.diag(1 / spreads), np.zeros((1, len(spreads)))])
         rows[-1, :b] = self.height_dirs / spread
         tall = self.height + self.height_dirs @ state.betas
-        away = np.concatenate([state.betas, [state.log_focal - np.log(focal)], state.held - self.held.mean[:len(state.held)]])
+        away = np.concatenate([state.betas - self.shape_mean, [state.log_focal - np.log(focal)],
+                               state.held - self.held.mean[:len(state.held)]])
         residual = np.append(away / spreads, (tall - metres) / spread)
         count = np.sqrt(self.seen.repeats)
         return residual * count, rows * count

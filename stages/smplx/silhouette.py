@@ -21,6 +21,8 @@ FIELD_HEIGHT = 320
 """Alpha is looked at this high: finer edges than this do not move a joint."""
 POINTS = 160
 """Outline points a frame, at most."""
+INSET = 0.5
+"""Field pixels that an outline point, the middle of a covered pixel, lies within the outline it stands for."""
 
 
 @dataclass

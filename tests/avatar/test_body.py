@@ -38,6 +38,21 @@ def test_at_zero_rotation_the_body_stands_in_a_t_pose_facing_plus_z(body):
     assert points["nose"][2] > points["left_ear"][2] + 0.05 and points["left_eye"][0] > 0 > points["right_eye"][0]
 
 
+def test_clothes_stand_off_the_skin_alike_on_both_sides_and_move_no_joint(body):
+    bare, joints = body.rest(np.zeros(body.num_betas))
+    for i, name in enumerate(body.clothes, body.num_figure):
+        betas = np.zeros(body.num_betas)
+        betas[i] = 1
+        dressed, moved = body.rest(betas)
+        off = np.linalg.norm(dressed - bare, axis=1)
+        assert 0.006 < np.percentile(off[off > 0.003], 90) < 0.014, name
+        assert np.abs(moved - joints).max() < 1e-3, name
+        assert off[np.abs(bare[:, 0]) > 0.8].max() < 1e-3, f"{name}: hands stay bare"
+        left, right = off[bare[:, 0] > 0.01].sum(), off[bare[:, 0] < -0.01].sum()
+        assert left == pytest.approx(right, rel=0.02), name
+    assert body.num_figure == 20 == body.num_betas - len(body.clothes)
+
+
 def test_joints_come_in_smplx_order_and_parents_before_children(body):
     assert body.joint_names == tuple(SMPLX_JOINTS) and len(SMPLX_JOINTS) == 55
     assert body.parents[0] == -1 and all(p < j for j, p in enumerate(body.parents))
@@ -100,7 +115,7 @@ def test_params_survive_writing_and_reading(tmp_path, body):
 
 def test_a_file_of_the_official_keys_drops_in(tmp_path):
     body = Body.load(official_file(tmp_path / "SMPLX_NEUTRAL.npz", directions=400))
-    assert (body.num_betas, body.exprdirs.shape[2]) == (20, 10) and body.parents[0] == -1
+    assert (body.num_betas, body.exprdirs.shape[2]) == (20, 10) and body.parents[0] == -1 and body.clothes == ()
     vertices, joints = body.rest(np.zeros(10))
     assert vertices.shape == (400, 3) and joints.shape == (55, 3)
     assert Body.load(official_file(tmp_path / "old.npz")).num_betas == 10

@@ -38,7 +38,7 @@ def turning_person(body: Body, frames: int, seed: int = 0) -> BodyParams:
     swing = 0.08 * np.sin(np.linspace(0, 5, frames))
     pose[:, 16, 2], pose[:, 17, 2] = -0.9 + swing, 0.85 + swing
     pose[:, 18, 1], pose[:, 19, 1] = -0.4, 0.5
-    betas = rng.normal(0, 0.5, body.num_betas)
+    betas = np.append(rng.normal(0, 0.5, body.num_figure), np.zeros(len(body.clothes)))
     transl = np.tile([0.05, 0.0, 2.4], (frames, 1))
     return BodyParams.from_pose(pose, transl, betas, np.zeros((frames, 52)), FOCAL, (WIDTH / 2, HEIGHT / 2), model=body.digest)
 
@@ -142,13 +142,17 @@ def test_derivatives_agree_with_finite_differences(body, tmp_path):
     pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
     rng = np.random.default_rng(0)
     state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
-                  truth.transl.astype(float) + 0.02, rng.normal(0, 0.3, body.num_betas), float(np.log(FOCAL)), np.zeros(0))
+                  truth.transl.astype(float) + 0.02, np.append(rng.normal(0, 0.3, body.num_figure), np.zeros(len(body.clothes))),
+                  float(np.log(FOCAL)), np.zeros(0))
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0)
     camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
     chain = problem.skeleton.pose(state.local, state.betas)
     x = positions(chain, pairs, state.betas)[0] + state.transl[0]
     vertices, _ = body.posed(to_params(body, state, problem.seen.center), [0])
     assert np.allclose(x, body.keypoints(vertices)[0][BODY_POINTS], atol=2e-3)
+    state.betas[body.num_figure:] = rng.normal(0, 1, len(body.clothes))
+    assert np.allclose(positions(problem.skeleton.pose(state.local, state.betas), pairs, state.betas)[0] + state.transl[0], x,
+                       atol=1e-3)
     for t, outline in enumerate(outlines):
         vertices, _ = body.posed(to_params(body, state, problem.seen.center), [t])
         problem.outline_pairs[t] = outline_points(body, vertices[0], camera, outline, t)[0]

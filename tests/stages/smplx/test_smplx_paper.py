@@ -32,7 +32,7 @@ def person(body: Body, frames: int = 4) -> BodyParams:
     turn = rotation.exp(np.array([np.pi, 0, 0])) @ rotation.exp(np.stack([0 * yaw, yaw, 0 * yaw], 1))
     pose[:, 0] = rotation.log(turn)
     pose[:, 16, 2], pose[:, 17, 2], pose[:, 18, 1] = -1.1, 0.7, -0.6
-    betas = np.random.default_rng(0).normal(0, 0.5, body.num_betas)
+    betas = np.append(np.random.default_rng(0).normal(0, 0.5, body.num_figure), np.zeros(len(body.clothes)))
     transl = np.tile([0.05, 0, 2.4], (frames, 1))
     return BodyParams.from_pose(pose, transl, betas, np.zeros((frames, 52)), FOCAL, (WIDTH / 2, HEIGHT / 2))
 
