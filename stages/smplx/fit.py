@@ -26,6 +26,8 @@ FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(h
 HIPS = (INDEX["left_hip"], INDEX["right_hip"])
 TOGETHER = 2.0
 """What a detector gets wrong it gets wrong in many frames together: its spreads count so many times."""
+HIPS_TOGETHER = 5.0
+"""The hips': nothing marks them, and where one person's are taken to be all along is up to 3 cm off."""
 DEPTH_SPREAD = 0.08
 """Metres; the detector's depth decides which way a limb points."""
 DEPTH_TRUST = 0.8
@@ -136,7 +138,9 @@ def observations(sightings: Sightings, detector: Detector, points: np.ndarray, c
                  config: SmplxConfig, outlines: list[Outline]) -> Observations:
     """The chosen points with their spreads: what the detector gets wrong, and more where it or `handgap` is unsure."""
     height = sightings.person_height
-    usual = TOGETHER * height * detector.spread
+    together = np.full(len(detector.spread), TOGETHER)
+    together[list(HIPS)] = HIPS_TOGETHER
+    usual = together * height * detector.spread
     unsure = np.sqrt(np.maximum(sightings.sigma**2 - sightings.sigma.min(0) ** 2, 0))
     spread = np.hypot(usual, unsure) / np.sqrt(np.clip(sightings.score, 0.2, 1))
     spread = np.where(sightings.seen, spread, np.inf)[:, points]
