@@ -24,14 +24,16 @@ def draw(ladders: dict[str, list[dict]], scratch: dict[str, list[tuple[int, floa
                       color=colour, label=f"{clip}: auto")
         if scratch.get(clip):
             quality.plot(*zip(*scratch[clip], strict=True), "x", color=colour, label=f"{clip}: from the start")
+    sizes = sorted({r["n_gaussians"] for rungs in ladders.values() for r in rungs})
     quality.set(ylabel="held-out PSNR on the person, poses aligned, dB")
     detail.set(ylabel="gradient energy over the truth's")
     for axes in (quality, detail):
         axes.set(xscale="log", xlabel="gaussians")
         axes.grid(alpha=0.25, which="both", lw=0.5)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.xaxis.set_major_formatter("{x:g}")
-    quality.legend(fontsize=7, frameon=False)
+        axes.set_xticks(sizes, [f"{n:,}" for n in sizes], fontsize=8)
+        axes.minorticks_off()
+    quality.legend(fontsize=7, frameon=False, loc="lower right")
     paths = [folder / "size.png", folder / "size.svg"]
     for path in paths:
         figure.savefig(path, dpi=160)
