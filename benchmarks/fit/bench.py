@@ -1,9 +1,9 @@
 """gsac bench fit: the body fit by `lm` and `paper` on the same detections of truth clips, the hand gap by every method, in one run.
 
-Clips come from the turntable, with bodies outside the shape basis and seeds that measured nothing, clothed and (`bare`, where a
-bare body can cover the silhouette as its bar asks) without clothes and hair, and from `--clip` folders. What
-the stages before `smplx` see is computed once and kept in the cache. Hand gaps are the ones of `gsac bench handgap`: windows masked
-in turning bodies; and windows masked in the truth clips' own detections, filled and then fitted, for the hidden wrist.
+Clips come from the turntable, with bodies outside the shape basis and seeds that measured nothing, clothed and (`bare`) without
+clothes and hair, and from `--clip` folders. What the stages before `smplx` see is computed once and kept in the cache. Hand gaps
+are the ones of `gsac bench handgap`: windows masked in turning bodies; and windows masked in the truth clips' own detections,
+filled and then fitted, for the hidden wrist.
 """
 
 from __future__ import annotations

@@ -113,7 +113,7 @@ def person(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("person")
     body, rng, N = Body.load(), np.random.default_rng(1), 6000
-    betas = rng.normal(size=body.num_betas).astype(np.float32) * .5
+    betas = np.append(rng.normal(size=body.num_figure), np.zeros(len(body.clothes))).astype(np.float32) * .5
     expression = np.zeros((2, len(body.expression_names)))
     params = BodyParams.from_pose(np.zeros((2, 55, 3)), np.zeros((2, 3)), betas, expression, 1000, (300, 300),
                                   rng.normal(size=(55, 3)) * .002, model=body.digest)

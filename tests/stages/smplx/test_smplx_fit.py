@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gsac.avatar import rotation
@@ -81,6 +83,21 @@ def test_a_clean_turn_is_recovered_to_millimetres(body, tmp_path):
     error = joint_error_mm(body, found, truth)
     assert np.median(error) < 12 and error.mean() < 18
     assert np.nanmin(fit.iou) > 0.9
+
+
+def test_clothes_that_the_outline_shows_are_worn_and_leave_the_joints_alone(body, tmp_path):
+    bare = turning_person(body, 8)
+    clothed = replace(bare, betas=bare.betas + 1.5 * (np.arange(body.num_betas) >= body.num_figure))
+    outlines = outlines_of(body, clothed, tmp_path)
+    found = {}
+    for name, betas in (("with", body.num_betas), ("without", body.num_figure)):
+        tailor = body if name == "with" else replace(body, clothes=(), shapedirs=body.shapedirs[:, :, :betas])
+        fit = fit_clip(tailor, sightings_of(body, bare), outlines, SmplxConfig(height_m=height_of(body, bare)), lambda *a: None)
+        params = to_params(tailor, fit.state, np.array([WIDTH / 2, HEIGHT / 2]))
+        found[name] = np.nanmean(fit.iou), joint_error_mm(body, params, bare).mean(), params.betas[body.num_figure:]
+    assert found["with"][0] > found["without"][0] + 0.01 and found["with"][1] < found["without"][1]
+    trunk = [body.clothes.index(name) for name in ("chest", "belly", "thighs")]
+    assert (found["with"][2][trunk] > 0.5).all()  # the prior alone gives 0.4
 
 
 def height_of(body: Body, params: BodyParams) -> float:
