@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from gsac.stages.contract import StageError
-from gsac.stages.train import bundle, evaluate, fast, paper
+from gsac.stages.train import corrections, evaluate, fast, paper
 from gsac.stages.train.alignment import Normal
 from gsac.stages.train.fast import start
 from gsac.stages.train.guard import finite
@@ -79,7 +79,7 @@ def test_the_rounds_of_poses_stop(job, monkeypatch):
     def bad_equations(normal, *arguments):
         return Normal(normal.gradient * np.nan, *normal[1:])
 
-    spoiled(monkeypatch, bundle, "normal_equations", bad_equations)
+    spoiled(monkeypatch, corrections, "normal_equations", bad_equations)
     with pytest.raises(StageError, match="poses' equations are not finite"):
         run(job(frames=8, **quiet(pose_rounds=2)))
 
