@@ -28,7 +28,7 @@ class TrainConfig:
     every_size: bool = False
     """Whether auto tries all sizes of its ladder, and not only those up to the first that is told apart: for `gsac bench size`."""
     steps: int | None = None
-    """Optimisation steps; null: the recipe's own, 1600 of one frame, 3200 on cuda (fast), 3000 of four (paper)."""
+    """Optimisation steps; null: the recipe's own, 1400 of one frame, 3200 on cuda (fast), 3000 of four (paper)."""
     height: int = 540
     """Height of the images that are trained on and judged, px; smaller frames are not enlarged."""
     seed: int = 0

@@ -32,7 +32,7 @@ WORSE = 1.1
 MOSTLY = 0.5
 """Share of the trained frames that must be near to the next."""
 SOLVER_STEPS, SOLVED = 60, 1e-10
-MIDWAY_ROUNDS, MIDWAY_SHARE = 3, 0.3
+MIDWAY_ROUNDS, MIDWAY_SHARE = 2, 0.3
 """Rounds in the midst of a training, and the share of TURN and SHIFT by which its poses are still taken to be off."""
 
 

@@ -27,7 +27,7 @@ from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 3200
-"""Twice the CPU's: 0.3 s more for 0.3 dB."""
+"""More than twice the CPU's: 0.4 s more for 0.3 dB."""
 
 
 def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[int, View]]:

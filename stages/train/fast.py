@@ -27,7 +27,7 @@ from gsac.stages.train.task import Fit, Loop, Task
 from gsac.stages.train.unseen import enough, laid, levelled, shown
 from gsac.stages.train.views import View, person_crop
 
-STEPS = 1600
+STEPS = 1400
 COARSE_SHARE = 0.15
 """Part of the steps that run at half the size; no more of them in a longer training."""
 MIDWAY = 0.3

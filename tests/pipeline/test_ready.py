@@ -19,7 +19,7 @@ def loaded(toy) -> int:
 def test_the_next_stages_code_is_loaded_while_the_stage_before_is_at_work(toy):
     toy.edit("left/stage.py", "from gsac.toy", NOTES + "from gsac.toy")
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3")
-    toy.wait_for(lambda: loaded(toy))
+    toy.wait_for(lambda: loaded(toy) and toy.runs)
     assert toy.runs == ["cut"] and not (toy.out / "cut" / "words").exists()
     assert process.wait(60) == 0
     assert loaded(toy) == 1
@@ -55,6 +55,6 @@ def warm(device):
 """
     toy.edit("left/stage.py", "from gsac.toy", "import os\n" + warm + "\n\nfrom gsac.toy")
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3", GSAC_DEVICE="cpu")
-    toy.wait_for(lambda: loaded(toy))
+    toy.wait_for(lambda: loaded(toy) and toy.runs)
     assert toy.runs == ["cut"] and Path(f"{toy.runs_file}.loaded").read_text() == "cpu\n"
     assert process.wait(60) == 0 and toy.runs == ["cut", "left", "right", "join"]
