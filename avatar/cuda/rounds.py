@@ -34,7 +34,3 @@ class RoundsTrainer(CudaTrainer):
         done = np.repeat([r.done for r in rounds], [len(r.frames) for r in rounds])
         return Drawn(np.concatenate([r.frames for r in rounds]).astype(np.int32)[:, None],
                      np.concatenate([r.backgrounds for r in rounds]).astype(np.float32)[:, None], rates_of(self.recipe, done))
-
-    def place(self, pose: np.ndarray, transl: np.ndarray) -> None:
-        """The poses (T, 55, 3) and translations (T, 3) from here on."""
-        self.buffers["pose"].write(np.concatenate([pose, transl[:, None]], 1))

@@ -126,6 +126,14 @@ class CudaTrainer:
         both = self.buffers["pose"].read()
         return both[:, :JOINTS].copy(), both[:, JOINTS].copy()
 
+    def place(self, pose: np.ndarray, transl: np.ndarray) -> None:
+        """The poses (T, 55, 3) and translations (T, 3) from here on: refined from there, pulled to there, moments anew."""
+        both = np.concatenate([pose, transl[:, None]], 1)
+        for name in ("pose", "fit"):
+            self.buffers[name].write(both)
+        for name in ("pose_first", "pose_second", "pose_steps"):
+            self.buffers[name].fill(0)
+
     def betas(self) -> np.ndarray:
         """(B,) float64, what has been learned on top of the body's betas; empty where none are learned."""
         return self.buffers["betas"].read() if self.recipe.beta_rate else np.zeros(0)

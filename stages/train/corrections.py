@@ -37,19 +37,21 @@ MIDWAY_ROUNDS, MIDWAY_SHARE = 2, 0.3
 
 
 def correct_midway(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaussians], face: np.ndarray,
-                   views: dict[int, View]) -> None:
+                   views: dict[int, View]) -> bool:
     """Corrects all poses in the midst of a training, when the avatar tells more of them than at its start.
 
-    trained: indices of the trained frames; gaussians, on the faces (N,): as they stand. Nothing happens where views are `apart`.
+    trained: indices of the trained frames; gaussians, on the faces (N,): as they stand. Says whether it did: not where views
+    are `apart`.
     """
     if apart(poses.fit_pose[trained, 0]):
-        return
+        return False
     everywhere = carried(poses, trained)
     poses.pose[:], poses.transl[:] = everywhere.pose, everywhere.transl
     corrections = Corrections(poses, gaussians, face, views, MIDWAY_SHARE)
     for _ in range(MIDWAY_ROUNDS):
         corrections.solve()
     poses.settle()
+    return True
 
 
 class Corrections:

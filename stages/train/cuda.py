@@ -18,7 +18,7 @@ from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
 from gsac.avatar.cuda.trainer import BodyArrays, CudaTrainer, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import StageError
-from gsac.stages.train import bundle, fast, ladder, offsets
+from gsac.stages.train import bundle, corrections, fast, ladder, offsets
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.evaluate import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.guard import finite, values
@@ -36,6 +36,8 @@ def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[i
     gaussians = fast.start(task, coarse, count)
     recipe = recipe_of(task.config, count)
     with training(task.poses, task.trained, [coarse, fine], gaussians, recipe) as trainer:
+        if task.config.pose_rounds:
+            correct_midway(trainer, task, coarse)
         follow(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
         body = trainer.body
         folded = offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
@@ -48,6 +50,15 @@ def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[i
         kept = settled(trainer, task)
         kept.seen = middle.seen
         return kept, fine, coarse
+
+
+def correct_midway(trainer: CudaTrainer, task: Task, views: dict[int, View]) -> None:
+    """Trains up to where `fast.train` corrects all poses together, and does so; the poses' equations are solved on the CPU."""
+    if midway := round(fast.MIDWAY * trainer.recipe.steps):
+        follow(trainer, task, midway)
+        poses, trained = task.poses, task.trained
+        if corrections.correct_midway(poses, trained, trainer.gaussians, trainer.face, views):
+            trainer.place(poses.pose[trained], poses.transl[trained])
 
 
 def refit(task: Task, fewer: fast.Trainer, views: dict[int, View]) -> fast.Trainer:

@@ -344,7 +344,7 @@ def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_s
 
 
 def turning(holdout=(), size=(101, 67), **values):
-    """A task of 12 frames, 30 degrees from one to the next: frames far apart are left as they are."""
+    """A task of 12 frames, 30 degrees from one to the next."""
     from gsac.avatar.body import Body, BodyParams
     from gsac.benchmarks.gpu.figure import figure
     from gsac.stages.train.config import TrainConfig
@@ -429,3 +429,41 @@ def test_a_tighter_reach_holds_from_the_step_on_that_it_is_told(figure):
         ways.append((np.linalg.norm(after.mu - before.mu, axis=1) * size[after.face]).max())
     trainer.close()
     assert ways[0] > 4e-4 and 1.9e-4 < ways[1] < 2.1e-4
+
+
+@gpu
+def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu():
+    from gsac.benchmarks.gpu.check import relative
+    from gsac.stages.train import cuda, fast
+    from gsac.stages.train.evaluate import judge
+
+    found = []
+    for train in (cuda.train, fast.train):
+        task = turning((5,), steps=300, gaussians=2000)
+        trainer, _, coarse = train(task, 2000)
+        poses, moved = task.poses, task.poses.base_pose - task.poses.fit_pose
+        assert np.abs(moved[5]).max() > 1e-4  # a frame that is not trained on is corrected with those around it
+        rows = judge(trainer.recoloured(coarse)[0], poses, task.trained, task.views)
+        found.append((moved, poses.base_transl - poses.fit_transl, 10 * np.log10(1 / np.mean([row["mse_fg"] for row in rows]))))
+    (pose, transl, quality), (expected_pose, expected_transl, target) = found
+    assert relative(pose, expected_pose) < 0.3 and relative(transl, expected_transl) < 0.3
+    assert abs(quality - target) < 0.4
+
+
+@gpu
+def test_poses_that_are_placed_are_where_the_frames_are_pulled_and_their_moments_begin_anew(figure):
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import start
+
+    trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 1000),
+                          fast(1000, steps=60, pose_pull=10.0))
+    trainer.train(20)
+    moved = figure.pose + 0.02, figure.transl + 0.01
+    trainer.place(*moved)
+    assert not trainer.buffers["pose_steps"].read().any() and not trainer.buffers["pose_second"].read().any()
+    for placed, got in zip(moved, trainer.poses(), strict=True):
+        np.testing.assert_array_equal(placed, got)
+    trainer.train(40)
+    ways = [np.abs(got - placed).max() for placed, got in zip(moved, trainer.poses(), strict=True)]
+    trainer.close()
+    assert 0 < max(ways) < 5e-3  # so strong a pull leaves little
