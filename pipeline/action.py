@@ -112,7 +112,12 @@ class Actor:
             if forced:
                 objects.remove(scratch)
             with self.store.private(name) as folder:
-                info = self._compute(parts, inputs, models, folder, scratch)
+                try:
+                    info = self._compute(parts, inputs, models, folder, scratch)
+                except StageError as error:
+                    self._check_code(parts, error)
+                    raise
+                self._check_code(parts)
                 still_valid()
                 outputs = tuple(output.path for output in stage.outputs)
                 if METRICS_OUTPUT in outputs:
@@ -121,6 +126,15 @@ class Actor:
             objects.remove(scratch)
         self.reporter.ends(name, Outcome.RAN, info.seconds)
         return Outcome.RAN, record
+
+    def _check_code(self, parts: KeyParts, because: StageError | None = None) -> None:
+        """StageError where the stage's code is no longer what the key names: what ran may be neither the old nor the new."""
+        now = self.keys.code(parts.stage)
+        edited = sorted(name for name in now.keys() | parts.code.keys() if now.get(name) != parts.code.get(name))
+        if edited:
+            more = f" and {len(edited) - 3} more" if len(edited) > 3 else ""
+            said = f"; meanwhile it failed: {because}" if because else ""
+            raise StageError(f"its code was edited while it ran ({', '.join(edited[:3])}{more}); run again{said}") from because
 
     def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path,
                  scratch: Path) -> RunInfo:

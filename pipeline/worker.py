@@ -7,6 +7,7 @@ Stdin stays open as long as the parent lives; when it closes, the child and its 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import importlib
 import json
 import os
@@ -82,13 +83,21 @@ def _work(order: dict[str, Any], voice: Voice) -> None:
         inputs={port: Path(path) for port, path in order["inputs"].items()},
         out=out,
         scratch=Path(order["scratch"]),
-        config=make_config(stage, order["params"]),
+        config=_config(stage, order["params"]),
         models={name: Path(path) for name, path in order["models"].items()},
         device=order["device"],
         progress=voice.progress,
         warn=voice.warn,
     ))
     check_outputs(stage, out)
+
+
+def _config(stage: Stage, params: dict[str, Any]) -> Any:
+    """Of all the stage's parameters, as the parent knew them when the run began; StageError where there are others by now."""
+    edited = {field.name for field in dataclasses.fields(stage.config)} ^ params.keys()
+    if edited:
+        raise StageError(f"its parameters were edited since the run began ({', '.join(sorted(edited))}); run again")
+    return make_config(stage, params)
 
 
 def check_outputs(stage: Stage, folder: Path) -> None:

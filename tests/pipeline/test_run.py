@@ -171,6 +171,24 @@ def test_a_clip_that_changes_while_it_is_read_is_not_published(toy):
     assert not list((toy.cache / "actions").glob("cut/*"))
 
 
+@pytest.mark.parametrize("trouble", ["warning", "silent"])
+def test_code_that_is_edited_while_its_stage_runs_publishes_nothing_and_is_named(toy, trouble):
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "left.pause_s=1.5", "--set", f"left.trouble={trouble}")
+    toy.wait_for(lambda: "left" in toy.runs)
+    toy.edit("left/stage.py", "spell(word)", "spell(word)[::-1]")
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1 and "its code was edited while it ran (gsac.toy.left.stage); run again" in err
+    assert not list((toy.cache / "actions").glob("left/*"))
+
+
+def test_a_parameter_that_is_added_while_a_run_goes_on_is_told_as_that(toy):
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=1.5")
+    toy.wait_for(lambda: "cut" in toy.runs)
+    toy.edit("left/__init__.py", "    def check", "    volume: int = 1\n\n    def check")
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1 and "its parameters were edited since the run began (volume); run again" in err
+
+
 def test_a_missing_parent_of_the_cache_is_made(toy):
     assert toy.run(GSAC_CACHE=str(toy.root / "deep" / "deeper")).code == 0
 

@@ -1,5 +1,7 @@
 // Orbit camera with OpenCV axes (x right, y down, z forward), and the gestures that move it.
 
+const GLIDE_S = 0.25;
+
 class OrbitCamera {
   constructor() {
     this.fov = 30;
@@ -9,6 +11,11 @@ class OrbitCamera {
     this.walked = [0, 0, 0];
     this.view = new Float32Array(12);
     this.yaw = 0;
+    this.pitch = 4;
+    this.target = [0, 0, 0];
+    this.distance = 3;
+    // What is left of the way from an older framing: target, m, pitch, degrees, distance, m. It dies away.
+    this.behind = [0, 0, 0, 0, 0];
     // By hand or by the address: then a new size of the page does not frame the figure again.
     this.moved = false;
   }
@@ -17,9 +24,29 @@ class OrbitCamera {
   frame(low, high, aspect) {
     this.pitch = 4;
     this.moved = false;
+    this.behind = [0, 0, 0, 0, 0];
     this.target = low.map((l, i) => (l + high[i]) / 2);
     const tall = (high[1] - low[1]) * 0.57 / (1 - this.covered), wide = (high[0] - low[0]) * 0.58 / aspect;
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
+  }
+
+  // As frame, but the picture gets there little by little, by `settle`.
+  glide(low, high, aspect) {
+    const from = this.place();
+    this.frame(low, high, aspect);
+    this.behind = this.place().map((to, i) => from[i] - to);
+  }
+
+  // Seconds of the glide.
+  settle(seconds) {
+    const left = Math.exp(-seconds / GLIDE_S);
+    this.behind = this.behind.map((x) => (Math.abs(x) < 1e-4 ? 0 : x * left));
+  }
+
+  // Where it is: the point that it looks at, pitch, distance.
+  place() {
+    const at = this.target.map((t, i) => t + this.walked[i]);
+    return [...at, this.pitch, this.distance].map((x, i) => x + this.behind[i]);
   }
 
   focal(height) {
@@ -35,12 +62,13 @@ class OrbitCamera {
 
   // Fills this.view: 3x4, row by row, world to camera.
   update() {
-    const y = this.yaw * Math.PI / 180, p = this.pitch * Math.PI / 180;
+    const place = this.place(), target = place.slice(0, 3), [pitch, distance] = place.slice(3);
+    const y = this.yaw * Math.PI / 180, p = pitch * Math.PI / 180;
     const back = [Math.sin(y) * Math.cos(p), Math.sin(p), Math.cos(y) * Math.cos(p)];
     const right = [Math.cos(y), 0, -Math.sin(y)], forward = back.map((v) => -v);
     const down = [forward[1] * right[2] - forward[2] * right[1], forward[2] * right[0] - forward[0] * right[2],
       forward[0] * right[1] - forward[1] * right[0]];
-    const eye = this.target.map((t, i) => t + this.walked[i] + this.distance * back[i]);
+    const eye = target.map((t, i) => t + distance * back[i]);
     [right, down, forward].forEach((axis, r) => {
       this.view.set(axis, r * 4);
       this.view[r * 4 + 3] = -(axis[0] * eye[0] + axis[1] * eye[1] + axis[2] * eye[2]);

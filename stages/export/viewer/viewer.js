@@ -75,10 +75,10 @@ class Viewer {
     this.paused = false;
   }
 
-  // As play, with the camera where it sees all of it, unless somebody has moved it.
+  // As play, and the camera goes where it sees all of it, unless somebody has moved it.
   choose(what) {
     this.play(what);
-    if (!this.camera.moved) this.frame();
+    if (!this.camera.moved) this.frame("glide");
   }
 
   // Seconds of the clip that plays; 0 for a still pose.
@@ -118,6 +118,7 @@ class Viewer {
     this.turn(this.pose);
     const share = 1 - Math.exp(-seconds / FOLLOW_S), { walked } = this.camera;
     for (const i of [0, 2]) walked[i] += share * (this.pose.transl[i] - walked[i]);
+    this.camera.settle(seconds);
   }
 
   // All that the picture depends on, in words; two equal ones need no new picture.
@@ -247,7 +248,8 @@ class Viewer {
   }
 
   // The whole figure, wherever its clip takes the limbs; the camera walks along by itself.
-  frame() {
+  // how: `frame` at once or `glide`, see OrbitCamera.
+  frame(how = "frame") {
     this.resize();
     const { walked } = this.camera, pose = new Pose(this.avatar), low = Array(3).fill(Infinity), high = Array(3).fill(-Infinity);
     const clip = this.avatar.clips[this.playing.clip], looks = clip ? Math.min(clip.keys, FRAME_LOOKS) : 1;
@@ -262,7 +264,7 @@ class Viewer {
       });
     }
     for (const i of [0, 2]) walked[i] = this.pose.transl[i];
-    this.camera.frame(low, high, this.canvas.width / this.canvas.height);
+    this.camera[how](low, high, this.canvas.width / this.canvas.height);
     this.move();
   }
 }

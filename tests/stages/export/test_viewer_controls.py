@@ -222,6 +222,29 @@ def test_a_motion_that_leaps_stays_in_the_picture_unless_the_camera_was_moved_by
     page.run("delete gsac.avatar.clips.leap")
 
 
+def test_the_camera_glides_to_another_clips_place_and_does_not_jump(page):
+    page.run("location.hash = 'pose=A&glide'")
+    page.until("gsac.playing.pose === 'A' && !gsac.camera.moved && gsac.fade === 1")
+    ways = page.run("""(() => {
+      const rotation = new Float32Array(3 * 3), transl = Float32Array.from([0, 0, 0, 0, 0.9, 0, 3, 0, 0]), { camera } = gsac;
+      gsac.avatar.clips.leap = { fps: 2, loop: false, joints: [0], keys: 3, rotation, transl };
+      gsac.paused = true;
+      const seen = [camera.place()[4]];
+      gsac.choose({ clip: 'leap' });
+      seen.push(camera.place()[4]);
+      for (let n = 0; n < 200; n++) {
+        gsac.step(1 / 60);
+        seen.push(camera.place()[4]);
+      }
+      return [seen, camera.distance];
+    })()""")
+    distances, goal = np.array(ways[0]), ways[1]
+    assert goal > 1.2 * distances[0] and distances[1] == pytest.approx(distances[0])
+    assert distances[-1] == goal and np.diff(distances).max() < 0.1 * (goal - distances[0])
+    page.run("gsac.paused = false; gsac.choose({ pose: 'T' }); delete gsac.avatar.clips.leap")
+    assert page.errors == []
+
+
 def test_the_open_drawer_leaves_the_buttons_free(page):
     for size in (SIZE, 1100):
         page.resize(size, 700)
