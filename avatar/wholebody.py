@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 BODY = slice(0, 17)
 FEET = slice(17, 23)
 FACE = slice(23, 91)
@@ -31,13 +29,3 @@ ARM = {side: (INDEX[f"{side}_shoulder"], INDEX[f"{side}_elbow"], INDEX[f"{side}_
        for side in ("left", "right")}
 """Shoulder, elbow, wrist, palm: the paper's S, E, W, P."""
 HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
-
-
-def face_flip() -> np.ndarray:
-    """(68,) index of each face point's mirror image, iBUG-68 order."""
-    contour = list(range(16, -1, -1))
-    brows = list(range(26, 16, -1))
-    nose = [27, 28, 29, 30, 35, 34, 33, 32, 31]
-    eyes = [45, 44, 43, 42, 47, 46, 39, 38, 37, 36, 41, 40]
-    mouth = [54, 53, 52, 51, 50, 49, 48, 59, 58, 57, 56, 55, 64, 63, 62, 61, 60, 67, 66, 65]
-    return np.array(contour + brows + nose + eyes + mouth)

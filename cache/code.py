@@ -17,7 +17,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from gsac.cache.digest import canonical, file_digest, typed_digest
+from gsac.cache.digest import file_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.memo import Memo, memo_in
 from gsac.cache.root import default_root
@@ -28,11 +28,6 @@ FILE_SUFFIXES = tuple(f".{s}" for s in (
     "npz npy json cu cuh c h cpp cs js css html jinja glsl wgsl hlsl compute shader asmdef unity md".split()))
 MEMO_KIND = f"module 3 python {sys.version_info.major}.{sys.version_info.minor}"
 """To be raised when `syntax` reads sources otherwise, so that what was remembered before is not taken for its word."""
-
-
-def code_digest(module: str, extra: tuple[str, ...] = (), memo: Memo | None = None) -> str:
-    """One digest of the whole closure."""
-    return typed_digest("code 1", canonical(code_parts(module, extra, memo)))
 
 
 def code_parts(

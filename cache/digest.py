@@ -27,10 +27,6 @@ def canonical(value: Any) -> bytes:
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode()
 
 
-def text_digest(text: str) -> str:
-    return typed_digest("text 1", text.encode("utf-8", "surrogatepass"))
-
-
 def file_digest(path: Path, memo: Memo | None = None) -> str:
     """Plain sha256 of a file's content, remembered by its stat (in the default store unless a memo is given)."""
     memo = memo or memo_in(default_root())

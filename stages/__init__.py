@@ -1,3 +1,1 @@
 """The eight steps from a clip to an avatar. Each is a pure function of declared inputs, parameters and models."""
-
-STAGES = ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")

@@ -21,8 +21,6 @@ NEEDED = [f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "
 LIMBS = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right")
          for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))]
 """Bones that are laid along the source's."""
-FINGERS = [(f"{side}_{finger}{k}", f"{side}_{finger}{k + 1}") for side in ("left", "right")
-           for finger in ("index", "middle", "pinky", "ring", "thumb") for k in (1, 2)]
 SPINE = ("spine1", "spine2", "spine3")
 STANDS = 0.4
 """A pose with at least this mean cosine between its limbs and the T-pose's is a reference: arms that hang give 0.5."""

@@ -54,12 +54,6 @@ def joint_distances(body: Body, params: BodyParams, truth: Truth) -> np.ndarray:
     return np.linalg.norm(_scale(fitted, true) * fitted - true, axis=-1) * 1e3
 
 
-def joint_errors(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
-    """Joint name -> mean error mm, aligned as in `score`."""
-    off = joint_distances(body, params, truth).mean(0)
-    return {body.joint_names[j]: float(mm) for j, mm in zip(truth.joint, off, strict=True)}
-
-
 def _rooted(joints: np.ndarray) -> np.ndarray:
     return np.asarray(joints - joints[:, :1], np.float64)
 

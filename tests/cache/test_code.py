@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from gsac.cache import code, memo
-from gsac.cache.code import code_digest, code_parts
+from gsac.cache.code import code_parts
 from gsac.cache.errors import CacheError
 
 STAGE = '''"""A stage."""
@@ -150,7 +150,7 @@ def test_a_source_that_cannot_be_parsed_still_counts(tree):
 
 def test_a_module_that_does_not_exist_is_named(store):
     with pytest.raises(CacheError, match="gsac.stages.nothing"):
-        code_digest("gsac.stages.nothing")
+        code_parts("gsac.stages.nothing")
 
 
 def test_an_unchanged_module_is_not_parsed_again_and_an_edit_is_noticed(tree, monkeypatch):
@@ -167,8 +167,8 @@ def test_an_unchanged_module_is_not_parsed_again_and_an_edit_is_noticed(tree, mo
     assert len(parsed) == 11
 
 
-def test_the_code_digest_is_the_same_in_every_process(tmp_path):
-    command = "from gsac.cache.code import code_digest; print(code_digest('gsac.cache.store'))"
+def test_the_digests_are_the_same_in_every_process(tmp_path):
+    command = "from gsac.cache.code import code_parts; print(code_parts('gsac.cache.store'))"
     printed = set()
     for seed in ("1", "2"):
         env = {**os.environ, "PYTHONHASHSEED": seed, "GSAC_CACHE": str(tmp_path / seed)}

@@ -3,7 +3,7 @@ import os
 
 import pytest
 from gsac.cache import digest, memo
-from gsac.cache.digest import file_digest, text_digest, tree_digest, typed_digest
+from gsac.cache.digest import file_digest, tree_digest, typed_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.memo import Memo, memo_in
 
@@ -46,7 +46,7 @@ def test_two_files_with_swapped_contents_are_another_tree(store, tmp_path):
 
 
 def test_things_of_two_kinds_never_share_a_digest():
-    assert len({text_digest("{}"), typed_digest("tree 1", b"{}"), hashlib.sha256(b"{}").hexdigest()}) == 3
+    assert len({typed_digest("action 1", b"{}"), typed_digest("tree 1", b"{}"), hashlib.sha256(b"{}").hexdigest()}) == 3
 
 
 def test_an_unchanged_file_is_read_once(store, tmp_path, settled_at_once, reads):
