@@ -26,6 +26,7 @@ from gsac.stages.train.guard import finite, result, values
 from gsac.stages.train.holdout import spaced_in_yaw, to_choose_by
 from gsac.stages.train.levels import judged
 from gsac.stages.train.novel import judge_novel
+from gsac.stages.train.parts import unseen_parts
 from gsac.stages.train.poses import Poses, carried
 from gsac.stages.train.recipes import ALIGN, RECIPES
 from gsac.stages.train.task import Task
@@ -81,6 +82,8 @@ def run(job: Job) -> None:
 
     run = Run(job, Poses(body, params), views, trained, held, choosing)
     run.fit()
+    if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
+        job.warn(f"No frame shows the {', '.join(parts)}; the avatar has there the colours of what lies around.")
     unseen = float((~run.result.seen).mean())
     if unseen > MOST_UNSEEN:
         job.warn(f"{unseen:.0%} of the gaussians were shown from the front by no frame; they look like their neighbours.")

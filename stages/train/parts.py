@@ -1,0 +1,52 @@
+"""Parts of the body that no frame shows, by name: what stands there in the avatar is made up from what lies around."""
+
+from __future__ import annotations
+
+import numpy as np
+from gsac.avatar.binding import face_frames
+from gsac.avatar.body import Body
+from gsac.stages.train.merging import skin_of
+
+HALVED = {"head": ("face", "back of the head"), "trunk": ("front of the trunk", "back")}
+"""Parts whose front and back are told apart."""
+LIMBS = {"upper arm": ("shoulder",), "forearm": ("elbow",), "hand": ("wrist", "index", "middle", "pinky", "ring", "thumb"),
+         "thigh": ("hip",), "shin": ("knee",), "foot": ("ankle", "foot")}
+"""Limb -> what its joints' names begin with after their side."""
+HEAD = ("head", "jaw", "left_eye_smplhf", "right_eye_smplhf")
+TRUNK = ("pelvis", "spine1", "spine2", "spine3", "left_collar", "right_collar")
+FACING = 0.3
+"""Cosine between a face's normal and the way ahead from which on it belongs to the front, or to the back by minus that."""
+SHOWN = 0.2
+"""Share of a part's gaussians below which it is called unseen; its rim is seen where its neighbours are."""
+FEWEST = 10
+"""Gaussians of a part below which nothing is said of it."""
+
+
+def part_of(name: str) -> str | None:
+    """Of a joint; None for the neck, whose skin goes up to the chin and down to the shoulders."""
+    if name in HEAD:
+        return "head"
+    if name in TRUNK:
+        return "trunk"
+    side, _, rest = name.partition("_")
+    return next((f"{side} {limb}" for limb, starts in LIMBS.items() if side in ("left", "right") and rest.startswith(starts)), None)
+
+
+def unseen_parts(face: np.ndarray, seen: np.ndarray, body: Body) -> list[str]:
+    """face: (N,) of the gaussians; seen: (N,) bool. From head to foot; a part's front and back only where the other is seen."""
+    names = [part_of(name) for name in body.joint_names]
+    carried = np.array([name or "" for name in names])[skin_of(face, body).argmax(1)]
+    ahead = face_frames(np.asarray(body.v_template, np.float32), body.faces).R[face, 2, 1]
+    found = []
+
+    def hidden(part: np.ndarray) -> bool:
+        return int(part.sum()) >= FEWEST and float(seen[part].mean()) < SHOWN
+
+    for name in ["head", "trunk", *(f"{side} {limb}" for limb in LIMBS for side in ("left", "right"))]:
+        part = carried == name
+        if hidden(part):
+            found.append(name)
+        elif name in HALVED:
+            halves = zip(HALVED[name], (ahead > FACING, ahead < -FACING), strict=True)
+            found += [half for half, on in halves if hidden(part & on)]
+    return found
