@@ -160,7 +160,7 @@ def _used_frames(vertices, faces, face, used, R, T, k, valid):
     for i in range(len(face)):
         if not used[face[i]]:
             used[face[i]] = True
-            _frame(vertices, faces, face[i], R, T, k, valid)
+            _frame(vertices, faces, np.int64(face[i]), R, T, k, valid)
 
 
 @kernel
@@ -202,7 +202,7 @@ def _bind_backward(worker, workers, vertices, faces, face, mu, quat, log_scale, 
     real = vertices.dtype.type
     one, two, third = real(1), real(2), real(1 / 3)
     for i in range(count * worker // workers, count * (worker + 1) // workers):
-        p0, p1, p2, q0, q1, q2, c0, c1, c2, d0, d1, d2, width, area2, side, good = _edges(vertices, faces, face[i])
+        p0, p1, p2, q0, q1, q2, c0, c1, c2, d0, d1, d2, width, area2, side, good = _edges(vertices, faces, np.int64(face[i]))
         r00, r01, r02, r10, r11, r12, r20, r21, r22, w, x, y, z, length = _rotation(quat, i)
         m0, m1, m2 = mu[i, 0], mu[i, 1], mu[i, 2]
         g0, g1, g2 = grad_means[i, 0], grad_means[i, 1], grad_means[i, 2]

@@ -138,7 +138,7 @@ class Trainer:
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
                        "rgb": gaussians.rgb, "opacity": np.log(opacity / (1 - opacity))[:, None]}
-        self.values = {name: np.array(value, np.float32) for name, value in self.values.items()}
+        self.values = {name: np.array(value, np.float32, order="C") for name, value in self.values.items()}
         self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)

@@ -72,6 +72,6 @@ def fold(gaussians: Gaussians, rest: np.ndarray, offset: np.ndarray, faces: np.n
     plain = face_frames(rest, faces)
     R, T, k = plain.R[gaussians.face], plain.T[gaussians.face], np.maximum(plain.k[gaussians.face, None], 1e-9)
     mu = np.einsum("nji,nj->ni", R, displaced.means - T) / k
-    quat = Rotation.from_matrix(np.einsum("nji,njk->nik", R, displaced.rotations)).as_quat()[:, [3, 0, 1, 2]]
+    quat = np.roll(Rotation.from_matrix(np.einsum("nji,njk->nik", R, displaced.rotations)).as_quat(), 1, axis=1)
     log_scale = np.log(np.maximum(displaced.scales, 1e-9) / k)
     return replace(g, mu=mu.astype(np.float32), quat=quat.astype(np.float32), log_scale=log_scale.astype(np.float32))

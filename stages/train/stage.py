@@ -29,6 +29,7 @@ from gsac.stages.train.novel import judge_novel
 from gsac.stages.train.parts import unseen_parts
 from gsac.stages.train.poses import Poses, carried
 from gsac.stages.train.recipes import ALIGN, RECIPES
+from gsac.stages.train.rehearsal import rehearse
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
 
@@ -91,10 +92,12 @@ def run(job: Job) -> None:
 
 
 def warm(device: str) -> None:
-    """Called while the stage before is at work: numba takes stock of what is compiled, and the GPU wakes up. Half a second each."""
-    face_frames(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
+    """Called while the stage before is at work: kernels are loaded, at the very first compiled, and the GPU wakes up."""
     if device == "cuda":
+        face_frames(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
         Device()
+    else:
+        rehearse()
 
 
 def check_device(device: str) -> None:
