@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from copy import copy
 from pathlib import Path
 from threading import Lock
 from typing import NamedTuple
@@ -108,7 +109,8 @@ class Lpips:
         """arrays: as `shapes(name)`."""
         import torch
 
-        self.layers, self.one_at_a_time = NETS[name], Lock()
+        self.layers, self.one_at_a_time, self.precision = NETS[name], Lock(), None
+        self.shift, self.scale = (torch.tensor(values, dtype=torch.float64)[:, None, None] for values in (SHIFT, SCALE))
         self.weights = {own: torch.from_numpy(np.ascontiguousarray(values, np.float32)) for own, values in arrays.items()}
 
     @classmethod
@@ -120,6 +122,24 @@ class Lpips:
             raise WeightsError(f"{path} does not hold the arrays of {name}; run `gsac models add {name} FILE` again")
         return cls(name, arrays)
 
+    def on(self, device: str, precision) -> Lpips:
+        """The same network there, its convolutions in that torch.dtype; for `compared`."""
+        import torch
+
+        other = copy(self)
+        other.precision, other.shift, other.scale = precision, self.shift.to(device), self.scale.to(device)
+        other.weights = {own: w.to(device, precision, memory_format=torch.channels_last if w.ndim == 4 else torch.preserve_format)
+                         for own, w in self.weights.items()}
+        return other
+
+    def compared(self, image, target):
+        """The distance of two tensors (H, W, 3) in 0..1, left there, as a tensor; the image's gradient can be taken."""
+        import torch
+
+        with torch.no_grad():
+            features = self._features(target.permute(2, 0, 1))
+        return self._distance(self._features(image.permute(2, 0, 1)), features)
+
     def distance(self, a: np.ndarray, b: np.ndarray, scaled: bool = True) -> float:
         """scaled: images are brought to -1..1, as the network's own input is; False: left in 0..1, as many papers score.
 
@@ -130,18 +150,18 @@ class Lpips:
         if min(a.shape[:2]) < LEAST_SIDE:
             return float("nan")
         with torch.no_grad(), self.one_at_a_time:  # torch brings its own threads, and the features of two images are large
-            return float(self._distance(*(_tensor(np.asarray(image, np.float32), scaled) for image in (a, b))))
+            return float(self._distance(*(self._features(_tensor(np.asarray(image, np.float32), scaled)) for image in (a, b))))
 
     def gradient(self, image: np.ndarray, target: np.ndarray, scaled: bool = True) -> tuple[float, np.ndarray]:
         """The distance, and its gradient (H, W, 3) with respect to the image."""
         import torch
 
         moved = torch.from_numpy(np.ascontiguousarray(image)).requires_grad_()
-        value = self._distance(_tensor(moved, scaled), _tensor(target, scaled))
+        value = self._distance(*(self._features(_tensor(image, scaled)) for image in (moved, target)))
         return value.item(), torch.autograd.grad(value, moved)[0].numpy()
 
     def _distance(self, a, b):
-        taps = zip(self._features(a), self._features(b), strict=True)
+        taps = zip(a, b, strict=True)
         return sum((self.weights[f"lin{k}"][:, None, None] * (x - y) ** 2).sum(0).mean() for k, (x, y) in enumerate(taps))
 
     def _features(self, x) -> list:
@@ -149,8 +169,8 @@ class Lpips:
         import torch
         from torch.nn import functional
 
-        shift, scale = (x.new_tensor(values)[:, None, None] for values in (SHIFT, SCALE))
-        x, taps = ((x - shift) / scale)[None], []
+        exact = x.dtype
+        x, taps = ((x - self.shift.to(exact)) / self.scale.to(exact))[None].to(self.precision or exact), []
         for layer in self.layers:
             if layer.pool:
                 x = functional.max_pool2d(x, layer.pool, 2)
@@ -158,7 +178,8 @@ class Lpips:
             x = functional.relu(functional.conv2d(x, weight, bias, layer.stride, layer.padding))
             if layer.tap:
                 # The root's slope at zero is infinite: where all features are zero, so shall the gradient be.
-                taps.append(x[0] / (torch.sqrt((x[0] ** 2).sum(0) + TINY**2) + TINY))
+                tap = x[0].to(exact)
+                taps.append(tap / (torch.sqrt((tap**2).sum(0) + TINY**2) + TINY))
         return taps
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gsac.avatar.cuda.recipe import Drawn, Recipe
-from gsac.avatar.cuda.scene import PLAN
+from gsac.avatar.cuda.recipe import Drawn, Recipe, no_rates
 from gsac.avatar.cuda.trainer import CudaTrainer
 
 
@@ -25,6 +24,6 @@ class Aligner(CudaTrainer):
     def plan(self, levels) -> Drawn:
         recipe, steps = self.recipe, self.recipe.steps // self.frames
         order = np.repeat(np.arange(self.frames, dtype=np.int32), steps)[:, None]
-        rates = np.zeros(len(order), [(name, np.int32 if name == "level" else np.float32) for name in PLAN])
+        rates = no_rates(len(order))
         rates["pose"] = np.tile(recipe.pose_rate * recipe.pose_end ** (np.arange(steps) / steps), self.frames)
         return Drawn(order, np.ones((len(order), 1, 3), np.float32), rates)

@@ -151,6 +151,11 @@ FORMULA BindGradient<real> bind_backward(const Face<real> &f, const Turn<real> &
     return out;
 }
 
+// Where a window of `size` px about `centre` begins, moved into a frame of `whole` px.
+template <class real> FORMULA int window_begin(real centre, int size, int whole) {
+    return int(floor(fmin(fmax(centre - size * real(0.5), real(0)), real(whole - size))));
+}
+
 template <class real> struct Lens { real fx, fy, cx, cy, width, height; };
 
 // What the clip's light makes of a colour channel on a face (avatar/light.py); light: 4 rows of 3; n: normal, camera frame.

@@ -8,7 +8,7 @@ struct Now {
     Frame frame;
     Plan plan;
     float background[3], gain[3];
-    int columns, rows, go;
+    int columns, rows, go, window_left, window_top;
 };
 
 FORMULA bool halted(const Scene &s) { return s.state->overflow != 0 || s.now[0].go == 0; }

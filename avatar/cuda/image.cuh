@@ -315,6 +315,11 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
             __syncthreads();
         }
         const Now &now = s.now[p.b];
+        if (p.b == 0 && now.plan.centre >= 0) {
+            int wx = x - now.window_left, wy = y - now.window_top;
+            if (wx >= 0 && wy >= 0 && wx < s.window_width && wy < s.window_height)
+                for (int k = 0; k < 3; ++k) grad[k] += s.perceptual * s.window_slope[3 * (wy * s.window_width + wx) + k];
+        }
         float4 out = {0, 0, 0, 6 * share * s.mask * (pixel.alpha - pixel.mask)};
         if (s.dice_weight > 0) out.w += s.dice[3 * p.b] * (1 - pixel.mask) - s.dice[3 * p.b + 1];
         for (int k = 0; k < 3; ++k) {

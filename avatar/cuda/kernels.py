@@ -9,10 +9,11 @@ from pathlib import Path
 
 from gsac.avatar.cuda.scene import declarations
 
-SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "update.cuh", "offsets.cuh", "shape.cuh",
-           "paper.cuh")
-KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "image_gradient", "blend_backward", "gaussian_step",
-           "gather", "joint_step", "offset_step", "shape_gradient", "shape_step", "dice", "neighbourhood", "nearest", "paper_step")
+SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "perceptual.cuh", "update.cuh",
+           "offsets.cuh", "shape.cuh", "paper.cuh")
+KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "cut_window", "image_gradient", "blend_backward",
+           "gaussian_step", "gather", "joint_step", "offset_step", "shape_gradient", "shape_step", "dice", "neighbourhood",
+           "nearest", "paper_step")
 OPTIONS = ("--std=c++17", "--extra-device-vectorization")
 
 

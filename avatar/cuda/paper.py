@@ -19,7 +19,7 @@ ROWS = {"mu": slice(0, 3), "quat": slice(3, 7), "scale": slice(7, 10), "rgb": sl
 
 @dataclass(kw_only=True)
 class PaperRecipe(Recipe):
-    """Rates are constant but for that of the places, which falls to `mu_decay`."""
+    """Rates are constant but for that of the places, which falls to `mu_decay`; losses are a mean over the whole frame."""
 
     mu_decay: float = 1.0
     edges: float = 0.0
@@ -30,8 +30,6 @@ class PaperRecipe(Recipe):
     """Weight of the neighbours' terms."""
     scale_limit: float = 0.0
     """Scales are scale_limit * sigmoid(logit), in units of the face."""
-    frame_size: tuple[int, int] = (0, 0)
-    """Width and height of the whole frame that the losses are a mean over, px."""
     renew: int = 50
     """Steps after which the neighbours are searched anew."""
 

@@ -55,6 +55,12 @@ class Recipe:
     """lambda of the displacement's smoothing."""
     hand_share: float = 1.0
     """Pose rate of the fingers relative to the body's; jaw and eyes stay."""
+    perceptual: float = 0.0
+    """Weight of LPIPS of a window of one of a step's frames, where the trainer is given a network; as a mean over the frames."""
+    perceptual_steps: int = 0
+    """Steps that have it, the last."""
+    frame_size: tuple[int, int] = (0, 0)
+    """Width and height of the whole frame that the shots are cut from, px."""
 
     @classmethod
     def of(cls, config, **more) -> Recipe:
@@ -88,9 +94,16 @@ def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
     return Drawn(order, background, rates_of(recipe, done, levels))
 
 
+def no_rates(steps: int) -> np.ndarray:
+    """(steps,) as `Drawn.rates`: nothing is learned, LPIPS takes no part."""
+    rates = np.zeros(steps, [(name, np.dtype(kind)) for name, kind in PLAN.items()])
+    rates["centre"] = -1
+    return rates
+
+
 def rates_of(recipe: Recipe, done: np.ndarray, levels: int = 1) -> np.ndarray:
     """As `Drawn.rates`, of steps at these shares of the way, (steps,)."""
-    rates = np.zeros(len(done), [(name, np.int32 if name == "level" else np.float32) for name in PLAN])
+    rates = no_rates(len(done))
     rates["level"] = np.where(done < recipe.coarse_share, 0, levels - 1)
     for name, rate, end in (("mu", recipe.mu_rate, 0.01), ("quat", recipe.quat_rate, 0.1), ("log_scale", recipe.scale_rate, 0.1),
                             ("rgb", recipe.rgb_rate, 0.1), ("opacity", recipe.opacity_rate, 0.1), ("pose", recipe.pose_rate, 0.01),

@@ -9,12 +9,14 @@ _NAMES = {INT: "int", FLOAT: "float", LONG: "long long"}
 MOST_BATCH = 16
 
 FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT, "fy": FLOAT, "cx": FLOAT, "cy": FLOAT, "rest": INT,
-         "pose": INT, "spare": INT}
-"""pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: which vertices at rest and which pose it shows."""
+         "pose": INT, "left": INT, "top": INT, "spare": INT}
+"""pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: which vertices at rest and which pose it shows;
+left, top: px, its corner in the whole frame."""
 
 PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
-        "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT}
-"""Of one step: size of the images, Adam rates, the share of its way that a gaussian is pulled back, m of an offset's step."""
+        "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT, "centre": INT}
+"""Of one step: size of the images, Adam rates, the share of its way that a gaussian is pulled back, m of an offset's step, the
+vertex in the middle of the window that LPIPS sees (-1: no LPIPS)."""
 
 STATE = {name: INT for name in (
     "step", "stop", "overflow", "needed", "most", "pairs", "listed", "checkpoints", "heavy", "light", "near", "segments",
@@ -43,6 +45,7 @@ POINTERS = {
     "gain": "float", "gain_part": "float", "overlap": "float", "dice": "float",
     "nearest_gaussian": "int", "near_of_start": "int", "near_of": "int",
     "rest_frame": "float", "place": "float", "hood": "float", "pulled": "float", "hits": "int",
+    "window": "float", "window_slope": "float", "window_value": "float",
     "grad_out": "float", "pose_grad_out": "double",
 }
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
@@ -50,8 +53,10 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
            "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
            "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
            "area": FLOAT, "half_width": FLOAT, "half_height": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT,
-           "scale_limit": FLOAT}
-"""area: pixels that a frame's losses are a mean over, 0: its own; the last eight are recipe `paper`'s (paper.cuh)."""
+           "scale_limit": FLOAT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
+           "perceptual": FLOAT}
+"""area: pixels that a frame's losses are a mean over, 0: its own; it and the next seven are recipe `paper`'s (paper.cuh); the last
+five are LPIPS' (perceptual.cuh)."""
 
 
 def _struct(name: str, fields: dict) -> type[ctypes.Structure]:

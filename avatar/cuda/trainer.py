@@ -14,6 +14,7 @@ from gsac.avatar.cuda.recipe import Drawn, Recipe, draw
 from gsac.avatar.cuda.scene import FRAME, POINTERS, Scene, State
 from gsac.avatar.cuda.smoothing import series
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.lpips import Lpips
 
 TILE, SEGMENT, JOINTS = 16, 128, 55
 BODY, JAW_EYES, FINGERS = slice(0, 22), slice(22, 25), 25
@@ -47,6 +48,8 @@ class Shot(NamedTuple):
     pixels: np.ndarray
     """(h, w, 4) uint8, premultiplied RGB and mask."""
     camera: Camera
+    corner: tuple[int, int] = (0, 0)
+    """x, y in the whole frame, px."""
 
 
 class CudaTrainer:
@@ -56,7 +59,8 @@ class CudaTrainer:
     """
 
     def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: Gaussians,
-                 recipe: Recipe, device: Device | None = None, pair_room: int | None = None):
+                 recipe: Recipe, device: Device | None = None, pair_room: int | None = None, network: Lpips | None = None):
+        """network: for the loss of the recipe's last `perceptual_steps`, by torch."""
         self.device = device or Device()
         self.recipe, self.body, self.face = recipe, body, np.asarray(gaussians.face, np.int32)
         self.frames, self.count, self.light = len(levels[0]), len(gaussians), gaussians.light
@@ -68,6 +72,9 @@ class CudaTrainer:
         drawn = self.plan(levels)
         self.batch, self.order, self.rates = drawn.order.shape[1], drawn.order, drawn.rates
         self._numbers(levels)
+        self.window, self.late = None, recipe.steps
+        if network is not None and recipe.perceptual_steps:
+            self._open_window(network)
         self._upload_shots(levels)
         self._upload("plan", drawn.rates.view(np.uint8), np.uint8)
         self._upload("order", drawn.order, np.int32)
@@ -93,16 +100,31 @@ class CudaTrainer:
         self.seconds += self.device.milliseconds(begin, end) / 1e3
 
     def _advance(self, stop: int) -> None:
-        self._set_state(stop=stop)
-        while (left := stop - self.state().step) > 0:
-            if self._graph is None:
-                self._graph = self.device.graph(lambda: [self.step() for _ in range(REPLAY)])
-            for _ in range(-(-left // REPLAY)):
-                self.device.replay(self._graph)
-            self.device.wait()
-            state = self.state()
-            if state.overflow:
-                self._lists(state.needed * 3 // 2)
+        parts = [(min(stop, self.late), self._replay)]
+        if stop > self.late:
+            parts.append((stop, self._replay_late))
+        for until, replay in parts:
+            self._set_state(stop=until)
+            while (left := until - self.state().step) > 0:
+                replay(left)
+                self.device.wait()
+                state = self.state()
+                if state.overflow:
+                    self._lists(state.needed * 3 // 2)
+
+    def _replay(self, steps: int) -> None:
+        if self._graph is None:
+            self._graph = self.device.graph(lambda: [self.step() for _ in range(REPLAY)])
+        for _ in range(-(-steps // REPLAY)):
+            self.device.replay(self._graph)
+
+    def _replay_late(self, steps: int) -> None:
+        for _ in range(steps):
+            for name in self.grids:
+                if name == "image_gradient":
+                    self.device.launch("cut_window", (-(-self.window.slope[..., 0].numel() // 256), 1), 256, self.scene)
+                    self.window.launch()
+                self.launch(name)
 
     def step(self) -> None:
         """Launches one step's kernels; no more than `stop` are carried out."""
@@ -208,6 +230,21 @@ class CudaTrainer:
         for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach", "offset_every"):
             setattr(scene, name, getattr(recipe, name))
 
+    def _open_window(self, network: Lpips) -> None:
+        from gsac.avatar.cuda.perceptual import SIDE, Window
+
+        recipe, scene = self.recipe, self.scene
+        self.late = max(recipe.steps - recipe.perceptual_steps, 0)
+        self.rates["centre"][self.late:] = np.random.default_rng([recipe.seed, 1]).integers(scene.vertex_count,
+                                                                                         size=recipe.steps - self.late)
+        scene.whole_width, scene.whole_height = recipe.frame_size
+        scene.window_width, scene.window_height = (min(SIDE, side) for side in recipe.frame_size)
+        scene.perceptual = recipe.perceptual * self.batch  # only the first frame of a batch has it
+        self.window = Window(self.device, network, scene.window_width, scene.window_height)
+        for name, tensor in (("window", self.window.images), ("window_slope", self.window.slope),
+                             ("window_value", self.window.value)):
+            setattr(scene, name, tensor.data_ptr())
+
     def _upload_shots(self, levels) -> None:
         frames = np.zeros(len(levels) * self.frames, [(name, np.dtype(kind)) for name, kind in FRAME.items()])
         pixels, flags = [], []
@@ -217,7 +254,7 @@ class CudaTrainer:
             rows, columns = -(-h // TILE), -(-w // TILE)
             shown = np.zeros((rows * TILE, columns * TILE), bool)
             shown[:h, :w] = np.ascontiguousarray(shot.pixels).view(np.uint32)[..., 0] != 0
-            frames[i] = (at, tiles, w, h, *shot.camera.focal, *shot.camera.center, self.body.rest_of[t], t, 0)
+            frames[i] = (at, tiles, w, h, *shot.camera.focal, *shot.camera.center, self.body.rest_of[t], t, *shot.corner, 0)
             pixels.append(shot.pixels.reshape(-1))
             flags.append(shown.reshape(rows, TILE, columns, TILE).any((1, 3)).reshape(-1))
             at, tiles = at + h * w, tiles + rows * columns

@@ -248,6 +248,7 @@ extern "C" __global__ void __launch_bounds__(512) joint_step(Scene s) {
             if (s.near_flag[b * s.max_tiles + t]) loss += s.tile_loss[b * s.max_tiles + t];
         loss = sum_block(loss, scratch);
         if (s.dice_weight > 0) loss += s.dice[3 * b + 2];
+        if (b == 0 && now.plan.centre >= 0) loss += s.perceptual * *s.window_value;
         if (tid == 0) s.losses[state.step * s.batch + b] = loss;
         if (s.gain_part) gain_step(s, b, scratch);
     } else {

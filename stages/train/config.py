@@ -9,9 +9,9 @@ from gsac.stages.contract import BadInput
 
 RECIPES = ("fast", "paper")
 AUTO = "auto"
-"""`gaussians` that the ladder of sizes chooses; `device` that the engine chooses."""
+"""`gaussians` that the ladder of sizes chooses; `device` that the engine chooses; `lpips` as the recipe has it."""
 DEVICES = (AUTO, "cpu", "cuda")
-LPIPS = ("none", "judge", "loss")
+LPIPS = (AUTO, "none", "judge", "loss")
 NETWORKS = ("lpips-vgg", "lpips-alex")
 
 
@@ -76,8 +76,8 @@ class TrainConfig:
     flip: bool = False
     """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
-    lpips: str = "loss"
-    """Of weights that `gsac models add` brought: none, judge: measured, or loss: also in recipe paper's loss (cpu; hours)."""
+    lpips: str = AUTO
+    """Weights that `gsac models add` brought: none, judge, loss (cpu: paper alone, hours), or auto: paper loss, fast judge."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
@@ -86,6 +86,10 @@ class TrainConfig:
     def wishes(self) -> tuple[str, ...]:
         """Names of the model files that are used where they are here."""
         return () if self.lpips == "none" else NETWORKS
+
+    def in_loss(self) -> bool:
+        """Whether LPIPS is to take part in the loss."""
+        return self.lpips == "loss" or self.lpips == AUTO and self.recipe == "paper"
 
     def check(self) -> None:
         if self.recipe not in RECIPES:

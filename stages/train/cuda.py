@@ -17,8 +17,9 @@ from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
 from gsac.avatar.cuda.trainer import BodyArrays, CudaTrainer, Shot
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.lpips import Lpips
 from gsac.stages.contract import StageError
-from gsac.stages.train import bundle, corrections, fast, ladder, offsets
+from gsac.stages.train import bundle, corrections, fast, ladder, offsets, paper
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.evaluate import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.guard import finite, values
@@ -30,12 +31,16 @@ STEPS = 3200
 """More than twice the CPU's: 0.4 s more for 0.3 dB."""
 
 
+PERCEPTUAL_STEPS = 200
+"""The last, of a training or a refit, that have LPIPS of a window where it is in the loss: 1.6 ms each, all others 0.2."""
+
+
 def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[int, View]]:
     """As `fast.train`. Raises StageError where the GPU fails, or naming the step and the quantity that is not finite."""
     fine, coarse = fast.crops(task)
     gaussians = fast.start(task, coarse, count)
-    recipe = recipe_of(task.config, count)
-    with training(task.poses, task.trained, [coarse, fine], gaussians, recipe) as trainer:
+    recipe = recipe_of(task.config, count, **of_windows(task))
+    with training(task.poses, task.trained, [coarse, fine], gaussians, recipe, network=task.lpips) as trainer:
         if task.config.pose_rounds:
             correct_midway(trainer, task, coarse)
         follow(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
@@ -65,8 +70,10 @@ def refit(task: Task, fewer: fast.Trainer, views: dict[int, View]) -> fast.Train
     """As `ladder.refit`."""
     gaussians = fewer.gaussians()
     recipe = recipe_of(task.config, len(gaussians), steps=ladder.refit_steps(task), begin=ladder.REFIT_FROM, coarse_share=0.0,
-                       pose_rate=0.0, offset_rate=0.0)
-    with training(task.poses, task.trained, [views], gaussians, recipe) as trainer:
+                       pose_rate=0.0, offset_rate=0.0, **of_windows(task))
+    first = int(task.trained[0])
+    whole = views[first].camera.focal == task.views[first].camera.focal  # the smaller images of coarser levels have no windows
+    with training(task.poses, task.trained, [views], gaussians, recipe, network=task.lpips if whole else None) as trainer:
         trainer.replace(gaussians, ~fewer.seen, fewer.reach)
         trainer.train(recipe.steps)
         kept = settled(trainer, task)
@@ -111,6 +118,12 @@ def recipe_of(config: TrainConfig, count: int, kind: type[Recipe] = Recipe, **mo
     return kind.of(config, **(given | more))
 
 
+def of_windows(task: Task) -> dict:
+    """What a recipe says of LPIPS of windows, for `recipe_of`."""
+    camera = task.views[0].camera
+    return {"perceptual": paper.LPIPS, "perceptual_steps": PERCEPTUAL_STEPS, "frame_size": (camera.width, camera.height)}
+
+
 def settled(trainer: CudaTrainer, task: Task) -> fast.Trainer:
     """A CPU trainer with the gaussians and gains as they stand on the GPU."""
     gaussians = trainer.gaussians()
@@ -123,13 +136,13 @@ def settled(trainer: CudaTrainer, task: Task) -> fast.Trainer:
 
 @contextmanager
 def training(poses: Poses, frames: np.ndarray, levels: list[dict[int, View]], gaussians: Gaussians, recipe: Recipe,
-             kind: type[CudaTrainer] = CudaTrainer) -> Iterator[CudaTrainer]:
-    """A trainer over the frames (indices), closed at the end. levels: frame -> view, coarse first."""
+             kind: type[CudaTrainer] = CudaTrainer, network: Lpips | None = None) -> Iterator[CudaTrainer]:
+    """A trainer over the frames (indices), closed at the end. levels: frame -> view, coarse first; network: for the loss."""
     trainer = None
     try:
-        shots = [[Shot(views[int(t)].pixels, views[int(t)].camera) for t in frames] for views in levels]
+        shots = [[Shot(view.pixels, view.camera, view.corner) for view in (views[int(t)] for t in frames)] for views in levels]
         trainer = kind(body_arrays(poses, frames, recipe.beta_rate > 0), shots, poses.pose[frames], poses.transl[frames], gaussians,
-                       recipe)
+                       recipe, network=network)
         yield trainer
     except (DeviceError, CompileError) as error:
         raise StageError(f"train on the GPU: {error}; or set train.device to cpu") from error

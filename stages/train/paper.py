@@ -15,7 +15,6 @@ import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import face_frames
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.lpips import LEAST_SIDE
 from gsac.avatar.raster import render_bound, render_bound_backward, screen_gradients
 from gsac.avatar.workspace import Workspace
 from gsac.stages.train.checkpoint import standing
@@ -60,7 +59,7 @@ def fit(task: Task) -> Fit:
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
         task.keep(step + 1, steps, partial(standing, step + 1, order, rng, trainer))
         task.progress(step + 1, steps, "steps")
-    return Fit(trainer.gaussians(), np.ones(len(trainer.face), bool), figures={"lpips_in_loss": trainer.lpips is not None})
+    return Fit(trainer.gaussians(), np.ones(len(trainer.face), bool))
 
 
 class Trainer:
@@ -77,7 +76,7 @@ class Trainer:
         self.first = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.second = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.frame_size = task.views[0].camera.width, task.views[0].camera.height
-        self.lpips = task.lpips if min(self.frame_size) >= LEAST_SIDE else None
+        self.lpips = task.lpips
         self.densifier = Densifier(count)
         self.neighbours = Neighbours()
         self.workspace, self.losses = Workspace(), Workspace()

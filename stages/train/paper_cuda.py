@@ -6,7 +6,7 @@ import numpy as np
 from gsac.avatar.cuda.paper import PaperRecipe, PaperTrainer
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train import paper
-from gsac.stages.train.cuda import follow, hand_back, training
+from gsac.stages.train.cuda import PERCEPTUAL_STEPS, follow, hand_back, training
 from gsac.stages.train.densify import LARGEST, Densifier, due
 from gsac.stages.train.neighbours import RENEW
 from gsac.stages.train.poses import HAND_SHARE
@@ -20,7 +20,7 @@ def fit(task: Task) -> Fit:
     gaussians = start(len(task.poses.body.faces), rng)
     densifier = Densifier(len(gaussians))
     views = {int(t): person_crop(task.views[t]) for t in task.trained}
-    with training(task.poses, task.trained, [views], gaussians, recipe, PaperTrainer) as trainer:
+    with training(task.poses, task.trained, [views], gaussians, recipe, PaperTrainer, task.lpips) as trainer:
         for event in filter(due, range(recipe.steps)):
             follow(trainer, task, event + 1)
             densifier.length, densifier.hits = trainer.pulls()
@@ -28,7 +28,7 @@ def fit(task: Task) -> Fit:
         follow(trainer, task, recipe.steps)
         hand_back(trainer, task)
         gaussians = trainer.gaussians()
-    return Fit(gaussians, np.ones(len(gaussians), bool), figures={"lpips_in_loss": False})
+    return Fit(gaussians, np.ones(len(gaussians), bool))
 
 
 def recipe_of(task: Task) -> PaperRecipe:
@@ -38,7 +38,7 @@ def recipe_of(task: Task) -> PaperRecipe:
         mu_rate=paper.MU_RATE, mu_decay=paper.MU_DECAY, rgb_rate=paper.RATES["rgb"], quat_rate=paper.RATES["quat"],
         scale_rate=paper.RATES["scale"], pose_rate=paper.POSE_RATE, beta_rate=paper.POSE_RATE, hand_share=HAND_SHARE,
         ssim=paper.SSIM, edges=paper.SOBEL, dice=paper.DICE, knn=paper.KNN, scale_limit=LARGEST,
-        frame_size=(camera.width, camera.height), renew=RENEW)
+        frame_size=(camera.width, camera.height), renew=RENEW, perceptual=paper.LPIPS, perceptual_steps=PERCEPTUAL_STEPS)
 
 
 def start(count: int, rng: np.random.Generator) -> Gaussians:

@@ -11,16 +11,17 @@ from gsac.avatar import rotation
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import BodyParams
-from gsac.avatar.cuda import why_not
+from gsac.avatar.camera import Camera
+from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
-from gsac.avatar.lpips import Lpips
+from gsac.avatar.lpips import LEAST_SIDE, Lpips
 from gsac.avatar.metrics import figures, summary
 from gsac.avatar.turn import turn_seen
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
-from gsac.stages.train.config import AUTO
+from gsac.stages.train.config import AUTO, NETWORKS
 from gsac.stages.train.evaluate import judge, turned
 from gsac.stages.train.guard import finite, result, values
 from gsac.stages.train.holdout import spaced_in_yaw, to_choose_by
@@ -78,8 +79,8 @@ def run(job: Job) -> None:
     if turn < LEAST_TURN:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
-    if config.recipe == "paper" and config.lpips == "loss" and job.device == "cuda" and "lpips-vgg" in job.models:
-        job.warn("LPIPS takes no part in the loss on cuda; set train.device to cpu where it must (hours).")
+    if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config.recipe, job.device, views[0].camera)):
+        job.warn(f"LPIPS takes no part in the loss: {why}.")
 
     run = Run(job, Poses(body, params), views, trained, held, choosing)
     run.fit()
@@ -98,6 +99,15 @@ def warm(device: str) -> None:
         Device()
     else:
         rehearse()
+
+
+def without_lpips(recipe: str, device: str, camera: Camera) -> str | None:
+    """Why LPIPS cannot be in the loss of a recipe, or None. camera: of the frames."""
+    if min(camera.width, camera.height) < LEAST_SIDE:
+        return f"frames of fewer than {LEAST_SIDE} px are too small for it"
+    if device == "cuda":
+        return perceptual.why_not()
+    return None if recipe == "paper" else "on the CPU recipe paper alone has it there"
 
 
 def check_device(device: str) -> None:
@@ -129,11 +139,13 @@ class Run:
         self.checkpoints = Checkpoints(job.scratch, job.warn)
         self.resumed_at: int | None = None
         self.lpips = {name: Lpips.read(name, job.models[name]) for name in job.config.wishes() if name in job.models}
+        in_loss = job.config.in_loss() and not without_lpips(job.config.recipe, job.device, views[0].camera)
+        self.in_loss = self.lpips.get(NETWORKS[0]) if in_loss else None
 
     def fit(self) -> None:
         self.began = now()
         task = Task(self.views, self.trained, self.choosing, self.poses, self.job.config, self.job.progress, self.checkpoint,
-                    self.marks, self.keep, lpips=self.lpips.get("lpips-vgg") if self.job.config.lpips == "loss" else None)
+                    self.marks, self.keep, lpips=self.in_loss)
         state = self.checkpoints.read()
         if state is not None:
             self.restore(state)
@@ -228,7 +240,7 @@ class Run:
             "heldout": [{"frame": t, **figures(row), **{f"{name}_ttpo": value for name, value in figures(other).items()}}
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
-            "resumed_at_step": self.resumed_at,
+            "resumed_at_step": self.resumed_at, "lpips_in_loss": self.in_loss is not None,
             "levels": judged(gaussians, self.result.coarser, poses, held, self.views),
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),

@@ -39,7 +39,7 @@ class Task:
     resumed: State | None = None
     """What the recipe gave to `keep` in a run that was stopped; the poses are as they were then."""
     lpips: Lpips | None = None
-    """The network that recipe paper judges by (VGG), where the user has brought it."""
+    """The network that takes part in the loss (VGG), where it is wished for and the user has brought it."""
     gpu_seconds: float = 0.0
     """On the GPU before the steps: the rounds that move the poses."""
 

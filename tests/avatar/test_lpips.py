@@ -175,3 +175,16 @@ def test_files_that_are_no_weights_are_refused_and_their_code_is_not_run(tmp_pat
         with pytest.raises(WeightsError, match=file):
             read_weights(tmp_path / file)
     assert "code of a file" not in capsys.readouterr().out
+
+
+def test_a_network_in_another_precision_says_nearly_the_same_and_its_slope_points_the_same_way():
+    """Rounding puts features near zero on the other side of ReLU, so slopes differ by far more than values do."""
+    scorer = Lpips("lpips-alex", weights("lpips-alex"))
+    image, target = np.float32(images(96, 80))
+    value, slope = scorer.gradient(image, target, scaled=False)
+    for precision, near, along in ((torch.float32, 1e-5, 0.9999), (torch.bfloat16, 0.02, 0.8)):
+        moved = torch.from_numpy(image).requires_grad_()
+        found = scorer.on("cpu", precision).compared(moved, torch.from_numpy(target))
+        got = torch.autograd.grad(found, moved)[0].numpy()
+        assert found.dtype == torch.float32 and found.item() == pytest.approx(value, rel=near)
+        assert (got * slope).sum() > along * np.linalg.norm(got) * np.linalg.norm(slope)

@@ -169,6 +169,10 @@ double dice_all(int n, const double *alpha, const double *mask, double outside, 
     return found.value;
 }
 
+void window_all(int n, const double *centre, int size, int whole, int *out) {
+    for (int i = 0; i < n; ++i) out[i] = window_begin(centre[i], size, whole);
+}
+
 void adam_dense(int n, double *value, const double *grad, double *first, double *second, int steps, double rate) {
     double begun = rate / (1 - pow(0.9, steps)), unbias = 1 / (1 - pow(0.999, steps));
     for (int i = 0; i < n; ++i) adam_value(value[i], grad[i], first[i], second[i], begun, unbias);

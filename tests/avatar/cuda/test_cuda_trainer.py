@@ -66,7 +66,8 @@ def test_the_plan_draws_what_the_cpu_recipe_draws():
 def test_a_recipe_that_is_told_nothing_learns_nothing_counts_nothing_and_limits_nothing():
     plain = Recipe(steps=3)
     drawn = draw(plain, 2, 1)
-    assert not any(drawn.rates[name].any() for name in drawn.rates.dtype.names)
+    assert (drawn.rates["centre"] == -1).all()
+    assert not any(drawn.rates[name].any() for name in drawn.rates.dtype.names if name != "centre")
     assert (plain.ssim, plain.sobel, plain.mask, plain.pose_pull) == (0, 0, 0, 0)
     assert np.isinf([plain.needle, plain.largest, plain.reach]).all()
 

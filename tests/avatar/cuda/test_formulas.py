@@ -13,7 +13,7 @@ from gsac.avatar.raster import render, render_backward
 from gsac.stages.train import kernels
 from gsac.stages.train.densify import LARGEST
 from gsac.stages.train.neighbours import K, Neighbours
-from gsac.stages.train.paper_losses import dice, sobel_magnitude
+from gsac.stages.train.paper_losses import WINDOW, dice, perceptual, sobel_magnitude
 
 HERE = Path(__file__).parent
 SOURCES = Path(binding.__file__).parent / "cuda"
@@ -179,3 +179,23 @@ def test_adam_of_recipe_paper_is_that_of_the_cpu_path(host):
     kernels.adam(*theirs, 9, 5e-3)
     for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12)
+
+
+def test_the_window_that_lpips_sees_is_that_of_the_cpu_path(host):
+    """Each pixel of the image holds its place, so that a network that returns what it is given tells where the window begins."""
+    seen = []
+
+    class Network:
+        def gradient(self, image, target, scaled):
+            seen.append(image[0, 0])
+            return 0.0, np.zeros_like(image)
+
+    width, height = 500, 411
+    places = np.stack([*np.meshgrid(np.arange(width), np.arange(height)), np.zeros((height, width))], 2).astype(np.float32)
+    centres = np.random.default_rng(3).uniform(-100, 500, (40, 2))
+    for centre in centres:
+        perceptual(Network(), places, places, np.zeros(3), np.zeros(2, int), (width, height), centre, 1.0, np.zeros_like(places))
+    for axis, whole in enumerate((width, height)):
+        got = np.full(40, -1, np.int32)
+        host("window_all", 40, np.ascontiguousarray(centres[:, axis]), WINDOW, whole, got)
+        assert len(set(got)) > 5 and got.tolist() == [int(place[axis]) for place in seen]

@@ -39,3 +39,19 @@ def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
     shared = {f.name for f in fields(TrainConfig)} & {f.name for f in fields(made)}
     config = TrainConfig(steps=9)
     assert {n: getattr(recipe_of(config, 12000), n) for n in shared} == {n: getattr(config, n) for n in shared}
+
+
+def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_able(monkeypatch):
+    from gsac.avatar.camera import Camera
+    from gsac.avatar.cuda import perceptual
+    from gsac.stages.train.stage import without_lpips
+
+    told = {(recipe, lpips): TrainConfig(recipe=recipe, lpips=lpips).in_loss()
+            for recipe in config.RECIPES for lpips in config.LPIPS}
+    assert {wish for wish, it_is in told.items() if it_is} == {("paper", "auto"), ("paper", "loss"), ("fast", "loss")}
+    frames, small = Camera((500, 500), (150, 200), 300, 400), Camera((50, 50), (31, 40), 63, 80)
+    assert without_lpips("paper", "cpu", frames) is None and "recipe paper" in without_lpips("fast", "cpu", frames)
+    assert "64 px" in without_lpips("paper", "cpu", small)
+    for why in (None, "torch cannot use the GPU"):
+        monkeypatch.setattr(perceptual, "why_not", lambda why=why: why)
+        assert without_lpips("fast", "cuda", frames) is why and without_lpips("paper", "cuda", frames) is why

@@ -1,0 +1,59 @@
+"""LPIPS of a window of the image, in the loss of late steps: the value and its slope by torch's convolutions, recorded once.
+
+The kernel `cut_window` fills `Window.images`, `image_gradient` adds `Window.slope`; nothing waits for the host in between.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+from gsac.avatar.cuda.device import Device
+from gsac.avatar.lpips import Lpips
+
+SIDE = 256
+"""px, at most; a smaller frame is taken whole."""
+WARM = 3
+"""Runs before the recording: libraries choose and load their kernels."""
+
+
+@cache
+def why_not() -> str | None:
+    """None where torch can use the GPU, else what is missing and what to do."""
+    import torch
+
+    if torch.cuda.is_available():
+        return None
+    return f"the torch {torch.__version__} that is installed cannot use the GPU; install a build for CUDA from pytorch.org"
+
+
+class Window:
+    """images (2, height, width, 3), render and target in 0..1; value () and its slope (height, width, 3) by the render."""
+
+    def __init__(self, device: Device, network: Lpips, width: int, height: int, precision: str = "bfloat16"):
+        """precision: of the convolutions, by torch's name."""
+        import torch
+
+        self._torch, self.network = torch, network.on("cuda", getattr(torch, precision))
+        self.images = torch.zeros((2, height, width, 3), device="cuda")
+        self.slope, self.value = torch.zeros((height, width, 3), device="cuda"), torch.zeros((), device="cuda")
+        self.stream = torch.cuda.ExternalStream(int(device.stream))
+        self._graph = torch.cuda.CUDAGraph()
+        # deterministic: one seed gives one avatar
+        with torch.backends.cudnn.flags(enabled=True, benchmark=False, deterministic=True, allow_tf32=False):
+            with torch.cuda.stream(torch.cuda.Stream()):
+                for _ in range(WARM):
+                    self._compute()
+            torch.cuda.synchronize()
+            with torch.cuda.graph(self._graph):
+                self._compute()
+
+    def launch(self) -> None:
+        """Puts the work into the device's stream."""
+        with self._torch.cuda.stream(self.stream):
+            self._graph.replay()
+
+    def _compute(self) -> None:
+        image = self.images[0].detach().requires_grad_()
+        value = self.network.compared(image, self.images[1])
+        self.slope.copy_(self._torch.autograd.grad(value, image)[0])
+        self.value.copy_(value.detach())
