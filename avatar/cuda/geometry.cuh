@@ -27,6 +27,15 @@ FORMULA int reserve(int *counter, int n) {
 
 FORMULA Vec<float> vec(const float *p) { return {p[0], p[1], p[2]}; }
 
+// What the learned expression of a frame does to a vertex at rest.
+FORMULA Vec<float> expressed(const Scene &s, int pose, int v) {
+    Vec<float> sum = {0, 0, 0};
+    const double *value = s.expression + size_t(pose) * s.expression_count;
+    for (int k = 0; k < s.expression_count; ++k)
+        sum = sum + vec(s.expression_dirs + 3 * (size_t(k) * s.vertex_count + v)) * float(value[k]);
+    return sum;
+}
+
 // (blocks of vertices, batch). Every block walks the joint chain itself: cheaper than a kernel of its own.
 extern "C" __global__ void __launch_bounds__(256) skin(Scene s) {
     __shared__ float local[55][9], transform[55][12];
@@ -84,6 +93,13 @@ extern "C" __global__ void __launch_bounds__(256) skin(Scene s) {
     int v = blockIdx.x * 256 + tid;
     if (v >= s.vertex_count) return;
     Vec<float> rest = vec(s.rest + 3 * (size_t(frame.rest) * s.vertex_count + v)) + vec(s.offset + 3 * v), out = {0, 0, 0};
+    if (s.expression) {
+        rest = rest + expressed(s, frame.pose, v);
+        float *worn = s.worn + 3 * (size_t(b) * s.vertex_count + v);
+        worn[0] = rest.x;
+        worn[1] = rest.y;
+        worn[2] = rest.z;
+    }
     const double *transl = s.pose + (frame.pose * 56 + 55) * 3;
     for (int k = 0; k < 4; ++k) {
         float w = s.skin_weight[4 * v + k];

@@ -12,8 +12,8 @@ from gsac.avatar.cuda.scene import declarations
 SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "perceptual.cuh", "update.cuh",
            "offsets.cuh", "shape.cuh", "paper.cuh")
 KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "cut_window", "image_gradient", "blend_backward",
-           "gaussian_step", "gather", "joint_step", "offset_step", "shape_gradient", "shape_step", "dice", "neighbourhood",
-           "nearest", "paper_step")
+           "gaussian_step", "gather", "joint_step", "offset_step", "shape_gradient", "shape_step", "expression_step",
+           "place_joints", "dice", "neighbourhood", "nearest", "paper_step")
 OPTIONS = ("--std=c++17", "--extra-device-vectorization")
 
 

@@ -49,6 +49,14 @@ class Recipe:
     """Steps whose gradients are gathered for one of the displacement."""
     beta_rate: float = 0.0
     """Adam rate of the betas, which all frames share."""
+    expression_rate: float = 0.0
+    """Adam rate of each frame's expression, falls to a hundredth; as the poses' it is pulled, to none."""
+    expression_unit: float = 1.0
+    """Coefficient in which an expression's size is measured."""
+    joint_rate: float = 0.0
+    """m, Adam rate of the joints at rest, which all frames share, likewise."""
+    joint_unit: float = 1.0
+    """m."""
     gain_rate: float = 0.0
     """Step of each frame's gain per colour channel at the start, falls to a tenth."""
     smoothness: float = 0.0
@@ -106,6 +114,8 @@ def rates_of(recipe: Recipe, done: np.ndarray, levels: int = 1) -> np.ndarray:
     rates = no_rates(len(done))
     rates["level"] = np.where(done < recipe.coarse_share, 0, levels - 1)
     for name, rate, end in (("mu", recipe.mu_rate, 0.01), ("quat", recipe.quat_rate, 0.1), ("log_scale", recipe.scale_rate, 0.1),
+                            ("expression", recipe.expression_rate, 0.01),
+                            ("joints", recipe.joint_rate, 0.01),
                             ("rgb", recipe.rgb_rate, 0.1), ("opacity", recipe.opacity_rate, 0.1), ("pose", recipe.pose_rate, 0.01),
                             ("place_pull", recipe.place_pull if recipe.mu_rate else 0.0, 0.01)):
         rates[name] = rate * end**done

@@ -14,7 +14,7 @@ FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT,
 left, top: px, its corner in the whole frame."""
 
 PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
-        "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT, "centre": INT}
+        "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT, "expression": FLOAT, "joints": FLOAT, "centre": INT}
 """Of one step: size of the images, Adam rates, the share of its way that a gaussian is pulled back, m of an offset's step, the
 vertex in the middle of the window that LPIPS sees (-1: no LPIPS)."""
 
@@ -42,6 +42,8 @@ POINTERS = {
     "gathered": "float", "offset_first": "float", "offset_second": "float", "solve_step": "float", "series": "float",
     "shape": "float", "joint_shape": "float", "betas": "double", "beta_first": "double", "beta_second": "double",
     "beta_part": "float", "beta_move": "float", "grad_joints": "float",
+    "expression_dirs": "float", "expression": "double", "expression_first": "double", "expression_second": "double",
+    "worn": "float", "joint_offset": "double", "joint_first": "double", "joint_second": "double", "joint_share": "double",
     "gain": "float", "gain_part": "float", "overlap": "float", "dice": "float",
     "nearest_gaussian": "int", "near_of_start": "int", "near_of": "int",
     "rest_frame": "float", "place": "float", "hood": "float", "pulled": "float", "hits": "int",
@@ -54,9 +56,9 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
            "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
            "area": FLOAT, "half_width": FLOAT, "half_height": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT,
            "scale_limit": FLOAT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
-           "perceptual": FLOAT}
-"""area: pixels that a frame's losses are a mean over, 0: its own; it and the next seven are recipe `paper`'s (paper.cuh); the last
-five are LPIPS' (perceptual.cuh)."""
+           "perceptual": FLOAT, "expression_count": INT, "expression_unit": FLOAT, "joint_unit": FLOAT}
+"""area: pixels that a frame's losses are a mean over, 0: its own; it and the next seven are recipe `paper`'s (paper.cuh); the next
+five are LPIPS' (perceptual.cuh), the last three of what else of the body is learned (shape.cuh)."""
 
 
 def _struct(name: str, fields: dict) -> type[ctypes.Structure]:

@@ -1,4 +1,5 @@
-// The body's shape (betas), which all frames share: gradient by its directions, Adam, and the body moved on.
+// What else of the body is learned. Its shape (betas) and its joints at rest, which all frames share, and each frame's expression:
+// gradient by its directions, Adam, and the body moved on.
 
 // (blocks of vertices), after the step's pose update. The last block takes the step.
 extern "C" __global__ void __launch_bounds__(256) shape_gradient(Scene s) {
@@ -52,4 +53,34 @@ extern "C" __global__ void __launch_bounds__(256) shape_step(Scene s) {
     }
     if (blockIdx.x == 0 && threadIdx.x < 165)
         for (int k = 0; k < s.beta_count; ++k) s.joints[threadIdx.x] += s.joint_shape[k * 165 + threadIdx.x] * s.beta_move[k];
+}
+
+// (expressions, batch), after the step's pose update: one coefficient of one frame.
+extern "C" __global__ void __launch_bounds__(256) expression_step(Scene s) {
+    __shared__ float scratch[8];
+    if (halted(s)) return;
+    const Now &now = s.now[blockIdx.y];
+    const float *grad = s.grad_rest + 3 * size_t(blockIdx.y) * s.vertex_count;
+    const float *way = s.expression_dirs + 3 * size_t(blockIdx.x) * s.vertex_count;
+    float sum = 0;
+    for (int v = threadIdx.x; v < s.vertex_count; v += 256) sum += dot(vec(grad + 3 * v), vec(way + 3 * v));
+    sum = sum_block(sum, scratch);
+    if (threadIdx.x > 0) return;
+    size_t at = size_t(now.frame.pose) * s.expression_count + blockIdx.x;
+    adam_pulled(s.expression[at], double(sum), s.expression_first[at], s.expression_second[at], s.pose_steps[now.frame.pose],
+                double(now.plan.expression), double(s.pose_pull), double(s.expression_unit));
+}
+
+// One block, after the step's pose update: the joints at rest.
+extern "C" __global__ void __launch_bounds__(192) place_joints(Scene s) {
+    if (halted(s)) return;
+    int i = threadIdx.x;
+    if (i >= 165) return;
+    double sum = 0;
+    for (int b = 0; b < s.batch; ++b) sum += s.grad_joints[b * 165 + i];
+    double before = s.joint_offset[i], value = before;
+    adam_pulled(value, sum / s.batch, s.joint_first[i], s.joint_second[i], s.state->step,
+                s.joint_share[i / 3] * s.now[0].plan.joints, double(s.pose_pull), double(s.joint_unit));
+    s.joint_offset[i] = value;
+    s.joints[i] += float(value - before);
 }

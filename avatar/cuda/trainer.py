@@ -42,6 +42,8 @@ class BodyArrays(NamedTuple):
     """(V, 3, B) m by beta, where betas are learned."""
     joint_shape: np.ndarray | None = None
     """(55, 3, B), likewise of the joints."""
+    expression: np.ndarray | None = None
+    """(V, 3, E) m by coefficient, where expressions are learned."""
 
 
 class Shot(NamedTuple):
@@ -153,12 +155,21 @@ class CudaTrainer:
         both = np.concatenate([pose, transl[:, None]], 1)
         for name in ("pose", "fit"):
             self.buffers[name].write(both)
-        for name in ("pose_first", "pose_second", "pose_steps"):
-            self.buffers[name].fill(0)
+        for name in ("pose_first", "pose_second", "pose_steps", "expression_first", "expression_second"):
+            if name in self.buffers:
+                self.buffers[name].fill(0)
 
     def betas(self) -> np.ndarray:
         """(B,) float64, what has been learned on top of the body's betas; empty where none are learned."""
         return self.buffers["betas"].read() if self.recipe.beta_rate else np.zeros(0)
+
+    def expressions(self) -> np.ndarray:
+        """(T, E) float64, what has been learned on top of what the frames wear."""
+        return self.buffers["expression"].read()
+
+    def joint_offset(self) -> np.ndarray:
+        """(55, 3) float64 m, what has been learned on top of the joints at rest."""
+        return self.buffers["joint_offset"].read()
 
     def gains(self) -> np.ndarray:
         """(T, 3) of the frames' colour channels; 1 where none are learned."""
@@ -227,7 +238,8 @@ class CudaTrainer:
         scene.vertex_count = self.body.rest.shape[1]
         scene.max_pixels = max(h * w for h, w in sizes)
         scene.max_tiles = max(-(-h // TILE) * -(-w // TILE) for h, w in sizes)
-        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach", "offset_every"):
+        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach", "offset_every",
+                     "expression_unit", "joint_unit"):
             setattr(scene, name, getattr(recipe, name))
 
     def _open_window(self, network: Lpips) -> None:
@@ -298,6 +310,17 @@ class CudaTrainer:
         self._upload("gain", np.ones((self.frames, 3)), np.float32)
         if self.recipe.beta_rate:
             self._upload_shape()
+        if self.recipe.expression_rate:
+            directions = np.moveaxis(self.body.expression, 2, 0)
+            self.scene.expression_count = len(directions)
+            self._upload("expression_dirs", directions, np.float32)
+            for name in ("expression", "expression_first", "expression_second"):
+                self._empty(name, (self.frames, len(directions)), np.float64).fill(0)
+        if self.recipe.joint_rate:
+            share[0] = 0  # the pelvis is where the translation puts it
+            self._upload("joint_share", share, np.float64)
+            for name in ("joint_offset", "joint_first", "joint_second"):
+                self._empty(name, (JOINTS, 3), np.float64).fill(0)
 
     def _upload_shape(self) -> None:
         """Directions of the betas, one after the other."""
@@ -349,11 +372,17 @@ class CudaTrainer:
         self._empty("near_flag", tiles, np.uint8)
         self._empty("now", batch * NOW, np.uint8)
         self.scratch = [*shapes, *integers, "box", "near_flag", "now"]
+        more = {}
         if self.recipe.beta_rate:
             betas = self.scene.beta_count
-            for name, shape in (("grad_joints", (batch, JOINTS, 3)), ("beta_part", (-(-v // 256), betas)), ("beta_move", betas)):
-                self._empty(name, shape, np.float32)
-                self.scratch.append(name)
+            more |= {"grad_joints": (batch, JOINTS, 3), "beta_part": (-(-v // 256), betas), "beta_move": betas}
+        if self.recipe.joint_rate:
+            more["grad_joints"] = (batch, JOINTS, 3)
+        if self.recipe.expression_rate:
+            more["worn"] = (batch, v, 3)
+        for name, shape in more.items():
+            self._empty(name, shape, np.float32)
+            self.scratch.append(name)
         if self.recipe.gain_rate:
             self._empty("gain_part", (tiles, 3), np.float32)
             self.scratch.append("gain_part")
@@ -369,6 +398,10 @@ class CudaTrainer:
             self.grids["offset_step"] = ((-(-v // 256), 1), 256)
         if self.recipe.beta_rate:
             self.grids |= {"shape_gradient": ((-(-v // 256), 1), 256), "shape_step": ((-(-v // 256), 1), 256)}
+        if self.recipe.expression_rate:
+            self.grids["expression_step"] = ((self.scene.expression_count, batch), 256)
+        if self.recipe.joint_rate:
+            self.grids["place_joints"] = ((1, 1), 192)
 
     def _lists(self, room: int) -> None:
         """Room for so many (tile, gaussian) pairs of a batch, and for what hangs on them."""

@@ -128,7 +128,7 @@ extern "C" __global__ void __launch_bounds__(128) gather(Scene s) {
     to[0] = x;
     to[1] = y;
     to[2] = z;
-    if (s.now[b].plan.offset == 0 && s.beta_count == 0) return;
+    if (s.now[b].plan.offset == 0 && s.beta_count == 0 && !s.expression) return;
     Vec<float> at_rest = {0, 0, 0};
     for (int k = 0; k < 4; ++k) {
         float w = s.skin_weight[4 * v + k];
@@ -179,7 +179,7 @@ FORMULA void pose_step(const Scene &s, int b) {
             for (int e = child_begin; e < child_end; ++e)
                 for (int c = 0; c < 12; ++c) G[c] += up[child[e]][c];
             const float *P = transform[p < 0 ? 0 : p], *L = local[j];
-            if (s.beta_count)
+            if (s.grad_joints)
                 for (int k = 0; k < 3; ++k) {
                     float g = p < 0 ? G[4 * k + 3] : 0;
                     for (int i = 0; i < 3; ++i) g += ((p < 0 ? 0 : P[4 * i + k]) - transform[j][4 * i + k]) * G[4 * i + 3];
@@ -260,7 +260,7 @@ extern "C" __global__ void __launch_bounds__(512) joint_step(Scene s) {
         for (int e = s.joint_start[j] + tid; e < end; e += 512) {
             int v = s.joint_vertex[e];
             float w = s.joint_weight[e];
-            Vec<float> r = vec(rest + 3 * v) + vec(s.offset + 3 * v);
+            Vec<float> r = s.worn ? vec(s.worn + 3 * (size_t(b) * s.vertex_count + v)) : vec(rest + 3 * v) + vec(s.offset + 3 * v);
             for (int i = 0; i < 3; ++i) {
                 float g = w * grad[3 * v + i];
                 sum[4 * i] += g * r.x;

@@ -56,7 +56,7 @@ def fit(task: Task) -> Fit:
     recipe = recipe_of(task.config, len(gaussians))
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]
     poses = task.poses
-    loop = Loop(body_arrays(poses, task.trained, False), poses.pose[task.trained], poses.transl[task.trained], gaussians, recipe)
+    loop = Loop(body_arrays(poses, task.trained, recipe), poses.pose[task.trained], poses.transl[task.trained], gaussians, recipe)
     plan = draw(recipe, len(task.trained), 2)
     backgrounds, seconds, done = tensor(plan.background[:, 0]), 0.0, 0
     begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))

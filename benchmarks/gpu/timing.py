@@ -153,4 +153,5 @@ def least_bytes(trainer: CudaTrainer) -> dict[str, float]:
         "joint_step": batch * v * 24 + v * 32,
         "dice": batch * s.max_tiles + state.near * 12, "neighbourhood": n * (52 + 12 + 12 + 16 + 12 + 12 + 12 + 80),
         "paper_step": slopes + n * (12 + 80 + 12 + 16 + 52 + 4 * 13 * 6),
-        "shape_gradient": batch * v * 12 + s.beta_count * v * 12, "shape_step": s.beta_count * v * 12 + v * 24}
+        "shape_gradient": batch * v * 12 + s.beta_count * v * 12, "shape_step": s.beta_count * v * 12 + v * 24,
+        "expression_step": s.expression_count * v * 12 + batch * v * 12, "place_joints": batch * 660}

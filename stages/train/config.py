@@ -53,6 +53,10 @@ class TrainConfig:
     """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; hands a tenth of it."""
     pose_pull: float = 1e-4
     """Weight of the squared distance of a refined pose from the one it starts with, in units of 0.05 rad and 2 cm."""
+    expression_rate: float = 0.0
+    """Adam rate of each frame's expression (fast), falls to a hundredth; pulled to the fit's as poses are, in units of 0.3."""
+    joint_rate: float = 0.0
+    """Adam rate of the joints' places at rest, m (fast), which all frames share, likewise; in units of 1 cm."""
     light: bool = True
     """Whether the clip's light, which stays while the person turns, is told apart from the colours (fast)."""
     exposure: bool = False
@@ -110,7 +114,8 @@ class TrainConfig:
                 raise BadInput(f"train.{name} is {getattr(self, name)}; it must be at least {low}")
         if self.holdout == 1:
             raise BadInput("train.holdout is 1: every frame would be held out; use 0 for none, or 2 and more")
-        for name in ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "pose_pull", "ssim",
+        for name in ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "expression_rate",
+                     "joint_rate", "pose_pull", "ssim",
                      "sobel", "mask", "largest", "reach", "place_pull"):
             if not 0 <= getattr(self, name) < 1e3:
                 raise BadInput(f"train.{name} is {getattr(self, name)}; it must be 0 or more")

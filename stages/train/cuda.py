@@ -23,7 +23,7 @@ from gsac.stages.train import bundle, corrections, fast, ladder, offsets, paper
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.evaluate import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.guard import finite, values
-from gsac.stages.train.poses import HAND_SHARE, SHIFT, TURN, Poses
+from gsac.stages.train.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, TURN, Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
 
@@ -31,6 +31,7 @@ STEPS = 3200
 """More than twice the CPU's: 0.4 s more for 0.3 dB."""
 
 
+POSES_STAY = {"pose_rate": 0.0, "expression_rate": 0.0, "joint_rate": 0.0}
 PERCEPTUAL_STEPS = 200
 """The last, of a training or a refit, that have LPIPS of a window where it is in the loss: 1.6 ms each, all others 0.2."""
 
@@ -70,7 +71,7 @@ def refit(task: Task, fewer: fast.Trainer, views: dict[int, View]) -> fast.Train
     """As `ladder.refit`."""
     gaussians = fewer.gaussians()
     recipe = recipe_of(task.config, len(gaussians), steps=ladder.refit_steps(task), begin=ladder.REFIT_FROM, coarse_share=0.0,
-                       pose_rate=0.0, offset_rate=0.0, **of_windows(task))
+                       offset_rate=0.0, **POSES_STAY, **of_windows(task))
     first = int(task.trained[0])
     whole = views[first].camera.focal == task.views[first].camera.focal  # the smaller images of coarser levels have no windows
     with training(task.poses, task.trained, [views], gaussians, recipe, network=task.lpips if whole else None) as trainer:
@@ -97,7 +98,7 @@ def learning(task: Task, views: dict[int, View], gaussians: Gaussians, plan: lis
     poses, where = task.poses, {int(t): k for k, t in enumerate(task.trained)}
     rounds = [Round(np.array([where[int(t)] for t in one.frames]), one.backgrounds, one.done) for one in plan]
     recipe = recipe_of(task.config, len(gaussians), RoundsRecipe, rounds=rounds, steps=sum(len(one.frames) for one in rounds),
-                       pose_rate=0.0)
+                       **POSES_STAY)
     with training(poses, task.trained, [views], gaussians, recipe, RoundsTrainer) as trainer:
         def learn(one: bundle.Round) -> None:
             trainer.place(poses.pose[task.trained], poses.transl[task.trained])
@@ -114,7 +115,7 @@ def recipe_of(config: TrainConfig, count: int, kind: type[Recipe] = Recipe, **mo
     given = {"steps": steps, "largest": fast.largest(config, count), "coarse_share": fast.coarse_steps(steps) / steps,
              "offset_rate": fast.OFFSET_RATE, "offset_share": fast.OFFSET_SHARE, "offset_every": offsets.EVERY,
              "smoothness": offsets.SMOOTHNESS, "gain_rate": fast.GAIN_RATE if config.exposure else 0.0, "turn_unit": TURN,
-             "shift_unit": SHIFT, "hand_share": HAND_SHARE}
+             "shift_unit": SHIFT, "expression_unit": EXPRESSION, "joint_unit": JOINT, "hand_share": HAND_SHARE}
     return kind.of(config, **(given | more))
 
 
@@ -141,7 +142,7 @@ def training(poses: Poses, frames: np.ndarray, levels: list[dict[int, View]], ga
     trainer = None
     try:
         shots = [[Shot(view.pixels, view.camera, view.corner) for view in (views[int(t)] for t in frames)] for views in levels]
-        trainer = kind(body_arrays(poses, frames, recipe.beta_rate > 0), shots, poses.pose[frames], poses.transl[frames], gaussians,
+        trainer = kind(body_arrays(poses, frames, recipe), shots, poses.pose[frames], poses.transl[frames], gaussians,
                        recipe, network=network)
         yield trainer
     except (DeviceError, CompileError) as error:
@@ -151,8 +152,8 @@ def training(poses: Poses, frames: np.ndarray, levels: list[dict[int, View]], ga
             trainer.close()
 
 
-def body_arrays(poses: Poses, frames: np.ndarray, betas: bool) -> BodyArrays:
-    """The body as the frames wear it, the first frame's rest first; betas: whether they are to be learned."""
+def body_arrays(poses: Poses, frames: np.ndarray, recipe: Recipe) -> BodyArrays:
+    """The body as the frames wear it, the first frame's rest first, with what the recipe learns of it."""
     body, rests, rest_of, known = poses.body, [], [], {}
     for t in frames:
         vertices, joints = poses.rest(int(t))
@@ -162,8 +163,8 @@ def body_arrays(poses: Poses, frames: np.ndarray, betas: bool) -> BodyArrays:
             rests.append(vertices)
         rest_of.append(at)
     arrays = BodyArrays(np.stack(rests), np.array(rest_of), joints, np.asarray(body.parents), body.skin_index, body.skin_weight,
-                        np.asarray(body.faces))
-    if not betas:
+                        np.asarray(body.faces), expression=body.exprdirs if recipe.expression_rate else None)
+    if not recipe.beta_rate:
         return arrays
     shape = body.shapedirs[:, :, :len(poses.betas)]
     return arrays._replace(shape=shape, joint_shape=np.tensordot(body.J_regressor, shape, 1))
@@ -184,10 +185,15 @@ def follow(trainer: CudaTrainer, task: Task, until: int) -> None:
 
 
 def hand_back(trainer: CudaTrainer, task: Task) -> None:
-    """Poses, and the body's shape where it is learned, as they stand on the GPU."""
+    """Poses, and what else of the body is learned, as they stand on the GPU."""
     poses = task.poses
     poses.pose[task.trained], poses.transl[task.trained] = trainer.poses()
     poses.offset = trainer.offset()
     if trainer.recipe.beta_rate:
         poses.betas = np.array(poses.params.betas, np.float64) + trainer.betas()
         poses.forget_rests()
+    if trainer.recipe.expression_rate:
+        poses.expression[task.trained] = trainer.expressions()
+        poses.forget_expressions()
+    if trainer.recipe.joint_rate:
+        poses.joint_offset = trainer.joint_offset()

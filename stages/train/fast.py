@@ -185,7 +185,8 @@ class Trainer:
         loss, grads, opacity, grad_gain = self.gradients(t, view, background, number)
         self._move(grads, opacity, done)
         if not self.settled:
-            grad_rest, _ = self.poses.step(t, grads.vertices, self.pose_rate * 0.01**done, config.pose_pull)
+            grad_rest, grad_joints = self.poses.step(t, grads.vertices, self.pose_rate * 0.01**done, config.pose_pull)
+            self._shape_body(t, grad_rest, grad_joints, done)
         if self.offsets:
             self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
             self.poses.offset = self.offsets.offset
@@ -194,6 +195,15 @@ class Trainer:
             self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
         finite(f"after step {number}", self.values | {"offset of the surface": self.poses.offset, **pose(self.poses, t)})
         return loss
+
+    def _shape_body(self, t: int, grad_rest: np.ndarray, grad_joints: np.ndarray, done: float) -> None:
+        """One step of frame t's expression and of the joints at rest, where they are learned and the poses are."""
+        config = self.config
+        if config.expression_rate and self.pose_rate:
+            self.poses.step_expression(t, self.poses.expression_gradient(grad_rest), config.expression_rate * 0.01**done,
+                                       config.pose_pull)
+        if config.joint_rate and self.pose_rate:
+            self.poses.step_joints(grad_joints, config.joint_rate * 0.01**done, config.pose_pull)
 
     def gradients(self, t: int, view: View, background: np.ndarray, number: int):
         """Loss of frame t, its gradients, the opacities (N,) and the gradient of the frame's gain (3,)."""

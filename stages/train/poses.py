@@ -14,7 +14,10 @@ HAND_SHARE = 0.1
 """Rate of the fingers, relative to the body's: an image says little about them."""
 TURN, SHIFT = 0.05, 0.02
 """rad and m in which the distance from the start is measured."""
-KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "beta_moments", "beta_count")
+EXPRESSION, JOINT = 0.3, 0.01
+"""Coefficient and m, likewise."""
+KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "beta_moments", "beta_count",
+        "expression", "expression_moments", "joint_offset", "joint_moments", "joint_count")
 """Attributes of Poses that training changes."""
 
 
@@ -24,6 +27,10 @@ def carried(poses: Poses, trained: np.ndarray) -> Poses:
     is_trained[trained] = True
     out = poses.copy()
     out.pose, out.transl = carry_corrections(out.base_pose, out.base_transl, out.pose, out.transl, is_trained)
+    if out.expression.any():
+        frames, at = np.arange(len(out.pose)), np.flatnonzero(is_trained)
+        out.expression = np.stack([np.interp(frames, at, column[at]) for column in out.expression.T], 1)
+        out.forget_expressions()
     return out
 
 
@@ -49,6 +56,12 @@ class Poses:
         self.rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self.shaped: tuple[np.ndarray, np.ndarray] | None = None
         self.moved: dict[int, np.ndarray] = {}
+        self.expression = np.zeros((frames, body.exprdirs.shape[2]))
+        """(T, E), what has been learned on top of the fit's; as `joint_offset` (55, 3) m of the joints at rest."""
+        self.expression_moments = np.zeros((2, *self.expression.shape))
+        self.joint_offset, self.joint_moments, self.joint_count = np.zeros((55, 3)), np.zeros((2, 55, 3)), 0
+        self.joint_share = self.share.copy()
+        self.joint_share[0] = 0  # the pelvis is where the translation puts it
         self.betas, self.beta_moments, self.beta_count = np.array(params.betas, np.float64), np.zeros((2, len(params.betas))), 0
 
     def copy(self) -> Poses:
@@ -56,6 +69,7 @@ class Poses:
         other = copy.copy(self)
         other.pose, other.transl = self.pose.copy(), self.transl.copy()
         other.moments, other.count = np.zeros_like(self.moments), np.zeros_like(self.count)
+        other.expression_moments = np.zeros_like(self.expression_moments)
         return other
 
     def state(self) -> dict:
@@ -69,8 +83,12 @@ class Poses:
 
     def forget_rests(self) -> None:
         """To be called when the betas have changed."""
-        self.rests.clear()
+        self.rests = {}
         self.shaped = None
+
+    def forget_expressions(self) -> None:
+        """To be called when expressions have changed."""
+        self.rests, self.moved = {}, {}
 
     def rest(self, t: int) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (V, 3) float32 and joints (55, 3) at rest, with the frame's expression."""
@@ -79,11 +97,12 @@ class Poses:
             if self.shaped is None:
                 self.shaped = self.body.rest(self.betas, None, p.joint_offset)
             if t not in self.moved:
-                expression = np.asarray(self.body.effective_expression(p, t), np.float32)
+                expression = np.asarray(self.body.effective_expression(p, t) + self.expression[t], np.float32)
                 self.moved[t] = self.body.exprdirs @ expression if expression.any() else np.float32(0)
             vertices, joints = self.shaped
             self.rests[t] = np.ascontiguousarray(vertices + self.moved[t], np.float32), np.asarray(joints, np.float64)
-        return self.rests[t]
+        vertices, joints = self.rests[t]
+        return vertices, joints + self.joint_offset
 
     def vertices(self, t: int) -> np.ndarray:
         """(V, 3) float32 m, camera frame, posed as the frame stands now."""
@@ -96,6 +115,7 @@ class Poses:
         """The poses as they stand become the base that single frames are corrected from; Adam starts anew."""
         self.base_pose, self.base_transl = self.pose.copy(), self.transl.copy()
         self.moments, self.count = np.zeros_like(self.moments), np.zeros_like(self.count)
+        self.expression_moments = np.zeros_like(self.expression_moments)
 
     def transforms(self, t: int) -> np.ndarray:
         """(55, 3, 4) rest to posed, without transl."""
@@ -137,12 +157,39 @@ class Poses:
         self.betas -= rate * (first / (1 - 0.9**self.beta_count)) / (np.sqrt(second / (1 - 0.99**self.beta_count)) + 1e-12)
         self.forget_rests()
 
+    def expression_gradient(self, grad_rest: np.ndarray) -> np.ndarray:
+        """(E,) gradient of a frame's expression from that of its rest vertices (V, 3)."""
+        return np.tensordot(grad_rest, self.body.exprdirs, 2)
+
+    def step_expression(self, t: int, grad: np.ndarray, rate: float, pull: float) -> None:
+        """One Adam step of the expression of frame t, after `step`. grad: (E,)."""
+        value, n = self.expression[t], self.count[t]
+        grad = grad + 2 * pull * value / EXPRESSION**2
+        first, second = self.expression_moments[:, t]
+        first += 0.1 * (grad - first)
+        second += 0.01 * (grad**2 - second)
+        value -= rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
+        self.rests.pop(t, None)
+        self.moved.pop(t, None)
+
+    def step_joints(self, grad: np.ndarray, rate: float, pull: float) -> None:
+        """One Adam step of the joints at rest, which all frames share. grad: (55, 3)."""
+        grad = grad + 2 * pull * self.joint_offset / JOINT**2
+        self.joint_count += 1
+        first, second = self.joint_moments
+        first += 0.1 * (grad - first)
+        second += 0.01 * (grad**2 - second)
+        n = self.joint_count
+        self.joint_offset -= self.joint_share * rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
+
     def refined(self):
         """BodyParams with the poses as they stand; `joints` computed anew."""
         flat = self.pose.astype(np.float32).reshape(len(self.pose), -1)
         params = replace(self.params, betas=self.betas.astype(np.float32), global_orient=flat[:, :3],
                          body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69],
                          leye_pose=flat[:, 69:72], reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120],
-                         right_hand_pose=flat[:, 120:165], transl=self.transl.astype(np.float32))
+                         right_hand_pose=flat[:, 120:165], transl=self.transl.astype(np.float32),
+                         expression=(self.params.expression + self.expression).astype(np.float32),
+                         joint_offset=(self.params.joint_offset + self.joint_offset).astype(np.float32))
         params.joints = np.concatenate([self.body.posed(params, [t])[1] for t in range(params.frames)])
         return params

@@ -169,6 +169,11 @@ double dice_all(int n, const double *alpha, const double *mask, double outside, 
     return found.value;
 }
 
+void adam_pulled_all(int n, double *value, const double *grad, double *first, double *second, int steps, double rate, double pull,
+                     double unit) {
+    for (int i = 0; i < n; ++i) adam_pulled(value[i], grad[i], first[i], second[i], steps, rate, pull, unit);
+}
+
 void window_all(int n, const double *centre, int size, int whole, int *out) {
     for (int i = 0; i < n; ++i) out[i] = window_begin(centre[i], size, whole);
 }

@@ -199,3 +199,20 @@ def test_the_window_that_lpips_sees_is_that_of_the_cpu_path(host):
         got = np.full(40, -1, np.int32)
         host("window_all", 40, np.ascontiguousarray(centres[:, axis]), WINDOW, whole, got)
         assert len(set(got)) > 5 and got.tolist() == [int(place[axis]) for place in seen]
+
+
+def test_a_step_of_the_joints_at_rest_is_that_of_the_cpu_path(host):
+    from gsac.avatar.body import Body, BodyParams
+    from gsac.stages.train.poses import JOINT, Poses
+
+    body, rng = Body.load(), np.random.default_rng(8)
+    poses = Poses(body, BodyParams.from_pose(np.zeros((1, 55, 3)), np.zeros((1, 3)), np.zeros(4),
+                                             np.zeros((1, body.exprdirs.shape[2])), 500.0, (0, 0)))
+    poses.joint_share[:] = 1
+    value, first, second = np.zeros((55, 3)), np.zeros((55, 3)), np.zeros((55, 3))
+    for step in range(1, 5):
+        grad = rng.normal(size=(55, 3)) * 1e-3
+        poses.step_joints(grad, 2e-3, 1e-4)
+        host("adam_pulled_all", 165, value, grad, first, second, step, 2e-3, 1e-4, JOINT)
+    assert np.abs(value).max() > 1e-3
+    np.testing.assert_allclose(value, poses.joint_offset, rtol=1e-12)
