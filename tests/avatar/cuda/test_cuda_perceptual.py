@@ -58,14 +58,14 @@ def test_the_window_is_the_cpus_and_its_slope_and_value_come_into_gradient_and_l
         image, slope = (trainer.buffers[name].read()[: h * w].reshape(h, w, 4) for name in ("image", "grad_image"))
         found.append((np.where(reached[..., None], slope[..., :3], 0), trainer.losses()[0, 0]))
         if steps:
-            image = np.where(reached[..., None], image, 0)
+            shown = np.where(reached[..., None], image, 0)
             window, value = trainer.window, float(trainer.window.value)
             images, own = window.images.cpu().numpy(), window.slope.cpu().numpy()
             vertex = trainer.buffers["vertices"].read()[0, trainer.rates["centre"][0]]
         trainer.close()
     (slope, loss), (without, plain) = found
     pixels = figure.shots[t].pixels.astype(np.float32) / np.float32(255)
-    render = image[..., :3] + (1 - image[..., 3:]) * ground
+    render = shown[..., :3] + (1 - shown[..., 3:]) * ground
     target = pixels[..., :3] + (1 - pixels[..., 3:]) * ground
     seen, expected = [], np.zeros_like(render)
 
