@@ -24,6 +24,7 @@ def main() -> None:
     if why := why_not():
         raise SystemExit(f"benchmarks.gpu: {why}")
     from gsac.avatar.cuda.device import Device
+    from gsac.benchmarks.gpu import perceptual
     from gsac.benchmarks.gpu.check import LIMIT, errors
     from gsac.benchmarks.gpu.figure import figure, start
     from gsac.benchmarks.gpu.timing import copy_bandwidth, float_rate
@@ -57,6 +58,10 @@ def main() -> None:
     measure_paper(device, big, ceilings)
     measure_rounds(device, big)
     done("times of recipe paper and of the rounds of poses")
+    measure_body(device, big, ceilings)
+    measure_tails(device, big)
+    perceptual.measure(device)
+    done("times of what is not learned by default, of long lists, of LPIPS")
     compare(big)
     done("all")
 
@@ -124,6 +129,38 @@ def measure_rounds(device, figure) -> None:
     print(f"rounds of poses: a step {np.median(steps) * 1e3:.0f} us; kernels in us, one that moves the surface: "
           + ", ".join(f"{name} {us:.1f}" for name, us in kernel_microseconds(trainer).items()), flush=True)
     trainer.close()
+
+
+def measure_body(device, figure, ceilings: tuple[float, float]) -> None:
+    """The kernels that expression and joints at rest cost where they are learned."""
+    from gsac.avatar.body import Body
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.timing import kernel_microseconds, least_bytes
+
+    recipe = paper_losses(steps=600, expression_rate=1e-3, joint_rate=1e-4)
+    body = figure.body._replace(expression=Body.load().exprdirs)
+    trainer = CudaTrainer(body, [figure.shots], figure.pose, figure.transl, start(body, 25000), recipe, device)
+    trainer.train(60)
+    kernels, least = kernel_microseconds(trainer), least_bytes(trainer)
+    print("expression and joints at rest learned: " + ", ".join(
+        f"{name} {kernels[name]:.1f} us" + (f" ({least[name] / ceilings[0] * 1e6:.1f} at the ceiling)" if name != "skin" else "")
+        for name in ("skin", "expression_step", "place_joints")), flush=True)
+    trainer.close()
+
+
+def measure_tails(device, figure) -> None:
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu import tails
+    from gsac.benchmarks.gpu.figure import start
+
+    for count, batch, smaller in ((25000, 1, 1), (25000, 4, 1), (12000, 1, 2)):
+        shots = figure.shots if smaller == 1 else figure.scaled(smaller)
+        trainer = CudaTrainer(figure.body, [shots], figure.pose, figure.transl, start(figure.body, count),
+                              paper_losses(count, steps=900, batch=batch), device)
+        trainer.train(300)
+        tails.measure(trainer, device)
+        trainer.close()
 
 
 def print_kernels(trainer, kernels: dict[str, float], pairs: float, ceilings: tuple[float, float]) -> None:

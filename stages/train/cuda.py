@@ -43,7 +43,7 @@ def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[i
     recipe = recipe_of(task.config, count, **of_windows(task))
     with training(task.poses, task.trained, [coarse, fine], gaussians, recipe, network=task.lpips) as trainer:
         if task.config.pose_rounds:
-            correct_midway(trainer, task, coarse)
+            correct_midway(trainer, task, fine)
         follow(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
         body = trainer.body
         folded = offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
