@@ -81,7 +81,7 @@ class TrainConfig:
     """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
     lpips: str = AUTO
-    """Weights that `gsac models add` brought: none, judge, loss (cpu: paper alone, hours), or auto: paper loss, fast judge."""
+    """Weights that `gsac models add` brought: none, judge, loss (cpu: paper alone, hours), or auto: paper on cpu loss, else judge."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
@@ -92,7 +92,7 @@ class TrainConfig:
         return () if self.lpips == "none" else NETWORKS
 
     def in_loss(self) -> bool:
-        """Whether LPIPS is to take part in the loss."""
+        """Whether LPIPS is to take part in the loss, where it can."""
         return self.lpips == "loss" or self.lpips == AUTO and self.recipe == "paper"
 
     def check(self) -> None:

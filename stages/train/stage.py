@@ -21,7 +21,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
-from gsac.stages.train.config import AUTO, NETWORKS
+from gsac.stages.train.config import AUTO, NETWORKS, TrainConfig
 from gsac.stages.train.evaluate import judge, turned
 from gsac.stages.train.guard import finite, result, values
 from gsac.stages.train.holdout import spaced_in_yaw, to_choose_by
@@ -79,7 +79,7 @@ def run(job: Job) -> None:
     if turn < LEAST_TURN:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
-    if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config.recipe, job.device, views[0].camera)):
+    if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].camera)):
         job.warn(f"LPIPS takes no part in the loss: {why}.")
 
     run = Run(job, Poses(body, params), views, trained, held, choosing)
@@ -101,13 +101,13 @@ def warm(device: str) -> None:
         rehearse()
 
 
-def without_lpips(recipe: str, device: str, camera: Camera) -> str | None:
-    """Why LPIPS cannot be in the loss of a recipe, or None. camera: of the frames."""
+def without_lpips(config: TrainConfig, device: str, camera: Camera) -> str | None:
+    """Why LPIPS, which is wished for, cannot be in the loss, or None. camera: of the frames."""
     if min(camera.width, camera.height) < LEAST_SIDE:
         return f"frames of fewer than {LEAST_SIDE} px are too small for it"
     if device == "cuda":
-        return perceptual.why_not()
-    return None if recipe == "paper" else "on the CPU recipe paper alone has it there"
+        return "on cuda it does where train.lpips is loss" if config.lpips == AUTO else perceptual.why_not()
+    return None if config.recipe == "paper" else "on the CPU recipe paper alone has it there"
 
 
 def check_device(device: str) -> None:
@@ -139,7 +139,7 @@ class Run:
         self.checkpoints = Checkpoints(job.scratch, job.warn)
         self.resumed_at: int | None = None
         self.lpips = {name: Lpips.read(name, job.models[name]) for name in job.config.wishes() if name in job.models}
-        in_loss = job.config.in_loss() and not without_lpips(job.config.recipe, job.device, views[0].camera)
+        in_loss = job.config.in_loss() and not without_lpips(job.config, job.device, views[0].camera)
         self.in_loss = self.lpips.get(NETWORKS[0]) if in_loss else None
 
     def fit(self) -> None:

@@ -50,8 +50,10 @@ def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_a
             for recipe in config.RECIPES for lpips in config.LPIPS}
     assert {wish for wish, it_is in told.items() if it_is} == {("paper", "auto"), ("paper", "loss"), ("fast", "loss")}
     frames, small = Camera((500, 500), (150, 200), 300, 400), Camera((50, 50), (31, 40), 63, 80)
-    assert without_lpips("paper", "cpu", frames) is None and "recipe paper" in without_lpips("fast", "cpu", frames)
-    assert "64 px" in without_lpips("paper", "cpu", small)
+    paper, fast = (TrainConfig(recipe=recipe, lpips="loss") for recipe in ("paper", "fast"))
+    assert without_lpips(paper, "cpu", frames) is None and "recipe paper" in without_lpips(fast, "cpu", frames)
+    assert "64 px" in without_lpips(paper, "cpu", small)
     for why in (None, "torch cannot use the GPU"):
         monkeypatch.setattr(perceptual, "why_not", lambda why=why: why)
-        assert without_lpips("fast", "cuda", frames) is why and without_lpips("paper", "cuda", frames) is why
+        assert without_lpips(fast, "cuda", frames) is why and without_lpips(paper, "cuda", frames) is why
+        assert "train.lpips is loss" in without_lpips(TrainConfig(recipe="paper"), "cuda", frames)  # its effect is not measured there
