@@ -81,7 +81,7 @@ class TrainConfig:
     """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
 
     lpips: str = AUTO
-    """Weights that `gsac models add` brought: none, judge, loss (cpu: paper alone, hours), or auto: paper on cpu loss, else judge."""
+    """Weights that `gsac models add` brought: none, judge, loss (cpu: paper alone, hours), or auto: loss for paper on cpu."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""

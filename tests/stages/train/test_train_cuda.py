@@ -56,4 +56,4 @@ def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_a
     for why in (None, "torch cannot use the GPU"):
         monkeypatch.setattr(perceptual, "why_not", lambda why=why: why)
         assert without_lpips(fast, "cuda", frames) is why and without_lpips(paper, "cuda", frames) is why
-        assert "train.lpips is loss" in without_lpips(TrainConfig(recipe="paper"), "cuda", frames)  # its effect is not measured there
+        assert "train.lpips is loss" in without_lpips(TrainConfig(recipe="paper"), "cuda", frames)
