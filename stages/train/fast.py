@@ -70,7 +70,7 @@ def train(task: Task, count: int) -> tuple[Trainer, dict[int, View], dict[int, V
     midway = round(MIDWAY * steps) if config.pose_rounds else -1
     for step in range(first, steps):
         if step == midway:
-            correct_midway(task.poses, task.trained, trainer.gaussians, trainer.face, coarse)
+            correct_midway(task.poses, task.trained, trainer.gaussians, trainer.face, fine)
         if not order:
             order = [int(t) for t in rng.permutation(task.trained)]
         t, done = order.pop(), step / steps

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
-from gsac.avatar.binding import face_frames
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda import perceptual, why_not
@@ -95,10 +94,8 @@ def run(job: Job) -> None:
 def warm(device: str) -> None:
     """Called while the stage before is at work: kernels are loaded, at the very first compiled, and the GPU wakes up."""
     if device == "cuda":
-        face_frames(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
         Device()
-    else:
-        rehearse()
+    rehearse()
 
 
 def without_lpips(config: TrainConfig, device: str, camera: Camera) -> str | None:

@@ -433,14 +433,12 @@ def test_a_tighter_reach_holds_from_the_step_on_that_it_is_told(figure):
 
 
 @gpu
-def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(monkeypatch):
+def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu():
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train import corrections, cuda, fast
+    from gsac.stages.train import cuda, fast
     from gsac.stages.train.evaluate import judge
 
     found = []
-    monkeypatch.setattr(fast, "correct_midway", lambda *given: corrections.correct_midway(
-        *given[:4], fast.crops(task)[0]))  # by the frames at full size there too
     for train in (cuda.train, fast.train):
         task = turning((5,), steps=300, gaussians=2000)
         trainer, _, coarse = train(task, 2000)
