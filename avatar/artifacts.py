@@ -135,9 +135,10 @@ def _finite(array: np.ndarray) -> bool:
 KEYPOINT_SHAPES = {"xy": ("T", 133, 2), "score": ("T", 133), "world": ("T", 133, 3), "detector": ()}
 FILLED_SHAPES = KEYPOINT_SHAPES | {"missing": ("T", 2), "filled": ("T", 133), "sigma": ("T", 133)}
 FACE_SHAPES = {"valid": ("T",), "expression": ("T", "E"), "jaw": ("T", 3), "shape": ("S",), "landmarks": ("T", "L", 3)}
-HEAD_SHAPES = {"head_template": ("N", 3), "head_vertices": ("N", 3), "head_faces": ("F", 3), "head_eyes": (2, 3),
-               "flame_expression": ("T", "X"), "flame_jaw": ("T", 3), "valid": ("T",)}
-"""What face.npz holds besides where a FLAME file was given: the person's resting head, m, and how FLAME's face moves."""
+HEAD_SHAPES = {"head_template": ("N", 3), "head_vertices": ("N", 3), "head_faces": ("F", 3), "head_eyes": (2, 3)}
+"""What face.npz holds besides where a face was seen: the person's resting head, m."""
+FLAME_SHAPES = {"flame_expression": ("T", "X"), "flame_jaw": ("T", 3), "valid": ("T",)}
+"""And where a FLAME file was given: how FLAME's face moves."""
 BODY_SHAPES = {
     "betas": ("B",), "expression": ("T", "E"), "global_orient": ("T", 3), "body_pose": ("T", 63),
     "left_hand_pose": ("T", 45), "right_hand_pose": ("T", 45), "jaw_pose": ("T", 3), "leye_pose": ("T", 3),
@@ -165,6 +166,8 @@ def check_face(path: Path) -> None:
     arrays = check_arrays(path, FACE_SHAPES)
     if "head_vertices" in arrays:
         check_arrays(path, HEAD_SHAPES)
+    if "flame_expression" in arrays:
+        check_arrays(path, FLAME_SHAPES)
 
 
 def check_body(path: Path) -> None:

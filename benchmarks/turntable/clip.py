@@ -78,9 +78,8 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
     return out / ("clip.mp4" if turn else "frames")
 
 
-def make_studio(person: Person, options: TurntableOptions) -> Studio:
+def make_view(person: Person, options: TurntableOptions, rng: np.random.Generator) -> View:
     """The camera stands so far off that arms stay in the picture."""
-    rng = np.random.default_rng([options.seed, 3])
     width, height = options.size
     fill = 0.73 if options.poses == "turn" else 0.53
     camera = Camera((options.focal_px,) * 2, (width / 2, height / 2), width, height)
@@ -90,11 +89,22 @@ def make_studio(person: Person, options: TurntableOptions) -> Studio:
     forward = aim / np.linalg.norm(aim)
     right = np.cross(forward, [0, 1, 0])
     right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
+    return View(camera, np.stack([right, np.cross(forward, right), forward]), eye)
+
+
+def studio_rng(options: TurntableOptions) -> np.random.Generator:
+    return np.random.default_rng([options.seed, 3])
+
+
+def make_studio(person: Person, options: TurntableOptions, window: Camera | None = None) -> Studio:
+    """window: a part of the view's own picture, where only that is to be drawn."""
+    rng = studio_rng(options)
+    view = make_view(person, options, rng)
+    if window is not None:
+        view.camera = window
     light = make_light(rng)
-    room = make_room(camera, rotation.T, eye, light, SHADOW, rng)
-    return Studio(View(camera, rotation, eye), make_appearance(person, np.random.default_rng([options.seed, 4])),
-                  light, room, options.supersample)
+    room = make_room(view.camera, view.rotation.T, view.eye, light, SHADOW, rng)
+    return Studio(view, make_appearance(person, np.random.default_rng([options.seed, 4])), light, room, options.supersample)
 
 
 def place(person: Person, motion: Motion, view: View) -> BodyParams:

@@ -6,138 +6,149 @@ Points are those of `landmarks.align`: (468, 3) m in the resting face's frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from gsac.avatar.artifacts import read_arrays
-from gsac.avatar.facemesh import LEFT_EYE, RIGHT_EYE
 
 TABLE = Path(__file__).with_name("actions.npz")
-"""Written by `bake.py`."""
+"""Written by `gsac.benchmarks.face_actions`."""
 BLIND = ("eyeLook", "tongueOut", "cheekPuff", "mouthClose")
 """Actions whose names begin so leave no mark on the points that could tell them from others: they stay at 0."""
-AXES = np.array([1.0, 1.0, 0.3])
-"""How far the network's x, y and z are trusted."""
-ROUNDS, SWEEPS = 40, 6
-OWN_VIEW = 2.0
-"""mm: how far a person's resting points change with the square of yaw otherwise than the table's, at one radian."""
-BROWS_OWN, BROWS_SHARE = 6.0, 0.3
-"""How many times as far as others the points may differ that brows move, at least by this share of what all else does: how
-high brows sit, and how a picture shows them, is each person's own."""
-LARGE_PX, EYES_M = 60.0, 0.063
-"""Between the eyes: from here on brows are read as all else; on a smaller face the little that they move is worth less."""
+COMMON = ("jawOpen", "eyeBlink", "mouthSmile", "brow", "cheekSquint", "mouthPucker", "mouthFunnel")
+USUAL, SELDOM, NEVER = 0.4, 0.15, 1e-3
+"""Spread of the actions that faces use most, of others, and of those that nothing tells."""
+BOTH_SIDES, BROWS_TOGETHER = 0.9, 0.8
+"""How alike left and right, and inner and outer brows, rise."""
+SLOW = ("brow", "mouthSmile", "cheekSquint", "mouthFrown", "noseSneer")
+"""Actions that take their time: lids and the talking mouth do not."""
+ROUNDS, SWEEPS = 12, 4
 
 
 @dataclass(frozen=True)
 class Actions:
-    """The measured answer of the face network to the open body's head."""
+    """The measured answer of the face network to people's faces."""
 
-    neutral: np.ndarray  # (468, 3) m, the resting face from the front
+    neutral: np.ndarray  # (468, 3) m, everybody's resting face from the front
     mirror: np.ndarray  # (468,) each point's mirror image
     view: np.ndarray  # (10, 468, 3) mm for each of `view_terms`: what turning the head adds
-    modes: np.ndarray  # (K, 468, 3) mm, how else the resting face wavers from view to view, one standard deviation each
-    response: np.ndarray  # (E, 468, 3) mm at full action
+    response: np.ndarray  # (3, E, 468, 3) mm at full action, for each of `turns`
+    channels: np.ndarray  # (C, 468, 3) 1/mm, sums of coordinates in which the network's wavering is white, of spread one
+    persons: np.ndarray  # (3, C, C) covariance there of how a person's resting face differs from everybody's, for each of `turns`
+    own: np.ndarray  # (468, 3) mm, spread of the same at each point
+    wavering: np.ndarray  # (468, 3) mm, spread of what else the network says from look to look
+    corner: np.ndarray  # (468, 3) the open body's vertices among which each point lies
+    share: np.ndarray  # (468, 3) and how near to each
     names: tuple[str, ...]
 
     @classmethod
     def load(cls, path: Path = TABLE) -> Actions:
         a = read_arrays(path)
-        return cls(a["neutral"].astype(float), a["mirror"].astype(int), a["view"].astype(float),
-                   a["modes"].astype(float), a["response"].astype(float), tuple(str(n) for n in a["names"]))
+        as_is = {name: a[name].astype(float) for name in ("neutral", "view", "response", "channels", "persons", "own", "wavering",
+                                                          "share")}
+        return cls(mirror=a["mirror"].astype(int), corner=a["corner"].astype(int), names=tuple(str(n) for n in a["names"]), **as_is)
 
-    def own(self) -> np.ndarray:
-        """(1404,) how far each coordinate of a person's resting face may differ, as a factor."""
-        reach, brows = np.linalg.norm(self.response, axis=2), np.array([name.startswith("brow") for name in self.names])
-        return np.where(reach[brows].max(0) > BROWS_SHARE * reach[~brows].max(0), BROWS_OWN, 1.0).repeat(3)
-
-    def pairs(self) -> list[tuple[int, int]]:
-        """Indices of left and right actions."""
-        return [(i, self.names.index(n[:-4] + "Right")) for i, n in enumerate(self.names)
-                if n.endswith("Left") and n[:-4] + "Right" in self.names]
+    @cached_property
+    def heard(self) -> tuple[np.ndarray, np.ndarray]:
+        """`view` (10, C) and `response` (3, E, C) in the channels."""
+        return tuple(np.tensordot(a, self.channels, ([-2, -1], [1, 2])) for a in (self.view, self.response))
 
 
 def view_terms(direction: np.ndarray) -> np.ndarray:
     """direction: (..., 3), where the face looks, y up, z toward the camera. Returns (..., 10): the polynomial in yaw and
     pitch (radians) along which the network's resting face changes; 0 for the frontal view."""
-    y, p = np.arctan2(direction[..., 0], direction[..., 2]), np.arcsin(np.clip(direction[..., 1], -1, 1))
+    y, p = yaw_of(direction), np.arcsin(np.clip(direction[..., 1], -1, 1))
     return np.stack([y, p, y * y, y * p, p * p, y**3, y * y * p, y * p * p, p**3, y**4], axis=-1)
 
 
-def solve(points: np.ndarray, weight: np.ndarray, direction: np.ndarray, size: np.ndarray, actions: Actions, ridge: float,
-          sparsity: float, symmetry: float, noise: float, identity: float) -> tuple[np.ndarray, np.ndarray]:
-    """points: (T, 468, 3) m aligned; weight: (T, 468); direction: (T, 3), where the face looks; size: (T,) px between the eyes.
+def turns(direction: np.ndarray) -> np.ndarray:
+    """direction: (..., 3). Returns (..., 3): how much of each of `Actions.response`, and of its own rest, a face that looks there
+    shows."""
+    y = yaw_of(direction)
+    return np.stack([np.ones_like(y), y, y * y], axis=-1)
 
-    Returns coefficients c (T, E) in 0..1 and the person's own resting offset (468, 3) m. Minimises over c, wavering n
-    (T, K), offset and what of it changes with the view, residuals in mm: their weighted mean square + ridge |c|^2
-    + sparsity sum(c) + symmetry |c_left - c_right|^2 + noise |n|^2 a frame, + |offset|^2 / identity^2 a point once (brows' points
-    may differ further); of brows the first two grow as a face gets smaller. The problem is convex; n is eliminated, and
-    coordinate descent on c alternates with the closed form for the offset, which is carried on by Nesterov's momentum: an action
-    that lasts and the person's own rest look alike, and plain alternation ends with brows raised for good. What n has in all
-    frames is the person's too and is returned with the offset.
+
+def yaw_of(direction: np.ndarray) -> np.ndarray:
+    return np.arctan2(direction[..., 0], direction[..., 2])
+
+
+def spread_of(names: tuple[str, ...]) -> np.ndarray:
+    """(E,) how far from 0 each action usually goes."""
+    return np.array([NEVER if n.startswith(BLIND) else USUAL if n.startswith(COMMON) else SELDOM for n in names])
+
+
+def togetherness(names: tuple[str, ...]) -> np.ndarray:
+    """(E, E) covariance of the actions about 0."""
+    alike, spread = np.eye(len(names)), spread_of(names)
+    for i, a in enumerate(names):
+        for k, b in enumerate(names):
+            if a != b and a.replace("Left", "Right") == b.replace("Left", "Right"):
+                alike[i, k] = BOTH_SIDES
+            elif "browInnerUp" in (a, b) and "browOuterUp" in a + b:
+                alike[i, k] = BROWS_TOGETHER
+    return alike * spread * spread[:, None]
+
+
+def solve(points: np.ndarray, direction: np.ndarray, actions: Actions, sparsity: float,
+          doubt: float) -> tuple[np.ndarray, np.ndarray]:
+    """points: (T, 468, 3) m aligned; direction: (T, 3), where the face looks.
+
+    Returns coefficients c (T, E) in 0..1 and how the person's own resting points differ from everybody's (468, 3) m. Minimises over
+    c and the person's rest o in the channels, where the network's wavering is white: |said - o - c response|^2 / doubt^2
+    + c' togetherness^-1 c + 2 sparsity sum(c) a frame, + o' persons^-1 o once; o changes with yaw. The problem is convex;
+    coordinate descent on c alternates with the closed form for o, which is carried on by Nesterov's momentum: an action that lasts
+    and the person's own rest look alike, and plain alternation ends with brows raised for good.
     """
     T, E = len(points), len(actions.names)
-    said = ((points - actions.neutral) * 1e3).reshape(T, -1) - view_terms(direction) @ actions.view.reshape(10, -1)
-    response, modes = actions.response.reshape(E, -1), actions.modes.reshape(len(actions.modes), -1)
-    w = (weight[..., None] * AXES).reshape(T, -1)
-    w = w / np.maximum(w.sum(axis=1, keepdims=True), 1e-9)
-    both = np.concatenate([response, modes])
-    hessian = (w @ (both[:, None] * both).reshape(-1, w.shape[1]).T).reshape(T, len(both), len(both))
-    cc, cn, nn = hessian[:, :E, :E], hessian[:, :E, E:], hessian[:, E:, E:] + noise * np.eye(len(modes))
-    doubt = np.where([name.startswith("brow") for name in actions.names], np.maximum(LARGE_PX / size, 1)[:, None] ** 2, 1)
-    cc = cc + ridge * doubt[:, :, None] * np.eye(E)
-    for left, right in actions.pairs():
-        cc[:, [left, right], [left, right]] += symmetry
-        cc[:, [left, right], [right, left]] -= symmetry
-    schur = cc - cn @ np.linalg.solve(nn, cn.transpose(0, 2, 1))
+    away = (points - actions.neutral) * 1e3
+    view, response = actions.heard
+    said = np.tensordot(away, actions.channels, ([1, 2], [1, 2])) - view_terms(direction) @ view
+    answer = np.tensordot(turns(direction), response, 1) / doubt
+    said = said / doubt
+    hessian = answer @ answer.transpose(0, 2, 1) + np.linalg.inv(togetherness(actions.names))
+    terms, C = turns(direction), said.shape[1]
+    normal = np.kron(terms.T @ terms, np.eye(C))
+    for k, covariance in enumerate(actions.persons):
+        normal[k * C: (k + 1) * C, k * C: (k + 1) * C] += np.linalg.inv(covariance) * doubt**2
+    share = np.linalg.inv(normal)
     free = [k for k, name in enumerate(actions.names) if not name.startswith(BLIND)]
-
-    rest = Rest(w, direction, identity * actions.own())
-    c, offset = np.zeros((T, E)), np.zeros_like(said)
-    before = offset
+    c, rest = np.zeros((T, E)), np.zeros_like(said)
+    before = rest
     for turn in range(ROUNDS):
-        pull = (w * (said - offset)) @ both.T
-        toward_n = np.linalg.solve(nn, pull[:, E:, None])[..., 0]
-        toward_c = pull[:, :E] - sparsity / 2 * doubt - np.einsum("tek,tk->te", cn, toward_n)
+        pull = np.einsum("tec,tc->te", answer, said - rest) - sparsity
         for _ in range(SWEEPS):
             for k in free:
-                step = (toward_c[:, k] - np.einsum("te,te->t", schur[:, k], c)) / schur[:, k, k]
+                step = (pull[:, k] - np.einsum("te,te->t", hessian[:, k], c)) / hessian[:, k, k]
                 c[:, k] = np.clip(c[:, k] + step, 0, 1)
-        n = np.linalg.solve(nn, (pull[:, E:] - np.einsum("tek,te->tk", cn, c))[..., None])[..., 0]
-        found, always = rest.of(said - c @ response - n @ modes)
-        offset, before = found + turn / (turn + 3) * (found - before), found
-    return c, (always + n.mean(axis=0) @ modes).reshape(-1, 3) / 1e3
+        left = said - np.einsum("te,tec->tc", c, answer)
+        found = terms @ (share @ (terms.T @ left).ravel()).reshape(-1, C)
+        rest, before = found + turn / (turn + 3) * (found - before), found
+    return c, own_rest(away, direction, c, actions)
 
 
-class Rest:
-    """A person's resting points against the table's: an offset, and a share of it that goes with the square of yaw."""
-
-    def __init__(self, w: np.ndarray, direction: np.ndarray, identity: np.ndarray):
-        """w: (T, D) weights that sum to one a frame; direction: (T, 3); identity: (D,) mm, spread of the offset."""
-        square = view_terms(direction)[:, 2]
-        self.w, self.basis = w, np.stack([np.ones_like(square), square - square.mean()], 1)
-        doubt = np.stack([identity**-2, np.full_like(identity, OWN_VIEW**-2)], 1) / w.shape[1]
-        self.normal = np.einsum("td,ta,tb->dab", w, self.basis, self.basis) + doubt[:, :, None] * np.eye(2)
-
-    def of(self, left_over: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """left_over: (T, D) mm. Returns the likeliest offset of each frame (T, D), and what all have (D,)."""
-        pull = np.einsum("td,ta->da", self.w * left_over, self.basis)
-        both = np.linalg.solve(self.normal, pull[..., None])[..., 0]
-        return self.basis @ both.T, both[:, 0]
+def own_rest(away: np.ndarray, direction: np.ndarray, c: np.ndarray, actions: Actions) -> np.ndarray:
+    """away: (T, 468, 3) mm from the neutral face. (468, 3) m: what neither view nor actions explain, as far as it is believed."""
+    shown = (turns(direction)[:, :, None] * c[:, None]).reshape(len(c), -1)
+    explained = shown @ actions.response.reshape(shown.shape[1], -1) + view_terms(direction) @ actions.view.reshape(10, -1)
+    left = (away.reshape(len(c), -1) - explained).mean(axis=0).reshape(-1, 3)
+    return left * actions.own**2 / (actions.own**2 + actions.wavering**2 / len(c)) / 1e3
 
 
-def between_eyes(points: np.ndarray, neutral: np.ndarray) -> np.ndarray:
-    """points: (T, 468, 3) px; neutral: (468, 3) m. (T,) px between the eyes of a face of usual size, however it is turned."""
-    wide = np.linalg.norm(points[:, LEFT_EYE] - points[:, RIGHT_EYE], axis=-1)
-    return EYES_M * wide / np.linalg.norm(neutral[LEFT_EYE] - neutral[RIGHT_EYE])
+def pace(names: tuple[str, ...], fast: float, slow: float) -> np.ndarray:
+    """(E,) s, each action's own smoothing."""
+    return np.where([name.startswith(SLOW) for name in names], slow, fast)
 
 
-def smooth(c: np.ndarray, times: np.ndarray, sigma: float) -> np.ndarray:
-    """c: (T, E) at rising times (T,) s. The Gaussian mean over time with this standard deviation in seconds."""
-    out = np.empty_like(c)
-    first, last = np.searchsorted(times, times - 4 * sigma), np.searchsorted(times, times + 4 * sigma, side="right")
-    for t, (a, b) in enumerate(zip(first, last, strict=True)):
-        near = np.exp(-0.5 * ((times[a:b] - times[t]) / sigma) ** 2)
-        out[t] = near @ c[a:b] / near.sum()
+def smooth(c: np.ndarray, times: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """c: (T, E) at rising times (T,) s; sigma: (E,). The Gaussian mean over time with these standard deviations in seconds."""
+    out = c.copy()
+    for one in np.unique(sigma[sigma > 0]):
+        same = sigma == one
+        first, last = np.searchsorted(times, times - 4 * one), np.searchsorted(times, times + 4 * one, side="right")
+        for t, (a, b) in enumerate(zip(first, last, strict=True)):
+            near = np.exp(-0.5 * ((times[a:b] - times[t]) / one) ** 2)
+            out[t, same] = near @ c[a:b, same] / near.sum()
     return out
 
 

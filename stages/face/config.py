@@ -16,24 +16,20 @@ class FaceConfig:
     180 looks straight into the camera, 90 is a profile."""
     threshold: float = 0.5
     """Least confidence of the face network, 0..1."""
-    ridge: float = 0.002
-    """Pull of every action to 0, mm^2: larger is calmer."""
-    sparsity: float = 0.002
-    """Price of each action, mm^2: larger uses fewer actions."""
-    symmetry: float = 0.05
-    """Pull of left and right actions together, mm^2."""
-    noise: float = 0.0002
-    """Price of the network's own wavering, mm^2: larger reads more of it as action."""
-    identity: float = 1.0
-    """How far, mm, the person's resting points may differ from the open body's; brows six times as far."""
+    sparsity: float = 0.3
+    """Price of each action, against one for the square of each number that tells actions apart: larger uses fewer actions."""
+    doubt: float = 1.0
+    """How far the network wavers, as a multiple of what was measured: larger is calmer."""
     smooth: float = 0.04
-    """Standard deviation, s, of the smoothing over time; 0 is none. Photos have no time and are not smoothed."""
+    """Standard deviation, s, of the smoothing over time of lids and mouth; 0 is none. Photos have no time and are not smoothed."""
+    smooth_slow: float = 0.1
+    """The same of what moves slowly: brows, smiles, cheeks and nose."""
     rest_time: float = 0.2
     """Time, s, in which an unseen face falls back to rest by a factor e."""
 
     flame: str = NONE
     """The name under which `gsac models add NAME FLAME.npz` keeps your FLAME head, or none: smplx.method paper holds the body's
-    head to it, and an SMPL-X body takes its expression from it."""
+    head to it instead of the open body's own head, and an SMPL-X body takes its expression from it."""
     flame_points: str = "flame-points"
     """The same of FLAME's own mediapipe_landmark_embedding.npz; only with a FLAME head."""
 
@@ -47,9 +43,9 @@ class FaceConfig:
             raise BadInput(f"face.angle is {self.angle}; expected degrees from 90 to below 180")
         if not 0 < self.threshold < 1:
             raise BadInput(f"face.threshold is {self.threshold}; expected a number between 0 and 1")
-        for name in ("ridge", "noise", "identity", "rest_time"):
+        for name in ("doubt", "rest_time"):
             if not getattr(self, name) > 0:
                 raise BadInput(f"face.{name} is {getattr(self, name)}; expected a number above 0")
-        for name in ("sparsity", "symmetry", "smooth"):
+        for name in ("sparsity", "smooth", "smooth_slow"):
             if getattr(self, name) < 0:
                 raise BadInput(f"face.{name} is {getattr(self, name)}; expected 0 or more")

@@ -10,8 +10,9 @@ from gsac.avatar.facemesh import POINTS, FaceMesh
 from gsac.avatar.wholebody import INDEX
 from gsac.avatar.workspace import available
 from gsac.stages.contract import Job, StageError
-from gsac.stages.face.actions import Actions, between_eyes, fill, smooth, solve
+from gsac.stages.face.actions import Actions, fill, pace, smooth, solve
 from gsac.stages.face.flame import FlameHead
+from gsac.stages.face.head import HeadModel
 from gsac.stages.face.landmarks import align, look
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
@@ -27,33 +28,41 @@ def run(job: Job) -> None:
     if len(keypoints["score"]) != len(paths):
         raise StageError(f"keypoints.npz has {len(keypoints['score'])} frames but split has {len(paths)}; "
                          "run keypoints again")
-    actions, head = Actions.load(), FlameHead.of(job)
-    landmarks, points, weight, direction = read_clip(job, paths, keypoints, actions)
+    actions, flame = Actions.load(), FlameHead.of(job)
+    landmarks, points, direction = read_clip(job, paths, keypoints, actions)
     valid = np.isfinite(landmarks[:, 0, 0])
     times = None if clip.timestamps_s is None else np.array(clip.timestamps_s)
     config = job.config
     if valid.any():
-        c, offset = solve(points[valid], weight[valid], direction[valid], between_eyes(landmarks[valid], actions.neutral), actions,
-                          config.ridge, config.sparsity, config.symmetry, config.noise, config.identity)
-        if times is not None and config.smooth > 0:
-            c = smooth(c, times[valid], config.smooth)
+        c, own = solve(points[valid], direction[valid], actions, config.sparsity, config.doubt)
+        if times is not None:
+            c = smooth(c, times[valid], pace(actions.names, config.smooth, config.smooth_slow))
     else:
-        c, offset = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
+        c, own = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
         job.warn("The face was never seen from the front; the avatar's face stays at rest.")
     expression = fill(c, valid, times, config.rest_time)
-    own = head.arrays(offset, actions, expression) if head and valid.any() else {}
+    head = head_of(actions, flame, own, expression) if valid.any() else {}
     write_arrays(job.out / "face.npz", valid=valid, expression=expression.astype(np.float32),
-                 jaw=np.zeros((len(paths), 3), np.float32), shape=offset.ravel().astype(np.float32),
-                 landmarks=landmarks.astype(np.float32), **own)
+                 jaw=np.zeros((len(paths), 3), np.float32), shape=own.ravel().astype(np.float32),
+                 landmarks=landmarks.astype(np.float32), **head)
+
+
+def head_of(actions: Actions, flame: FlameHead | None, own: np.ndarray, expression: np.ndarray) -> dict[str, np.ndarray]:
+    """own: (468, 3) m, the person's resting points less everybody's. What face.npz holds of the person's head."""
+    rest = actions.neutral + own
+    if flame:
+        return flame.arrays(rest, actions, expression)
+    model = HeadModel.of_open_body(actions)
+    return model.arrays(model.shape_of(rest)[0])
 
 
 def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple[np.ndarray, ...]:
     """Returns landmarks (T, 468, 3) px, NaN where the face is turned away or not believed, and of those frames, aligned
-    points (T, 468, 3) m, weights (T, 468) and where the face looks (T, 3); zeros elsewhere."""
+    points (T, 468, 3) m and where the face looks (T, 3); zeros elsewhere."""
     mesh = FaceMesh(job.models, threads=1)
     T = len(paths)
     landmarks = np.full((T, POINTS, 3), np.nan)
-    points, weight, direction = np.zeros((T, POINTS, 3)), np.zeros((T, POINTS)), np.zeros((T, 3))
+    points, direction = np.zeros((T, POINTS, 3)), np.zeros((T, 3))
     least = -np.cos(np.radians(job.config.angle))
 
     def frame(t: int) -> None:
@@ -62,12 +71,12 @@ def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple
             face = look(mesh, read_frame(paths[t]), seen, actions.mirror)
             aligned, looks = align(face.points, actions.neutral, face.facing())
             if face.presence >= job.config.threshold and looks[2] >= least:
-                landmarks[t], points[t], weight[t], direction[t] = face.points, aligned, face.facing(), looks
+                landmarks[t], points[t], direction[t] = face.points, aligned, looks
 
     with ThreadPoolExecutor(min(available(), MOST)) as pool:
         for done, _ in enumerate(pool.map(frame, range(T)), 1):
             job.progress(done, T, "frames")
-    return landmarks, points, weight, direction
+    return landmarks, points, direction
 
 
 def turned_away(world: np.ndarray, least: float) -> bool:

@@ -1,9 +1,9 @@
 """The face terms of the published method: the body's resting head against a head mesh that a face network found.
 
-The network's head (FLAME's, or any other) comes in face.npz in its own mesh: `head_template` and `head_vertices`, everybody's and
-the person's own at rest, m, y up and z out of the face, `head_faces` over both, and the template's `head_eyes` (2, 3), left and
-right. The template is laid on the body's by the eyes, then as it fits best; so each of the body's vertices, whichever body that
-is, has its place on the mesh.
+The network's head (the open body's own, or FLAME's) comes in face.npz in its own mesh: `head_template` and `head_vertices`,
+everybody's and the person's own at rest, m, y up and z out of the face, `head_faces` over both, and the template's `head_eyes`
+(2, 3), left and right. The template is laid on the body's by the eyes, then as it fits best; so each of the body's vertices,
+whichever body that is, has its place on the mesh.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Head:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray], body: Body) -> Head | None:
-        """The head of face.npz's arrays; None where the face method gives none. Raises StageError."""
+        """The head of face.npz's arrays; None where no face was seen. Raises StageError."""
         if "head_vertices" not in arrays:
             return None
         for name in ("head_template", "head_faces", "head_eyes"):

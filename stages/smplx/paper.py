@@ -2,9 +2,9 @@
 all means, by Adam in three passes over batches of frames. The baseline that `lm` is measured against.
 
 Read differently from the publication, because what it takes is not there: the start is `lm`'s closed form (the paper regresses it
-by Hand4Whole); the face terms need a head mesh in face.npz (`head.py`); the body has no face offsets, so they move its shape only,
-and the second key point term, which differs from the first by the face offsets alone, is left out. Every step poses all vertices,
-as the published one does for the term that holds the mesh to the start.
+by Hand4Whole); the head of the face terms is the one in face.npz, FLAME's or the open body's own (`head.py`); the body has no
+face offsets, so they move its shape only, and the second key point term, which differs from the first by the face offsets alone,
+is left out. Every step poses all vertices, as the published one does for the term that holds the mesh to the start.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     state = State(local, transl, betas, start.log_focal, np.zeros(0))
     notes = ("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's regression",)
     if objective.head is None:
-        notes += ("face.npz holds no head mesh (face.flame brings one); the paper's face terms (vertex, Laplacian, edge) are off",)
+        notes += ("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) are off",)
     iou = overlap(body, state, joint_offset, outlines, center, sightings)
     return Fit(state, spread_of(body, sightings, state, config, center), iou,
                pixels_off(objective, sightings, state, joint_offset), total, joint_offset, notes)

@@ -3,7 +3,7 @@ import pytest
 from gsac.avatar.body import Body
 from gsac.avatar.facemesh import IBUG68
 from gsac.stages.contract import BadInput
-from gsac.stages.face.actions import Actions, fill, smooth, solve, view_terms
+from gsac.stages.face.actions import Actions, fill, pace, smooth, solve, turns, view_terms
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.landmarks import align
 
@@ -19,27 +19,25 @@ def looking(yaw: np.ndarray, pitch: float = -0.1) -> np.ndarray:
     return np.stack([np.sin(yaw) * np.cos(pitch), np.full_like(yaw, np.sin(pitch)), np.cos(yaw) * np.cos(pitch)], axis=-1)
 
 
-def fit(points, weight, direction, actions, eyes_px=70.0):
-    c = CONFIG
-    size = np.full(len(points), eyes_px)
-    return solve(points, weight, direction, size, actions, c.ridge, c.sparsity, c.symmetry, c.noise, c.identity)
+def fit(points, direction, actions, doubt=CONFIG.doubt):
+    return solve(points, direction, actions, CONFIG.sparsity, doubt)
 
 
-def clip_of(actions: Actions, c: np.ndarray, offset: np.ndarray, seed: int = 0) -> tuple[np.ndarray, ...]:
-    """Aligned points, weights and directions of a turning head with these actions, the network's wavering and noise."""
-    random = np.random.default_rng(seed)
+def clip_of(actions: Actions, c: np.ndarray, own: np.ndarray, noise: float = 2e-4) -> tuple[np.ndarray, np.ndarray]:
+    """Aligned points and directions of a turning head with these actions, own rest (468, 3) m and noise, m."""
     direction = looking(np.linspace(-0.8, 0.8, len(c)))
     view = np.tensordot(view_terms(direction), actions.view, axes=1)
-    waver = np.tensordot(random.normal(0, 1, (len(c), len(actions.modes))), actions.modes, axes=1)
-    points = actions.neutral + offset + (np.tensordot(c, actions.response, axes=1) + view + waver) / 1e3
-    return points + random.normal(0, 2e-4, points.shape), np.ones(points.shape[:2]), direction
+    shown = np.einsum("tk,te,kelc->tlc", turns(direction), c, actions.response)
+    points = actions.neutral + own + (shown + view) / 1e3
+    return points + np.random.default_rng(0).normal(0, noise, points.shape), direction
 
 
 def test_the_table_speaks_of_the_open_bodys_actions_and_is_symmetric(actions):
     assert actions.names == Body.load().expression_names
     assert (actions.mirror[actions.mirror] == np.arange(468)).all()
     left, right = (actions.names.index(f"mouthSmile{side}") for side in ("Left", "Right"))
-    np.testing.assert_allclose(actions.response[left][actions.mirror] * [-1, 1, 1], actions.response[right], atol=0.02)
+    front = actions.response[0]
+    np.testing.assert_allclose(front[left][actions.mirror] * [-1, 1, 1], front[right], atol=0.02)
 
 
 def test_the_68_points_mirror_as_ibugs_do(actions):
@@ -49,60 +47,62 @@ def test_the_68_points_mirror_as_ibugs_do(actions):
     np.testing.assert_array_equal(actions.mirror[IBUG68], IBUG68[[*contour, *brows, *nose, *eyes, *mouth]])
 
 
+def test_in_the_channels_the_points_own_noise_is_no_louder_than_the_networks(actions):
+    """White noise of the wavering's size is at least as loud there: the channels avoid what wavers together."""
+    random = np.random.default_rng(0).normal(0, 1, (50, 468, 3)) * actions.wavering
+    heard = np.tensordot(random, actions.channels, ([1, 2], [1, 2]))
+    assert heard.std() > 0.8
+
+
 def test_known_actions_are_found_again_and_no_other(actions):
     t = np.arange(40)
     c = np.zeros((40, len(actions.names)))
     for name, rate in (("jawOpen", 0.5), ("mouthSmileLeft", 0.3), ("mouthSmileRight", 0.3), ("eyeBlinkLeft", 0.9),
-                       ("eyeBlinkRight", 0.9), ("browInnerUp", 0.2)):
-        c[:, actions.names.index(name)] = np.clip(np.sin(rate * t + len(name)), 0, 1)
+                       ("eyeBlinkRight", 0.9), ("browInnerUp", 0.2), ("browOuterUpLeft", 0.2), ("browOuterUpRight", 0.2)):
+        c[:, actions.names.index(name)] = np.clip(np.sin(rate * t + len(name[:6])), 0, 1)
     got, _ = fit(*clip_of(actions, c, np.zeros((468, 3))), actions)
     moved = np.flatnonzero(c.any(axis=0))
     for k in moved:
-        assert np.corrcoef(got[:, k], c[:, k])[0, 1] > 0.75, actions.names[k]
-    for name in ("jawOpen", "mouthSmileLeft", "browInnerUp"):
-        k = actions.names.index(name)
-        assert np.corrcoef(got[:, k], c[:, k])[0, 1] > 0.88, name
+        assert np.corrcoef(got[:, k], c[:, k])[0, 1] > (0.85 if "brow" in actions.names[k] else 0.95), actions.names[k]
     assert np.delete(got, moved, axis=1).mean() < 0.1 * got[:, moved].mean()
     assert got.min() >= 0 and got.max() <= 1
 
 
 def test_a_persons_own_resting_face_is_not_read_as_expression(actions):
-    shape = np.random.default_rng(3).normal(0, 1, len(actions.modes))
-    offset = np.tensordot(shape, actions.modes, axes=1) / 1e3 + 0.7 * actions.response[
-        actions.names.index("mouthFrownLeft")] / 1e3
-    got, found = fit(*clip_of(actions, np.zeros((30, len(actions.names))), offset), actions)
-    assert got.mean() < 0.01
-    assert np.sqrt(((found - offset)[..., :2] ** 2).mean()) < 0.5 * np.sqrt((offset[..., :2] ** 2).mean())
+    """A face that differs from everybody's as people do, all through the clip."""
+    own = np.random.default_rng(3).normal(0, 1, (468, 3)) * actions.own / 1e3
+    got, found = fit(*clip_of(actions, np.zeros((30, len(actions.names))), own), actions)
+    assert got.mean() < 0.02
+    assert np.sqrt(((found - own)[..., :2] ** 2).mean()) < 0.5 * np.sqrt((own[..., :2] ** 2).mean())
 
 
 def test_brows_that_are_painted_high_are_the_persons_own_and_not_raised(actions):
     """The same raise in all frames, whatever the view, is how the person looks."""
-    up = actions.names.index("browInnerUp")
-    painted = 0.8 * actions.response[up] / 1e3
+    brows = [actions.names.index(name) for name in ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")]
+    painted = 0.8 * actions.response[0, brows].sum(0) / 1e3
     c = np.zeros((30, len(actions.names)))
-    c[::3, up] = 0.6
+    c[::3, brows] = 0.6
     got, _ = fit(*clip_of(actions, c, painted), actions)
-    assert got[c[:, up] == 0, up].mean() < 0.25 and np.corrcoef(got[:, up], c[:, up])[0, 1] > 0.85
+    up, rest = got[:, brows[0]], c[:, brows[0]] == 0
+    assert up[rest].mean() < 0.35 and np.corrcoef(up, c[:, brows[0]])[0, 1] > 0.85
 
 
-def test_brows_of_a_small_face_are_believed_less_and_all_else_as_much(actions):
-    c = np.zeros((30, len(actions.names)))
-    up, jaw = (actions.names.index(name) for name in ("browInnerUp", "jawOpen"))
-    c[::3, up], c[::2, jaw] = 0.5, 0.7
-    large, small = (fit(*clip_of(actions, c, np.zeros((468, 3))), actions, eyes_px)[0] for eyes_px in (60.0, 30.0))
-    assert small[:, up].mean() < 0.9 * large[:, up].mean()
-    np.testing.assert_allclose(small[:, jaw], large[:, jaw], atol=0.05)
-
-
-def test_hidden_points_do_not_count(actions):
+def test_more_doubt_moves_less(actions):
     c = np.zeros((20, len(actions.names)))
-    c[::2, actions.names.index("jawOpen")] = 0.8
-    points, weight, direction = clip_of(actions, c, np.zeros((468, 3)))
-    hidden = np.random.default_rng(0).permutation(468)[:150]
-    points[:, hidden] += 0.05
-    weight[:, hidden] = 0
-    got, _ = fit(points, weight, direction, actions)
-    assert np.corrcoef(got[:, actions.names.index("jawOpen")], c[:, actions.names.index("jawOpen")])[0, 1] > 0.95
+    c[::2, actions.names.index("mouthSmileLeft")] = 0.5
+    clip = clip_of(actions, c, np.zeros((468, 3)), 2e-3)
+    calm, trusting = (fit(*clip, actions, doubt)[0] for doubt in (4.0, 1.0))
+    assert calm.sum() < 0.8 * trusting.sum()
+
+
+def test_each_action_is_smoothed_at_its_own_pace(actions):
+    sigma = pace(actions.names, 0.04, 0.15)
+    assert sigma[actions.names.index("browInnerUp")] == 0.15 and sigma[actions.names.index("mouthSmileLeft")] == 0.15
+    assert sigma[actions.names.index("eyeBlinkLeft")] == 0.04 and sigma[actions.names.index("jawOpen")] == 0.04
+    spike = np.zeros((21, len(sigma)))
+    spike[10] = 1
+    left = smooth(spike, np.arange(21) / 30, sigma).max(axis=0)
+    assert left[actions.names.index("browInnerUp")] < 0.4 * left[actions.names.index("eyeBlinkLeft")]
 
 
 def test_align_undoes_a_heads_turn_size_and_place(actions):
@@ -124,12 +124,13 @@ def test_unseen_frames_fall_back_to_rest():
 
 def test_smoothing_keeps_a_constant_and_calms_a_flicker():
     times = np.arange(10) / 30
-    assert smooth(np.full((10, 2), 0.3), times, 0.04) == pytest.approx(np.full((10, 2), 0.3))
+    sigma = np.array([0.04, 0.04])
+    assert smooth(np.full((10, 2), 0.3), times, sigma) == pytest.approx(np.full((10, 2), 0.3))
     flicker = (np.arange(10) % 2)[:, None].astype(float)
-    assert np.ptp(smooth(flicker, times, 0.04)[2:8]) < 0.2
+    assert np.ptp(smooth(flicker, times, sigma[:1])[2:8]) < 0.2
 
 
-@pytest.mark.parametrize(("name", "value"), [("angle", 60.0), ("threshold", 0.0), ("ridge", 0.0), ("smooth", -1.0)])
+@pytest.mark.parametrize(("name", "value"), [("angle", 60.0), ("threshold", 0.0), ("doubt", 0.0), ("smooth", -1.0)])
 def test_a_wrong_parameter_is_named(name, value):
     with pytest.raises(BadInput, match=f"face.{name} is"):
         FaceConfig(**{name: value}).check()

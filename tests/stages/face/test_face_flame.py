@@ -8,7 +8,8 @@ from gsac.stages.contract import BadInput, Job
 from gsac.stages.face import STAGE
 from gsac.stages.face.actions import Actions
 from gsac.stages.face.config import FaceConfig
-from gsac.stages.face.flame import EXPRESSIONS, FlameHead, similarity
+from gsac.stages.face.flame import EXPRESSIONS, FlameHead
+from gsac.stages.face.head import similarity
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
 
 def test_the_head_of_known_points_is_found_whatever_their_place_and_size(head):
     true = head.flame.rest(np.random.default_rng(1).normal(0, 5, 16))
-    shape, turn, size = head.shape_of(as_seen(head, true))
+    shape, turn, size = head.model.shape_of(as_seen(head, true))
     used = np.unique(head.flame.faces[head.points.face])
     off, alone = (apart(vertices[used], true[used]) for vertices in (head.flame.rest(shape), head.flame.v_template))
     assert off < 0.3 * alone
@@ -64,7 +65,7 @@ def test_an_opening_mouth_opens_flames_mouth_and_rest_is_rest(head, actions):
     expression = np.zeros((3, len(actions.names)))
     expression[1, actions.names.index("jawOpen")] = 1
     expression[2, actions.names.index("eyeBlinkLeft")] = 1
-    made = head.arrays(np.zeros((468, 3)), actions, expression)
+    made = head.arrays(actions.neutral, actions, expression)
     assert not made["flame_expression"][0].any() and not made["flame_jaw"][0].any()
     low = made["flame_expression"] @ head.flame.exprdirs[:, 1, :EXPRESSIONS].T
     arm = made["head_vertices"] - head.flame.J_regressor[2] @ made["head_vertices"]

@@ -182,6 +182,16 @@ def test_face_terms_vanish_at_the_same_head_and_lead_towards_it(body):
     assert float((half.grad * torch.tensor(betas)).sum()) < 0
 
 
+def test_the_face_terms_draw_the_fitted_head_towards_the_one_that_face_found(body, fitted):
+    """The same clip without a head mesh leaves the head to the key points."""
+    betas = np.append(np.random.default_rng(5).normal(0, 1.5, body.num_figure), np.zeros(len(body.clothes)))
+    arrays = head_of(body, betas)
+    terms = HeadTerms(body, Head.from_arrays(arrays, body))
+    told = fit_clip(body, sightings_of(body, person(body), face=arrays), [], SmplxConfig(method="paper"), lambda *done: None, SHORT)
+    with_head, without = (float(terms.loss(torch.tensor(fit.state.betas, dtype=torch.float32))) for fit in (told, fitted[1]))
+    assert with_head < 0.5 * without
+
+
 def test_the_face_counts_only_when_it_looks_at_the_camera(body):
     yaw = np.radians([0, 30, 60, 90, 180, 270, 330])
     pose = np.zeros((len(yaw), 55, 3))

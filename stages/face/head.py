@@ -1,0 +1,82 @@
+"""The person's head at rest as a mesh, whichever head it is: the open body's own, or one that the user brings (`flame.py`).
+
+The network's points have no size of their own, so a head's shape is found up to a similarity, and the head keeps its own metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gsac.avatar.body import Body
+from gsac.stages.face.actions import Actions
+
+POINT_NOISE = 0.002
+"""m: how well a resting point is known."""
+AXES = np.array([1.0, 1.0, 0.3])
+"""How far the network's x, y and z are trusted."""
+ROUNDS = 10
+HEAD_JOINTS = ("head", "jaw", "left_eye_smplhf", "right_eye_smplhf")
+EYE_JOINTS = [23, 24]
+
+
+@dataclass
+class HeadModel:
+    """A head mesh of N vertices and how people's differ from it."""
+
+    template: np.ndarray  # (N, 3) m, y up, z out of the face
+    faces: np.ndarray  # (F, 3)
+    shapedirs: np.ndarray  # (N, 3, S) m at one spread
+    eyes: np.ndarray  # (2, 3) m of the template, left and right
+    index: np.ndarray  # (L,) the network's points that lie on it
+    corners: np.ndarray  # (L, 3) the vertices among which each lies
+    share: np.ndarray  # (L, 3) and how near to each
+    neutral: np.ndarray | None = None  # (468, 3) m, where the network puts them on the template; None: where they lie
+
+    @classmethod
+    def of_open_body(cls, actions: Actions) -> HeadModel:
+        """The open body's head; of its shape directions those that shape the figure."""
+        body = Body.load()
+        on = body.weights[:, [body.joint_names.index(name) for name in HEAD_JOINTS]].sum(1) > 0.5
+        on[np.unique(actions.corner)] = True
+        place = np.cumsum(on) - 1
+        faces = body.faces[on[body.faces].all(1)]
+        return cls(body.v_template[on], place[faces], body.shapedirs[on][:, :, : body.num_figure],
+                   body.J_regressor[EYE_JOINTS] @ body.v_template, np.arange(len(actions.corner)), place[actions.corner],
+                   actions.share, actions.neutral)
+
+    def on(self, vertices: np.ndarray) -> np.ndarray:
+        """vertices: (N, ...). Returns (L, ...) the same of the points."""
+        return np.einsum("lk,lk...->l...", self.share, vertices[self.corners])
+
+    def shape_of(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """rest: (468, 3) m, y up, z out of the face, the person's points. Returns the likeliest shape (S,) and turn (3, 3) and size
+        that bring the head's points onto these."""
+        target = rest[self.index]
+        mean, ways = self.on(self.template).astype(float), self.on(self.shapedirs).astype(float)
+        if self.neutral is not None:  # how the network's points differ from the skin's is the same for all
+            turn, size, shift = similarity(mean, self.neutral[self.index])
+            target = target - self.neutral[self.index] + size * mean @ turn.T + shift
+        shape = np.zeros(ways.shape[2])
+        for _ in range(ROUNDS):
+            turn, size, shift = similarity(mean + ways @ shape, target)
+            columns = (size * np.einsum("ab,lbs->las", turn, ways) * AXES[:, None]).reshape(-1, len(shape))
+            missing = ((target - shift - size * mean @ turn.T) * AXES).ravel()
+            shape = np.linalg.solve(columns.T @ columns + POINT_NOISE**2 * np.eye(len(shape)), columns.T @ missing)
+        return shape, turn, size
+
+    def arrays(self, shape: np.ndarray) -> dict[str, np.ndarray]:
+        """What face.npz holds of a head of this shape (S,)."""
+        return {"head_template": self.template.astype(np.float32), "head_faces": self.faces.astype(np.int32),
+                "head_vertices": (self.template + self.shapedirs @ shape).astype(np.float32),
+                "head_eyes": self.eyes.astype(np.float32)}
+
+
+def similarity(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """(n, 3) both. Turn (3, 3), size and shift (3,) that bring source nearest to target (Umeyama)."""
+    a, b = source - source.mean(0), target - target.mean(0)
+    u, spread, vt = np.linalg.svd(b.T @ a)
+    signs = np.array([1, 1, np.sign(np.linalg.det(u @ vt))])
+    turn = (u * signs) @ vt
+    size = float((spread * signs).sum() / max((a**2).sum(), 1e-12))
+    return turn, size, target.mean(0) - size * turn @ source.mean(0)
