@@ -30,6 +30,8 @@ class SmplxConfig:
     """Weight of the silhouette against the key points; 0 leaves it out."""
     smoothness: float = 1.0
     """Weight of the temporal terms."""
+    joint_offsets: float = 0.0
+    """`lm`: how far joints may lie off what the shape says, metres, the same left and right; 0 leaves them where it has them."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
@@ -45,6 +47,6 @@ class SmplxConfig:
         for name in ("rounds", "iterations"):
             if getattr(self, name) < 1:
                 raise BadInput(f"smplx.{name} is {getattr(self, name)}; expected 1 or more")
-        for name in ("silhouette", "smoothness"):
+        for name in ("silhouette", "smoothness", "joint_offsets"):
             if getattr(self, name) < 0:
                 raise BadInput(f"smplx.{name} is {getattr(self, name)}; expected 0 or more")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from gsac.avatar import rotation
@@ -13,6 +13,7 @@ from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
 from gsac.stages.smplx import start
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.personal import Personal
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.problem import ROBUST, Observations, Problem, State
@@ -26,8 +27,6 @@ FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(h
 HIPS = (INDEX["left_hip"], INDEX["right_hip"])
 TOGETHER = 2.0
 """What a detector gets wrong it gets wrong in many frames together: its spreads count so many times."""
-HIPS_TOGETHER = 5.0
-"""The hips': nothing marks them, and where one person's are taken to be all along is up to 3 cm off."""
 DEPTH_SPREAD = 0.08
 """Metres; the detector's depth decides which way a limb points."""
 DEPTH_TRUST = 0.8
@@ -97,15 +96,16 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     center = np.array([sightings.width / 2, sightings.height / 2])
     focal, spread = focal_prior(sightings, config)
     detector = Detector.measured(sightings.detector, body)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
+    personal = Personal.of(body, config.joint_offsets)
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS], personal.points[BODY_POINTS])
     seen = observations(sightings, detector, BODY_POINTS, center, (focal, spread), config, outlines)
-    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0)
-    state = starting_state(body, sightings, focal, center)
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0, personal)
+    state = replace(starting_state(body, sightings, focal, center), own=np.zeros(len(personal.spread)))
     seen.depth *= scale_of_world(problem, state, sightings)
     seen.repeats = repeats(state.local[:, 0])
     take_off_habits(seen, sightings, detector, BODY_POINTS, state)
     problem.limit = FAR_OFF * ROBUST
-    free, all_shared = np.zeros(problem.size, bool), np.zeros(body.num_betas + 1 + len(state.held), bool)
+    free, all_shared = np.zeros(problem.size, bool), np.zeros(1 + len(state.shape) + len(state.held), bool)
     trunk_only = free.copy()
     trunk_only[3:-3] = True
     state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, START_STEPS)
@@ -123,7 +123,8 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         steps += more.steps
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
-    return Fit(state, joint_spread(problem, state), iou, reprojection(problem, state), steps + more.steps)
+    return Fit(state, joint_spread(problem, state), iou, reprojection(problem, state), steps + more.steps,
+               personal.joint_offset(state.own))
 
 
 def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
@@ -138,9 +139,7 @@ def observations(sightings: Sightings, detector: Detector, points: np.ndarray, c
                  config: SmplxConfig, outlines: list[Outline]) -> Observations:
     """The chosen points with their spreads: what the detector gets wrong, and more where it or `handgap` is unsure."""
     height = sightings.person_height
-    together = np.full(len(detector.spread), TOGETHER)
-    together[list(HIPS)] = HIPS_TOGETHER
-    usual = together * height * detector.spread
+    usual = TOGETHER * height * detector.spread
     unsure = np.sqrt(np.maximum(sightings.sigma**2 - sightings.sigma.min(0) ** 2, 0))
     spread = np.hypot(usual, unsure) / np.sqrt(np.clip(sightings.score, 0.2, 1))
     spread = np.where(sightings.seen, spread, np.inf)[:, points]
@@ -193,8 +192,8 @@ def repeats(turns: np.ndarray) -> float:
 def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> float:
     """How much larger the body is than the detector's metric points, by trunk and thigh lengths."""
     bones = [(5, 11), (6, 12), (11, 13), (12, 14), (5, 7), (6, 8)]
-    chain = problem.skeleton.pose(state.local[:1], state.betas)
-    x = positions(chain, problem.pairs, state.betas)[0]
+    chain = problem.skeleton.pose(state.local[:1], state.shape)
+    x = positions(chain, problem.pairs, state.shape)[0]
     ratios = []
     for a, b in bones:
         length = np.linalg.norm(sightings.world[:, a] - sightings.world[:, b], axis=-1)
@@ -206,6 +205,7 @@ def scale_of_world(problem: Problem, state: State, sightings: Sightings) -> floa
 def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
     """Takes new outline points from the posed body; returns each frame's IoU with the alpha."""
     params = to_params(problem.body, state, problem.seen.center)
+    params.joint_offset = problem.personal.joint_offset(state.own).astype(np.float32)
     camera = params.camera(sightings.width, sightings.height)
     iou = np.full(len(state.local), np.nan)
 
@@ -227,13 +227,13 @@ def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, stat
     body = problem.body
     pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS], detector.offsets[FINGER_POINTS])
     seen = observations(sightings, detector, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, [])
-    fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, 0.0)
-    state = State(state.local.copy(), state.transl, state.betas, state.log_focal, np.zeros(0))
+    fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, 0.0, problem.personal)
+    state = replace(state, local=state.local.copy(), held=np.zeros(0))
     state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)
     frozen = np.zeros(fingers.size, bool)
     frozen[-3:] = True
     return levenberg_marquardt(state, fingers.linearise, fingers.cost, fingers.move, frozen,
-                               np.ones(body.num_betas + 1, bool), config.iterations)
+                               np.ones(1 + len(state.shape), bool), config.iterations)
 
 
 def joint_spread(problem: Problem, state: State) -> np.ndarray:
@@ -243,7 +243,7 @@ def joint_spread(problem: Problem, state: State) -> np.ndarray:
     information = system.band[:, np.arange(n), np.arange(n)]
     angle = 1 / np.sqrt(np.maximum(information[:, :-3].reshape(len(state.local), -1, 3).min(-1), 1e-6))
     place = np.sqrt(1 / np.maximum(information[:, -3:-1].min(-1), 1e-6))
-    chain = problem.skeleton.pose(state.local, state.betas)
+    chain = problem.skeleton.pose(state.local, state.shape)
     out = np.zeros(chain.place.shape[:2])
     index = {int(j): i for i, j in enumerate(problem.active)}
     for j, p in enumerate(problem.skeleton.parents):
@@ -259,7 +259,7 @@ def joint_spread(problem: Problem, state: State) -> np.ndarray:
 def reprojection(problem: Problem, state: State) -> np.ndarray:
     """(T,) median distance px between seen and fitted body points; NaN where nothing was seen."""
     out = np.full(len(state.local), np.nan)
-    for t, x in enumerate(problem.points(problem.skeleton.pose(state.local, state.betas), state)):
+    for t, x in enumerate(problem.points(problem.skeleton.pose(state.local, state.shape), state)):
         off = np.linalg.norm(problem.project(state, x) - problem.seen.xy[t], axis=-1)[np.isfinite(problem.seen.spread[t])]
         out[t] = np.median(off) if len(off) else np.nan
     return out

@@ -1,19 +1,21 @@
 """The fit as one least-squares problem: state, residuals, cost and normal equations.
 
 Residuals are in units of their own spread, so that weights are probabilities and not taste. Data terms are robust
-(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = B + 1 + H shared ones.
+(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = 1 + B + K + H shared ones:
+focal length, betas, what is the person's own, what is held.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.smplx import prior
 from gsac.stages.smplx.held import Held
+from gsac.stages.smplx.personal import Personal
 from gsac.stages.smplx.points import Chain, Pairs, Skeleton, positions, pulled_back
 from gsac.stages.smplx.silhouette import INSET, Outline
 from gsac.stages.smplx.solver import System
@@ -37,6 +39,13 @@ class State:
     log_focal: float
     held: np.ndarray
     """(H,) what the clip keeps to, as in held.py; empty where that is not sought."""
+    own: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """(K,) m, the person's own, as in personal.py; empty where that is not sought."""
+
+    @property
+    def shape(self) -> np.ndarray:
+        """(B + K,) what does not move with the pose."""
+        return np.concatenate([self.betas, self.own])
 
 
 @dataclass
@@ -70,9 +79,10 @@ class Problem:
     """One clip's fit over chosen joints."""
 
     def __init__(self, body: Body, pairs: Pairs, hips: tuple[int, int], seen: Observations, active: np.ndarray,
-                 smoothness: float, outline_weight: float):
+                 smoothness: float, outline_weight: float, personal: Personal | None = None):
         self.body, self.pairs, self.hips, self.seen = body, pairs, hips, seen
-        self.skeleton = Skeleton(body, active)
+        self.skeleton, self.personal = Skeleton(body, active, personal.joints if personal else None), personal
+        self.own_spread = personal.spread if personal else np.zeros(0)
         self.active = active
         self.mean, self.spread = prior.pose_prior(active)
         speed, acceleration = prior.turning_spread(active)
@@ -93,15 +103,15 @@ class Problem:
         """step: (T, n); shared: (s,)."""
         local = state.local.copy()
         local[:, self.active] = local[:, self.active] @ rotation.exp(step[:, :-3].reshape(len(step), -1, 3))
-        b = len(state.betas)
-        return State(local, state.transl + step[:, -3:], state.betas + shared[:b], state.log_focal + float(shared[b]),
-                     state.held + shared[b + 1:])
+        b, s = 1 + len(state.betas), 1 + len(state.shape)
+        return State(local, state.transl + step[:, -3:], state.betas + shared[1:b], state.log_focal + float(shared[0]),
+                     state.held + shared[s:], state.own + shared[b:s])
 
     def project(self, state: State, x: np.ndarray) -> np.ndarray:
         return np.exp(state.log_focal) * x[..., :2] / np.maximum(x[..., 2:], 0.05) + self.seen.center
 
     def cost(self, state: State) -> float:
-        chain = self.skeleton.pose(state.local, state.betas)
+        chain = self.skeleton.pose(state.local, state.shape)
         total = 0.0
         x = self.points(chain, state)
         total += robust(self._point_residual(self.project(state, x)), self.limit)[0].sum()
@@ -122,15 +132,15 @@ class Problem:
         self._add_temporal(system, state)
         if len(state.held):
             local = state.local[:, self.active]
-            self.held.add(system, local, rotation.log(local), state.held, len(state.betas) + 1)
+            self.held.add(system, local, rotation.log(local), state.held, len(state.shape) + 1)
         residual, jacobian = self._shared_residual(state)
         system.add_shared(jacobian, residual)
         return system
 
     def of_each_frame(self, state: State) -> System:
         """Normal equations of what each frame shows by itself, and of the pose prior."""
-        system = System.zeros(len(state.local), self.size, len(state.betas) + 1 + len(state.held))
-        chain = self.skeleton.pose(state.local, state.betas)
+        system = System.zeros(len(state.local), self.size, len(state.shape) + 1 + len(state.held))
+        chain = self.skeleton.pose(state.local, state.shape)
         self._add_points(system, state, chain)
         for t, x in self.outline_points(chain, state):
             self._add_outline(system, state, chain, t, x)
@@ -139,14 +149,14 @@ class Problem:
 
     def points(self, chain: Chain, state: State) -> np.ndarray:
         """(T, P, 3) key points, camera frame."""
-        return positions(chain, self.pairs, state.betas) + state.transl[:, None]
+        return positions(chain, self.pairs, state.shape) + state.transl[:, None]
 
     def outline_points(self, chain: Chain, state: State) -> Iterator[tuple[int, np.ndarray]]:
         """Frame and its outline points (P, 3), of the frames that have any."""
         if self.outline_weight > 0:
             for t, pairs in enumerate(self.outline_pairs):
                 if pairs is not None:
-                    yield t, positions(chain.frame(t), pairs, state.betas)[0] + state.transl[t]
+                    yield t, positions(chain.frame(t), pairs, state.shape)[0] + state.transl[t]
 
     def _add_points(self, system: System, state: State, chain: Chain) -> None:
         """Key points and their depths: two rows and one row a point."""
@@ -160,10 +170,10 @@ class Problem:
         covectors = np.zeros((*x.shape[:2], 3, 3))
         covectors[..., :2, :], covectors[..., 2, 2] = self._projection_slope(state, x), 1
         scale = np.concatenate([weight, (depth_shrink / self.seen.depth_spread)[..., None]], 2)
-        rows = pulled_back(self.skeleton, chain, self.pairs, state.betas, covectors)
+        rows = pulled_back(self.skeleton, chain, self.pairs, state.shape, covectors)
         rows[:, :, 2] -= rows[:, list(self.hips), 2].mean(1, keepdims=True)
-        jacobian = np.zeros((*rows.shape[:3], rows.shape[3] + 1))
-        jacobian[..., :-1], jacobian[..., :2, -1] = rows, uv - self.seen.center
+        jacobian, n = np.zeros((*rows.shape[:3], rows.shape[3] + 1)), self.size
+        jacobian[..., :n], jacobian[..., :2, n], jacobian[..., n + 1:] = rows[..., :n], uv - self.seen.center, rows[..., n:]
         jacobian *= scale[..., None]
         values = np.concatenate([residual * shrink, (depth * depth_shrink)[..., None]], 2)
         system.add(slice(None), jacobian.reshape(len(x), -1, jacobian.shape[-1]), values.reshape(len(x), -1))
@@ -205,9 +215,9 @@ class Problem:
         along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x))  # (P, 3)
         along[:, 2] -= clothes / np.maximum(x[:, 2], 0.05)
         along *= weight[:, None]
-        rows = pulled_back(self.skeleton, chain.frame(t), self.outline_pairs[t], state.betas, along[None, :, None])[0, :, 0]
+        rows = pulled_back(self.skeleton, chain.frame(t), self.outline_pairs[t], state.shape, along[None, :, None])[0, :, 0]
         focal = (((uv - self.seen.center) * direction).sum(1) + clothes) * weight
-        system.add(slice(t, t + 1), np.concatenate([rows, focal[:, None]], 1)[None], (residual * shrink)[None])
+        system.add(slice(t, t + 1), np.insert(rows, self.size, focal, 1)[None], (residual * shrink)[None])
 
     def _prior_residual(self, vector: np.ndarray) -> np.ndarray:
         """vector: (T, A, 3) rotation vectors of the active joints. Returns (T, A, 3)."""
@@ -295,16 +305,17 @@ class Problem:
                 system.band[frames, block, columns] += left.transpose(0, 2, 1) @ right
 
     def _shared_residual(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Shape, focal and height priors, and those of what is held: residuals (R,) and rows (R, s).
+        """Focal, shape and height priors, those of what is the person's own and of what is held: residuals (R,) and rows (R, s).
 
         Frames of one view share their errors (clothes, the detector's habits), so that the priors count once for each repeat.
         """
-        b, (focal, focal_spread), (metres, spread) = len(state.betas), self.seen.focal_prior, self.seen.height
-        spreads = np.concatenate([self.shape_spread, [focal_spread], self.held.mean_spread[:len(state.held)]])
+        b, (focal, focal_spread), (metres, spread) = 1 + len(state.betas), self.seen.focal_prior, self.seen.height
+        spreads = np.concatenate([[focal_spread], self.shape_spread, self.own_spread[:len(state.own)],
+                                  self.held.mean_spread[:len(state.held)]])
         rows = np.concatenate([np.diag(1 / spreads), np.zeros((1, len(spreads)))])
-        rows[-1, :b] = self.height_dirs / spread
+        rows[-1, 1:b] = self.height_dirs / spread
         tall = self.height + self.height_dirs @ state.betas
-        away = np.concatenate([state.betas - self.shape_mean, [state.log_focal - np.log(focal)],
+        away = np.concatenate([[state.log_focal - np.log(focal)], state.betas - self.shape_mean, state.own,
                                state.held - self.held.mean[:len(state.held)]])
         residual = np.append(away / spreads, (tall - metres) / spread)
         count = np.sqrt(self.seen.repeats)

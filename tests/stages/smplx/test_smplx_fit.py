@@ -16,6 +16,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
 from gsac.stages.smplx.fit import BODY_POINTS, HIPS, Sightings, fit_clip, observations, to_params
 from gsac.stages.smplx.held import Held
+from gsac.stages.smplx.personal import Personal
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS
 from gsac.stages.smplx.problem import Problem, State
@@ -156,20 +157,22 @@ def test_derivatives_agree_with_finite_differences(body, tmp_path):
     outlines = outlines_of(body, truth, tmp_path)
     seen = observations(sightings_of(body, truth, 2.0), Detector.measured("", body), BODY_POINTS,
                         np.array([WIDTH / 2, HEIGHT / 2]), (FOCAL, 0.1), SmplxConfig(height_m=1.8), outlines)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
+    personal = Personal.of(body, 0.01)
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], None, personal.points[BODY_POINTS])
     rng = np.random.default_rng(0)
     state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
                   truth.transl.astype(float) + 0.02, np.append(rng.normal(0, 0.3, body.num_figure), np.zeros(len(body.clothes))),
-                  float(np.log(FOCAL)), np.zeros(0))
-    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0)
+                  float(np.log(FOCAL)), np.zeros(0), np.zeros(len(personal.spread)))
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0, personal)
     camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
-    chain = problem.skeleton.pose(state.local, state.betas)
-    x = positions(chain, pairs, state.betas)[0] + state.transl[0]
+    chain = problem.skeleton.pose(state.local, state.shape)
+    x = positions(chain, pairs, state.shape)[0] + state.transl[0]
     vertices, _ = body.posed(to_params(body, state, problem.seen.center), [0])
     assert np.allclose(x, body.keypoints(vertices)[0][BODY_POINTS], atol=2e-3)
     state.betas[body.num_figure:] = rng.normal(0, 1, len(body.clothes))
-    assert np.allclose(positions(problem.skeleton.pose(state.local, state.betas), pairs, state.betas)[0] + state.transl[0], x,
+    assert np.allclose(positions(problem.skeleton.pose(state.local, state.shape), pairs, state.shape)[0] + state.transl[0], x,
                        atol=1e-3)
+    state.own[:] = rng.normal(0, 0.01, len(state.own))
     for t, outline in enumerate(outlines):
         vertices, _ = body.posed(to_params(body, state, problem.seen.center), [t])
         problem.outline_pairs[t] = outline_points(body, vertices[0], camera, outline, t)[0]
@@ -189,7 +192,8 @@ def check_gradient(problem: Problem, state: State, rng, h: float, tolerance: flo
         system = problem.linearise(state)
         for _ in range(4):
             step = rng.normal(0, 1, (len(state.local), problem.size))
-            shared = rng.normal(0, 1, len(state.betas) + 1 + len(state.held)) * 0.3
+            shared = rng.normal(0, 1, 1 + len(state.shape) + len(state.held)) * 0.3
+            shared[1 + len(state.betas): 1 + len(state.shape)] *= 0.03  # metres
             slope = (problem.cost(problem.move(state, h * step, h * shared))
                      - problem.cost(problem.move(state, -h * step, -h * shared))) / (2 * h)
             expected = 2 * ((system.gradient * step).sum() + system.shared_gradient @ shared)
@@ -243,6 +247,7 @@ def test_who_turns_is_held_and_who_moves_is_let_go(body):
 
 @pytest.mark.parametrize("values,name", [({"method": "magic"}, "smplx.method"), ({"height_m": 17.0}, "smplx.height_m"),
                                          ({"focal_px": -1.0}, "smplx.focal_px"), ({"rounds": 0}, "smplx.rounds"),
+                                         ({"joint_offsets": -0.1}, "smplx.joint_offsets"),
                                          ({"betas": 3}, "smplx.betas")])
 def test_a_wrong_parameter_is_named(values, name):
     with pytest.raises(BadInput, match=name):
