@@ -12,7 +12,8 @@ from gsac.benchmarks.turntable.options import TurntableOptions
 from gsac.benchmarks.turntable.shell import Shell, capped, cut, draped, lifted
 
 REGIONS = Path(__file__).with_name("regions.npz")
-"""(6, V) shares of lips, ears, eyelids, nails, inner mouth, face: MakeHuman's CC0 texture masks, at the vertices."""
+"""(6, V) shares of lips, ears, eyelids, nails, inner mouth, face: MakeHuman's CC0 texture masks at the vertices, in 255ths;
+`avatar/open_body/bake_regions.py` makes it."""
 OUTSIDE = Path(__file__).with_name("outside.npz")
 """What single local shape sliders do: `vertices` (S, V, 3) and `joints` (S, 55, 3), m; from the open body's bake."""
 EYES = slice(13574, 13718)
