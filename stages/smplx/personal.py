@@ -16,7 +16,8 @@ from gsac.avatar.wholebody import INDEX
 
 SEEN = {"shoulder": (7, 3, 2), "elbow": (7, 2.5, 3), "wrist": (5, 2, 2), "hip": (5, 15, 4), "knee": (3, 9, 3), "ankle": (3, 6, 3),
         "big_toe": (4, 4, 7), "heel": (3, 6, 5)}
-"""Spreads over people of what is left of a key point's offset, mm: of twelve truth turns, beside the offsets they all share."""
+"""Spreads over people of what is left of a key point's offset, mm: of twelve truth turns, beside the offsets they all share.
+Both sides go alike (hips: 15 mm together, 2 against each other), so one unknown serves both."""
 JOINTS = ("hip", "spine1", "knee", "spine2", "ankle", "spine3", "neck", "collar", "head", "shoulder", "elbow", "wrist")
 """Joints that may lie off what the betas say."""
 
