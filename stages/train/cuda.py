@@ -28,12 +28,12 @@ from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 3200
-"""More than twice the CPU's: 0.4 s more for 0.3 dB."""
+"""More than twice the CPU's: 0.4 s more for 0.15 dB, 0.3 with poses moved to their images."""
 
 
 POSES_STAY = {"pose_rate": 0.0, "expression_rate": 0.0, "joint_rate": 0.0}
 PERCEPTUAL_STEPS = 200
-"""The last, of a training or a refit, that have LPIPS of a window where it is in the loss: 1.6 ms each, all others 0.2."""
+"""The last, of a training or a refit, that have LPIPS of a window where it is in the loss: 2.3 ms more each."""
 
 
 def train(task: Task, count: int) -> tuple[fast.Trainer, dict[int, View], dict[int, View]]:
