@@ -14,7 +14,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 Item, Result = TypeVar("Item"), TypeVar("Result")
 
@@ -78,7 +77,7 @@ def side_by_side(work: Callable[[Item, Workspace], Result], items: Iterable[Item
         workspace = Workspace(1)
         return [work(item, workspace) for item in items[k::many]]
 
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(many) as pool:
+    with ThreadPoolExecutor(many) as pool:
         parts = list(pool.map(part, range(many)))
     return [parts[i % many][i // many] for i in range(len(items))]
 

@@ -32,6 +32,7 @@ from gsac.stages.train.recipes import ALIGN, RECIPES
 from gsac.stages.train.rehearsal import rehearse
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
+from threadpoolctl import threadpool_limits
 
 LOSS_ROWS = 20
 """How many rows of the curve tell the loss."""
@@ -43,6 +44,7 @@ TRAIN_SAMPLE = 8
 """How many trained frames `psnr_fg_train` is taken over."""
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices, and the same sums whoever else is at work
 def run(job: Job) -> None:
     config = job.config
     check_device(job.device)
