@@ -34,6 +34,14 @@ def carried(poses: Poses, trained: np.ndarray) -> Poses:
     return out
 
 
+def adam(moments: np.ndarray, count: int, grad: np.ndarray, rate: float) -> np.ndarray:
+    """How far to step back (...) at the count-th gradient (...); moments (2, ...) are moved on in place."""
+    first, second = moments
+    first += 0.1 * (grad - first)
+    second += 0.01 * (grad**2 - second)
+    return rate * (first / (1 - 0.9**count)) / (np.sqrt(second / (1 - 0.99**count)) + 1e-12)
+
+
 class Poses:
     """Poses of T frames with Adam's state; a frame's count of steps is its own."""
 
@@ -134,11 +142,7 @@ class Poses:
         grad[:-1] += 2 * pull * (self.pose[t] - self.base_pose[t]) / TURN**2
         grad[-1] += 2 * pull * (self.transl[t] - self.base_transl[t]) / SHIFT**2
         self.count[t] += 1
-        first, second = self.moments[:, t]
-        first += 0.1 * (grad - first)
-        second += 0.01 * (grad**2 - second)
-        n = self.count[t]
-        move = rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
+        move = adam(self.moments[:, t], self.count[t], grad, rate)
         self.pose[t] -= self.share * move[:-1]
         self.transl[t] -= move[-1]
         return grad_rest, grad_joints
@@ -151,10 +155,7 @@ class Poses:
     def step_betas(self, grad: np.ndarray, rate: float) -> None:
         """One Adam step of the betas (B,), which all frames share."""
         self.beta_count += 1
-        first, second = self.beta_moments
-        first += 0.1 * (grad - first)
-        second += 0.01 * (grad**2 - second)
-        self.betas -= rate * (first / (1 - 0.9**self.beta_count)) / (np.sqrt(second / (1 - 0.99**self.beta_count)) + 1e-12)
+        self.betas -= adam(self.beta_moments, self.beta_count, grad, rate)
         self.forget_rests()
 
     def expression_gradient(self, grad_rest: np.ndarray) -> np.ndarray:
@@ -163,12 +164,8 @@ class Poses:
 
     def step_expression(self, t: int, grad: np.ndarray, rate: float, pull: float) -> None:
         """One Adam step of the expression of frame t, after `step`. grad: (E,)."""
-        value, n = self.expression[t], self.count[t]
-        grad = grad + 2 * pull * value / EXPRESSION**2
-        first, second = self.expression_moments[:, t]
-        first += 0.1 * (grad - first)
-        second += 0.01 * (grad**2 - second)
-        value -= rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
+        grad = grad + 2 * pull * self.expression[t] / EXPRESSION**2
+        self.expression[t] -= adam(self.expression_moments[:, t], self.count[t], grad, rate)
         self.rests.pop(t, None)
         self.moved.pop(t, None)
 
@@ -176,11 +173,7 @@ class Poses:
         """One Adam step of the joints at rest, which all frames share. grad: (55, 3)."""
         grad = grad + 2 * pull * self.joint_offset / JOINT**2
         self.joint_count += 1
-        first, second = self.joint_moments
-        first += 0.1 * (grad - first)
-        second += 0.01 * (grad**2 - second)
-        n = self.joint_count
-        self.joint_offset -= self.joint_share * rate * (first / (1 - 0.9**n)) / (np.sqrt(second / (1 - 0.99**n)) + 1e-12)
+        self.joint_offset -= self.joint_share * adam(self.joint_moments, self.joint_count, grad, rate)
 
     def refined(self):
         """BodyParams with the poses as they stand; `joints` computed anew."""
