@@ -25,7 +25,7 @@ test: setup debian
 	$(BIN)/python -m pytest
 
 test-fast: setup
-	$(BIN)/python -m pytest -m 'not slow'
+	$(BIN)/python -m pytest -m 'not slow' -n 2
 
 # Some tests use Debian packages; where they may not be installed, those tests skip and name them.
 debian:
