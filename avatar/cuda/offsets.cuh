@@ -83,9 +83,10 @@ extern "C" __global__ void __launch_bounds__(256) offset_step(Scene s) {
         for (int w = 1; w < 8; ++w) peak = fmaxf(peak, peaks[w]);
         atomicMax(&state.peak, __float_as_int(peak));  // bits of positive floats sort as integers
     }
+    float second = *s.offset_second;  // read on this side of the barrier: on the other one the first block writes it
     barrier.wait();
     peak = __int_as_float(*(volatile int *)&state.peak);
-    float n = step / every + 1, second = *s.offset_second;
+    float n = step / every + 1;
     second += 0.01f * (peak * peak - second);
     float scale = rate / (1 - powf(0.9f, n)) / (sqrtf(second / (1 - powf(0.99f, n))) + 1e-20f);
     if (mine) {
