@@ -81,6 +81,7 @@ class PaperTrainer(CudaTrainer):
         for name, kept in moments.items():
             self.buffers[name].write(np.pad(kept, ((0, 0), (0, fresh))))
         self._scratch()
+        self.grids = self._grids()
         self._lists(max(self.scene.pair_room, 6 * self.count * self.batch))
 
     def _numbers(self, levels) -> None:
@@ -110,15 +111,17 @@ class PaperTrainer(CudaTrainer):
         for name, shape in (("overlap", (tiles, 3)), ("dice", (self.batch, 3)), ("place", (n, 3)), ("hood", (n, 2 * COLUMNS))):
             self._empty(name, shape, np.float32)
             self.scratch.append(name)
-        blocks, grids = -(-n // 128), {}
-        for name, grid in self.grids.items():
+
+    def _grids(self) -> dict[str, tuple[tuple[int, int], int]]:
+        blocks, grids = -(-self.count // 128), {}
+        for name, grid in super()._grids().items():
             if name == "image_gradient":
                 grids["dice"] = ((self.batch, 1), 256)
             if name == "gaussian_step":
                 grids |= {"neighbourhood": ((blocks, 1), 128), "paper_step": ((blocks, 1), 128)}
             else:
                 grids[name] = grid
-        self.grids = grids
+        return grids
 
     def _find_neighbours(self) -> None:
         """By where the gaussians stand now; the search of all pairs takes about a millisecond on the device."""

@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.cuda.lists import joint_levels
 from gsac.avatar.cuda.recipe import Recipe, draw
-from gsac.avatar.cuda.trainer import BodyArrays, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import BRIGHTEST, DARKEST, FROM_CAMERA
 from gsac.benchmarks.gpu.figure import Figure

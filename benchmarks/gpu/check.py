@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from gsac.avatar import losses
+from gsac.avatar.cuda.arrays import Shot
 from gsac.avatar.cuda.recipe import Recipe
-from gsac.avatar.cuda.trainer import CudaTrainer, Shot
+from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.skinning import skin_backward

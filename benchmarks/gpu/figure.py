@@ -8,7 +8,7 @@ import numpy as np
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
-from gsac.avatar.cuda.trainer import BodyArrays, Shot
+from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
 from gsac.avatar.rotation import log

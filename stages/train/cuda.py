@@ -11,11 +11,12 @@ from contextlib import contextmanager
 
 import numpy as np
 from gsac.avatar.cuda.align import Aligner, AlignRecipe
+from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.cuda.device import DeviceError
 from gsac.avatar.cuda.kernels import CompileError
 from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
-from gsac.avatar.cuda.trainer import BodyArrays, CudaTrainer, Shot
+from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
 from gsac.stages.contract import StageError

@@ -1,6 +1,7 @@
-"""What the GPU's side of `train` refuses and promises without a GPU."""
+"""What the GPU's side of `train` refuses and promises without a GPU, and, where there is one, the stage's bytes."""
 
-from dataclasses import fields
+import json
+from dataclasses import fields, replace
 
 import pytest
 from gsac.avatar.cuda import why_not
@@ -9,7 +10,7 @@ from gsac.stages.train import STAGE, config, fast
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.cuda import STEPS, recipe_of
 from gsac.stages.train.recipes import RECIPES
-from gsac.stages.train.stage import check_device
+from gsac.stages.train.stage import check_device, run
 
 
 def test_every_recipe_has_an_entry_for_every_device():
@@ -57,3 +58,16 @@ def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_a
         monkeypatch.setattr(perceptual, "why_not", lambda why=why: why)
         assert without_lpips(fast, "cuda", frames) is why and without_lpips(paper, "cuda", frames) is why
         assert "train.lpips is loss" in without_lpips(TrainConfig(recipe="paper"), "cuda", frames)
+
+
+@pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
+@pytest.mark.parametrize("values", [{"gaussians": "auto", "steps": 400}, {"recipe": "paper", "steps": 100}], ids=["fast", "paper"])
+def test_one_seed_gives_the_same_bytes_on_a_gpu_and_the_same_choice_of_a_size(job, values):
+    found = []
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        made = job(name, device="cuda", seed=seed, **values)
+        run(replace(made, device="cuda"))
+        figures = json.loads((made.out / "metrics.json").read_text())
+        found.append([*((made.out / file).read_bytes() for file in ("avatar.npz", "body.npz")), figures.get("size_curve"),
+                      [row["loss"] for row in figures["curve"]], figures["heldout"]])
+    assert found[0] == found[1] and found[0][0] != found[2][0]

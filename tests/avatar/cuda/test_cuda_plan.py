@@ -1,0 +1,115 @@
+"""What holds of the CUDA trainer without a GPU: its plan, its lists, its structs, and what it says."""
+
+import ctypes
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from gsac.avatar.cuda import lists, scene, why_not
+from gsac.avatar.cuda.recipe import Recipe, draw
+
+
+def test_importing_the_cuda_path_loads_nothing_heavy():
+    code = ("import sys, gsac.avatar.cuda, gsac.avatar.cuda.recipe, gsac.avatar.cuda.kernels; "
+            "print([m for m in ('torch', 'numba', 'cuda', 'cuda.bindings') if m in sys.modules])")
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+@pytest.mark.skipif(why_not() is None, reason="there is a GPU here")
+def test_without_a_gpu_the_device_says_why_it_cannot_be_used():
+    from gsac.avatar.cuda.device import Device, NoDeviceError
+
+    with pytest.raises(NoDeviceError, match="GPU|driver|gsac\\[gpu\\]"):
+        Device()
+
+
+def test_structs_are_laid_out_alike_for_host_and_kernels(tmp_path):
+    compiler = shutil.which("g++") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no gcc here: the structs' layout is not compiled")
+    sizes = ", ".join(f"sizeof({name})" for name in ("Frame", "Plan", "State", "Scene"))
+    text = scene.declarations() + f"\n#include <cstddef>\nextern \"C\" void sizes(int *out) {{ int all[] = {{{sizes}, " \
+        "(int)offsetof(Scene, ssim), (int)offsetof(Frame, fx)}; for (int i = 0; i < 6; ++i) out[i] = all[i]; }"
+    (tmp_path / "sizes.cpp").write_text(text)
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", tmp_path / "sizes.so", tmp_path / "sizes.cpp"], check=True)
+    out = (ctypes.c_int * 6)()
+    ctypes.CDLL(str(tmp_path / "sizes.so")).sizes(out)
+    assert list(out) == [*(ctypes.sizeof(getattr(scene, name)) for name in ("Frame", "Plan", "State", "Scene")),
+                         scene.Scene.ssim.offset, scene.Frame.fx.offset]
+
+
+def test_the_plan_draws_what_the_cpu_recipe_draws():
+    drawn = draw(Recipe(steps=30, seed=5, coarse_share=0.5, mu_rate=1.5e-3), 7, 2)
+    random, left = np.random.default_rng(5), []
+    for step in range(30):
+        if not left:
+            left = list(random.permutation(7))
+        assert drawn.order[step, 0] == left.pop()
+        np.testing.assert_array_equal(drawn.background[step, 0], random.random(3).astype(np.float32))
+    assert (drawn.rates["level"] == np.repeat([0, 1], 15)).all()
+    np.testing.assert_allclose(drawn.rates["mu"], 1.5e-3 * 0.01 ** (np.arange(30) / 30), rtol=1e-6)
+
+
+def test_a_recipe_that_is_told_nothing_learns_nothing_counts_nothing_and_limits_nothing():
+    plain = Recipe(steps=3)
+    drawn = draw(plain, 2, 1)
+    assert (drawn.rates["centre"] == -1).all()
+    assert not any(drawn.rates[name].any() for name in drawn.rates.dtype.names if name != "centre")
+    assert (plain.ssim, plain.sobel, plain.mask, plain.pose_pull) == (0, 0, 0, 0)
+    assert np.isinf([plain.needle, plain.largest, plain.reach]).all()
+
+
+def test_plans_of_the_other_trainers_hold_their_frames_and_rates():
+    from types import SimpleNamespace
+
+    from gsac.avatar.cuda.align import Aligner, AlignRecipe
+    from gsac.avatar.cuda.paper import PaperRecipe, PaperTrainer
+    from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
+
+    def plan(kind, recipe, frames):
+        return kind.plan(SimpleNamespace(recipe=recipe, frames=frames), [None])
+
+    still = plan(Aligner, AlignRecipe(steps=12, pose_rate=1e-3, pose_end=0.05), 3)
+    assert still.order[:, 0].tolist() == [0] * 4 + [1] * 4 + [2] * 4 and (still.background == 1).all()
+    np.testing.assert_allclose(still.rates["pose"], np.tile(1e-3 * 0.05 ** (np.arange(4) / 4), 3), rtol=1e-6)
+    assert not any(still.rates[name].any() for name in ("mu", "quat", "log_scale", "rgb", "opacity", "offset", "place_pull"))
+
+    grounds = np.random.default_rng(0).random((2, 3, 3))
+    rounds = [Round(np.array([2, 0, 1]), grounds[0], 0.0), Round(np.array([1, 2, 0]), grounds[1], 0.3)]
+    found = plan(RoundsTrainer, RoundsRecipe(steps=6, mu_rate=1.5e-3, offset_rate=1e-3, offset_share=0.6, gain_rate=2e-3,
+                                              rounds=rounds), 3)
+    assert found.order[:, 0].tolist() == [2, 0, 1, 1, 2, 0] and not found.rates["pose"].any()
+    np.testing.assert_allclose(found.background[:, 0], grounds.reshape(-1, 3), rtol=1e-6)
+    np.testing.assert_allclose(found.rates["mu"], np.repeat([1.5e-3, 1.5e-3 * 0.01**0.3], 3), rtol=1e-6)
+    np.testing.assert_allclose(found.rates["offset"], np.repeat([1e-3, 1e-3 * 0.1**0.5], 3), rtol=1e-6)
+    np.testing.assert_allclose(found.rates["gain"], np.repeat([2e-3, 2e-3 * 0.1**0.3], 3), rtol=1e-6)
+
+    found = plan(PaperTrainer, PaperRecipe(steps=10, batch=4, mu_rate=1e-4, mu_decay=0.01, rgb_rate=5e-3, beta_rate=2e-4), 6)
+    assert found.order.shape == (10, 4) and (found.rates["rgb"] == np.float32(5e-3)).all() and (found.rates["betas"] > 0).all()
+    np.testing.assert_allclose(found.rates["mu"], 1e-4 * 0.01 ** (np.arange(10) / 10), rtol=1e-6)
+
+
+def test_a_step_never_holds_a_frame_twice():
+    order = draw(Recipe(steps=50, batch=4), 6, 1).order
+    assert all(len(set(row)) == 4 for row in order)
+    assert draw(Recipe(steps=2, batch=4), 3, 1).order.shape == (2, 3)
+
+
+def test_lists_hold_every_corner_weight_and_child_once():
+    random = np.random.default_rng(0)
+    faces, face = random.integers(0, 9, (20, 3)), random.integers(0, 20, 50)
+    start, item = lists.vertices_of(faces, face, 9)
+    assert sorted(item) == list(range(150))
+    for v in range(9):
+        mine = item[start[v]:start[v + 1]]
+        assert (faces[face].reshape(-1)[mine] == v).all() and (np.diff(mine) > 0).all()
+    index, weight = random.integers(0, 5, (30, 4)), random.random((30, 4)) * (random.random((30, 4)) > 0.3)
+    start, vertex, kept = lists.joints_of(index, weight, 5)
+    for j in range(5):
+        np.testing.assert_allclose(kept[start[j]:start[j + 1]].sum(), weight[index == j].sum())
+    assert start[-1] == (weight != 0).sum() and len(vertex) == start[-1]
+    start, child = lists.children(np.array([-1, 0, 0, 1, 3]))
+    assert [list(child[start[j]:start[j + 1]]) for j in range(5)] == [[1, 2], [3], [], [4], []]
+    assert list(lists.joint_levels(np.array([-1, 0, 0, 1, 3]))) == [0, 1, 1, 2, 3]
