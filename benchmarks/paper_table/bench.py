@@ -2,7 +2,7 @@
 
 Truth clips of turning people whose hand goes behind the back or before the belly; each row is the mean of trainings with
 several seeds. PSNR and SSIM are of whole held-out frames on black, as published; the hands' PSNR stands beside them. LPIPS is
-left open: its network is in no package.
+a dash until its weights are brought (`gsac models add`).
 """
 
 from __future__ import annotations
