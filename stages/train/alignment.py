@@ -73,24 +73,20 @@ def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: i
     """Of frame t in its view. share: `carriers` of the gaussians' faces."""
     vertices = poses.vertices(t)
     rendering = render_bound(vertices, poses.body.faces, gaussians, view.camera, workspace)
-    weight = np.float32(np.sqrt(MASK))
-    image = np.dstack([rendering.rgb, weight * rendering.alpha])
-    truth = view.pixels * np.float32([1 / 255, 1 / 255, 1 / 255, weight / 255])
-    residual = image - truth
-    person = (rendering.alpha > 0.5) | (view.pixels[..., 3] > 127)
-    down, across = np.gradient(image, axis=(0, 1))
-    slope = np.stack([(across * across).sum(2), (across * down).sum(2), (down * down).sum(2)], 2)
-    slope /= np.maximum(rendering.alpha, np.float32(CLEAR))[..., None]
+    height, width = rendering.alpha.shape
+    colour, mask = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
+    slope, squares = np.empty((height, width, 3), np.float32), np.empty((height * width, 4), np.float32)
+    pixels = compared(rendering.rgb, rendering.alpha, view.pixels, np.float32(np.sqrt(MASK)), colour, mask, slope, squares)
     means = rendering.state.means.copy()
-    grads = render_bound_backward(rendering.state, np.ascontiguousarray(residual[..., :3]), weight * residual[..., 3])
+    grads = render_bound_backward(rendering.state, colour, mask)
     grad_pose, grad_transl, _, _ = poses.gradients(t, grads.vertices)
     turns = np.einsum("jba,jb->ja", rotation.log_derivative(poses.pose[t, BODY]), grad_pose[BODY])
     tensors = render_backward(rendering.state, slope, np.zeros_like(rendering.alpha)).rgb
-    used = tensors[:, 0] + tensors[:, 2] > FLAT
-    rows = np.empty((2 * int(used.sum()), UNKNOWNS), np.float32)
-    _rows(means[used], tensors[used], share[used], *_axes(poses, t), np.array(view.camera.focal, np.float32), rows)
+    used = np.flatnonzero(tensors[:, 0] + tensors[:, 2] > FLAT)
+    rows = np.empty((2 * len(used), UNKNOWNS), np.float32)
+    _rows(used, means, tensors, share, *_axes(poses, t), np.array(view.camera.focal, np.float32), rows)
     return Normal(np.concatenate([turns.ravel(), grad_transl]), CURVATURE * (rows.T @ rows).astype(np.float64),
-                  float((residual[person] ** 2).sum()), int(person.sum()))
+                  float(squares[:pixels].sum()), pixels)
 
 
 def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], rounds: int) -> None:
@@ -131,10 +127,49 @@ def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _rows(means, tensors, share, axes, places, focal, rows):
-    """Two rows a gaussian: its motion in the image by each unknown, times the root of its slope tensor [a b; b c]."""
+def compared(rgb, alpha, pixels, weight, colour, mask, slope, squares):
+    """What a render (h, w, 3), (h, w) is off by from its frame, pixels (h, w, 4), the mask counted `weight` times.
+
+    Written: colour and mask, the residuals, that of the mask weighted once more; slope (h, w, 3), products of the render's slopes
+    (across twice, across and down, down twice) by alpha; squares (h w, 4), of the residuals of the pixels that show the person, as
+    many as it returns.
+    """
+    height, width = alpha.shape
+    byte, byte_mask, half = np.float32(1 / 255), np.float32(weight / np.float32(255)), np.float32(0.5)
+    across, down, number = np.empty(4, np.float32), np.empty(4, np.float32), 0
+    for y in range(height):
+        above, below = max(y - 1, 0), min(y + 1, height - 1)
+        for x in range(width):
+            left, right = max(x - 1, 0), min(x + 1, width - 1)
+            wide, tall = half if right - left == 2 else np.float32(1), half if below - above == 2 else np.float32(1)
+            for c in range(3):
+                across[c] = (rgb[y, right, c] - rgb[y, left, c]) * wide
+                down[c] = (rgb[below, x, c] - rgb[above, x, c]) * tall
+                colour[y, x, c] = rgb[y, x, c] - np.float32(pixels[y, x, c]) * byte
+            across[3] = (weight * alpha[y, right] - weight * alpha[y, left]) * wide
+            down[3] = (weight * alpha[below, x] - weight * alpha[above, x]) * tall
+            off = weight * alpha[y, x] - np.float32(pixels[y, x, 3]) * byte_mask
+            mask[y, x] = weight * off
+            xx, xy, yy = np.float32(0), np.float32(0), np.float32(0)
+            for c in range(4):
+                xx += across[c] * across[c]
+                xy += across[c] * down[c]
+                yy += down[c] * down[c]
+            shared = max(alpha[y, x], np.float32(CLEAR))
+            slope[y, x, 0], slope[y, x, 1], slope[y, x, 2] = xx / shared, xy / shared, yy / shared
+            if alpha[y, x] > half or pixels[y, x, 3] > 127:
+                for c in range(3):
+                    squares[number, c] = colour[y, x, c] * colour[y, x, c]
+                squares[number, 3] = off * off
+                number += 1
+    return number
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rows(used, means, tensors, share, axes, places, focal, rows):
+    """Two rows a gaussian of those used: its motion in the image by each unknown, times the root of its slope tensor [a b; b c]."""
     last = 3 * axes.shape[0]
-    for i in range(means.shape[0]):
+    for at, i in enumerate(used):
         x, y, z = means[i, 0], means[i, 1], means[i, 2]
         fx, fy = focal[0] / z, focal[1] / z
         a = np.sqrt(max(tensors[i, 0], np.float32(1e-12)))
@@ -145,14 +180,14 @@ def _rows(means, tensors, share, axes, places, focal, rows):
             ax, ay, az = x - places[j, 0], y - places[j, 1], z - places[j, 2]
             for k in range(3):
                 if w == 0:
-                    rows[2 * i, 3 * j + k] = rows[2 * i + 1, 3 * j + k] = 0
+                    rows[2 * at, 3 * j + k] = rows[2 * at + 1, 3 * j + k] = 0
                     continue
                 ex, ey, ez = axes[j, 0, k], axes[j, 1, k], axes[j, 2, k]
                 mx, my, mz = w * (ey * az - ez * ay), w * (ez * ax - ex * az), w * (ex * ay - ey * ax)
                 u, v = fx * (mx - x / z * mz), fy * (my - y / z * mz)
-                rows[2 * i, 3 * j + k] = a * u + b * v
-                rows[2 * i + 1, 3 * j + k] = c * v
-        rows[2 * i, last], rows[2 * i + 1, last] = a * fx, 0
-        rows[2 * i, last + 1], rows[2 * i + 1, last + 1] = b * fy, c * fy
-        rows[2 * i, last + 2] = -(a * fx * x + b * fy * y) / z
-        rows[2 * i + 1, last + 2] = -c * fy * y / z
+                rows[2 * at, 3 * j + k] = a * u + b * v
+                rows[2 * at + 1, 3 * j + k] = c * v
+        rows[2 * at, last], rows[2 * at + 1, last] = a * fx, 0
+        rows[2 * at, last + 1], rows[2 * at + 1, last + 1] = b * fy, c * fy
+        rows[2 * at, last + 2] = -(a * fx * x + b * fy * y) / z
+        rows[2 * at + 1, last + 2] = -c * fy * y / z

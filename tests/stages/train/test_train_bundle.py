@@ -30,6 +30,25 @@ def half_error(gaussians, poses, t, view, workspace):
     return 0.5 * ((colour**2).sum() + alignment.MASK * ((rendering.alpha - view.pixels[..., 3] / 255) ** 2).sum())
 
 
+def test_a_render_is_compared_with_its_frame_as_plain_arrays_are():
+    rng = np.random.default_rng(1)
+    h, w, weight = 23, 17, np.float32(0.8)
+    rgb, alpha = rng.random((h, w, 3), np.float32), rng.random((h, w), np.float32)
+    pixels = rng.integers(0, 256, (h, w, 4), np.uint8)
+    colour, mask = np.empty((h, w, 3), np.float32), np.empty((h, w), np.float32)
+    slope, squares = np.empty((h, w, 3), np.float32), np.empty((h * w, 4), np.float32)
+    count = alignment.compared(rgb, alpha, pixels, weight, colour, mask, slope, squares)
+    image = np.dstack([rgb, weight * alpha])
+    off = image - pixels / np.float32([255, 255, 255, 255 / weight])
+    person = (alpha > 0.5) | (pixels[..., 3] > 127)
+    down, across = np.gradient(image, axis=(0, 1))
+    expected = np.stack([across**2, across * down, down**2], 2).sum(3) / np.maximum(alpha, alignment.CLEAR)[..., None]
+    assert 0 < person.sum() == count < h * w
+    for got, plain in ((colour, off[..., :3]), (mask, weight * off[..., 3]), (slope, expected),
+                       (squares[:count], off[person] ** 2)):
+        np.testing.assert_allclose(got, plain, rtol=1e-5, atol=1e-6)
+
+
 def test_the_equations_of_a_frame_are_its_slope_and_nearly_its_curvature(job):
     task, workspace = task_of(job(frames=2)), Workspace(1)
     poses, view = task.poses, fast.person_crop(task.views[0])
