@@ -84,18 +84,19 @@ def summary(clip: str, ends: dict) -> dict:
         {"recipe": recipe, "steps": steps} | {k: m[k] for k in ("gpu_seconds", "seconds", "psnr_fg", "psnr_fg_ttpo", "n_gaussians")}
         for (recipe, steps), m in ends.items()]}
     goal = next(m["psnr_fg"] for (recipe, _), m in ends.items() if recipe == "paper")
-    reached = [at["gpu_seconds"] for (recipe, _), m in ends.items() if recipe == "fast"
+    reached = [(at["gpu_seconds"], at["seconds"]) for (recipe, _), m in ends.items() if recipe == "fast"
                for at in m["curve"] if at.get("psnr_fg", -1) >= goal]
-    return out | {"paper_psnr_fg": goal, "fast_reaches_it_gpu_seconds": min(reached, default=None)}
+    on_gpu, in_all = min(reached, default=(None, None))
+    return out | {"paper_psnr_fg": goal, "fast_reaches_it_gpu_seconds": on_gpu, "fast_reaches_it_seconds": in_all}
 
 
 def words(found: dict) -> list[str]:
     lines = [f"{found['clip']}: {t['recipe']}, {t['steps']} steps: {t['gpu_seconds']:.3f} s on the GPU, {t['seconds']:.2f} in all, "
              f"{t['psnr_fg']:.2f} dB (pose moved to the image: {t['psnr_fg_ttpo']:.2f}), {t['n_gaussians']} gaussians"
              for t in found["trainings"]]
-    first = found["fast_reaches_it_gpu_seconds"]
+    on_gpu, in_all = (found[f"fast_reaches_it_{kind}"] for kind in ("gpu_seconds", "seconds"))
     return [*lines, f"{found['clip']}: fast is at paper's {found['paper_psnr_fg']:.2f} dB after "
-                    + (f"{first:.3f} s on the GPU" if first is not None else "no time: it never gets there")]
+                    + ("no time: it never gets there" if on_gpu is None else f"{on_gpu:.3f} s on the GPU, {in_all:.2f} in all")]
 
 
 def write(rows: list[tuple], path: Path) -> None:

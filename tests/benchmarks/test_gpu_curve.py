@@ -35,7 +35,7 @@ def test_the_summary_says_when_fast_is_first_as_good_as_paper():
     fast, paper = metrics("fast", [(0.1, 20.0), (0.2, 22.0), (0.3, 23.0)]), metrics("paper", [(3.0, 21.0)])
     found = curve.summary("a", {("fast", 100): fast, ("paper", 100): paper})
     assert found["paper_psnr_fg"] == 21.0 and found["fast_reaches_it_gpu_seconds"] == 0.2
-    assert "21.00 dB after 0.200 s" in curve.words(found)[-1]
+    assert "21.00 dB after 0.200 s on the GPU, 0.40 in all" in curve.words(found)[-1]
     found = curve.summary("a", {("fast", 100): fast, ("paper", 100): metrics("paper", [(3.0, 25.0)])})
     assert found["fast_reaches_it_gpu_seconds"] is None and "never" in curve.words(found)[-1]
 
