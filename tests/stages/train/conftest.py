@@ -1,10 +1,13 @@
 """A person small enough to train in seconds: the open body turning once, coloured by place, drawn by the z-buffer."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from gsac.avatar.artifacts import Clip, write_alpha, write_frame
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.cuda import why_not
 from gsac.avatar.light import FROM_CAMERA, shade
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.stages.contract import Job, make_config
@@ -58,8 +61,8 @@ def write_inputs(folder, frames=12, blank=(), timestamps=True, lamp=False):
 
 @pytest.fixture
 def job(tmp_path):
-    """job(**parameters, frames=, blank=, lamp=): a Job over fresh inputs; its warnings are in job.warnings."""
-    def make(name="out", frames=12, blank=(), timestamps=True, lamp=False, **parameters):
+    """job(**parameters, frames=, blank=, lamp=, device=): a Job over fresh inputs; its warnings are in job.warnings."""
+    def make(name="out", frames=12, blank=(), timestamps=True, lamp=False, device="cpu", **parameters):
         inputs = tmp_path / f"in_{frames}_{len(blank)}_{timestamps}_{lamp}"
         if not inputs.exists():
             write_inputs(inputs, frames, blank, timestamps, lamp)
@@ -67,7 +70,16 @@ def job(tmp_path):
         out.mkdir()
         warnings = []
         made = Job({port: inputs / port for port in STAGE.inputs}, out, make_config(STAGE, SMALL | parameters),
-                   warn=warnings.append)
+                   warn=warnings.append, device=device)
         made.warnings = warnings
         return made
     return make
+
+
+gpu = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
+
+
+@pytest.fixture(params=["cpu", pytest.param("cuda", marks=gpu)])
+def job_anywhere(request, job):
+    """As `job`, on the CPU, and on a GPU where there is one."""
+    return partial(job, device=request.param)

@@ -1,7 +1,7 @@
 """What the GPU's side of `train` refuses and promises without a GPU, and, where there is one, the stage's bytes."""
 
 import json
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import pytest
 from gsac.avatar.cuda import why_not
@@ -61,13 +61,12 @@ def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_a
 
 
 @pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
-@pytest.mark.parametrize("values", [{"gaussians": "auto", "steps": 400}, {"recipe": "paper", "steps": 100}], ids=["fast", "paper"])
-def test_one_seed_gives_the_same_bytes_on_a_gpu_and_the_same_choice_of_a_size(job, values):
+def test_one_seed_gives_the_same_bytes_on_a_gpu_and_the_same_choice_of_a_size(job):
     found = []
-    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
-        made = job(name, device="cuda", seed=seed, **values)
-        run(replace(made, device="cuda"))
+    for name in ("a", "b"):
+        made = job(name, device="cuda", gaussians="auto", steps=400)
+        run(made)
         figures = json.loads((made.out / "metrics.json").read_text())
-        found.append([*((made.out / file).read_bytes() for file in ("avatar.npz", "body.npz")), figures.get("size_curve"),
+        found.append([*((made.out / file).read_bytes() for file in ("avatar.npz", "body.npz")), figures["size_curve"],
                       [row["loss"] for row in figures["curve"]], figures["heldout"]])
-    assert found[0] == found[1] and found[0][0] != found[2][0]
+    assert found[0] == found[1] and len(found[0][2]) > 1

@@ -59,10 +59,10 @@ def test_nothing_seen_gives_an_even_light():
 
 
 @pytest.mark.slow
-def test_a_person_turning_under_a_lamp_is_drawn_better_with_its_light(job):
+def test_a_person_turning_under_a_lamp_is_drawn_better_with_its_light(job_anywhere):
     psnr = {}
     for light in (True, False):
-        made = job(name=f"light_{light}", lamp=True, light=light, pose_rounds=0)
+        made = job_anywhere(name=f"light_{light}", lamp=True, light=light, pose_rounds=0)
         run(made)
         psnr[light] = json.loads((made.out / "metrics.json").read_text())["psnr_fg_ttpo"]
     assert psnr[True] > psnr[False] + 1

@@ -18,8 +18,8 @@ def metrics(job):
 
 
 @pytest.mark.slow
-def test_held_out_frames_are_rendered_better_as_training_goes_on_and_poses_come_nearer_the_truth(job):
-    made = job(curve=10)
+def test_held_out_frames_are_rendered_better_as_training_goes_on_and_poses_come_nearer_the_truth(job_anywhere):
+    made = job_anywhere(curve=10)
     run(made)
     figures = metrics(made)
     assert figures["psnr_fg"] > 15.5 and figures["alpha_iou"] > 0.8
@@ -44,8 +44,8 @@ TOGETHER = EVERY_IMAGE | {"psnr_full_pooled", "psnr_full_black_pooled", "psnr_fg
 
 
 @pytest.mark.slow
-def test_every_figure_is_told_of_all_images_and_of_each_with_and_without_the_pose_moved_to_the_image(job):
-    made = job(steps=10, flip=True)
+def test_every_figure_is_told_of_all_images_and_of_each_with_and_without_the_pose_moved_to_the_image(job_anywhere):
+    made = job_anywhere(steps=10, flip=True)
     run(made)
     figures = metrics(made)
     for names, told in ((TOGETHER, figures), (EVERY_IMAGE | {"psnr_left_hand", "psnr_right_hand"}, figures["heldout"][0])):
@@ -62,11 +62,11 @@ def test_every_figure_is_told_of_all_images_and_of_each_with_and_without_the_pos
 
 @pytest.mark.slow
 @pytest.mark.parametrize("values", [{"steps": 40}, {"steps": 4, "recipe": "paper"}], ids=["fast", "paper"])
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_avatar(job, monkeypatch, values):
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_avatar(job_anywhere, monkeypatch, values):
     monkeypatch.setattr("gsac.stages.train.densify.FIRST", 1)
     monkeypatch.setattr("gsac.stages.train.densify.EVERY", 2)
     monkeypatch.setattr("gsac.stages.train.densify.PHASE", 0)
-    jobs = [job(name, pose_test_steps=0, seed=seed, **values) for name, seed in (("a", 0), ("b", 0), ("c", 1))]
+    jobs = [job_anywhere(name, pose_test_steps=0, seed=seed, **values) for name, seed in (("a", 0), ("b", 0), ("c", 1))]
     for each in jobs:
         run(each)
     for name in ("avatar.npz", "body.npz"):
@@ -75,8 +75,8 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_avatar(job,
 
 
 @pytest.mark.slow
-def test_empty_masks_are_left_out_with_a_warning_that_names_the_frames(job):
-    made = job(blank=(2, 5), steps=10)
+def test_empty_masks_are_left_out_with_a_warning_that_names_the_frames(job_anywhere):
+    made = job_anywhere(blank=(2, 5), steps=10)
     run(made)
     figures = metrics(made)
     assert "2 of 12 frames (2, 5)" in made.warnings[0]
@@ -85,8 +85,8 @@ def test_empty_masks_are_left_out_with_a_warning_that_names_the_frames(job):
 
 
 @pytest.mark.slow
-def test_frames_without_a_fitted_body_are_neither_trained_on_nor_judged(job):
-    made = job(steps=20, pose_test_steps=0)
+def test_frames_without_a_fitted_body_are_neither_trained_on_nor_judged(job_anywhere):
+    made = job_anywhere(steps=20, pose_test_steps=0)
     path = made.inputs["smplx/body.npz"]
     params = BodyParams.read(path)
     params.sigma_joints[[2, 3]] = LOST
@@ -105,8 +105,8 @@ def test_masks_that_are_all_empty_stop_the_stage(job):
 
 
 @pytest.mark.slow
-def test_a_turn_that_was_seen_in_part_is_warned_of_and_a_whole_one_is_not(job):
-    whole, part = job("whole", steps=4), job("part", steps=4)
+def test_a_turn_that_was_seen_in_part_is_warned_of_and_a_whole_one_is_not(job_anywhere):
+    whole, part = job_anywhere("whole", steps=4), job_anywhere("part", steps=4)
     params = BodyParams.read(part.inputs["smplx/body.npz"])
     run(whole)
     params.global_orient[:] = params.global_orient[6] + np.linspace(0, 0.1, len(params.global_orient))[:, None]
@@ -121,8 +121,8 @@ def test_a_turn_that_was_seen_in_part_is_warned_of_and_a_whole_one_is_not(job):
 
 
 @pytest.mark.slow
-def test_one_photo_gives_an_avatar_without_a_measure_and_says_so(job):
-    made = job(frames=1, steps=10, timestamps=False)
+def test_one_photo_gives_an_avatar_without_a_measure_and_says_so(job_anywhere):
+    made = job_anywhere(frames=1, steps=10, timestamps=False)
     run(made)
     figures = metrics(made)
     assert figures["psnr_fg"] is None and figures["psnr_full_ttpo"] is None and figures["heldout_frames"] == []
