@@ -174,6 +174,8 @@ def body_arrays(poses: Poses, frames: np.ndarray, recipe: Recipe) -> BodyArrays:
 def follow(trainer: CudaTrainer, task: Task, until: int) -> None:
     """Trains up to a step, and says at every mark on the way how far it is."""
     steps, done = trainer.recipe.steps, trainer.state().step
+    if done == until:
+        return  # of very few steps none may be left
     for stop in [*(mark for mark in task.marks(steps) if done < mark < until), until]:
         trainer.train(stop - done)
         losses = trainer.losses()[done:].mean(1)

@@ -8,9 +8,9 @@ from gsac.stages.train import levels
 from gsac.stages.train.stage import run
 
 
-def test_a_level_draws_better_at_its_own_size_than_the_finest_does(job, monkeypatch):
+def test_a_level_draws_better_at_its_own_size_than_the_finest_does(job_anywhere, monkeypatch):
     monkeypatch.setattr(levels, "LEAST", 30)
-    made = job(gaussians=1800, steps=90, pose_test_steps=0)
+    made = job_anywhere(gaussians=1800, steps=90, pose_test_steps=0)
     run(made)
     figures = json.loads((made.out / "metrics.json").read_text())["levels"]
     finest, *coarser = Gaussians.read_levels(made.out / "avatar.npz")
@@ -23,8 +23,8 @@ def test_a_level_draws_better_at_its_own_size_than_the_finest_does(job, monkeypa
         np.testing.assert_array_equal(level.light, finest.light)
 
 
-def test_few_gaussians_have_no_coarser_level(job):
-    made = job(gaussians=200, frames=2, steps=2, pose_test_steps=0)
+def test_few_gaussians_have_no_coarser_level(job_anywhere):
+    made = job_anywhere(gaussians=200, frames=2, steps=2, pose_test_steps=0)
     run(made)
     assert len(Gaussians.read_levels(made.out / "avatar.npz")) == 1
     assert json.loads((made.out / "metrics.json").read_text())["levels"] == []

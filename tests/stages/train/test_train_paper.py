@@ -165,8 +165,8 @@ def test_densification_happens_eleven_times_and_only_above_the_threshold():
 
 
 @pytest.mark.slow
-def test_the_recipe_learns_poses_and_betas_and_says_that_the_perceptual_loss_is_left_out(job):
-    made = job(recipe="paper", steps=60, curve=3, pose_test_steps=0)
+def test_the_recipe_learns_poses_and_betas_and_says_that_the_perceptual_loss_is_left_out(job_anywhere):
+    made = job_anywhere(recipe="paper", steps=60, curve=3, pose_test_steps=0)
     run(made)
     figures = json.loads((made.out / "metrics.json").read_text())
     judged = [row["psnr_fg"] for row in figures["curve"] if "psnr_fg" in row]

@@ -47,10 +47,10 @@ def test_text_that_is_not_auto_is_refused():
 
 
 @pytest.mark.slow
-def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job, monkeypatch):
+def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywhere, monkeypatch):
     monkeypatch.setattr(ladder, "SIZES", (1200, 600, 60, 30))
     monkeypatch.setattr(ladder, "REFIT", 0.13)
-    made = job(gaussians="auto", pose_test_steps=0)
+    made = job_anywhere(gaussians="auto", pose_test_steps=0)
     run(made)
     figures = json.loads((made.out / "metrics.json").read_text())
     curve = figures["size_curve"]
@@ -63,10 +63,10 @@ def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job, monkey
 
 
 @pytest.mark.slow
-def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job, monkeypatch):
+def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job_anywhere, monkeypatch):
     monkeypatch.setattr(ladder, "SIZES", (500, 60))
     monkeypatch.setattr(holdout, "LONG", 6)
-    made = job(gaussians="auto", frames=10, steps=8, holdout=4, pose_rounds=0, pose_test_steps=0)
+    made = job_anywhere(gaussians="auto", frames=10, steps=8, holdout=4, pose_rounds=0, pose_test_steps=0)
     run(made)
     figures = json.loads((made.out / "metrics.json").read_text())
     chose, judged = figures["size_frames"], figures["heldout_frames"]
@@ -75,9 +75,9 @@ def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job, monkeypatch):
 
 
 @pytest.mark.slow
-def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules(job, monkeypatch):
+def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules(job_anywhere, monkeypatch):
     monkeypatch.setattr(ladder, "SIZES", (400, 40, 20))
-    made = job(gaussians="auto", every_size=True, frames=6, steps=12, pose_rounds=0, pose_test_steps=0)
+    made = job_anywhere(gaussians="auto", every_size=True, frames=6, steps=12, pose_rounds=0, pose_test_steps=0)
     run(made)
     curve = json.loads((made.out / "metrics.json").read_text())["size_curve"]
     assert [row["n_gaussians"] for row in curve] == [400, 40, 20]
@@ -87,8 +87,8 @@ def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules
 
 
 @pytest.mark.slow
-def test_auto_without_held_out_frames_takes_a_fixed_size(job, monkeypatch):
+def test_auto_without_held_out_frames_takes_a_fixed_size(job_anywhere, monkeypatch):
     monkeypatch.setattr(ladder, "UNJUDGED", 700)
-    made = job(gaussians="auto", frames=3, steps=5)
+    made = job_anywhere(gaussians="auto", frames=3, steps=5)
     run(made)
     assert json.loads((made.out / "metrics.json").read_text())["n_gaussians"] == 700
