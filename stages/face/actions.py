@@ -5,6 +5,7 @@ Points are those of `landmarks.align`: (468, 3) m in the resting face's frame.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,11 +20,18 @@ BLIND = ("eyeLook", "tongueOut", "cheekPuff", "mouthClose")
 COMMON = ("jawOpen", "eyeBlink", "mouthSmile", "brow", "cheekSquint", "mouthPucker", "mouthFunnel")
 USUAL, SELDOM, NEVER = 0.4, 0.15, 1e-3
 """Spread of the actions that faces use most, of others, and of those that nothing tells."""
+BROWS = 0.2
+"""Spread that one look's word about brows is taken with: what it says of them is mostly not so."""
+RESTING_BROWS = 0.5
+"""How far people's brows at rest lie from everybody's, in full actions and from every side alike. Without it a person with low
+brows frowns for good: the rest, as measured on heads of one make, does not change with yaw as a frown does."""
+FRESH = 0.3
+"""Share of what another look near in time says of brows that is news: looks of one person are wrong alike."""
 BOTH_SIDES, BROWS_TOGETHER = 0.9, 0.8
 """How alike left and right, and inner and outer brows, rise."""
-SLOW = ("brow", "mouthSmile", "cheekSquint", "mouthFrown", "noseSneer")
-"""Actions that take their time: lids and the talking mouth do not."""
-ROUNDS, SWEEPS = 12, 4
+SLOW = ("mouthSmile", "cheekSquint", "mouthFrown", "noseSneer")
+"""Actions that take their time, as brows do: lids and the talking mouth do not."""
+ROUNDS, SWEEPS, LAST_SWEEPS = 12, 4, 30
 
 
 @dataclass(frozen=True)
@@ -80,7 +88,7 @@ def spread_of(names: tuple[str, ...]) -> np.ndarray:
 
 def togetherness(names: tuple[str, ...]) -> np.ndarray:
     """(E, E) covariance of the actions about 0."""
-    alike, spread = np.eye(len(names)), spread_of(names)
+    alike, spread = np.eye(len(names)), np.where([name.startswith("brow") for name in names], BROWS, spread_of(names))
     for i, a in enumerate(names):
         for k, b in enumerate(names):
             if a != b and a.replace("Left", "Right") == b.replace("Left", "Right"):
@@ -90,15 +98,27 @@ def togetherness(names: tuple[str, ...]) -> np.ndarray:
     return alike * spread * spread[:, None]
 
 
-def solve(points: np.ndarray, direction: np.ndarray, actions: Actions, sparsity: float,
-          doubt: float) -> tuple[np.ndarray, np.ndarray]:
-    """points: (T, 468, 3) m aligned; direction: (T, 3), where the face looks.
+def persons_rest(actions: Actions) -> np.ndarray:
+    """(3C, 3C) covariance of how a person's resting face differs from everybody's in the channels, for each of `turns`."""
+    _, response = actions.heard
+    C = response.shape[-1]
+    out = np.zeros((3 * C, 3 * C))
+    for k, covariance in enumerate(actions.persons):
+        out[k * C: (k + 1) * C, k * C: (k + 1) * C] = covariance
+    brows = response[:, [name.startswith("brow") for name in actions.names]].swapaxes(0, 1).reshape(-1, 3 * C)
+    return out + RESTING_BROWS**2 * brows.T @ brows
+
+
+def solve(points: np.ndarray, direction: np.ndarray, actions: Actions, sparsity: float, doubt: float,
+          times: np.ndarray | None = None, pause: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """points: (T, 468, 3) m aligned; direction: (T, 3), where the face looks; times: (T,) s, or None where there are none.
 
     Returns coefficients c (T, E) in 0..1 and how the person's own resting points differ from everybody's (468, 3) m. Minimises over
     c and the person's rest o in the channels, where the network's wavering is white: |said - o - c response|^2 / doubt^2
-    + c' togetherness^-1 c + 2 sparsity sum(c) a frame, + o' persons^-1 o once; o changes with yaw. The problem is convex;
+    + c' togetherness^-1 c + 2 sparsity sum(c) a frame, + o' persons_rest^-1 o once; o changes with yaw. The problem is convex;
     coordinate descent on c alternates with the closed form for o, which is carried on by Nesterov's momentum: an action that lasts
     and the person's own rest look alike, and plain alternation ends with brows raised for good.
+    With times, each frame's brows are then found again from all looks near it, by a Gaussian of standard deviation `pause` s.
     """
     T, E = len(points), len(actions.names)
     away = (points - actions.neutral) * 1e3
@@ -106,25 +126,39 @@ def solve(points: np.ndarray, direction: np.ndarray, actions: Actions, sparsity:
     said = np.tensordot(away, actions.channels, ([1, 2], [1, 2])) - view_terms(direction) @ view
     answer = np.tensordot(turns(direction), response, 1) / doubt
     said = said / doubt
-    hessian = answer @ answer.transpose(0, 2, 1) + np.linalg.inv(togetherness(actions.names))
+    prior = np.linalg.inv(togetherness(actions.names))
+    loudness = answer @ answer.transpose(0, 2, 1)
     terms, C = turns(direction), said.shape[1]
-    normal = np.kron(terms.T @ terms, np.eye(C))
-    for k, covariance in enumerate(actions.persons):
-        normal[k * C: (k + 1) * C, k * C: (k + 1) * C] += np.linalg.inv(covariance) * doubt**2
-    share = np.linalg.inv(normal)
+    share = np.linalg.inv(np.kron(terms.T @ terms, np.eye(C)) + np.linalg.inv(persons_rest(actions)) * doubt**2)
     free = [k for k, name in enumerate(actions.names) if not name.startswith(BLIND)]
     c, rest = np.zeros((T, E)), np.zeros_like(said)
     before = rest
     for turn in range(ROUNDS):
-        pull = np.einsum("tec,tc->te", answer, said - rest) - sparsity
-        for _ in range(SWEEPS):
-            for k in free:
-                step = (pull[:, k] - np.einsum("te,te->t", hessian[:, k], c)) / hessian[:, k, k]
-                c[:, k] = np.clip(c[:, k] + step, 0, 1)
+        descend(c, np.einsum("tec,tc->te", answer, said - rest) - sparsity, loudness + prior, free, SWEEPS)
         left = said - np.einsum("te,tec->tc", c, answer)
         found = terms @ (share @ (terms.T @ left).ravel()).reshape(-1, C)
         rest, before = found + turn / (turn + 3) * (found - before), found
+    if times is not None and pause > 0:
+        brows = [k for k in free if actions.names[k].startswith("brow")]
+        near = np.exp(-0.5 * ((times[:, None] - times) / pause) ** 2)
+        looks = near.sum(axis=1, keepdims=True)
+        near *= (1 + FRESH * (looks - 1)) / looks
+        left = said - rest - np.einsum("te,tec->tc", np.delete(c, brows, 1), np.delete(answer, brows, 1))
+        pull = near @ np.einsum("tec,tc->te", answer[:, brows], left) - sparsity
+        among = np.ix_(range(T), brows, brows)
+        c[:, brows] = descend(c[:, brows], pull, np.tensordot(near, loudness[among], 1) + prior[np.ix_(brows, brows)],
+                              range(len(brows)), LAST_SWEEPS)
     return c, own_rest(away, direction, c, actions)
+
+
+def descend(c: np.ndarray, pull: np.ndarray, hessian: np.ndarray, columns: Iterable[int], sweeps: int) -> np.ndarray:
+    """c: (T, E), changed in place; pull: (T, E); hessian: (T, E, E). Sweeps over columns toward the least of
+    c' hessian c / 2 - pull c with c in 0..1, each frame for itself; returns c."""
+    for _ in range(sweeps):
+        for k in columns:
+            step = (pull[:, k] - np.einsum("te,te->t", hessian[:, k], c)) / hessian[:, k, k]
+            c[:, k] = np.clip(c[:, k] + step, 0, 1)
+    return c
 
 
 def own_rest(away: np.ndarray, direction: np.ndarray, c: np.ndarray, actions: Actions) -> np.ndarray:
@@ -136,8 +170,8 @@ def own_rest(away: np.ndarray, direction: np.ndarray, c: np.ndarray, actions: Ac
 
 
 def pace(names: tuple[str, ...], fast: float, slow: float) -> np.ndarray:
-    """(E,) s, each action's own smoothing."""
-    return np.where([name.startswith(SLOW) for name in names], slow, fast)
+    """(E,) s, each action's own smoothing; brows are calm as they are found."""
+    return np.select([[name.startswith(which) for name in names] for which in (SLOW, "brow")], [slow, 0.0], fast)
 
 
 def smooth(c: np.ndarray, times: np.ndarray, sigma: np.ndarray) -> np.ndarray:

@@ -23,7 +23,10 @@ class FaceConfig:
     smooth: float = 0.04
     """Standard deviation, s, of the smoothing over time of lids and mouth; 0 is none. Photos have no time and are not smoothed."""
     smooth_slow: float = 0.1
-    """The same of what moves slowly: brows, smiles, cheeks and nose."""
+    """The same of what moves slowly: smiles, cheeks and nose."""
+    smooth_brow: float = 0.35
+    """Standard deviation, s, of the weights in time of the looks that each frame's brows are found from: one look alone says little
+    of them; 0 is that one look."""
     rest_time: float = 0.2
     """Time, s, in which an unseen face falls back to rest by a factor e."""
 
@@ -46,6 +49,6 @@ class FaceConfig:
         for name in ("doubt", "rest_time"):
             if not getattr(self, name) > 0:
                 raise BadInput(f"face.{name} is {getattr(self, name)}; expected a number above 0")
-        for name in ("sparsity", "smooth", "smooth_slow"):
+        for name in ("sparsity", "smooth", "smooth_slow", "smooth_brow"):
             if getattr(self, name) < 0:
                 raise BadInput(f"face.{name} is {getattr(self, name)}; expected 0 or more")

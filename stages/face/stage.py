@@ -34,9 +34,10 @@ def run(job: Job) -> None:
     times = None if clip.timestamps_s is None else np.array(clip.timestamps_s)
     config = job.config
     if valid.any():
-        c, own = solve(points[valid], direction[valid], actions, config.sparsity, config.doubt)
-        if times is not None:
-            c = smooth(c, times[valid], pace(actions.names, config.smooth, config.smooth_slow))
+        seen = None if times is None else times[valid]
+        c, own = solve(points[valid], direction[valid], actions, config.sparsity, config.doubt, seen, config.smooth_brow)
+        if seen is not None:
+            c = smooth(c, seen, pace(actions.names, config.smooth, config.smooth_slow))
     else:
         c, own = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
         job.warn("The face was never seen from the front; the avatar's face stays at rest.")
