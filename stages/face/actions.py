@@ -30,7 +30,7 @@ FRESH = 0.3
 BOTH_SIDES, BROWS_TOGETHER = 0.9, 0.8
 """How alike left and right, and inner and outer brows, rise."""
 SLOW = ("mouthSmile", "cheekSquint", "mouthFrown", "noseSneer")
-"""Actions that take their time, as brows do: lids and the talking mouth do not."""
+"""Actions that take their time, as brows do: the talking mouth does not, and lids least of all."""
 ROUNDS, SWEEPS, LAST_SWEEPS = 12, 4, 30
 
 
@@ -169,9 +169,11 @@ def own_rest(away: np.ndarray, direction: np.ndarray, c: np.ndarray, actions: Ac
     return left * actions.own**2 / (actions.own**2 + actions.wavering**2 / len(c)) / 1e3
 
 
-def pace(names: tuple[str, ...], fast: float, slow: float) -> np.ndarray:
-    """(E,) s, each action's own smoothing; brows are calm as they are found."""
-    return np.select([[name.startswith(which) for name in names] for which in (SLOW, "brow")], [slow, 0.0], fast)
+def pace(names: tuple[str, ...], lids: float, mouth: float, slow: float, apart: float = 0.0) -> np.ndarray:
+    """(E,) s, each action's own smoothing; what is smoothed at all by no less than frames are apart, but for lids: a blink may be
+    one frame. Brows are calm as they are found."""
+    mouth, slow = (max(sigma, apart) if sigma > 0 else 0.0 for sigma in (mouth, slow))
+    return np.select([[name.startswith(which) for name in names] for which in (SLOW, "brow", "eye")], [slow, 0.0, lids], mouth)
 
 
 def smooth(c: np.ndarray, times: np.ndarray, sigma: np.ndarray) -> np.ndarray:

@@ -21,9 +21,12 @@ class FaceConfig:
     doubt: float = 1.0
     """How far the network wavers, as a multiple of what was measured: larger is calmer."""
     smooth: float = 0.04
-    """Standard deviation, s, of the smoothing over time of lids and mouth; 0 is none. Photos have no time and are not smoothed."""
+    """Standard deviation, s, of the smoothing over time of jaw and mouth, at least the time between frames; 0 is none. Photos have
+    no time and are not smoothed."""
     smooth_slow: float = 0.1
     """The same of what moves slowly: smiles, cheeks and nose."""
+    smooth_lids: float = 0.02
+    """The same of lids, however far frames are apart: a blink may be one frame."""
     smooth_brow: float = 0.35
     """Standard deviation, s, of the weights in time of the looks that each frame's brows are found from: one look alone says little
     of them; 0 is that one look."""
@@ -49,6 +52,6 @@ class FaceConfig:
         for name in ("doubt", "rest_time"):
             if not getattr(self, name) > 0:
                 raise BadInput(f"face.{name} is {getattr(self, name)}; expected a number above 0")
-        for name in ("sparsity", "smooth", "smooth_slow", "smooth_brow"):
+        for name in ("sparsity", "smooth", "smooth_slow", "smooth_lids", "smooth_brow"):
             if getattr(self, name) < 0:
                 raise BadInput(f"face.{name} is {getattr(self, name)}; expected 0 or more")

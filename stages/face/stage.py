@@ -37,7 +37,8 @@ def run(job: Job) -> None:
         seen = None if times is None else times[valid]
         c, own = solve(points[valid], direction[valid], actions, config.sparsity, config.doubt, seen, config.smooth_brow)
         if seen is not None:
-            c = smooth(c, seen, pace(actions.names, config.smooth, config.smooth_slow))
+            apart = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+            c = smooth(c, seen, pace(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, apart))
     else:
         c, own = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
         job.warn("The face was never seen from the front; the avatar's face stays at rest.")

@@ -106,7 +106,7 @@ def test_faces_of_another_renderer_are_read_as_well(store):
         times = np.flatnonzero(seen) / RATE
         points, looks = aligned(clip["landmarks"][seen], actions)
         found, _ = solve(points, looks, actions, config.sparsity, config.doubt, times, config.smooth_brow)
-        found = smooth(found, times, pace(actions.names, config.smooth, config.smooth_slow))
+        found = smooth(found, times, pace(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, 1 / RATE))
         said.append(found - found.mean(axis=0))
         true.append(clip["expression"][seen] - clip["expression"][seen].mean(axis=0))
     said, true = np.concatenate(said), np.concatenate(true)

@@ -129,14 +129,19 @@ def test_more_doubt_moves_less(actions):
 
 
 def test_each_action_is_smoothed_at_its_own_pace(actions):
-    sigma = pace(actions.names, 0.04, 0.15)
-    assert sigma[actions.names.index("browInnerUp")] == 0 and sigma[actions.names.index("mouthSmileLeft")] == 0.15
-    assert sigma[actions.names.index("eyeBlinkLeft")] == 0.04 and sigma[actions.names.index("jawOpen")] == 0.04
+    brow, smile, blink, jaw = (actions.names.index(name) for name in ("browInnerUp", "mouthSmileLeft", "eyeBlinkLeft", "jawOpen"))
+    sigma = pace(actions.names, 0.02, 0.04, 0.15)
+    assert sigma[[brow, smile, blink, jaw]].tolist() == [0, 0.15, 0.02, 0.04]
     spike = np.zeros((21, len(sigma)))
     spike[10] = 1
     left = smooth(spike, np.arange(21) / 30, sigma).max(axis=0)
-    assert left[actions.names.index("mouthSmileLeft")] < 0.4 * left[actions.names.index("eyeBlinkLeft")]
-    assert left[actions.names.index("browInnerUp")] == 1
+    assert left[smile] < 0.4 * left[jaw] and left[jaw] < 0.8 * left[blink] and left[brow] == 1
+
+
+def test_smoothing_reaches_the_next_frame_but_spares_lids_and_what_is_not_smoothed(actions):
+    smile, blink, jaw = (actions.names.index(name) for name in ("mouthSmileLeft", "eyeBlinkLeft", "jawOpen"))
+    assert pace(actions.names, 0.02, 0.04, 0.15, apart=0.1)[[smile, blink, jaw]].tolist() == [0.15, 0.02, 0.1]
+    assert pace(actions.names, 0.02, 0.0, 0.15, apart=0.2)[[smile, blink, jaw]].tolist() == [0.2, 0.02, 0.0]
 
 
 def test_align_undoes_a_heads_turn_size_and_place(actions):
