@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from gsac.avatar.skinning import joint_transforms
 from gsac.benchmarks.turntable.options import TurntableOptions
+from gsac.benchmarks.turntable.planted import plant
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -41,11 +42,15 @@ def _turn(body, joints, options: TurntableOptions, rng) -> Motion:
     yaw = 2 * np.pi * (s + uneven - uneven[0])
     pose = np.repeat(a_pose(body, rng)[None], T, 0)
     stir(pose, index, options.arm_swing, rng)
-    steps(pose, index, yaw, options.sway)
+    if options.feet == "turning":
+        steps(pose, index, yaw, options.sway)
     if options.hidden_hand != "none":
         hide_hand(pose, index, body.parents, joints, options)
-    pose[:, 0] = Rotation.from_euler("YX", np.stack([yaw, wander(rng, T, 0.015 * options.sway)], 1)).as_rotvec()
+    turns = Rotation.from_euler("YX", np.stack([yaw, wander(rng, T, 0.015 * options.sway)], 1))
+    pose[:, 0] = turns.as_rotvec()
     place = np.stack([wander(rng, T, 0.03 * options.sway), wander(rng, T, 0.03 * options.sway)], 1)
+    if options.feet == "planted":
+        plant(pose, index, joints, yaw, place, turns.as_matrix())
     return Motion(pose, place, yaw, expressions(body, options, rng))
 
 

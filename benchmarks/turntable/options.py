@@ -24,6 +24,8 @@ class TurntableOptions:
     """Pixels; None: 1.05 times the longer side, a phone's main camera in video mode."""
     poses: Literal["turn", "novel"] = "turn"
     """`turn`: A-pose, once around. `novel`: squat, raised arms, reach, twist; PNG frames, no video, no noise."""
+    feet: Literal["turning", "planted"] = "turning"
+    """`turning`: feet go round with the body and lift in turn. `planted`: soles rest on the floor and step after the body."""
     hidden_hand: Literal["none", "left_back", "right_back", "left_front", "right_front"] = "none"
     """A hand that goes behind the back, or before the belly, for a while."""
     hidden_from: float | None = None
@@ -63,7 +65,7 @@ class TurntableOptions:
             raise ValueError(f"fps is {self.fps}, expected more than 0")
         if self.height % 2 or self.size[0] % 2:
             raise ValueError(f"size is {self.size[0]}x{self.height}, expected even numbers (H.264 wants them)")
-        for name, choices in (("poses", ("turn", "novel")), ("hidden_hand", HIDDEN_HANDS)):
+        for name, choices in (("poses", ("turn", "novel")), ("feet", ("turning", "planted")), ("hidden_hand", HIDDEN_HANDS)):
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} is {getattr(self, name)!r}, expected one of {', '.join(choices)}")
         start, stop = self.hidden

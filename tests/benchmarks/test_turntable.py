@@ -113,6 +113,19 @@ def test_one_turn_covers_all_sides_unevenly():
     assert np.ptp(still.pose[:, 1:], axis=0).max() == 0 and not still.expression.any()
 
 
+def test_planted_feet_stay_where_they_are_until_they_step():
+    options = dataclasses.replace(SMALL, frames=60, feet="planted")
+    person = make_person(options, np.random.default_rng(1))
+    motion = make_motion(person.body, person.joints, options, np.random.default_rng(2))
+    view = clip.make_view(person, options, np.random.default_rng(3))
+    params = clip.place(person, motion, view)
+    feet = np.stack([view.to_world(clip.posed(person, params, t)[2][[7, 8, 10, 11]]) for t in range(60)])
+    way = np.linalg.norm(np.diff(feet, axis=0), axis=-1)  # left and right ankles, left and right balls
+    still = np.stack([way[:, [0, 2]].max(1), way[:, [1, 3]].max(1)], 1) < 1e-3
+    assert (still.mean(0) > 0.4).all() and still.any(1).mean() > 0.9 and way.max() > 0.05
+    assert np.abs(params.pose[:, [4, 5], 0]).max() < np.radians(60) and np.ptp(feet[:, :2, 1], axis=0).min() > 0.05
+
+
 def test_the_person_stands_on_the_floor_and_faces_the_camera_first(made):
     out, truth = made
     first, half = truth["joints"][0], truth["joints"][3]
