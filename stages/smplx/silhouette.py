@@ -72,6 +72,6 @@ def outline_points(body: Body, vertices: np.ndarray, camera: Camera, outline: Ou
     edge[[0, -1]] = edge[:, [0, -1]] = False
     y, x = np.nonzero(edge)
     if len(y) > POINTS:
-        pick = np.sort(np.random.default_rng(seed).permutation(len(y))[:POINTS])
+        pick = ((np.arange(POINTS) + np.random.default_rng(seed).random(POINTS)) * len(y) / POINTS).astype(int)  # evenly by height
         y, x = y[pick], x[pick]
     return surface_pairs(body, face[y, x], bary[y, x].astype(np.float64)), float(overlap)

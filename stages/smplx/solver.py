@@ -63,6 +63,9 @@ class System:
 
 
 FROZEN = 1e12
+DAMPING = 1e-5
+"""At the first step, a share of each unknown's own curvature. Shape and the hips' place lie in valleys a thousandth as steep as
+what surrounds them: more damping than that, and the fit stops on the way."""
 
 
 def solve_band(band: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -109,12 +112,12 @@ class Trace:
 
 
 def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callable, frozen: np.ndarray,
-                        frozen_shared: np.ndarray, iterations: int, tolerance: float = 3e-3) -> tuple[object, Trace]:
+                        frozen_shared: np.ndarray, iterations: int, tolerance: float = 1e-3) -> tuple[object, Trace]:
     """Minimises `cost(state)`; `linearise(state)` gives a System, `move(state, step, shared)` a new state.
 
     Stops after `iterations` accepted or refused steps, or when a step lowers the cost by less than `tolerance` of it.
     """
-    damping, trace, system = 1e-3, Trace([cost(state)]), None
+    damping, trace, system = DAMPING, Trace([cost(state)]), None
     for _ in range(iterations):
         system = system or linearise(state)
         try:
