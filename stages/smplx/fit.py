@@ -13,6 +13,7 @@ from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
 from gsac.stages.smplx import start
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.ground import Ground
 from gsac.stages.smplx.personal import Personal
 from gsac.stages.smplx.points import pairs_of, positions
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
@@ -119,12 +120,23 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         if config.silhouette > 0:
             iou = renew_outlines(problem, state, sightings)
         state.held = problem.held.learn(state.local[:, problem.active], state.held)
+        stand(problem, state, sightings, config)
+        all_shared = np.zeros(1 + len(state.shape) + len(state.held) + len(state.level), bool)
         state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, config.iterations)
         steps += more.steps
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     return Fit(state, joint_spread(problem, state), iou, reprojection(problem, state), steps + more.steps,
                personal.joint_offset(state.own))
+
+
+def stand(problem: Problem, state: State, sightings: Sightings, config: SmplxConfig) -> None:
+    """From the first round on the feet stand on a ground."""
+    if problem.ground is None and config.contact > 0:
+        problem.ground = Ground(problem.body, config.contact)
+        problem.ground.watch(sightings.xy, sightings.seen, sightings.seconds, sightings.person_height)
+        chain = problem.skeleton.pose(state.local, state.shape)
+        state.level = problem.ground.level(chain, state.shape, state.transl, state.held)
 
 
 def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
@@ -228,7 +240,7 @@ def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, stat
     pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS], detector.offsets[FINGER_POINTS])
     seen = observations(sightings, detector, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, [])
     fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, 0.0, problem.personal)
-    state = replace(state, local=state.local.copy(), held=np.zeros(0))
+    state = replace(state, local=state.local.copy(), held=np.zeros(0), level=np.zeros(0))
     state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)
     frozen = np.zeros(fingers.size, bool)
     frozen[-3:] = True

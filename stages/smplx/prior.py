@@ -52,8 +52,10 @@ def finger_prior(side: str, part: str) -> tuple[np.ndarray, np.ndarray]:
 def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Spread of angular speed (A,) rad/s (infinite for the pelvis, which turns) and of acceleration (A,) rad/s^2."""
     speed, acceleration = np.full(len(joints), 0.4), np.full(len(joints), 1.0)
-    limbs = np.isin(joints, (16, 17, 18, 19, 20, 21, 1, 2, 4, 5))
-    speed[limbs], acceleration[limbs] = 0.75, 2.0
+    arms, legs, ankles = np.isin(joints, (16, 17, 18, 19, 20, 21)), np.isin(joints, (1, 2, 4, 5)), np.isin(joints, (7, 8))
+    speed[arms], acceleration[arms] = 0.75, 2.0
+    speed[legs], acceleration[legs] = 6.0, 40.0  # a step bends a knee by 30 degrees and back in half a second
+    speed[ankles], acceleration[ankles] = 3.0, 20.0
     trunk = np.isin(joints, (3, 6, 9, 13, 14, 10, 11))
     speed[trunk], acceleration[trunk] = 0.15, 0.5
     fingers = joints >= 25

@@ -1,8 +1,8 @@
 """The fit as one least-squares problem: state, residuals, cost and normal equations.
 
 Residuals are in units of their own spread, so that weights are probabilities and not taste. Data terms are robust
-(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = 1 + B + K + H shared ones:
-focal length, betas, what is the person's own, what is held.
+(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = 1 + B + K + H + G shared
+ones: focal length, betas, what is the person's own, what is held, the ground.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.smplx import prior
+from gsac.stages.smplx.ground import Ground
 from gsac.stages.smplx.held import Held
 from gsac.stages.smplx.personal import Personal
 from gsac.stages.smplx.points import Chain, Pairs, Skeleton, positions, pulled_back
@@ -41,6 +42,8 @@ class State:
     """(H,) what the clip keeps to, as in held.py; empty where that is not sought."""
     own: np.ndarray = field(default_factory=lambda: np.zeros(0))
     """(K,) m, the person's own, as in personal.py; empty where that is not sought."""
+    level: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """(G,) m, 0 or 1: the ground along the upright, as in ground.py; empty where nothing stands on it."""
 
     @property
     def shape(self) -> np.ndarray:
@@ -90,6 +93,7 @@ class Problem:
         self.smoothness, self.outline_weight = smoothness, outline_weight
         self.limit = ROBUST
         self.held = Held(active)
+        self.ground: Ground | None = None
         self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
         self.size = 3 * len(active) + 3
         top, sole = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
@@ -104,8 +108,9 @@ class Problem:
         local = state.local.copy()
         local[:, self.active] = local[:, self.active] @ rotation.exp(step[:, :-3].reshape(len(step), -1, 3))
         b, s = 1 + len(state.betas), 1 + len(state.shape)
+        h = s + len(state.held)
         return State(local, state.transl + step[:, -3:], state.betas + shared[1:b], state.log_focal + float(shared[0]),
-                     state.held + shared[s:], state.own + shared[b:s])
+                     state.held + shared[s:h], state.own + shared[b:s], state.level + shared[h:])
 
     def project(self, state: State, x: np.ndarray) -> np.ndarray:
         return np.exp(state.log_focal) * x[..., :2] / np.maximum(x[..., 2:], 0.05) + self.seen.center
@@ -124,6 +129,8 @@ class Problem:
         total += (self._prior_residual(vector) ** 2).sum() + (self._limit_residual(vector)[0] ** 2).sum()
         if len(state.held):
             total += (self.held.residual(state.local[:, self.active], vector, state.held) ** 2).sum()
+        if len(state.level):
+            total += self.ground.cost(chain, state.shape, state.transl, state.held, state.level)
         total += sum((r**2).sum() for r in self._temporal_residuals(state, self._turns(state)[0]))
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
@@ -133,13 +140,16 @@ class Problem:
         if len(state.held):
             local = state.local[:, self.active]
             self.held.add(system, local, rotation.log(local), state.held, len(state.shape) + 1)
+        if len(state.level):
+            chain = self.skeleton.pose(state.local, state.shape)
+            self.ground.add(system, self.skeleton, chain, state.shape, state.transl, state.held, state.level)
         residual, jacobian = self._shared_residual(state)
         system.add_shared(jacobian, residual)
         return system
 
     def of_each_frame(self, state: State) -> System:
         """Normal equations of what each frame shows by itself, and of the pose prior."""
-        system = System.zeros(len(state.local), self.size, len(state.shape) + 1 + len(state.held))
+        system = System.zeros(len(state.local), self.size, 1 + len(state.shape) + len(state.held) + len(state.level))
         chain = self.skeleton.pose(state.local, state.shape)
         self._add_points(system, state, chain)
         for t, x in self.outline_points(chain, state):
@@ -319,4 +329,4 @@ class Problem:
                                state.held - self.held.mean[:len(state.held)]])
         residual = np.append(away / spreads, (tall - metres) / spread)
         count = np.sqrt(self.seen.repeats)
-        return residual * count, rows * count
+        return residual * count, np.pad(rows * count, ((0, 0), (0, len(state.level))))

@@ -192,7 +192,7 @@ def check_gradient(problem: Problem, state: State, rng, h: float, tolerance: flo
         system = problem.linearise(state)
         for _ in range(4):
             step = rng.normal(0, 1, (len(state.local), problem.size))
-            shared = rng.normal(0, 1, 1 + len(state.shape) + len(state.held)) * 0.3
+            shared = rng.normal(0, 1, 1 + len(state.shape) + len(state.held) + len(state.level)) * 0.3
             shared[1 + len(state.betas): 1 + len(state.shape)] *= 0.03  # metres
             slope = (problem.cost(problem.move(state, h * step, h * shared))
                      - problem.cost(problem.move(state, -h * step, -h * shared))) / (2 * h)
