@@ -31,7 +31,9 @@ class SmplxConfig:
     smoothness: float = 1.0
     """Weight of the temporal terms."""
     contact: float = 1.0
-    """`lm`: weight of the ground: soles lie on one plane or above it, and feet that rest in the picture stay; 0 leaves it out."""
+    """`lm`: weight of the ground: soles lie on one plane or above it, and feet that rest in the picture stay; 0 leaves it out.
+    On eight turns joints 17.1 -> 16.6 mm, acceleration's error .98 -> .79 of the truth's own; on two with planted feet soles at
+    rest slide 5 mm a frame instead of 9, joints 23.0 -> 23.6 mm."""
     joint_offsets: float = 0.0
     """`lm`: how far joints may lie off what the shape says, metres, the same left and right; 0 leaves them where it has them.
     On turns 0.005 measured the same within 1 %: 13.8 mm of joints, 13.2 against 13.3 mm of vertices in unseen poses."""
