@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from gsac.avatar.kernel import kernel
 from gsac.avatar.workspace import Workspace
+from scipy.spatial.transform import Rotation
 
 
 class FaceFrames(NamedTuple):
@@ -62,6 +63,15 @@ def bind(frames: FaceFrames, face: np.ndarray, mu: np.ndarray, quat: np.ndarray,
     _bind(0, 1, frames.R, frames.T, frames.k, plain(face, np.int32), mu, plain(quat, mu.dtype),
           plain(log_scale, mu.dtype), *out)
     return out
+
+
+def unbind(frames: FaceFrames, face: np.ndarray, bound: Bound) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `bind` on the faces (N,) makes `bound` of: mu (N, 3), quat (N, 4) wxyz and log_scale (N, 3), float32."""
+    R, T, k = frames.R[face], frames.T[face], np.maximum(frames.k[face, None], 1e-9)
+    mu = np.einsum("nji,nj->ni", R, bound.means - T) / k
+    quat = np.roll(Rotation.from_matrix(np.einsum("nji,njk->nik", R, bound.rotations)).as_quat(), 1, axis=1)
+    log_scale = np.log(np.maximum(bound.scales, 1e-9) / k)
+    return mu.astype(np.float32), quat.astype(np.float32), log_scale.astype(np.float32)
 
 
 def bind_backward(vertices: np.ndarray, faces: np.ndarray, face: np.ndarray, mu: np.ndarray, quat: np.ndarray,

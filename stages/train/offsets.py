@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.binding import bind, face_frames, unbind
 from gsac.avatar.gaussians import Gaussians
 from scipy.sparse import coo_matrix, diags, identity
 from scipy.sparse.linalg import splu
-from scipy.spatial.transform import Rotation
 
 SMOOTHNESS = 30.0
 """lambda: a step reaches about its root in edges."""
@@ -69,9 +68,5 @@ def fold(gaussians: Gaussians, rest: np.ndarray, offset: np.ndarray, faces: np.n
     """The gaussians of the displaced body, bound to the plain one; at rest nothing changes."""
     g = gaussians
     displaced = bind(face_frames(rest + offset, faces), g.face, g.mu, g.quat, g.log_scale)
-    plain = face_frames(rest, faces)
-    R, T, k = plain.R[gaussians.face], plain.T[gaussians.face], np.maximum(plain.k[gaussians.face, None], 1e-9)
-    mu = np.einsum("nji,nj->ni", R, displaced.means - T) / k
-    quat = np.roll(Rotation.from_matrix(np.einsum("nji,njk->nik", R, displaced.rotations)).as_quat(), 1, axis=1)
-    log_scale = np.log(np.maximum(displaced.scales, 1e-9) / k)
-    return replace(g, mu=mu.astype(np.float32), quat=quat.astype(np.float32), log_scale=log_scale.astype(np.float32))
+    mu, quat, log_scale = unbind(face_frames(rest, faces), g.face, displaced)
+    return replace(g, mu=mu, quat=quat, log_scale=log_scale)

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from gsac.stages.train import bundle, cuda, fast, ladder, levels, paper, paper_cuda
+from gsac.stages.train import bundle, cuda, fast, gauge, ladder, levels, paper, paper_cuda
 from gsac.stages.train.config import AUTO
 from gsac.stages.train.evaluate import align_poses
 from gsac.stages.train.guard import finite, values
@@ -10,12 +10,12 @@ from gsac.stages.train.task import Fit, Loop, Task
 
 
 def fit_fast(loop: Loop, task: Task) -> Fit:
-    """Poses moved to the images; then the given number of gaussians, or the ladder; then coarser levels."""
+    """Poses moved to the images; the given number of gaussians, or the ladder; coarser levels; bones turned back to the fit's."""
     if task.resumed is None:
         bundle.adjust(task, loop.learning)
     fit = ladder.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
     finite("after the last step", values(fit.gaussians))
-    fit.coarser = levels.coarser(task, loop, fit)
+    fit.gaussians, *fit.coarser = gauge.taken_back([fit.gaussians, *levels.coarser(task, loop, fit)], task.poses, task.trained)
     return fit
 
 

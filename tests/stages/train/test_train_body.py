@@ -63,12 +63,13 @@ def test_steps_lead_to_the_expression_and_the_joints_that_were_and_what_is_writt
 
 def test_a_training_learns_them_where_it_is_asked_to(job_anywhere):
     plain, asked = (job_anywhere(name, steps=40, pose_test_steps=0, **rates) for name, rates in
-                    (("plain", {}), ("asked", {"expression_rate": 1e-2, "joint_rate": 1e-3})))
+                    (("plain", {"pose_rounds": 0, "pose_rate": 0.0}), ("asked", {"expression_rate": 1e-2, "joint_rate": 1e-3})))
     for made in (plain, asked):
         run(made)
     fitted = BodyParams.read(plain.inputs["smplx/body.npz"])
     one, other = (BodyParams.read(made.out / "body.npz") for made in (plain, asked))
-    assert np.array_equal(one.expression, fitted.expression) and np.array_equal(one.joint_offset, fitted.joint_offset)
+    assert np.array_equal(one.expression, fitted.expression)
+    np.testing.assert_allclose(one.joint_offset, fitted.joint_offset, atol=1e-6)
     assert 1e-3 < np.abs(other.expression - fitted.expression).max() < 0.5
     assert 1e-4 < np.abs(other.joint_offset - fitted.joint_offset).max() < 0.05
     assert np.isfinite(json.loads((asked.out / "metrics.json").read_text())["psnr_fg"])
