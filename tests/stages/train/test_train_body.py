@@ -61,6 +61,7 @@ def test_steps_lead_to_the_expression_and_the_joints_that_were_and_what_is_writt
     assert np.array_equal(between.expression[0], poses.expression[1]) and between.expression[1].any()
 
 
+@pytest.mark.slow
 def test_a_training_learns_them_where_it_is_asked_to(job_anywhere):
     plain, asked = (job_anywhere(name, steps=40, pose_test_steps=0, **rates) for name, rates in
                     (("plain", {"pose_rounds": 0, "pose_rate": 0.0}), ("asked", {"expression_rate": 1e-2, "joint_rate": 1e-3})))

@@ -3,11 +3,13 @@
 import json
 
 import numpy as np
+import pytest
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train import levels
 from gsac.stages.train.stage import run
 
 
+@pytest.mark.slow
 def test_a_level_draws_better_at_its_own_size_than_the_finest_does(job_anywhere, monkeypatch):
     monkeypatch.setattr(levels, "LEAST", 30)
     made = job_anywhere(gaussians=1800, steps=90, pose_test_steps=0)
