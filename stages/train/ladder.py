@@ -28,7 +28,7 @@ from gsac.stages.train.views import View
 SIZES = (12000, 8000, 6000, 4000, 3000, 2000, 1000)
 UNJUDGED = 12000
 """Size where no frame is held out."""
-REFIT, REFIT_FROM = 0.24, 0.2
+REFIT, REFIT_FROM = 0.16, 0.3
 """Steps of a smaller size, as a share of the training's; their rates are those of a training from this share of its steps on."""
 ROUNDS = 5
 """That move the held-out frames' poses, on any device: sizes are to be chosen alike."""
