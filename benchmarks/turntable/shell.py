@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from gsac.avatar.normals import vertex_normals
 from scipy import sparse
 from scipy.spatial import ConvexHull
 
@@ -127,14 +128,6 @@ def adjacency(faces: np.ndarray, count: int) -> sparse.csr_matrix:
     a = sparse.csr_matrix((np.ones(len(i)), (i, j)), (count, count))
     a.data[:] = 1
     return a
-
-
-def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3) unit, weighted by area; 0 where a vertex has no face."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    n = np.cross(b - a, c - a)
-    out = np.stack([np.bincount(faces.ravel(), np.repeat(n[:, k], 3), len(vertices)) for k in range(3)], -1)
-    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
 
 
 def _turned(faces, first):

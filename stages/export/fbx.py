@@ -9,8 +9,9 @@ from __future__ import annotations
 from itertools import count
 
 import numpy as np
+from gsac.avatar.normals import vertex_normals
 from gsac.stages.export.fbx_file import CREATED, FILE_ID, Long, Node, fbx_bytes
-from gsac.stages.export.glb import vertex_colours, vertex_normals
+from gsac.stages.export.glb import vertex_colours
 from gsac.stages.export.rigged import Clip, RiggedAvatar
 from scipy.spatial.transform import Rotation
 
@@ -70,7 +71,7 @@ class _Scene:
         geometry.add("Vertices", self.vertices.astype(np.float64).reshape(-1))
         geometry.add("PolygonVertexIndex", faces.reshape(-1))
         geometry.add("GeometryVersion", 124)
-        normals = vertex_normals(self.vertices, self.avatar.faces).astype(np.float64)
+        normals = vertex_normals(self.vertices, self.avatar.faces)
         rgba = np.column_stack([colours, np.ones(len(colours))]).astype(np.float64)
         layer = Node("Layer", [0])
         layer.add("Version", 100)

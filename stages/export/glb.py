@@ -12,6 +12,7 @@ import json
 import struct
 
 import numpy as np
+from gsac.avatar.normals import vertex_normals
 from gsac.stages.export.ply import SH0
 from gsac.stages.export.rigged import Clip, RiggedAvatar
 from scipy.spatial import cKDTree
@@ -50,7 +51,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
         "mode": TRIANGLES, "material": 0, "indices": file.add(avatar.faces.reshape(-1).astype("<u4"), ELEMENT_BUFFER),
         "attributes": {
             "POSITION": file.add(vertices, ARRAY_BUFFER, bounds=True),
-            "NORMAL": file.add(vertex_normals(vertices, avatar.faces), ARRAY_BUFFER),
+            "NORMAL": file.add(vertex_normals(vertices, avatar.faces).astype(np.float32), ARRAY_BUFFER),
             "COLOR_0": file.add(_linear(colours), ARRAY_BUFFER),
             **_skin_attributes(file, avatar.skin_index, avatar.skin_weight),
         }}], "name": "body"}
@@ -97,17 +98,6 @@ def vertex_colours(vertices: np.ndarray, means: np.ndarray, rgb: np.ndarray, opa
     distance, near = distance.reshape(len(vertices), -1), near.reshape(len(vertices), -1)
     weight = (opacity[near] + 1e-6) / (distance ** 2 + BLUR_M ** 2)
     return np.einsum("vk,vkc->vc", weight / weight.sum(1, keepdims=True), np.clip(rgb, 0, 1)[near]).astype(np.float32)
-
-
-def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3) float32, unit, area-weighted; +z at a vertex without a face."""
-    v0, v1, v2 = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
-    face_normal = np.cross(v1 - v0, v2 - v0)
-    normal = np.zeros((len(vertices), 3))
-    for i in range(3):
-        np.add.at(normal, faces[:, i], face_normal)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.where(length > 1e-12, normal / np.maximum(length, 1e-12), (0, 0, 1)).astype(np.float32)
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:

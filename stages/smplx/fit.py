@@ -106,7 +106,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     seen.repeats = repeats(state.local[:, 0])
     take_off_habits(seen, sightings, detector, BODY_POINTS, state)
     problem.limit = FAR_OFF * ROBUST
-    free, all_shared = np.zeros(problem.size, bool), np.zeros(1 + len(state.shape) + len(state.held), bool)
+    free, all_shared = np.zeros(problem.size, bool), np.zeros(state.shared, bool)
     trunk_only = free.copy()
     trunk_only[3:-3] = True
     state, trace = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, trunk_only, ~all_shared, START_STEPS)
@@ -121,7 +121,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
             iou = renew_outlines(problem, state, sightings)
         state.held = problem.held.learn(state.local[:, problem.active], state.held)
         stand(problem, state, sightings, config)
-        all_shared = np.zeros(1 + len(state.shape) + len(state.held) + len(state.level), bool)
+        all_shared = np.zeros(state.shared, bool)
         state, more = levenberg_marquardt(state, problem.linearise, problem.cost, problem.move, free, all_shared, config.iterations)
         steps += more.steps
     state, more = fit_fingers(sightings, detector, problem, state, config)
@@ -245,17 +245,17 @@ def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, stat
     frozen = np.zeros(fingers.size, bool)
     frozen[-3:] = True
     return levenberg_marquardt(state, fingers.linearise, fingers.cost, fingers.move, frozen,
-                               np.ones(1 + len(state.shape), bool), config.iterations)
+                               np.ones(state.shared, bool), config.iterations)
 
 
 def joint_spread(problem: Problem, state: State) -> np.ndarray:
     """(T, 55) m: how far each joint may be off by what its frame shows alone, each unknown by itself."""
-    system = problem.of_each_frame(state)
+    chain = problem.skeleton.pose(state.local, state.shape)
+    system = problem.of_each_frame(state, chain)
     n = problem.size
     information = system.band[:, np.arange(n), np.arange(n)]
     angle = 1 / np.sqrt(np.maximum(information[:, :-3].reshape(len(state.local), -1, 3).min(-1), 1e-6))
     place = np.sqrt(1 / np.maximum(information[:, -3:-1].min(-1), 1e-6))
-    chain = problem.skeleton.pose(state.local, state.shape)
     out = np.zeros(chain.place.shape[:2])
     index = {int(j): i for i, j in enumerate(problem.active)}
     for j, p in enumerate(problem.skeleton.parents):

@@ -11,6 +11,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx.held import upright
 from gsac.stages.smplx.points import Chain, Pairs, Skeleton, pairs_of, positions, pulled_back
+from gsac.stages.smplx.robust import robust
 from gsac.stages.smplx.solver import System
 from scipy import sparse
 from scipy.ndimage import uniform_filter1d
@@ -55,7 +56,7 @@ class Ground:
     def cost(self, chain: Chain, shape: np.ndarray, transl: np.ndarray, held: np.ndarray, level: np.ndarray) -> float:
         x = positions(chain, self.pairs, shape) + transl[:, None]
         off, slip = self._off(x, held, level), self._slip(x)
-        return float((off**2 * _off_ground(off)).sum() + (slip**2 * _let_go(slip, SLIPPED)).sum())
+        return float(_off_ground(off)[0].sum() + robust(slip, SLIPPED)[0].sum())
 
     def add(self, system: System, skeleton: Skeleton, chain: Chain, shape: np.ndarray, transl: np.ndarray, held: np.ndarray,
             level: np.ndarray) -> None:
@@ -64,7 +65,7 @@ class Ground:
         n, first = system.gradient.shape[1], 1 + len(shape)
         up, by_slope = upright(held)
         off = self._off(x, held, level)
-        shrink = _off_ground(off)
+        shrink = _off_ground(off)[1]
         rows = pulled_back(skeleton, chain, self.pairs, shape, np.broadcast_to(up, (*x.shape[:2], 1, 3)))[:, :, 0]
         jacobian = np.zeros((*x.shape[:2], n + first + len(held) + 1))
         jacobian[..., :n], jacobian[..., n + 1: n + 1 + rows.shape[2] - n] = rows[..., :n], rows[..., n:]
@@ -77,7 +78,7 @@ class Ground:
     def _add_slip(self, system: System, rows: np.ndarray, x: np.ndarray) -> None:
         """rows: (T, P, 3, n + S') of the soles' places x (T, P, 3)."""
         slip = self._slip(x)
-        shrink = _let_go(slip, SLIPPED)
+        shrink = robust(slip, SLIPPED)[1]
         weight = (shrink * self.rest[..., None] * self.scale)[..., None]
         n, residual = system.gradient.shape[1], (slip * shrink).reshape(len(slip), -1, 1)
         before, after = ((sign * r * weight).reshape(len(slip), -1, r.shape[-1]) for sign, r in ((-1, rows[:-1]), (1, rows[1:])))
@@ -105,13 +106,8 @@ class Ground:
         return np.diff(x, axis=0) * (self.rest * self.scale)[..., None] if len(self.rest) else np.zeros((0, *x.shape[1:]))
 
 
-def _let_go(residual: np.ndarray, limit: float | np.ndarray) -> np.ndarray:
-    """Square root of the reweighting (Geman-McClure)."""
-    return 1 / (1 + residual**2 / limit**2)
-
-
-def _off_ground(off: np.ndarray) -> np.ndarray:
-    return _let_go(off, np.where(off > 0, LIFTED, SUNK))
+def _off_ground(off: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return robust(off, np.where(off > 0, LIFTED, SUNK))
 
 
 def soles(body: Body) -> Pairs:

@@ -18,6 +18,7 @@ from gsac.stages.smplx.ground import Ground
 from gsac.stages.smplx.held import Held
 from gsac.stages.smplx.personal import Personal
 from gsac.stages.smplx.points import Chain, Pairs, Skeleton, positions, pulled_back
+from gsac.stages.smplx.robust import robust
 from gsac.stages.smplx.silhouette import INSET, Outline
 from gsac.stages.smplx.solver import System
 
@@ -50,6 +51,11 @@ class State:
         """(B + K,) what does not move with the pose."""
         return np.concatenate([self.betas, self.own])
 
+    @property
+    def shared(self) -> int:
+        """How many unknowns all frames share."""
+        return 1 + len(self.shape) + len(self.held) + len(self.level)
+
 
 @dataclass
 class Observations:
@@ -69,13 +75,6 @@ class Observations:
     """Frames for each different view of the person; what they get wrong they get wrong together."""
     outlines: list[Outline]
     outline_spread: float  # px
-
-
-def robust(residual: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cost and the square root of the reweighting of residuals in spreads (Geman-McClure)."""
-    square = residual**2
-    shrink = 1 / (1 + square / limit**2)
-    return square * shrink, shrink
 
 
 class Problem:
@@ -135,22 +134,21 @@ class Problem:
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
     def linearise(self, state: State) -> System:
-        system = self.of_each_frame(state)
+        chain = self.skeleton.pose(state.local, state.shape)
+        system = self.of_each_frame(state, chain)
         self._add_temporal(system, state)
         if len(state.held):
             local = state.local[:, self.active]
             self.held.add(system, local, rotation.log(local), state.held, len(state.shape) + 1)
         if len(state.level):
-            chain = self.skeleton.pose(state.local, state.shape)
             self.ground.add(system, self.skeleton, chain, state.shape, state.transl, state.held, state.level)
         residual, jacobian = self._shared_residual(state)
         system.add_shared(jacobian, residual)
         return system
 
-    def of_each_frame(self, state: State) -> System:
+    def of_each_frame(self, state: State, chain: Chain) -> System:
         """Normal equations of what each frame shows by itself, and of the pose prior."""
-        system = System.zeros(len(state.local), self.size, 1 + len(state.shape) + len(state.held) + len(state.level))
-        chain = self.skeleton.pose(state.local, state.shape)
+        system = System.zeros(len(state.local), self.size, state.shared)
         self._add_points(system, state, chain)
         for t, x in self.outline_points(chain, state):
             self._add_outline(system, state, chain, t, x)

@@ -11,6 +11,7 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.binding import bind, face_frames, unbind
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.normals import vertex_normals
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.stages.train.poses import BODY, Poses
 
@@ -115,11 +116,3 @@ def carried_levers(body, which: np.ndarray, rest: np.ndarray, joints: np.ndarray
 def world(body, pose: np.ndarray, joints: np.ndarray) -> np.ndarray:
     """(T, 55, 3, 3) rotations from rest."""
     return joint_transforms(np.asarray(pose, np.float64), joints, body.parents)[..., :3]
-
-
-def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3)."""
-    normals, across = np.zeros((len(vertices), 3)), face_frames(vertices, faces).R[:, :, 1]
-    for corner in range(3):
-        np.add.at(normals, faces[:, corner], across)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
