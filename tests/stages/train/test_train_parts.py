@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.wholebody import INDEX
 from gsac.stages.train import fast
 from gsac.stages.train.parts import part_of, unseen_parts
 
@@ -33,6 +34,12 @@ def test_a_head_above_the_picture_is_named(covering):
     chin = body.joint_names.index("neck")
     neck = float((body.J_regressor @ body.v_template)[chin, 1])
     assert unseen_parts(face, at[:, 1] < neck, body) == ["head"]
+
+
+def test_a_head_of_which_only_the_chin_is_in_the_picture_is_named_as_well(covering):
+    body, face, at = covering
+    mouth = float(body.keypoints(body.v_template)[INDEX["nose"], 1]) - 0.03
+    assert unseen_parts(face, at[:, 1] < mouth, body) == ["head"]
 
 
 def test_views_from_one_side_name_the_other(covering):
