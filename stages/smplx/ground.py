@@ -1,7 +1,8 @@
-"""Feet on the ground: soles lie on one plane through the clip, or above it, and a sole that rests in the picture stays in place.
+"""Feet on the ground: soles lie flat on one plane through the clip, or above it, and one that rests in the picture stays in place.
 
 The plane is level with the clip's upright (held.py); its height is an unknown of the clip. Who lifts a foot is let go.
-T frames, P = 4 soles (heel and ball of each foot), n unknowns a frame, S shape unknowns, H of what is held.
+T frames, P = 8 points of the soles (inner and outer edge of heel and ball of each foot), n unknowns a frame, S shape unknowns,
+H of what is held.
 """
 
 from __future__ import annotations
@@ -20,8 +21,12 @@ FEET = tuple((f"{side}_ankle", f"{side}_foot") for side in ("left", "right"))
 SEEN = tuple((INDEX[f"{side}_heel"], INDEX[f"{side}_big_toe"]) for side in ("left", "right"))
 OFF = 0.010
 """Metres that a sole on the ground is off the plane: shoes, bare soles that roll."""
+TILT = 0.004
+"""Metres that one edge of it is higher than the other: three degrees."""
 LIFTED, SUNK = 2.0, 4.0
 """Spreads above the ground, and below it, from which a foot counts less and less: it may be lifted, and the camera may be moved."""
+SOLE = 0.008
+"""Metres above a foot's lowest point up to which it is sole."""
 SLIDE = 0.03
 """m/s that a foot at rest moves."""
 SLIPPED = 3.0
@@ -39,6 +44,9 @@ class Ground:
         """weight: of both terms."""
         self.pairs = soles(body)
         self.scale = np.sqrt(weight)
+        half = np.eye(self.pairs.count // 2)
+        self.flat = np.concatenate([np.kron(half, [[0.5, 0.5]]) / OFF, np.kron(half, [[1, -1]]) / TILT]) * self.scale
+        """(P, P) from the points' heights to middles above the plane and edges above each other, in spreads."""
         self.rest = np.zeros((0, self.pairs.count))  # (T - 1, P) square root of the information, s/m
 
     def watch(self, xy: np.ndarray, seen: np.ndarray, seconds: np.ndarray | None, height: float) -> None:
@@ -46,7 +54,7 @@ class Ground:
         if seconds is None or len(xy) < WINDOW:
             return
         feet = np.stack([resting(xy[:, points] / height, seen[:, points], seconds) for points in SEEN], 1)  # (T, 2)
-        both = np.repeat(np.minimum(feet[:-1], feet[1:]), 2, axis=1)
+        both = np.repeat(np.minimum(feet[:-1], feet[1:]), 4, axis=1) / 2  # two edges share what is known of a sole
         self.rest = np.sqrt(both) / SLIDE / np.diff(seconds)[:, None]
 
     def level(self, chain: Chain, shape: np.ndarray, transl: np.ndarray, held: np.ndarray) -> np.ndarray:
@@ -70,7 +78,7 @@ class Ground:
         jacobian = np.zeros((*x.shape[:2], n + first + len(held) + 1))
         jacobian[..., :n], jacobian[..., n + 1: n + 1 + rows.shape[2] - n] = rows[..., :n], rows[..., n:]
         jacobian[..., -3:-1], jacobian[..., -1] = x @ by_slope, -1
-        system.add(slice(None), jacobian * (shrink * self.scale / OFF)[..., None], off * shrink)
+        system.add(slice(None), self.flat @ jacobian * shrink[..., None], off * shrink)
         if self.rest.any():
             axes = np.broadcast_to(np.eye(3), (*x.shape[:2], 3, 3))
             self._add_slip(system, pulled_back(skeleton, chain, self.pairs, shape, axes), x)
@@ -98,8 +106,8 @@ class Ground:
         return (positions(chain, self.pairs, shape) + transl[:, None]) @ upright(held)[0]
 
     def _off(self, x: np.ndarray, held: np.ndarray, level: np.ndarray) -> np.ndarray:
-        """(T, P) above the plane, in spreads."""
-        return (x @ upright(held)[0] - level[0]) * (self.scale / OFF)
+        """(T, P) middles above the plane, edges above each other, in spreads."""
+        return (x @ upright(held)[0] - level[0]) @ self.flat.T
 
     def _slip(self, x: np.ndarray) -> np.ndarray:
         """(T - 1, P, 3) in spreads; empty where nothing rests."""
@@ -107,18 +115,21 @@ class Ground:
 
 
 def _off_ground(off: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return robust(off, np.where(off > 0, LIFTED, SUNK))
+    limit = np.where(off > 0, LIFTED, SUNK)
+    limit[..., off.shape[-1] // 2:] = LIFTED  # a sole tips one way as easily as the other
+    return robust(off, limit)
 
 
 def soles(body: Body) -> Pairs:
-    """The lowest points of heel and ball of each foot."""
+    """The outermost points, right and left, of heel and ball of each foot."""
     rest, carrier = body.v_template, np.asarray(body.weights.argmax(1)).ravel()
     joints = body.J_regressor @ rest
-    lowest = []
+    edges = []
     for ankle, foot in (map(body.joint_names.index, names) for names in FEET):
         for part in ((carrier == ankle) & (rest[:, 2] < joints[ankle, 2]), carrier == foot):
-            lowest.append(np.flatnonzero(part)[rest[part, 1].argmin()])
-    one = sparse.csr_matrix((np.ones(len(lowest)), (range(len(lowest)), lowest)), (len(lowest), len(rest)))
+            sole = np.flatnonzero(part & (rest[:, 1] < rest[part, 1].min() + SOLE))
+            edges += [sole[rest[sole, 0].argmin()], sole[rest[sole, 0].argmax()]]
+    one = sparse.csr_matrix((np.ones(len(edges)), (range(len(edges)), edges)), (len(edges), len(rest)))
     return pairs_of(body, one)
 
 

@@ -37,7 +37,7 @@ def on_ground(body: Body, limits: float, monkeypatch):
     monkeypatch.setattr(module, "SLIPPED", limits)
     ground, skeleton = Ground(body, 0.7), Skeleton(body, BODY_JOINTS)
     local, shape, transl, held = standing(body)
-    ground.rest = np.random.default_rng(1).uniform(0, 30, (FRAMES - 1, 4))
+    ground.rest = np.random.default_rng(1).uniform(0, 30, (FRAMES - 1, 8))
     level = ground.level(skeleton.pose(local, shape), shape, transl, held) - 0.004
     return ground, skeleton, local, shape, transl, held, level
 
@@ -99,6 +99,27 @@ def test_lifted_soles_are_let_go_sooner_than_sunk_ones(body):
     high, low = heights.max() + 0.3, heights.min() - 0.3
     assert pull(high) > 3 * pull(low)
     assert pull(low) < module.LIFTED**2 * heights.size
+
+
+def test_soles_are_held_flat(body):
+    """A foot that tips by four degrees about its own length, its middle staying on the ground, is turned back."""
+    ground, skeleton, level = Ground(body), Skeleton(body, BODY_JOINTS), np.zeros(1)
+    local, _, _, held = standing(body)
+    held[:] = 0
+    local[:] = np.eye(3)
+    local[:, 0] = np.diag([1.0, -1, -1])
+    ankle, shape = body.joint_names.index("left_ankle"), np.zeros(body.num_betas)
+    slopes = []
+    for degrees in (-4, 0, 4):
+        local[:, ankle] = rotation.exp(np.radians([0, 0, degrees]))
+        chain = skeleton.pose(local, shape)
+        transl = -(positions(chain, ground.pairs, shape)[:, :4].mean(1) @ module.upright(held)[0])[:, None] * [0, -1, 0]
+        system = System.zeros(FRAMES, 69, 1 + len(shape) + HELD + 1)
+        ground.add(system, skeleton, chain, shape, transl, held, level)
+        slopes.append(system.gradient[:, 3 * ankle + 2])
+    left, flat, right = np.array(slopes)
+    assert (left < -10).all() and (right > 10).all()
+    assert (np.abs(flat) < 0.3 * right).all()
 
 
 def test_feet_that_stand_rest_and_feet_that_step_do_not():
