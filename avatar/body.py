@@ -174,13 +174,21 @@ class Body:
         shaped, joints = self.rest(params.betas, None, params.joint_offset)
         transforms = joint_transforms(params.pose[frames], joints, self.parents)
         vertices = np.empty((len(frames), len(shaped), 3), np.float32)
-        posed_joints = np.empty((len(frames), J, 3), np.float32)
         for i, t in enumerate(frames):
             expression = self.effective_expression(params, t)
             rest = shaped + self.exprdirs @ expression if expression.any() else shaped
             vertices[i] = skin(rest, transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
-            posed_joints[i] = np.einsum("jab,jb->ja", transforms[i, :, :, :3], joints) + transforms[i, :, :, 3]
-        return vertices, posed_joints + params.transl[frames][:, None]
+        return vertices, self._carried(transforms, joints) + params.transl[frames][:, None]
+
+    def posed_joints(self, params: BodyParams) -> np.ndarray:
+        """Joints (T, 55, 3) of all frames, as `posed` gives them."""
+        joints = self.rest(params.betas, None, params.joint_offset)[1]
+        return self._carried(joint_transforms(params.pose, joints, self.parents), joints) + params.transl[:, None]
+
+    @staticmethod
+    def _carried(transforms: np.ndarray, joints: np.ndarray) -> np.ndarray:
+        """(T, 55, 3) of transforms (T, 55, 3, 4) and joints (55, 3)."""
+        return np.stack([np.einsum("jab,jb->ja", each[:, :, :3], joints) + each[:, :, 3] for each in transforms]).astype(np.float32)
 
     def keypoints(self, vertices: np.ndarray) -> np.ndarray:
         """COCO-WholeBody points (..., 133, 3) of posed vertices (..., V, 3); NaN where the body carries no such point."""

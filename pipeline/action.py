@@ -35,7 +35,6 @@ LITTLE_ROOM = 16 << 20
 class Ready:
     """A process that has loaded a stage's code."""
 
-    stage: str
     code: dict[str, str]
     """Digests of that code, before it was loaded."""
     child: Child
@@ -52,7 +51,8 @@ class Actor:
     """Folder for `<stage>.log`."""
     begun: Callable[[], None] = lambda: None
     """Called when a stage's process has its order: what can be done meanwhile."""
-    ready: Ready | None = None
+    ready: dict[str, Ready] = field(default_factory=dict)
+    """By stage."""
     done: list[Child] = field(default_factory=list)
     """Processes that may still be leaving, which takes a while where they held much memory."""
 
@@ -64,18 +64,20 @@ class Actor:
         while self.done:
             self.done.pop().close()
 
-    def prepare(self, name: str) -> None:
-        """Starts a process that loads a stage's code, to be there when the stage's inputs are."""
-        self._drop()
-        with contextlib.suppress(CacheError, BadInput):  # it will be raised again when the stage's turn comes
-            code = self.keys.code(name)
-            self.ready = Ready(name, code, self._child(name, self._log(name, ".next")))
+    def prepare(self, *names: str) -> None:
+        """Starts a process for each stage that loads its code, to be there when the stage's inputs are; ends those of others."""
+        self._drop(keep=names)
+        for name in names:
+            if name not in self.ready:
+                with contextlib.suppress(CacheError, BadInput):  # it will be raised again when the stage's turn comes
+                    code = self.keys.code(name)
+                    self.ready[name] = Ready(code, self._child(name, self._log(name, ".next")))
 
-    def _drop(self) -> None:
-        if self.ready is not None:
-            self.ready.child.close()
-            self.ready.child.log.unlink(missing_ok=True)
-            self.ready = None
+    def _drop(self, keep: tuple[str, ...] = ()) -> None:
+        for name in self.ready.keys() - set(keep):
+            child = self.ready.pop(name).child
+            child.close()
+            child.log.unlink(missing_ok=True)
 
     def _child(self, name: str, log: Path) -> Child:
         self.logs.mkdir(parents=True, exist_ok=True)
@@ -87,13 +89,13 @@ class Actor:
 
     def _taken(self, parts: KeyParts) -> Child:
         """A process for the stage: the one that is ready, if it has loaded the code that the key names, else a new one."""
-        ready, log = self.ready, self._log(parts.stage)
-        if ready is None or (ready.stage, ready.code) != (parts.stage, parts.code):
-            self._drop()
-            return self._child(parts.stage, log)
-        self.ready = None
-        ready.child.rename_log(log)
-        return ready.child
+        name, log = parts.stage, self._log(parts.stage)
+        if name in self.ready and self.ready[name].code == parts.code:
+            child = self.ready.pop(name).child
+            child.rename_log(log)
+            return child
+        self._drop(keep=tuple(self.ready.keys() - {name}))
+        return self._child(name, log)
 
     def act(self, verdict: Verdict, inputs: dict[str, Path], forced: bool = False,
             still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:

@@ -27,6 +27,10 @@ from gsac.pipeline.workspace import METRICS, RUN, Workspace
 from gsac.stages.contract import BadInput, StageError
 
 
+AHEAD = 2
+"""Stages whose code is loaded while one is at work: some are done before the next has loaded."""
+
+
 class NotUpToDateError(Exception):
     """Something that should be there already is not (exit code 3)."""
 
@@ -139,8 +143,9 @@ class Chain:
         digests = {CLIP: source}
         paths = {CLIP: clip}
         with in_use(self.store) as lease, self._kept(clip), self._actor() as actor:
-            for name, following in zip(steps, [*steps[1:], None], strict=True):
-                actor.begun = partial(actor.prepare, following) if following else partial(at_last, name)
+            for at, name in enumerate(steps, 1):
+                following = steps[at:at + AHEAD]
+                actor.begun = partial(actor.prepare, *following) if following else partial(at_last, name)
                 inputs = {port: digests[port] for port in self.graph.step(name).deps}
                 lease.add(self.keys.parts(name, inputs).key())
                 verdict = self._judge(name, digests, options)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
+from gsac.avatar.distinct import distinct
 
 
 def joint_levels(parents: np.ndarray) -> np.ndarray:
@@ -37,9 +40,17 @@ def vertices_of(faces: np.ndarray, face: np.ndarray, vertices: int) -> tuple[np.
 
 def neighbours(faces: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
     """start (V + 1,) and the vertices that share an edge with each vertex."""
-    i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64).T
-    both = np.unique(np.r_[i, j] * vertices + np.r_[j, i])
-    return _starts(both // vertices, vertices), both % vertices
+    return _neighbours(np.ascontiguousarray(faces, np.int64).tobytes(), vertices)
+
+
+@lru_cache(maxsize=2)  # a fit asks for those of its body time and again
+def _neighbours(faces: bytes, vertices: int) -> tuple[np.ndarray, np.ndarray]:
+    faces = np.frombuffer(faces, np.int64).reshape(-1, 3)
+    i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
+    both = distinct(np.r_[i, j] * vertices + np.r_[j, i])
+    start, near = _starts(both // vertices, vertices), both % vertices
+    start.flags.writeable = near.flags.writeable = False
+    return start, near
 
 
 def _starts(owner: np.ndarray, count: int) -> np.ndarray:

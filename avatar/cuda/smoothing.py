@@ -5,6 +5,7 @@ A term costs the kernels one look at the neighbours, and both series share their
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,12 @@ class Series(NamedTuple):
 
 def series(faces: np.ndarray, vertices: int, smoothness: float) -> Series:
     """faces: (F, 3) int; smoothness: lambda."""
-    start, near = neighbours(np.asarray(faces), vertices)
+    return _series(np.ascontiguousarray(faces, np.int64).tobytes(), vertices, smoothness)
+
+
+@lru_cache(maxsize=2)
+def _series(faces: bytes, vertices: int, smoothness: float) -> Series:
+    start, near = neighbours(np.frombuffer(faces, np.int64).reshape(-1, 3), vertices)
     laplacian = diags(np.diff(start).astype(float)) - csr_matrix((np.ones(len(near)), near, start), (vertices, vertices))
     begin = np.sin(np.arange(vertices, dtype=float))
     top = eigsh(laplacian, k=1, which="LA", tol=1e-2, v0=begin, return_eigenvectors=False)[0]

@@ -10,6 +10,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.turn import yaw
 from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
+from gsac.avatar.workspace import available
 from gsac.stages.smplx import start
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
@@ -44,8 +45,8 @@ START_STEPS = 4
 """Steps in which the body only turns and moves as a whole, before anything bends."""
 VIEW = np.radians(30)
 """Yaw that makes another view of the person."""
-THREADS = 2
-"""Drawing the body lets go of Python; more than two mostly wait for what does not."""
+THREADS = min(available(), 8)
+"""Drawing the body lets go of Python; more threads mostly wait for what does not."""
 POSED_AT_ONCE = 64
 """Frames whose vertices are held in memory together."""
 

@@ -51,7 +51,7 @@ def run(job: Job) -> None:
     params.jaw_pose = jaw
     if fit.joint_offset is not None:
         params.joint_offset = fit.joint_offset.astype(np.float32)
-    params.joints = body.posed(params)[1]
+    params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = lost_frames(fit, seen, sightings.person_height)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST

@@ -63,9 +63,9 @@ def drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.ndarra
     levers = carried_levers(body, which, rest, joints)
     normals = vertex_normals(rest, body.faces)[which]
     own, fit = (world(body, angles[frames], joints)[:, :BONES] for angles in (poses.pose, poses.fit_pose))
-    weight = np.asarray(body.weights)[which]
-    seen = np.einsum("nj,tjab,nb->tna", weight[:, :BONES], own, normals)
-    places = np.einsum("tjab,njb->tna", own, levers) + (poses.transl[frames] + joints[0])[:, None]
+    weight = np.asarray(body.weights)[which, :BONES]
+    seen = summed(own, weight[:, :, None] * normals[:, None])
+    places = summed(own, levers) + (poses.transl[frames] + joints[0])[:, None]
     facing = np.clip(-(seen * places).sum(2) / np.linalg.norm(places, axis=2), 0, 1)
     goal = places[..., :2] / places[..., 2:]
     turns, shift = np.tile(np.eye(3), (BONES, 1, 1)), (poses.transl - poses.fit_transl)[frames].mean(0)
@@ -74,19 +74,13 @@ def drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.ndarra
     for _ in range(ROUNDS):
         hessian, gradient = known.copy(), known @ np.append(rotation.log(turns).ravel(), np.zeros(3))
         arms = np.einsum("jab,njb->nja", turns, levers)
-        cross = np.zeros((*arms.shape, 3))
-        cross[..., 0, 1], cross[..., 1, 2], cross[..., 2, 0] = arms[..., 2], arms[..., 0], arms[..., 1]
-        cross -= cross.swapaxes(2, 3)  # d(turn arm) / d turn
-        for t in range(len(frames)):
-            place = np.einsum("jab,njb->na", fit[t], arms) + start[t]
-            slopes = np.einsum("jab,njbc->najc", fit[t], cross).reshape(len(which), 3, -1)
-            slopes = np.concatenate([slopes, np.broadcast_to(fit[t, 0], (len(which), 3, 3))], 2)
-            z = place[:, 2, None]
-            rows = (slopes[:, :2] - (place[:, :2] / z)[..., None] * slopes[:, 2:]) / z[..., None]
-            miss = place[:, :2] / z - goal[t]
-            rows, miss, w = rows.reshape(-1, rows.shape[2]), miss.ravel(), np.repeat(facing[t], 2)
-            hessian += rows.T @ (rows * w[:, None])
-            gradient += rows.T @ (miss * w)
+        for t, place in enumerate(summed(fit, arms) + start[:, None]):
+            z = place[:, 2]
+            for axis in range(2):
+                image = place[:, axis] / z
+                rows = slopes(fit[t, :, axis] - image[:, None, None] * fit[t, :, 2], arms) / z[:, None]
+                hessian += rows.T @ (rows * facing[t, :, None])
+                gradient += rows.T @ ((image - goal[t, :, axis]) * facing[t])
         move = np.linalg.solve(hessian, -gradient)
         turns = rotation.exp(move[:-3].reshape(BONES, 3)) @ turns
         start = start + np.einsum("tab,b->ta", fit[:, 0], move[-3:])
@@ -95,6 +89,21 @@ def drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.ndarra
     for joint in range(BONES, len(joints)):
         turns = np.concatenate([turns, turns[None, body.parents[joint]]])
     return turns
+
+
+def summed(turns: np.ndarray, levers: np.ndarray) -> np.ndarray:
+    """(T, n, 3) of turns (T, BONES, 3, 3) and levers (n, BONES, 3): sums over the bones of turn times lever."""
+    return levers.reshape(len(levers), -1) @ turns.swapaxes(2, 3).reshape(len(turns), -1, 3)
+
+
+def slopes(covectors: np.ndarray, arms: np.ndarray) -> np.ndarray:
+    """(n, 3 BONES + 3): how much farther places lie along covectors when the bones turn at rest and the pelvis moves.
+
+    covectors: (n, BONES, 3) in the axes of each bone; arms: (n, BONES, 3).
+    """
+    (x, y, z), (a, b, c) = np.moveaxis(arms, 2, 0), np.moveaxis(covectors, 2, 0)
+    turned = np.stack([y * c - z * b, z * a - x * c, x * b - y * a], 2)
+    return np.concatenate([turned.reshape(len(arms), -1), covectors[:, 0]], 1)
 
 
 def carried_levers(body, which: np.ndarray, rest: np.ndarray, joints: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.body import Body
+from gsac.avatar.distinct import distinct
 from gsac.avatar.gaussians import Gaussians
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
@@ -47,8 +48,8 @@ def cheapest(gaussians: Gaussians, bound: Bound, shown: np.ndarray, normals: np.
     """(P, 2) neighbours, the cheapest pair first, no gaussian in two of them."""
     places = bound.means.astype(np.float64)
     near = cKDTree(places).query(places, k=min(NEIGHBOURS + 1, len(places)))[1][:, 1:]
-    pairs = np.stack([np.repeat(np.arange(len(places)), near.shape[1]), near.ravel()], 1)
-    i, j = np.unique(np.sort(pairs, 1), axis=0).T
+    one, other = np.repeat(np.arange(len(places)), near.shape[1]), near.ravel()
+    i, j = np.divmod(distinct(np.minimum(one, other) * len(places) + np.maximum(one, other)), len(places))
     skin = skin_of(gaussians.face, body)
     fit = ((normals[i] * normals[j]).sum(1) > SAME_SIDE) & (0.5 * np.abs(skin[i] - skin[j]).sum(1) < SAME_PART)
     i, j = i[fit], j[fit]

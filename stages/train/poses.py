@@ -184,5 +184,5 @@ class Poses:
                          right_hand_pose=flat[:, 120:165], transl=self.transl.astype(np.float32),
                          expression=(self.params.expression + self.expression).astype(np.float32),
                          joint_offset=(self.params.joint_offset + self.joint_offset).astype(np.float32))
-        params.joints = np.concatenate([self.body.posed(params, [t])[1] for t in range(params.frames)])
+        params.joints = self.body.posed_joints(params)
         return params

@@ -81,6 +81,7 @@ def test_a_bent_elbow_moves_the_hand_and_nothing_of_the_other_side(body):
     pose[1, SMPLX_JOINTS.index("left_elbow")] = [0, -1.2, 0]
     params = BodyParams.from_pose(pose, np.zeros((2, 3)), np.zeros(body.num_betas), np.zeros((2, 52)), 1000, (0, 0))
     vertices, joints = body.posed(params)
+    assert np.array_equal(body.posed_joints(params), joints)
     moved = np.linalg.norm(vertices[1] - vertices[0], axis=1)
     assert moved[vertices[0][:, 0] < 0].max() < 1e-6
     assert joints[1, SMPLX_JOINTS.index("left_wrist"), 2] > joints[0, SMPLX_JOINTS.index("left_wrist"), 2] + 0.1

@@ -58,3 +58,22 @@ def warm(device):
     toy.wait_for(lambda: loaded(toy) and toy.runs)
     assert toy.runs == ["cut"] and Path(f"{toy.runs_file}.loaded").read_text() == "cpu\n"
     assert process.wait(60) == 0 and toy.runs == ["cut", "left", "right", "join"]
+
+
+def test_the_stage_after_the_next_is_loaded_as_well_and_each_runs_in_its_own_process(toy):
+    for name in ("left", "right"):
+        toy.edit(f"{name}/stage.py", "from gsac.toy", NOTES + "from gsac.toy")
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3")
+    toy.wait_for(lambda: loaded(toy) == 2)
+    assert toy.runs == ["cut"]
+    assert process.wait(60) == 0 and toy.runs == ["cut", "left", "right", "join"]
+    assert loaded(toy) == 2
+    assert [(toy.out / "logs" / f"{name}.log").read_text() for name in ("left", "right")] == ["left at work\n", "right at work\n"]
+
+
+def test_libraries_in_a_stages_process_have_one_thread_unless_the_user_says_otherwise(toy):
+    toy.edit("left/stage.py", "from gsac.toy", "import os\n\nprint(os.environ['OPENCV_FOR_THREADS_NUM'])\nfrom gsac.toy")
+    assert toy.run().code == 0
+    assert (toy.out / "logs" / "left.log").read_text().startswith("1\n")
+    assert toy.run("--force", "left", OPENCV_FOR_THREADS_NUM="2").code == 0
+    assert (toy.out / "logs" / "left.log").read_text().startswith("2\n")
