@@ -26,7 +26,6 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.workspace import METRICS, RUN, Workspace
 from gsac.stages.contract import BadInput, StageError
 
-
 AHEAD = 2
 """Stages whose code is loaded while one is at work: some are done before the next has loaded."""
 

@@ -12,6 +12,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import FROM_CAMERA, basis, shade
+from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
 from scipy.spatial import cKDTree
 
@@ -52,8 +53,8 @@ class Sight:
 
 def read_sights(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussians) -> list[Sight]:
     """The colours that the frames show where gaussians are."""
-    sights = []
-    for frame in frames:
+
+    def read(frame: PosedFrame, _: Workspace) -> Sight:
         posed = face_frames(frame.vertices, faces)
         places = bind(posed, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means.astype(np.float64)
         facing = -(posed.R[gaussians.face, :, 1] * places).sum(1) / np.maximum(np.linalg.norm(places, axis=1), 1e-9)
@@ -63,9 +64,10 @@ def read_sights(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussian
         pixel = frame.pixels[y, x].astype(np.float64)
         sure = pixel[:, 3] > SURE
         chosen = visible[sure]
-        sights.append(Sight(chosen, pixel[sure, :3] / pixel[sure, 3:], posed.R[gaussians.face[chosen], :, 1] * FROM_CAMERA,
-                            facing[chosen] ** 2))
-    return sights
+        return Sight(chosen, pixel[sure, :3] / pixel[sure, 3:], posed.R[gaussians.face[chosen], :, 1] * FROM_CAMERA,
+                     facing[chosen] ** 2)
+
+    return side_by_side(read, frames)
 
 
 def mean_colours(sights: list[Sight], count: int, light: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -44,11 +45,27 @@ def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
     return view.pixels[..., :3] / np.float32(255), view.pixels[..., 3] / np.float32(255)
 
 
+class Look(NamedTuple):
+    """What is to be judged: an avatar, posed, in some frames."""
+
+    gaussians: Gaussians
+    poses: Poses
+    frames: Iterable[int]
+    views: Mapping[int, View] | list[View]
+
+
 def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
           flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
     """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
+    return judge_all([Look(gaussians, poses, frames, views)], folder, flip, lpips)[0]
 
-    def row(t: int, workspace: Workspace) -> dict:
+
+def judge_all(looks: list[Look], folder: Path | None = None, flip: bool = False,
+              lpips: Mapping[str, Lpips] | None = None) -> list[list[dict]]:
+    """`judge` of each look, all their frames side by side."""
+
+    def row(frame: tuple[Look, int], workspace: Workspace) -> dict:
+        (gaussians, poses, _, views), t = frame
         finite("when it is judged", pose(poses, t))
         rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
         finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
@@ -63,7 +80,8 @@ def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder:
             write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(heat, cv2.COLOR_BGR2RGB))
         return scores
 
-    return side_by_side(row, map(int, frames))
+    rows = iter(side_by_side(row, [(look, int(t)) for look in looks for t in look.frames]))
+    return [[next(rows) for _ in look.frames] for look in looks]
 
 
 def boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:

@@ -12,7 +12,7 @@ import numpy as np
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
 from gsac.stages.train import fast
-from gsac.stages.train.evaluate import judge
+from gsac.stages.train.evaluate import Look, judge_all
 from gsac.stages.train.ladder import care, shown
 from gsac.stages.train.merging import merged
 from gsac.stages.train.poses import Poses
@@ -58,14 +58,14 @@ def coarser(task: Task, loop: Loop, fit: Fit) -> list[Gaussians]:
 
 def judged(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View]) -> list[dict]:
     """For each level its number of gaussians, the height of its images, its held-out psnr_fg and ssim there, and the finest's."""
-    rows = []
+    rows, looks = [], []
     for (_, halvings), level in zip(LEVELS, levels, strict=False):
         small = {int(t): halved(views[t], halvings) for t in held}
-        row = {"n_gaussians": len(level), "image_height": halved(views[0], halvings).camera.height}
-        for name, gaussians in (("", level), ("_finest", finest)):
-            figures = summary(judge(gaussians, poses, held, small))
-            row |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}
-        rows.append(row)
+        rows.append({"n_gaussians": len(level), "image_height": halved(views[0], halvings).camera.height})
+        looks += [Look(gaussians, poses, held, small) for gaussians in (level, finest)]
+    for k, judged_rows in enumerate(judge_all(looks)):
+        figures, name = summary(judged_rows), "_finest" if k % 2 else ""
+        rows[k // 2] |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}
     return rows
 
 

@@ -21,7 +21,7 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.config import AUTO, NETWORKS, TrainConfig
-from gsac.stages.train.evaluate import judge, turned
+from gsac.stages.train.evaluate import Look, judge, judge_all, turned
 from gsac.stages.train.guard import finite, result, values
 from gsac.stages.train.holdout import spaced_in_yaw, to_choose_by
 from gsac.stages.train.levels import judged
@@ -220,10 +220,11 @@ class Run:
         else:
             ttpo = []
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
+        of_fit, of_trained = judge_all([Look(gaussians, fitted, held, self.views), Look(gaussians, poses, sample, self.views)])
         return summary(rows) | {
             **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips_net"},
-            "psnr_fg_fit": self.psnr_fg(gaussians, fitted, held),
-            "psnr_fg_train": self.psnr_fg(gaussians, poses, sample),
+            "psnr_fg_fit": summary(of_fit)["psnr_fg"],
+            "psnr_fg_train": summary(of_trained)["psnr_fg"],
             "pose_at_test": {
                 "psnr_fg": "the body fit's pose plus the correction of the neighbouring trained frames, interpolated; "
                            "the held-out image is not used",
