@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from gsac.avatar.skinning import joint_transforms, skin, skin_backward
+from gsac.stages.train.between import follow_neighbours
 from gsac.stages.train.holdout import carry_corrections
 
 BODY, JAW_EYES = slice(0, 22), slice(22, 25)
@@ -22,11 +23,12 @@ KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offse
 
 
 def carried(poses: Poses, trained: np.ndarray) -> Poses:
-    """A copy in which every frame that is not among `trained` (indices) is corrected as its trained neighbours are."""
+    """A copy in which frames that are not among `trained` (indices) follow their trained neighbours, or are corrected alike."""
     is_trained = np.zeros(len(poses.pose), bool)
     is_trained[trained] = True
     out = poses.copy()
     out.pose, out.transl = carry_corrections(out.base_pose, out.base_transl, out.pose, out.transl, is_trained)
+    out.pose, out.transl = follow_neighbours(out.fit_pose, out.fit_transl, out.pose, out.transl, is_trained)
     if out.expression.any():
         frames, at = np.arange(len(out.pose)), np.flatnonzero(is_trained)
         out.expression = np.stack([np.interp(frames, at, column[at]) for column in out.expression.T], 1)

@@ -192,7 +192,7 @@ class Run:
         self.aside += self.clock() - before
 
     def carried(self) -> Poses:
-        """The poses with every frame that was not trained on corrected as its neighbours are."""
+        """The poses with every frame that was not trained on put between its neighbours."""
         return carried(self.poses, self.trained)
 
     def psnr_fg(self, gaussians, poses: Poses, frames) -> float | None:
@@ -226,8 +226,9 @@ class Run:
             "psnr_fg_fit": summary(of_fit)["psnr_fg"],
             "psnr_fg_train": summary(of_trained)["psnr_fg"],
             "pose_at_test": {
-                "psnr_fg": "the body fit's pose plus the correction of the neighbouring trained frames, interpolated; "
-                           "the held-out image is not used",
+                "psnr_fg": "between the refined poses of the neighbouring trained frames, plus what the body fit has beside its "
+                           "own there, as far as that proved right in trained frames; at the clip's ends and between far views the "
+                           "fit's pose with the neighbours' correction; the held-out image is not used",
                 "*_ttpo": f"that pose, {config.pose_test_steps} steps optimised on the held-out image, avatar frozen",
                 "psnr_fg_fit": "the body fit's pose as it came",
             },
