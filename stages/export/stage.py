@@ -17,6 +17,7 @@ from gsac.stages.export.levels import MEMBERS, coarser
 from gsac.stages.export.motion import add_motion
 from gsac.stages.export.page import page_bytes
 from gsac.stages.export.ply import ply_bytes
+from gsac.stages.export.rehearsal import rehearse
 from gsac.stages.export.rigged import RiggedAvatar
 from gsac.stages.export.spz import spz_bytes
 from gsac.stages.export.unity_package import write_unity
@@ -61,6 +62,11 @@ def run(job: Job) -> None:
     (job.out / "unity").mkdir()
     write_unity(job.out / "unity", container, version("gsac"))
     job.progress(len(files) + 1, len(files) + 1, "files")
+
+
+def warm(device: str) -> None:
+    """Called while a stage before is at work."""
+    rehearse(run)
 
 
 def rigged(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar:

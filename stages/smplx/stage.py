@@ -11,6 +11,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.smplx.fit import THREADS, Sightings, fit_clip, to_params
 from gsac.stages.smplx.mimic import mimic
+from gsac.stages.smplx.rehearsal import rehearse
 from gsac.stages.smplx.silhouette import read_outline
 from gsac.stages.smplx.trust import lost_frames, sentences
 from threadpoolctl import threadpool_limits
@@ -59,6 +60,11 @@ def run(job: Job) -> None:
         job.warn(sentence)
     warn(job, params, clip)
     params.write(job.out / "body.npz")
+
+
+def warm(device: str) -> None:
+    """Called while a stage before is at work."""
+    rehearse(run)
 
 
 def warn(job: Job, params, clip: Clip) -> None:
