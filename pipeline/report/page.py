@@ -35,7 +35,9 @@ class Section:
 
 
 def draw_sections(out_dir: Path, running: str) -> dict[str, Section]:
-    """By name, those sections that can be drawn while a stage still runs: of what the stages before it made."""
+    """By name, those sections that can be drawn while a stage still runs: of what the stages before it made. The template is
+    read as well."""
+    template()
     drawn = sections_of(Results(out_dir), without=running)
     return {section.ident: section for section in drawn if not section.absent}
 
@@ -55,21 +57,26 @@ def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path
 
 
 def render(results: Results, drawn: dict[str, Section]) -> str:
-    import jinja2
-
     sections = sections_of(results, drawn)
     shown = [section for section in sections if section.sheet]
     facts = {name: value for section in shown for name, value in section.sheet.facts.items()}
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True,
-                                     undefined=jinja2.StrictUndefined)
-    environment.filters |= {"seconds": seconds, "bytes": size}
-    template = environment.from_string(Path(__file__).with_name(TEMPLATE).read_text(encoding="utf-8"))
-    return template.render(
+    return template().render(
         clip=results.clip_name, when=when(results), headline=headline(results, facts), sections=sections,
         warnings=warnings(results), failed=results.failed, reached=reached(results), stages=stage_rows(results),
         totals=totals(results), parameters=parameters(results), files=exported(results), foot=foot(results),
         viewer="export/viewer.html" if exported_viewer(results) else "",
     )
+
+
+@functools.cache
+def template():
+    """The page's jinja2 template."""
+    import jinja2
+
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True,
+                                     undefined=jinja2.StrictUndefined)
+    environment.filters |= {"seconds": seconds, "bytes": size}
+    return environment.from_string(Path(__file__).with_name(TEMPLATE).read_text(encoding="utf-8"))
 
 
 def sections_of(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:
