@@ -1,0 +1,62 @@
+"""python -m gsac.benchmarks.gpu.runs CLIP [CLIP ...] : whole runs, each over a store with nothing of its clip, as README's rows.
+
+Models and compiled kernels are those of the usual store. A clip that is given twice is also held to the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from gsac.cache.root import default_root
+from gsac.stages.contract import BadInput
+
+KEPT = ("models", "kernels")
+"""Folders of the usual store that every run may use."""
+SAME = ("train/avatar.npz", "train/body.npz", "export/avatar.gsac")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.gpu.runs", description=__doc__.splitlines()[0])
+    parser.add_argument("clips", type=Path, nargs="+", metavar="CLIP")
+    known: dict[Path, list[bytes]] = {}
+    for number, clip in enumerate(parser.parse_args().clips):
+        with tempfile.TemporaryDirectory() as folder:
+            took, summary = run(clip.absolute(), Path(folder))
+            if not number:
+                print(row("clip", [stage["name"] for stage in summary["stages"]] + ["between them", "in all"]), flush=True)
+            seconds = [stage["seconds"] for stage in summary["stages"]]
+            print(row(clip.stem, [f"{s:.1f}" for s in (*seconds, took - sum(seconds), took)]), flush=True)
+            made = [(Path(folder) / "out" / name).read_bytes() for name in SAME]
+        if known.setdefault(clip, made) is not made:
+            print("    the same bytes as before" if known[clip] == made else "    NOT the same bytes as before", flush=True)
+
+
+def run(clip: Path, folder: Path) -> tuple[float, dict]:
+    """Wall seconds of one run into folder/out, and the object of its --json. BadInput where it fails."""
+    (folder / "store").mkdir()
+    for name in KEPT:
+        (default_root() / name).mkdir(parents=True, exist_ok=True)
+        (folder / "store" / name).symlink_to(default_root() / name)
+    began = time.monotonic()
+    done = subprocess.run([sys.executable, "-m", "gsac.pipeline.cli", "run", str(clip), "--out", str(folder / "out"), "--json"],
+                          capture_output=True, text=True,
+                          env=os.environ | {"GSAC_CACHE": str(folder / "store")})
+    took = time.monotonic() - began
+    if done.returncode:
+        raise BadInput(f"{clip}: the run ended with code {done.returncode}\n{done.stderr}")
+    return took, json.loads(done.stdout.splitlines()[-1])
+
+
+def row(head: str, cells: list[str]) -> str:
+    return f"| {' | '.join([head, *cells])} |"
+
+
+if __name__ == "__main__":
+    main()
