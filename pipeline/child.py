@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -39,16 +40,19 @@ class Child:
     def __init__(self, declaration: str, entry: str, device: str, log: Path):
         """declaration, entry: modules of the stage; device: what it will run on; log: where its prints go."""
         self.log = log
+        self._temporary = tempfile.TemporaryDirectory(prefix="gsac-", ignore_cleanup_errors=True)
         self._events, write = os.pipe()
         try:
             with log.open("wb") as log_stream:
                 self._process = subprocess.Popen(
                     [sys.executable, "-P", "-m", "gsac.pipeline.worker"],
                     stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write,),
-                    start_new_session=True, env=ENVIRONMENT | os.environ | {"PYTHONUNBUFFERED": "1"},
+                    start_new_session=True,
+                    env=ENVIRONMENT | os.environ | {"PYTHONUNBUFFERED": "1", "TMPDIR": self._temporary.name},
                 )
         except BaseException:
             os.close(self._events)
+            self._temporary.cleanup()
             raise
         finally:
             os.close(write)
@@ -61,7 +65,7 @@ class Child:
         self.close()
 
     def close(self) -> None:
-        """The whole group goes at once: what it was writing is private and is dropped."""
+        """The whole group goes at once: what it was writing is private and is dropped, its temporary files are removed."""
         if self._events >= 0:
             os.close(self._events)
             self._events = -1
@@ -70,6 +74,7 @@ class Child:
         self._process.wait()
         with contextlib.suppress(OSError):
             self._process.stdin.close()
+        self._temporary.cleanup()
 
     def order(self, order: dict[str, Any]) -> None:
         """Once: lets it begin."""

@@ -1,5 +1,6 @@
 """The next stage's process loads its code while the stage before it is at work."""
 
+import signal
 from pathlib import Path
 
 NOTES = """
@@ -58,6 +59,25 @@ def warm(device):
     toy.wait_for(lambda: loaded(toy) and toy.runs)
     assert toy.runs == ["cut"] and Path(f"{toy.runs_file}.loaded").read_text() == "cpu\n"
     assert process.wait(60) == 0 and toy.runs == ["cut", "left", "right", "join"]
+
+
+def test_what_a_process_left_among_temporary_files_goes_with_it(toy):
+    warm = """
+def warm(device):
+    import os, tempfile, time
+    with open(os.environ["TOY_RUNS"] + ".loaded", "a") as log:
+        log.write(tempfile.mkdtemp() + "\\n")
+    time.sleep(60)
+"""
+    toy.edit("left/stage.py", "from gsac.toy", warm + "\n\nfrom gsac.toy")
+    assert toy.run("--until", "cut", "--set", "cut.pause_s=3").code == 0
+    assert loaded(toy) == 0, "nothing is prepared that does not run"
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=4")
+    toy.wait_for(lambda: loaded(toy))
+    folder = Path(Path(f"{toy.runs_file}.loaded").read_text().split()[0])
+    assert folder.is_dir()
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) == 130 and not folder.exists()
 
 
 def test_the_stage_after_the_next_is_loaded_as_well_and_each_runs_in_its_own_process(toy):
