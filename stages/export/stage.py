@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 
 import numpy as np
@@ -56,12 +57,20 @@ def run(job: Job) -> None:
         "avatar.fbx": lambda: avatar_fbx(avatar, rest[0]),
         "viewer.html": lambda: page_bytes(container),
     }
-    for done, (name, make) in enumerate(files.items()):
-        job.progress(done, len(files) + 1, "files")
-        (job.out / name).write_bytes(make())
-    (job.out / "unity").mkdir()
-    write_unity(job.out / "unity", container, version("gsac"))
-    job.progress(len(files) + 1, len(files) + 1, "files")
+
+    def write(name: str) -> None:
+        (job.out / name).write_bytes(files[name]())
+
+    def write_package() -> None:
+        (job.out / "unity").mkdir()
+        write_unity(job.out / "unity", container, version("gsac"))
+
+    with ThreadPoolExecutor() as pool:  # what takes long is zlib, which lets go of Python
+        tasks = [pool.submit(write_package), *(pool.submit(write, name) for name in files)]
+        for done, task in enumerate(tasks):
+            job.progress(done, len(tasks), "files")
+            task.result()
+    job.progress(len(tasks), len(tasks), "files")
 
 
 def warm(device: str) -> None:

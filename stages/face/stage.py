@@ -49,6 +49,11 @@ def run(job: Job) -> None:
                  landmarks=landmarks.astype(np.float32), **head)
 
 
+def warm(device: str) -> None:
+    """Called while a stage before is at work: what reads a body takes longest to import."""
+    HeadModel.of_open_body(Actions.load())
+
+
 def head_of(actions: Actions, flame: FlameHead | None, own: np.ndarray, expression: np.ndarray) -> dict[str, np.ndarray]:
     """own: (468, 3) m, the person's resting points less everybody's. What face.npz holds of the person's head."""
     rest = actions.neutral + own
