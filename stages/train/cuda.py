@@ -71,8 +71,8 @@ def correct_midway(trainer: CudaTrainer, task: Task, views: dict[int, View]) -> 
 def refit(task: Task, fewer: fast.Trainer, views: dict[int, View]) -> fast.Trainer:
     """As `ladder.refit`."""
     gaussians = fewer.gaussians()
-    recipe = recipe_of(task.config, len(gaussians), steps=ladder.refit_steps(task), begin=ladder.REFIT_FROM, coarse_share=0.0,
-                       offset_rate=0.0, **POSES_STAY, **of_windows(task))
+    recipe = recipe_of(ladder.refit_config(task.config), len(gaussians), steps=ladder.refit_steps(task), begin=ladder.REFIT_FROM,
+                       coarse_share=0.0, offset_rate=0.0, **POSES_STAY, **of_windows(task))
     first = int(task.trained[0])
     whole = views[first].camera.focal == task.views[first].camera.focal  # the smaller images of coarser levels have no windows
     with training(task.poses, task.trained, [views], gaussians, recipe, network=task.lpips if whole else None) as trainer:

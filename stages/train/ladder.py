@@ -7,7 +7,7 @@ would reward blur. The first size that these frames can tell from the best ends 
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 from gsac.avatar.body import Body
@@ -17,6 +17,7 @@ from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.workspace import Workspace, side_by_side
 from gsac.stages.train import fast
 from gsac.stages.train.alignment import converge
+from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.evaluate import judge
 from gsac.stages.train.merging import merged, skin_of
 from gsac.stages.train.poses import carried
@@ -30,6 +31,8 @@ UNJUDGED = 12000
 """Size where no frame is held out."""
 REFIT, REFIT_FROM = 0.16, 0.3
 """Steps of a smaller size, as a share of the training's; their rates are those of a training from this share of its steps on."""
+WIDTHS = 3.0
+"""Rate of the scales in that time, over a training's: of what was merged these are off most."""
 ROUNDS = 5
 """That move the held-out frames' poses, on any device: sizes are to be chosen alike."""
 NEAR, CARE = [15, 20, 21, *range(22, 55)], 3.0
@@ -87,9 +90,15 @@ def refit_steps(task: Task) -> int:
     return max(1, round(REFIT * (task.config.steps or fast.STEPS)))
 
 
+def refit_config(config: TrainConfig) -> TrainConfig:
+    """The rates of that time."""
+    return replace(config, scale_rate=WIDTHS * config.scale_rate)
+
+
 def refit(task: Task, trainer: fast.Trainer, views: dict[int, View]) -> fast.Trainer:
     """A short training of a trainer's gaussians with the poses as they are; those that it has not seen rest."""
     rng = np.random.default_rng(task.config.seed)
+    trainer.config = refit_config(task.config)
     order: list[int] = []
     steps = refit_steps(task)
     for step in range(steps):

@@ -23,8 +23,8 @@ HIDDEN = 0.02
 """Of the mean: what a gaussian that no frame shows is taken to show."""
 ROUND = 0.15
 """Share of the gaussians that a round of merging takes away, at most; then the neighbours are looked for anew."""
-OPAQUE, WIDER = 0.95, 1.2
-"""Opacity of a merged gaussian, and what its width may grow by to cover what the two covered, at most."""
+OPAQUE = 0.95
+"""Opacity of a merged gaussian, at most."""
 
 
 def merged(gaussians: Gaussians, shown: np.ndarray, size: int, body: Body, rest: np.ndarray) -> Gaussians:
@@ -94,8 +94,6 @@ def joined(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndar
     axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
     scales = np.sqrt(np.maximum(square, 1e-12))
     needed = (mass[keep] + mass[drop]) / (scales[:, 1] * scales[:, 2])
-    scales[:, 1:] *= np.clip(np.sqrt(needed / OPAQUE), 1, WIDER)[:, None]
-
     out = gaussians[np.arange(len(gaussians))]
     R, T, k = frames.R[out.face[keep]], frames.T[out.face[keep]], np.maximum(frames.k[out.face[keep], None], 1e-9)
     out.mu[keep] = np.einsum("nji,nj->ni", R, middle - T) / k
