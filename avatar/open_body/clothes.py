@@ -2,7 +2,8 @@
 
 A silhouette shows a person's clothes, and a body that can only grow heavier follows them at the cost of its joints. So the body's
 shape basis ends with these: each lifts one region along the smoothed normals by `UNIT` a unit (soles downwards), fades into its
-neighbours and leaves every joint where it is. Hands, face and neck have none.
+neighbours and leaves every joint where it is. Hands, face and neck have none. The waist has its own beside the belly: shirts hang
+straight over the small of the back, and to a body that cannot have that filled they show a pelvis that is too high.
 
     python avatar/open_body/clothes.py    # writes them anew into open_body.npz; `bake.py` does so at its end
 """
@@ -54,6 +55,7 @@ def directions(v: np.ndarray, faces: np.ndarray, weights: np.ndarray, joints: li
     share = {
         "chest": blur(of("spine2", "spine3") + of("collar") * (y < 0.72), 12),
         "belly": blur(of("pelvis", "spine1"), 12),
+        "waist": blur(of("pelvis", "spine1", "spine2", "spine3", "hip") * ramp(y, 0.05, 0.18) * ramp(-y, -0.35, -0.18), 6),
         "upper arms": blur(of("shoulder"), 12),
         "sleeves": blur(of("shoulder") * ramp(x, 0.25, 0.40), 6),
         "forearms": blur(of("elbow"), 12),

@@ -17,8 +17,9 @@ SPREAD = {
     "knee": (50, 5, 4), "ankle": (20, 10, 8), "foot": (5, 2, 2), "neck": (15, 15, 10), "head": (15, 20, 12),
     "collar": (5, 8, 8), "shoulder": (30, 35, 40), "elbow": (35, 45, 6), "wrist": (25, 20, 20),
 }
-MEAN = {"left_shoulder": (0, 0, -55), "right_shoulder": (0, 0, 55), "left_elbow": (0, -20, 0), "right_elbow": (0, 20, 0),
-        "left_knee": (8, 0, 0), "right_knee": (8, 0, 0)}
+MEAN = {"left_collar": (0, 0, -3), "right_collar": (0, 0, 3), "left_shoulder": (0, 0, -55), "right_shoulder": (0, 0, 55),
+        "left_elbow": (0, -20, 0), "right_elbow": (0, 20, 0), "left_knee": (8, 0, 0), "right_knee": (8, 0, 0)}
+"""Arms hang, and the collar bones with them: the template's lie as under arms held 45 degrees out."""
 LIMITS = ((4, 0, 1), (5, 0, 1), (18, 1, -1), (19, 1, 1))
 """Hinges that do not bend back: joint, axis, sign of the allowed bend."""
 LIMIT_SPREAD = np.radians(3)
@@ -64,8 +65,9 @@ def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return speed, acceleration
 
 
-CLOTHES = {"chest": (4, 8), "belly": (4, 8), "upper arms": (3, 8), "sleeves": (1.5, 8), "forearms": (1.5, 6), "thighs": (4, 8),
-           "shanks": (4, 12), "cuffs": (2.5, 10), "feet": (2.5, 8), "soles": (5, 10), "hair": (5, 15), "nape": (1.5, 15)}
+CLOTHES = {"chest": (4, 8), "belly": (4, 8), "waist": (10, 10), "upper arms": (3, 8), "sleeves": (1.5, 8), "forearms": (1.5, 6),
+           "thighs": (4, 8), "shanks": (4, 12), "cuffs": (2.5, 10), "feet": (2.5, 8), "soles": (5, 10), "hair": (5, 15),
+           "nape": (1.5, 15)}
 """How far clothes and hair stand off the skin, mm: mean and spread, of people in clothes and without."""
 
 

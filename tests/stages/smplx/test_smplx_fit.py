@@ -10,6 +10,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.zbuffer import silhouette
+from gsac.benchmarks.turntable.shell import draped
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.smplx import STAGE
 from gsac.stages.smplx.config import SmplxConfig
@@ -99,6 +100,36 @@ def test_clothes_that_the_outline_shows_are_worn_and_leave_the_joints_alone(body
     assert found["with"][0] > found["without"][0] + 0.01 and found["with"][1] < found["without"][1]
     trunk = [body.clothes.index(name) for name in ("chest", "belly", "thighs")]
     assert (found["with"][2][trunk] > 0.5).all()  # the prior alone gives 0.4
+
+
+def test_a_shirt_that_hangs_over_the_waist_lifts_the_pelvis_less_than_without_a_waist_of_cloth(body, tmp_path):
+    waist = body.num_figure + body.clothes.index("waist")
+    other = replace(body, clothes=tuple(n for n in body.clothes if n != "waist"), shapedirs=np.delete(body.shapedirs, waist, 2))
+    lifted = np.zeros(2)
+    for seed in (2, 3):
+        bare = turning_person(body, 12, seed)
+        seen = sightings_of(body, bare)
+        seen.score[:, HIPS] = 0  # the shirt hides them
+        outlines = outlines_of(*in_a_shirt(body, bare), tmp_path)
+        for i, tailor in enumerate((body, other)):
+            fit = fit_clip(tailor, seen, outlines, SmplxConfig(height_m=height_of(body, bare)), lambda *a: None)
+            found = to_params(tailor, fit.state, np.array([WIDTH / 2, HEIGHT / 2]))
+            lifted[i] += pelvis_height(tailor, found) - pelvis_height(body, bare)
+    assert 0 < lifted[0] < 0.8 * lifted[1]
+
+
+def in_a_shirt(body: Body, bare: BodyParams) -> tuple[Body, BodyParams]:
+    """Cloth that falls from the chest to the hips; joints stay where they are."""
+    rest, joints = body.rest(bare.betas)
+    trunk = (rest[:, 1] > 0.07) & (rest[:, 1] < 0.52) & (np.abs(rest[:, 0]) < 0.2)
+    shirt = replace(body, v_template=body.v_template + draped(rest, trunk * np.clip((0.52 - rest[:, 1]) / 0.08, 0, 1)) - rest)
+    return shirt, replace(bare, joint_offset=joints - shirt.rest(bare.betas)[1])
+
+
+def pelvis_height(body: Body, params: BodyParams) -> float:
+    """Metres above the ankles, mean over the frames."""
+    joints = body.posed(params)[1]
+    return float((joints[:, 7:9, 1].mean(1) - joints[:, 0, 1]).mean())
 
 
 def height_of(body: Body, params: BodyParams) -> float:
