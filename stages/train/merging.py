@@ -94,6 +94,7 @@ def joined(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndar
     axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
     scales = np.sqrt(np.maximum(square, 1e-12))
     needed = (mass[keep] + mass[drop]) / (scales[:, 1] * scales[:, 2])
+
     out = gaussians[np.arange(len(gaussians))]
     R, T, k = frames.R[out.face[keep]], frames.T[out.face[keep]], np.maximum(frames.k[out.face[keep], None], 1e-9)
     out.mu[keep] = np.einsum("nji,nj->ni", R, middle - T) / k
