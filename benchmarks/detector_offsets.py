@@ -1,18 +1,21 @@
 """Where a detector's key points lie on the body, and how that changes with the turn: measured on truth clips, kept with the fit.
 
-    for seed in 11 12 41 42 43 44: python -m gsac.benchmarks.turntable CLIPS/$seed --seed $seed; gsac run CLIPS/$seed/clip.mp4 ...
+    python -m gsac.benchmarks.turntable CLIPS/201 --seed 201 --frames 30 --fps 5; gsac run CLIPS/201/clip.mp4 --until keypoints ...
     python -m gsac.benchmarks.detector_offsets RUN TRUTH [RUN TRUTH ...] --out stages/smplx/offsets/mediapipe.npz
+
+The kept file was measured on 120 people, seeds 201 to 320, those of 201, 206, 211 ... with `--feet planted`.
 
 RUN is a run's folder (keypoints/keypoints.npz), TRUTH the clip's truth.npz. A detector's hip is not the body's hip: for every point
 one constant offset (3,) m in the frame of the joint that carries it most is found by robust least squares over all frames and
 clips. What is left is laid out over the body's yaw: harmonics for each point, x and y as a share of the person's height, and the
-spread of the rest. Left and right share everything, mirrored.
+spread of the rest. Each person's own offsets from these are laid out over the betas of their figure (a hip is taken to be higher in
+a long trunk), and the directions in which people still differ are kept. Left and right share everything, mirrored.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +24,23 @@ from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.turn import yaw
 from gsac.avatar.wholebody import BODY_NAMES, FACE, FEET_NAMES, INDEX, LEFT_HAND, RIGHT_HAND
-from gsac.stages.smplx.detector import HARMONICS, UNKNOWN, harmonics
+from gsac.stages.smplx.detector import HARMONICS, PERSONAL, UNKNOWN, Detector, harmonics
 from gsac.stages.smplx.fit import Sightings
+from gsac.stages.smplx.mirrored import mirrored
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")
 RIDGE = 2.0
 """Pull of an offset to zero, in sightings of 1 px at 1 m."""
 HABIT_RIDGE = 2.0
 """Pull of a habit's harmonics to zero, in sightings; the highest twice."""
+FIGURE_RIDGE = 1e-4
 LEAST_SPREAD = 0.002
+OWN_NOISE, OWN_SPREAD = 8.0, 0.02
+"""px of one sighting, frames of a view counted apart; m, over people: a person's own offset is pulled to zero by these."""
+PEOPLE_RIDGE = 10.0
+"""Pull of an offset's slopes by the betas to zero, in people."""
+LEAST_OWN = 0.002
+"""m, of a direction in which people differ."""
 FEW = 20
 """Sightings below which nothing is said of a point."""
 
@@ -45,6 +56,7 @@ class Sight:
     turn: np.ndarray  # (T, 55, 3, 3) of the joints to the camera frame
     focal: float
     center: np.ndarray  # (2,) px
+    figure: np.ndarray  # (F,) betas of the person's figure
 
     @classmethod
     def read(cls, body: Body, run: Path, truth: Path) -> Sight:
@@ -53,11 +65,24 @@ class Sight:
         score = seen["score"]
         height = Sightings(seen["xy"], score, score, seen["world"], None, 0, 0, None).person_height
         return cls(seen["xy"].astype(np.float64), score > 0.5, height, body.keypoints(z["vertices"].astype(np.float32)),
-                   world_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"])
+                   world_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"], figure(body, z))
+
+    def slope(self, points: np.ndarray) -> np.ndarray:
+        """points: (n, 3). (n, 2, 3) px by metres."""
+        x, y, z = points.T
+        none = np.zeros_like(z)
+        return self.focal * np.stack([np.stack([1 / z, none, -x / z**2], -1), np.stack([none, 1 / z, -y / z**2], -1)], 1)
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """points: (..., 3). (..., 2) px."""
         return self.focal * points[..., :2] / points[..., 2:] + self.center
+
+
+def figure(body: Body, truth: dict[str, np.ndarray]) -> np.ndarray:
+    """(F,) betas that come nearest to the truth's bare body, which the basis does not span."""
+    basis = body.shapedirs[:, :, : body.num_figure].reshape(-1, body.num_figure).astype(np.float64)
+    beyond = (truth["shift"] - truth["joint_offset"][0]).ravel()  # about the pelvis, as the basis is
+    return truth["betas"] + np.linalg.solve(basis.T @ basis + FIGURE_RIDGE * np.eye(body.num_figure), basis.T @ beyond)
 
 
 def carrier(body: Body) -> np.ndarray:
@@ -92,9 +117,8 @@ def measure_offsets(body: Body, clips: list[Sight]) -> tuple[np.ndarray, np.ndar
     for clip in clips:
         for p in np.nonzero(joint >= 0)[0]:
             for t in np.nonzero(clip.seen[:, p])[0]:
-                x, f = clip.points[t, p], clip.focal
-                slope = np.array([[f / x[2], 0, -f * x[0] / x[2] ** 2], [0, f / x[2], -f * x[1] / x[2] ** 2]])
-                rows[p].append((slope @ clip.turn[t, joint[p]], clip.xy[t, p] - clip.project(x)))
+                x = clip.points[t, p]
+                rows[p].append((clip.slope(x[None])[0] @ clip.turn[t, joint[p]], clip.xy[t, p] - clip.project(x)))
     flip = np.array([-1.0, 1, 1])
     offsets, quality = np.zeros((133, 3)), np.full((133, 2), np.nan)
     for p in np.nonzero(joint >= 0)[0]:
@@ -140,6 +164,43 @@ def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple
     return habit, spread
 
 
+def own_offsets(body: Body, clip: Sight, offsets: np.ndarray, habit: np.ndarray) -> np.ndarray:
+    """(len(PERSONAL), 3) m, what one person's points lie off the offsets (133, 3) and habit, in the left side's axes."""
+    joint, flip = carrier(body), np.array([-1.0, 1, 1])
+    usual = Detector(offsets, None, None, habit, None).error(yaw(clip.turn[:, 0])) * clip.height
+    moved = clip.points + np.einsum("tpab,pb->tpa", clip.turn[:, joint], offsets)
+    out = np.zeros((len(PERSONAL), 3))
+    for n, name in enumerate(PERSONAL):
+        slopes, aways = [], []
+        for point, sign in ((INDEX[f"left_{name}"], 1), (INDEX[f"right_{name}"], flip)):
+            t = np.flatnonzero(clip.seen[:, point])
+            slopes.append(clip.slope(moved[t, point]) @ clip.turn[t, joint[point]] * sign)
+            aways.append(clip.xy[t, point] - clip.project(moved[t, point]) - usual[t, point])
+        slope, away = np.concatenate(slopes), np.concatenate(aways)
+        for _ in range(8):
+            left = np.linalg.norm(away - slope @ out[n], axis=1)
+            w = 1 / (1 + (left / (2 * np.median(left) + 1e-6)) ** 2) ** 2 / OWN_NOISE**2
+            normal = np.einsum("r,rab,rac->bc", w, slope, slope) + np.eye(3) / OWN_SPREAD**2
+            out[n] = np.linalg.solve(normal, np.einsum("r,rab,ra->b", w, slope, away))
+    return out
+
+
+def measure_people(figures: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What offsets have in common, by_betas (133, 3, F) and directions (133, 3, K) in which people differ still.
+
+    figures: (N, F) betas; own: (N, len(PERSONAL), 3) m.
+    """
+    values = own.reshape(len(own), -1)
+    wide = np.column_stack([np.ones(len(own)), figures])
+    pull = PEOPLE_RIDGE * np.diag([0.0] + [1.0] * figures.shape[1])
+    by = np.linalg.solve(wide.T @ wide + pull, wide.T @ values)  # (1 + F, 3 n)
+    left = values - wide @ by
+    variance, directions = np.linalg.eigh(np.cov(left.T))
+    kept = variance > LEAST_OWN**2
+    axes = mirrored(dict.fromkeys(PERSONAL, (1, 1, 1)), INDEX, 133)[0]
+    return axes @ by[0], axes @ by[1:].T, axes @ (directions * np.sqrt(np.maximum(variance, 0)))[:, kept][:, ::-1]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("paths", nargs="+", type=Path, help="RUN TRUTH pairs")
@@ -149,8 +210,11 @@ def main() -> None:
     clips = [Sight.read(body, *pair) for pair in zip(options.paths[::2], options.paths[1::2], strict=True)]
     offsets, quality = measure_offsets(body, clips)
     habit, spread = measure_habits(body, clips, offsets)
-    write_arrays(options.out, offsets=offsets.astype(np.float32), habit=habit.astype(np.float32),
-                 spread=spread.astype(np.float32), model=np.array(body.digest))
+    own = np.stack([own_offsets(body, clip, offsets, habit) for clip in clips])
+    common, by_betas, directions = measure_people(np.stack([clip.figure for clip in clips]), own)
+    kept = Detector(offsets + common, by_betas, directions, habit, spread)
+    arrays = {f.name: getattr(kept, f.name).astype(np.float32) for f in fields(kept)}
+    write_arrays(options.out, **arrays, model=np.array(body.digest))
     for name in (*BODY_NAMES, *FEET_NAMES, "left_hand_wrist", "left_hand_middle1", "left_hand_middle4"):
         i = INDEX[name]
         print(f"{name:18} {quality[i, 0]:6.1f} -> {quality[i, 1]:5.1f} px   {np.round(1e3 * offsets[i])} mm   "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
@@ -16,7 +18,8 @@ def score(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
     """Errors of a fit of all of the truth's frames.
 
     joints_median_mm, joints_mean_mm: body joints but the pelvis, pelvis on pelvis, one scale for the whole clip.
-    joints_metric_mm: the same mean without the scale. vertices_mean_mm: registered alike, with a scale of their own.
+    joints_metric_mm: the same mean without the scale. vertices_mean_mm: registered alike, with a scale of their own; the truth's
+    are bare, the fit's wear what it takes for clothes; skin_mean_mm: the fit's without those.
     iou_mean, iou_worst: the bare fitted body against the clip's mask, which wears clothes and hair; iou_of_truth: the mean that
     the true bare body itself reaches.
     reprojection_px: median distance of body and feet points, person 1000 px high.
@@ -30,8 +33,10 @@ def score(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
     out = {"joints_median_mm": np.median(off), "joints_mean_mm": off.mean(),
            "joints_metric_mm": np.linalg.norm(fitted - true, axis=-1)[:, 1:].mean() * 1e3, "scale": scale}
     if truth.vertices is not None and truth.vertices.shape == vertices.shape:
-        a, b = vertices - joints[:, :1], truth.vertices - truth.joints[:, :1]
-        out["vertices_mean_mm"] = np.linalg.norm(_scale(a, b) * a - b, axis=-1).mean() * 1e3
+        true_vertices = truth.vertices - truth.joints[:, :1]
+        out["vertices_mean_mm"] = _distance(vertices - joints[:, :1], true_vertices)
+        bare, own_joints = body.posed(replace(params, betas=np.where(np.arange(body.num_betas) < body.num_figure, params.betas, 0)))
+        out["skin_mean_mm"] = _distance(bare - own_joints[:, :1], true_vertices)
         own = Camera((truth.focal, truth.focal), truth.center, *truth.masks.shape[:0:-1])
         out["iou_of_truth"] = _overlap(body, truth.vertices, own, truth.masks).mean()
     camera = params.camera(*truth.masks.shape[:0:-1])
@@ -61,6 +66,11 @@ def _rooted(joints: np.ndarray) -> np.ndarray:
 def _scale(source: np.ndarray, target: np.ndarray) -> float:
     """The one factor that brings source nearest to target."""
     return float((source * target).sum() / (source * source).sum())
+
+
+def _distance(source: np.ndarray, target: np.ndarray) -> float:
+    """mm, mean, source scaled to the target."""
+    return float(np.linalg.norm(_scale(source, target) * source - target, axis=-1).mean() * 1e3)
 
 
 def _overlap(body: Body, vertices: np.ndarray, camera: Camera, masks: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ COLUMNS = (
     ("joints_median_mm", "joints median mm", "{:.1f}", 20.0),
     ("joints_mean_mm", "mean mm", "{:.1f}", 30.0),
     ("vertices_mean_mm", "vertices mm", "{:.1f}", 30.0),
+    ("skin_mean_mm", "skin mm", "{:.1f}", None),
     ("iou_mean", "IoU mean", "{:.3f}", 0.93),
     ("iou_worst", "worst", "{:.3f}", 0.88),
     ("iou_of_truth", "truth's", "{:.3f}", None),

@@ -38,13 +38,13 @@ class Pairs:
 
 def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, moves: np.ndarray | None = None) -> Pairs:
     """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m added in the axes of the heaviest joint;
-    moves: (P, 3, K) how each point moves there by unknowns beyond the betas.
+    moves: (P, 3, B + K) how these offsets move by the shape unknowns.
 
     The points are the person's own: clothes do not move them.
     """
     matrix = matrix.tocsr()
-    moves = np.zeros((matrix.shape[0], 3, 0)) if moves is None else moves
-    start, joint, mass, moment, dirs, own = [0], [], [], [], [], []
+    moves = np.zeros((matrix.shape[0], 3, body.num_betas)) if moves is None else moves
+    start, joint, mass, moment, dirs, added = [0], [], [], [], [], []
     for p in range(matrix.shape[0]):
         span = slice(matrix.indptr[p], matrix.indptr[p + 1])
         vertices, a = matrix.indices[span], matrix.data[span].astype(np.float64)
@@ -56,12 +56,11 @@ def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None =
             mass.append(w.sum())
             moment.append(w @ body.v_template[vertices] + (offsets[p] if offsets is not None and k == heaviest else 0))
             dirs.append(np.tensordot(w, body.shapedirs[vertices], 1))
-            own.append(moves[p] * (k == heaviest))
+            added.append(moves[p] * (k == heaviest))
         start.append(len(joint))
-    dirs = np.array(dirs).reshape(-1, 3, body.num_betas)
-    dirs[:, :, body.num_figure:] = 0
-    dirs = np.concatenate([dirs, np.array(own).reshape(len(dirs), *moves.shape[1:])], 2)
-    return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), dirs)
+    added = np.array(added).reshape(-1, *moves.shape[1:])
+    added[:, :, : body.num_figure] += np.array(dirs).reshape(-1, 3, body.num_betas)[:, :, : body.num_figure]
+    return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), added)
 
 
 def surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:

@@ -42,7 +42,7 @@ class State:
     held: np.ndarray
     """(H,) what the clip keeps to, as in held.py; empty where that is not sought."""
     own: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    """(K,) m, the person's own, as in personal.py; empty where that is not sought."""
+    """(K,) the person's own, as in personal.py; empty where that is not sought."""
     level: np.ndarray = field(default_factory=lambda: np.zeros(0))
     """(G,) m, 0 or 1: the ground along the upright, as in ground.py; empty where nothing stands on it."""
 

@@ -49,6 +49,13 @@ def test_distance_and_one_scale_of_the_clip_do_not_count_as_joint_error(body, pa
     assert got["joints_metric_mm"] > 20
 
 
+def test_clothes_count_on_the_surface_and_not_on_the_skin(body, params, truth):
+    betas = params.betas.copy()
+    betas[body.num_figure:] = 1
+    got = score(body, dataclasses.replace(params, betas=betas), truth)
+    assert got["vertices_mean_mm"] > 3 and got["skin_mean_mm"] < 1e-3
+
+
 def test_a_wrong_joint_is_measured_in_millimetres(body, params, truth):
     moved = truth.joints.copy()
     moved[:, 20] += [0, 0.03, 0]

@@ -188,8 +188,10 @@ def test_derivatives_agree_with_finite_differences(body, tmp_path):
     outlines = outlines_of(body, truth, tmp_path)
     seen = observations(sightings_of(body, truth, 2.0), Detector.measured("", body), BODY_POINTS,
                         np.array([WIDTH / 2, HEIGHT / 2]), (FOCAL, 0.1), SmplxConfig(height_m=1.8), outlines)
-    personal = Personal.of(body, 0.01)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], None, personal.points[BODY_POINTS])
+    detector = Detector.measured("mediapipe", body)
+    personal = Personal.of(body, detector.own, 0.01)
+    moves = np.concatenate([detector.slopes(body), personal.points], 2)[BODY_POINTS]
+    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], None, moves)
     rng = np.random.default_rng(0)
     state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
                   truth.transl.astype(float) + 0.02, np.append(rng.normal(0, 0.3, body.num_figure), np.zeros(len(body.clothes))),
@@ -197,13 +199,14 @@ def test_derivatives_agree_with_finite_differences(body, tmp_path):
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0, personal)
     camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
     chain = problem.skeleton.pose(state.local, state.shape)
-    x = positions(chain, pairs, state.shape)[0] + state.transl[0]
+    surface = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
+    x = positions(chain, surface, state.shape)[0] + state.transl[0]
     vertices, _ = body.posed(to_params(body, state, problem.seen.center), [0])
     assert np.allclose(x, body.keypoints(vertices)[0][BODY_POINTS], atol=2e-3)
     state.betas[body.num_figure:] = rng.normal(0, 1, len(body.clothes))
-    assert np.allclose(positions(problem.skeleton.pose(state.local, state.shape), pairs, state.shape)[0] + state.transl[0], x,
+    assert np.allclose(positions(problem.skeleton.pose(state.local, state.shape), surface, state.shape)[0] + state.transl[0], x,
                        atol=1e-3)
-    state.own[:] = rng.normal(0, 0.01, len(state.own))
+    state.own[:] = rng.normal(0, 1, len(state.own)) * personal.spread
     for t, outline in enumerate(outlines):
         vertices, _ = body.posed(to_params(body, state, problem.seen.center), [t])
         problem.outline_pairs[t] = outline_points(body, vertices[0], camera, outline, t)[0]
@@ -224,7 +227,7 @@ def check_gradient(problem: Problem, state: State, rng, h: float, tolerance: flo
         for _ in range(4):
             step = rng.normal(0, 1, (len(state.local), problem.size))
             shared = rng.normal(0, 1, 1 + len(state.shape) + len(state.held) + len(state.level)) * 0.3
-            shared[1 + len(state.betas): 1 + len(state.shape)] *= 0.03  # metres
+            shared[1 + len(state.betas): 1 + len(state.shape)] *= 0.03  # mostly metres
             slope = (problem.cost(problem.move(state, h * step, h * shared))
                      - problem.cost(problem.move(state, -h * step, -h * shared))) / (2 * h)
             expected = 2 * ((system.gradient * step).sum() + system.shared_gradient @ shared)

@@ -7,10 +7,12 @@ import pytest
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.smplx import personal
+from gsac.stages.smplx import detector
 from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector import Detector
 from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
-from gsac.stages.smplx.personal import JOINTS, Personal, mirrored
+from gsac.stages.smplx.mirrored import mirrored
+from gsac.stages.smplx.personal import JOINTS
 from scipy.spatial.transform import Rotation
 
 WIDTH, HEIGHT, FOCAL, FRAMES = 360, 640, 700.0, 10
@@ -55,10 +57,10 @@ def joint_error_mm(body: Body, fit, truth: BodyParams) -> float:
 def test_hips_seen_too_high_in_every_frame_are_told_apart_from_the_pose(body, monkeypatch):
     truth = turn(body)
     fit = fitted(body, truth, {}, UP)
-    moved = Personal.of(body, 0.0).points @ fit.state.own
+    moved = Detector.measured("", body).own @ fit.state.own
     assert moved[INDEX["left_hip"], 1] > UP / 4 and moved[INDEX["left_hip"], 1] == moved[INDEX["right_hip"], 1]
     assert not fit.joint_offset.any()
-    monkeypatch.setattr(personal, "SEEN", {})
+    monkeypatch.setattr(detector, "PERSONAL", {})
     assert joint_error_mm(body, fit, truth) < 0.9 * joint_error_mm(body, fitted(body, truth, {}, UP), truth)
 
 
