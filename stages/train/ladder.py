@@ -29,8 +29,10 @@ from gsac.stages.train.views import View
 SIZES = (12000, 8000, 6000, 4000, 3000, 2000, 1000)
 UNJUDGED = 12000
 """Size where no frame is held out."""
-REFIT, REFIT_FROM = 0.16, 0.3
+REFIT, REFIT_FROM = 0.2, 0.15
 """Steps of a smaller size, as a share of the training's; their rates are those of a training from this share of its steps on."""
+AVERAGED = 0.1
+"""Share of these steps, the last, after which gaussians are their own mean: each step runs after the one frame that it sees."""
 WIDTHS = 3.0
 """Rate of the scales in that time, over a training's: of what was merged these are off most."""
 ROUNDS = 5
@@ -47,28 +49,27 @@ def fit(task: Task, loop: Loop) -> Fit:
     poses = carried(task.poses, task.trained)
     converge(trainer.gaussians(), poses, task.held, task.views, ROUNDS)
     rungs: list[Rung] = []
-    kept: list[fast.Trainer] = []
+    kept: list[Fit] = []
     for size in SIZES:
         if rungs:
             gaussians = trainer.gaussians()
-            worth = shown(gaussians, task, fine) * care(gaussians, task.poses.body)
+            worth = shown(gaussians, task, coarse) * care(gaussians, task.poses.body)
             fewer = merged(gaussians, worth, size, task.poses.body, trainer.rest)
             trainer = fast.Trainer(levelled(fewer, trainer.rest, trainer.faces), task, settled=True)
             trainer.rest_unseen(coarse)
             trainer = loop.refit(task, trainer, fine)
-        rows = judge(trainer.gaussians(), poses, task.held, task.views)
+        kept.append(Fit(*trainer.recoloured(coarse), dict(trainer.gains)))
+        rows = judge(kept[-1].gaussians, poses, task.held, task.views)
         rungs.append(Rung(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
-        kept.append(trainer)
         if choose(rungs) is not rungs[-1] and not task.config.every_size:
             break
     best = choose(rungs)
-    taken = kept[rungs.index(best)]
     figures = {"size_curve": [asdict(rung) | rung.means() | {"chosen": rung is best} for rung in rungs],
                "size_rule": f"smallest within one standard error, and {MOST_LOST} dB, of the best psnr_fg of size_frames, their "
                             "poses moved to the images, and as sharp; size_optimism: by how many dB these frames flatter the "
                             "choice, since it was made by them; other heldout_frames do not",
                "size_frames": task.held.tolist(), "size_optimism": optimism(rungs)}
-    return Fit(*taken.recoloured(coarse), dict(taken.gains), figures)
+    return replace(kept[rungs.index(best)], figures=figures)
 
 
 def shown(gaussians: Gaussians, task: Task, views: dict[int, View]) -> np.ndarray:
@@ -101,8 +102,14 @@ def refit(task: Task, trainer: fast.Trainer, views: dict[int, View]) -> fast.Tra
     trainer.config = refit_config(task.config)
     order: list[int] = []
     steps = refit_steps(task)
+    averaged = max(1, round(AVERAGED * steps))
+    sums = {name: np.zeros(value.shape) for name, value in trainer.values.items()}
     for step in range(steps):
         order = order or [int(t) for t in rng.permutation(task.trained)]
         t = order.pop()
         trainer.step(t, views[t], REFIT_FROM + (1 - REFIT_FROM) * step / steps, rng.random(3), step)
+        if step >= steps - averaged:
+            for name, value in trainer.values.items():
+                sums[name] += value
+    trainer.values = {name: (total / averaged).astype(np.float32) for name, total in sums.items()}
     return trainer

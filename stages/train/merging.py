@@ -79,11 +79,12 @@ def skin_of(face: np.ndarray, body: Body) -> np.ndarray:
 
 def joined(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndarray,
            frames: FaceFrames) -> tuple[Gaussians, np.ndarray]:
-    """Each pair as one gaussian with the mean and the spread of both, bound as the one that shows more; and what it shows."""
+    """Each pair as one gaussian with the mean and the spread of both, as they show, bound as the one that shows more; and what it
+    shows."""
     first = shown[pairs[:, 0]] >= shown[pairs[:, 1]]
     keep, drop = np.where(first, *pairs.T), np.where(first, *pairs.T[::-1])
     mass, means = gaussians.opacity * areas(bound), bound.means.astype(np.float64)
-    share = (mass[keep] / np.maximum(mass[keep] + mass[drop], 1e-20))[:, None]
+    share = (shown[keep] / (shown[keep] + shown[drop]))[:, None]
     middle = share * means[keep] + (1 - share) * means[drop]
     spread = np.zeros((len(keep), 3, 3))
     for one, part in ((keep, share), (drop, 1 - share)):
@@ -101,8 +102,7 @@ def joined(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndar
     out.quat[keep] = Rotation.from_matrix(R.transpose(0, 2, 1) @ axes).as_quat()[:, [3, 0, 1, 2]]
     out.log_scale[keep] = np.log(scales / k)
     out.opacity[keep] = np.minimum(needed, OPAQUE)
-    tint = (shown[keep] / (shown[keep] + shown[drop]))[:, None]
-    out.rgb[keep] = tint * gaussians.rgb[keep] + (1 - tint) * gaussians.rgb[drop]
+    out.rgb[keep] = share * gaussians.rgb[keep] + (1 - share) * gaussians.rgb[drop]
     shown = shown.copy()
     shown[keep] += shown[drop]
     left = np.setdiff1d(np.arange(len(out)), drop)

@@ -24,6 +24,8 @@ LEAST_SHARE = 0.15
 NEIGHBOURS = 8
 AROUND, STEP = 24, 0.02
 """How many gaussians tell the surface's height at a place, and m that one may lie above or below it."""
+SPARSE = 3000
+"""Gaussians of an avatar below which these m grow with the way from one to the next: shrunk, they would leave holes."""
 
 
 def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera, workspace: Workspace) -> np.ndarray:
@@ -71,10 +73,11 @@ def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.nda
 
 
 def levelled(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians, none of them more than STEP above or below the middle height of those around it. rest: (V, 3) m.
+    """The gaussians, none of them more than STEP (few: `SPARSE`) above or below the middle height around it. rest: (V, 3) m.
 
     Neither is one thicker than that, measured along the face's normal as a standard deviation: it shrinks.
     """
+    step = STEP * max(1, SPARSE / max(len(gaussians), 1)) ** 0.5
     frames = face_frames(rest, faces)
     size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
     near = cKDTree(middle).query(middle, k=min(AROUND, len(gaussians)))[1].reshape(len(gaussians), -1)
@@ -83,6 +86,6 @@ def levelled(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gauss
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     axes = np.einsum("ni,nij->nj", frames.R[gaussians.face, :, 1], bound.rotations) * bound.scales
     out = gaussians[np.arange(len(gaussians))]
-    out.mu[:, 1] = np.clip(height, usual - STEP, usual + STEP) / size
-    out.log_scale += np.minimum(0, np.log(STEP / np.maximum(np.linalg.norm(axes, axis=1), 1e-9)))[:, None].astype(np.float32)
+    out.mu[:, 1] = np.clip(height, usual - step, usual + step) / size
+    out.log_scale += np.minimum(0, np.log(step / np.maximum(np.linalg.norm(axes, axis=1), 1e-9)))[:, None].astype(np.float32)
     return out

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
@@ -64,10 +65,21 @@ def test_what_frames_show_outlives_what_none_shows(person, rest, body):
     assert after[before > 0.9].mean() > 0.9 * before[before > 0.9].mean(), "the part that no frame shows stays covered"
 
 
+def test_a_merged_gaussian_lies_where_the_one_that_shows_more_lay(person, rest, body):
+    gaussians, _ = person
+    frames = face_frames(rest, body.faces)
+    bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    shown = np.ones(COUNT)
+    pair = merging.cheapest(gaussians, bound, shown, frames.R[gaussians.face, :, 1], body)[:1]
+    shown[pair[0, 0]] = 9
+    fewer, _ = merging.joined(gaussians, bound, shown, pair, frames)
+    places = bind(frames, fewer.face, fewer.mu, fewer.quat, fewer.log_scale).means
+    wanted = 0.9 * bound.means[pair[0, 0]] + 0.1 * bound.means[pair[0, 1]]
+    assert np.linalg.norm(places - wanted, axis=1).min() < 1e-5
+
+
 def test_fingers_are_not_merged_with_each_other(rest, body):
     gaussians = Gaussians.area(rest, body.faces, 12000)
-    from gsac.avatar.binding import bind, face_frames
-
     frames = face_frames(rest, body.faces)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     i, j = merging.cheapest(gaussians, bound, np.ones(len(gaussians)), frames.R[gaussians.face, :, 1], body).T

@@ -1,12 +1,14 @@
 """The ladder of sizes: the rule on made-up figures, the whole on the small person."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import BadInput, make_config
-from gsac.stages.train import STAGE, holdout, ladder
+from gsac.stages.train import STAGE, fast, holdout, ladder
 from gsac.stages.train.sizes import Rung, choose, optimism, standard_error
 from gsac.stages.train.stage import run
 
@@ -44,6 +46,41 @@ def test_a_choice_that_hangs_on_one_frame_flatters_it():
 def test_text_that_is_not_auto_is_refused():
     with pytest.raises(BadInput, match="train.gaussians is 'many'"):
         make_config(STAGE, {"gaussians": "many"})
+
+
+def test_a_size_is_the_mean_of_its_last_steps(monkeypatch):
+    config, places = make_config(STAGE, {"steps": 100}), []
+
+    class Steps:
+        values = {"mu": np.zeros((2, 3), np.float32)}
+
+        def step(self, t, view, done, background, number):
+            self.values = {"mu": self.values["mu"] + np.float32(number)}
+            places.append(self.values["mu"])
+
+    monkeypatch.setattr(ladder, "REFIT", 0.4)
+    monkeypatch.setattr(ladder, "AVERAGED", 0.1)
+    refitted = ladder.refit(SimpleNamespace(config=config, trained=np.arange(3)), Steps(), dict.fromkeys(range(3)))
+    assert len(places) == 40
+    np.testing.assert_allclose(refitted.values["mu"], np.mean(places[-4:], 0))
+
+
+@pytest.mark.slow
+def test_sizes_are_judged_as_they_are_handed_out(job_anywhere, monkeypatch):
+    levelled, judge, judged = fast.levelled, ladder.judge, []
+
+    def marked(gaussians, rest, faces):
+        return replace(levelled(gaussians, rest, faces), rgb=np.full_like(gaussians.rgb, 0.25))
+
+    def watched(gaussians, *rest):
+        judged.append(gaussians)
+        return judge(gaussians, *rest)
+
+    monkeypatch.setattr(ladder, "SIZES", (400, 40))
+    monkeypatch.setattr(fast, "levelled", marked)
+    monkeypatch.setattr(ladder, "judge", watched)
+    run(job_anywhere(gaussians="auto", frames=6, steps=12, pose_rounds=0, pose_test_steps=0))
+    assert len(judged) == 2 and all((gaussians.rgb == 0.25).all() for gaussians in judged)
 
 
 @pytest.mark.slow

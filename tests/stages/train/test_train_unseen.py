@@ -109,6 +109,15 @@ def test_a_disc_that_sticks_out_of_the_surface_shrinks(body):
     assert (size * np.exp(out.log_scale[:, 2]))[out_of].max() == pytest.approx(unseen.STEP, rel=1e-4)
 
 
+def test_the_discs_of_a_coarse_level_keep_the_width_that_covers_the_body(body):
+    gaussians = fast.Gaussians.area(body.v_template, body.faces, unseen.SPARSE // 4)
+    size = fast.face_frames(body.v_template, body.faces).k[gaussians.face]
+    gaussians.quat[:] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
+    gaussians.log_scale[:, 2] = np.log(1.8 * unseen.STEP / size)
+    out = unseen.levelled(gaussians, body.v_template, body.faces)
+    np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
+
+
 def test_what_is_shown_little_for_its_size_is_not_seen(body):
     gaussians, at = covering(body)
     frames = fast.face_frames(body.v_template, body.faces)
