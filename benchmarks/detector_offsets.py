@@ -3,7 +3,7 @@
     python -m gsac.benchmarks.turntable CLIPS/201 --seed 201 --frames 30 --fps 5; gsac run CLIPS/201/clip.mp4 --until keypoints ...
     python -m gsac.benchmarks.detector_offsets RUN TRUTH [RUN TRUTH ...] --out stages/smplx/offsets/mediapipe.npz
 
-The kept file was measured on 120 people, seeds 201 to 320, those of 201, 206, 211 ... with `--feet planted`.
+The kept file was measured on 120 people, seeds 201 to 320, those that end in 1 or 2 with `--feet planted`.
 
 RUN is a run's folder (keypoints/keypoints.npz), TRUTH the clip's truth.npz. A detector's hip is not the body's hip: for every point
 one constant offset (3,) m in the frame of the joint that carries it most is found by robust least squares over all frames and
@@ -29,14 +29,15 @@ from gsac.stages.smplx.fit import Sightings
 from gsac.stages.smplx.mirrored import mirrored
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")
-RIDGE = 2.0
-"""Pull of an offset to zero, in sightings of 1 px at 1 m."""
+RIDGE = 2000.0
+"""Pull of an offset that all share to zero: one of 1 m is as bad as so many square px."""
 HABIT_RIDGE = 2.0
 """Pull of a habit's harmonics to zero, in sightings; the highest twice."""
 FIGURE_RIDGE = 1e-4
+"""Pull of the betas that lie beyond the truth's to zero, in square metres of all vertices."""
 LEAST_SPREAD = 0.002
-OWN_NOISE, OWN_SPREAD = 8.0, 0.02
-"""px of one sighting, frames of a view counted apart; m, over people: a person's own offset is pulled to zero by these."""
+OWN_RIDGE = (8.0 / 0.02) ** 2
+"""The same for one person's own: px that a sighting is off over metres that people differ by."""
 PEOPLE_RIDGE = 10.0
 """Pull of an offset's slopes by the betas to zero, in people."""
 LEAST_OWN = 0.002
@@ -126,15 +127,20 @@ def measure_offsets(body: Body, clips: list[Sight]) -> tuple[np.ndarray, np.ndar
         if len(both) < FEW:
             continue
         jacobian, away = np.stack([j for j, _ in both]), np.stack([a for _, a in both])
-        offset = np.zeros(3)
-        for _ in range(8):
-            left = np.linalg.norm(away - jacobian @ offset, axis=1)
-            w = 1 / (1 + (left / (2 * np.median(left) + 1e-6)) ** 2) ** 2
-            normal = np.einsum("r,rab,rac->bc", w, jacobian, jacobian) + RIDGE * np.eye(3) * 1e3
-            offset = np.linalg.solve(normal, np.einsum("r,rab,ra->b", w, jacobian, away))
-        offsets[p] = offset
-        quality[p] = np.median(np.linalg.norm(away, axis=1)), np.median(np.linalg.norm(away - jacobian @ offset, axis=1))
+        offsets[p] = nearest(jacobian, away, RIDGE)
+        quality[p] = np.median(np.linalg.norm(away, axis=1)), np.median(np.linalg.norm(away - jacobian @ offsets[p], axis=1))
     return offsets, quality
+
+
+def nearest(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
+    """(3,) m, the offset that explains px (R, 2) by slopes (R, 2, 3) best, outliers let go."""
+    offset = np.zeros(3)
+    for _ in range(8):
+        left = np.linalg.norm(away - slope @ offset, axis=1)
+        w = 1 / (1 + (left / (2 * np.median(left) + 1e-6)) ** 2) ** 2
+        normal = np.einsum("r,rab,rac->bc", w, slope, slope) + ridge * np.eye(3)
+        offset = np.linalg.solve(normal, np.einsum("r,rab,ra->b", w, slope, away))
+    return offset
 
 
 def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -177,11 +183,8 @@ def own_offsets(body: Body, clip: Sight, offsets: np.ndarray, habit: np.ndarray)
             slopes.append(clip.slope(moved[t, point]) @ clip.turn[t, joint[point]] * sign)
             aways.append(clip.xy[t, point] - clip.project(moved[t, point]) - usual[t, point])
         slope, away = np.concatenate(slopes), np.concatenate(aways)
-        for _ in range(8):
-            left = np.linalg.norm(away - slope @ out[n], axis=1)
-            w = 1 / (1 + (left / (2 * np.median(left) + 1e-6)) ** 2) ** 2 / OWN_NOISE**2
-            normal = np.einsum("r,rab,rac->bc", w, slope, slope) + np.eye(3) / OWN_SPREAD**2
-            out[n] = np.linalg.solve(normal, np.einsum("r,rab,ra->b", w, slope, away))
+        if len(away) >= FEW:
+            out[n] = nearest(slope, away, OWN_RIDGE)
     return out
 
 
@@ -217,7 +220,7 @@ def main() -> None:
     write_arrays(options.out, **arrays, model=np.array(body.digest))
     for name in (*BODY_NAMES, *FEET_NAMES, "left_hand_wrist", "left_hand_middle1", "left_hand_middle4"):
         i = INDEX[name]
-        print(f"{name:18} {quality[i, 0]:6.1f} -> {quality[i, 1]:5.1f} px   {np.round(1e3 * offsets[i])} mm   "
+        print(f"{name:18} {quality[i, 0]:6.1f} -> {quality[i, 1]:5.1f} px   {np.round(1e3 * kept.offsets[i])} mm   "
               f"habit {np.round(1e3 * np.linalg.norm(habit[i], axis=-1), 1)}, rest {1e3 * spread[i]:.1f} of 1000")
 
 
