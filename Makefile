@@ -37,7 +37,7 @@ params: setup
 
 # Writes the viewer page's shaders from the Unity package's HLSL; needs glslang-tools and npm.
 shaders: setup
-	$(BIN)/python -m gsac.stages.export.wgsl
+	$(BIN)/python -m gsac.viewer.wgsl
 
 lint: setup
 	$(BIN)/ruff check

@@ -10,9 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from gsac.avatar.kernel import kernel
-from gsac.avatar.workspace import Workspace
 from scipy.spatial.transform import Rotation
+
+from gsac.avatar.kernel import kernel
+from gsac.avatar.threads import Workspace
 
 
 class FaceFrames(NamedTuple):

@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import BODY_SHAPES, ArtifactError, check_arrays, write_arrays
 from gsac.avatar.camera import Camera
 from gsac.avatar.skinning import joint_transforms, skin

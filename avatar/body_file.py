@@ -10,8 +10,9 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from gsac.avatar.artifacts import ArtifactError
 from scipy import sparse
+
+from gsac.avatar.artifacts import ArtifactError
 
 ALWAYS = {"v_template": 2, "f": 2, "shapedirs": 3, "J_regressor": 2, "weights": 2, "kintree_table": 2}
 """Array -> number of dimensions."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import ArtifactError
 
 SHAPES, EXPRESSIONS = 300, 100

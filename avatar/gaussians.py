@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar import artifacts
 
 FLATNESS = 0.15

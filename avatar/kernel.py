@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numba
 
-SOURCES = ("kernel.py", "lanes.py", "binding.py", "losses.py", "ssim.py", "sobel.py", "raster/project.py", "raster/tiles.py",
+SOURCES = ("kernel.py", "simd.py", "binding.py", "losses.py", "ssim.py", "sobel.py", "raster/project.py", "raster/tiles.py",
            "raster/forward.py", "raster/backward.py")
 """Files under this folder that kernels or their constants come from."""
 

@@ -10,12 +10,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+
 from gsac.avatar import sobel as _sobel
 from gsac.avatar import ssim as _ssim
 from gsac.avatar.kernel import kernel
-from gsac.avatar.lanes import WIDTH, load, spread, store, total
+from gsac.avatar.simd import WIDTH, load, spread, store, total
 from gsac.avatar.ssim import MARGIN
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.threads import Workspace
 
 
 class Loss(NamedTuple):

@@ -15,6 +15,7 @@ from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
+
 from gsac.avatar.weight_file import WeightsError, read_weights
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+
 from gsac.avatar.flip import flip
 from gsac.avatar.lpips import Lpips
 

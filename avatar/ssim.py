@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from gsac.avatar.kernel import kernel
-from gsac.avatar.lanes import WIDTH, load, spread, store, total
+from gsac.avatar.simd import WIDTH, load, spread, store, total
 
 REACH = 5
 ROWS = 2 * REACH + 1

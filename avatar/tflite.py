@@ -6,7 +6,8 @@ from pathlib import Path
 from threading import local
 
 import numpy as np
-from gsac.avatar.workspace import available
+
+from gsac.avatar.threads import available
 
 
 class Network:

@@ -8,8 +8,9 @@ are drawn. A face with a corner at or behind `near`, or not finite, is left out 
 from __future__ import annotations
 
 import numpy as np
-from gsac.avatar.camera import Camera
 from numba import njit
+
+from gsac.avatar.camera import Camera
 
 NEAR = 0.01
 """Metres."""

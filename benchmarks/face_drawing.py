@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
 from gsac.avatar.zbuffer import interpolate, rasterise
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 SIZE, SPAN = 448, 0.36
 """Pixels and metres across the picture."""

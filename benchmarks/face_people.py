@@ -10,23 +10,24 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
+
 from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
 from gsac.avatar.facemesh import LEFT_EYE, MODELS, POINTS, RIGHT_EYE, Face, FaceMesh
-from gsac.avatar.models import model_path
+from gsac.avatar.network_files import model_path
 from gsac.avatar.region import Region
 from gsac.avatar.wholebody import INDEX
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.benchmarks.face_drawing import SMALLEST, Head, Look
 from gsac.benchmarks.perception import video_frames
-from gsac.benchmarks.turntable.clip import Video, develop, make_studio, make_view, place, posed, studio_rng
-from gsac.benchmarks.turntable.motion import make_motion
-from gsac.benchmarks.turntable.options import TurntableOptions
-from gsac.benchmarks.turntable.person import Person, make_person
 from gsac.stages.face.landmarks import look
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
+from gsac.turntable.clip import Video, develop, make_studio, make_view, place, posed, studio_rng
+from gsac.turntable.motion import make_motion
+from gsac.turntable.options import TurntableOptions
+from gsac.turntable.person import Person, make_person
 
 FRAMES = 44
 DRAWN = 2000

@@ -14,8 +14,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_frame
-from gsac.avatar.models import model_path
+from gsac.avatar.network_files import model_path
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import Job, Stage
 

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar import losses, raster
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians

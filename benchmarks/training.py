@@ -108,7 +108,7 @@ def _train(inputs: dict[str, Path], folder: Path, values: dict, cores: list[int]
 def networks(config) -> dict[str, Path]:
     """Files of what the stage only wishes for, as far as the user has brought them."""
     from gsac.cache.store import Store
-    from gsac.pipeline.models import Models
+    from gsac.pipeline.model_store import Models
 
     models = Models(Store.open())
     return models.need([name for name in config.wishes() if name in models.brought], print)
@@ -133,7 +133,7 @@ def _exact(case: Case, out: Path) -> Case:
 
 def clip(out: Path, name: str, say, **turntable) -> Path:
     """Folder of the truth clip of that name, rendered where it is not yet. turntable: its options."""
-    from gsac.benchmarks.turntable.clip import make_clip
+    from gsac.turntable.clip import make_clip
 
     folder = out / "clips" / name
     if not (folder / "truth.npz").is_file():
@@ -147,11 +147,11 @@ def fitted(out: Path, folder: Path, variant: str, say, settings: tuple[str, ...]
     from gsac.pipeline.params import resolve
     from gsac.pipeline.project import Project
     from gsac.pipeline.run import Chain, Options
-    from gsac.pipeline.workspace import Workspace
+    from gsac.pipeline.run_folder import RunFolder
 
     name = f"{folder.name}_{variant}" if variant else folder.name
     project, video = Project.at_hand(), (folder / "clip.mp4").resolve()
-    configs, workspace = resolve(project, sets=settings), Workspace(out / "runs" / name)
+    configs, workspace = resolve(project, sets=settings), RunFolder(out / "runs" / name)
     workspace.prepare(video, project, configs)
     for last in ("segment", "smplx"):
         Chain(project, configs, Store.open(say=say.note), workspace, say).run(video, Options(until=last))

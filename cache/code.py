@@ -20,14 +20,14 @@ from pathlib import Path
 from gsac.cache.digest import file_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.memo import Memo, memo_in
+from gsac.cache.module_digest import read_source
 from gsac.cache.root import default_root
-from gsac.cache.syntax import read_source
 
 FIRST_PARTY = "gsac"
 FILE_SUFFIXES = tuple(f".{s}" for s in (
     "npz npy json cu cuh c h cpp cs js css html jinja glsl wgsl hlsl compute shader asmdef unity md".split()))
 MEMO_KIND = f"module 3 python {sys.version_info.major}.{sys.version_info.minor}"
-"""To be raised when `syntax` reads sources otherwise, so that what was remembered before is not taken for its word."""
+"""To be raised when `module_digest` reads sources otherwise, so that what was remembered before is not taken for its word."""
 
 
 def code_parts(

@@ -16,14 +16,14 @@ from gsac.cache.digest import tree_files
 from gsac.cache.store import Store
 from gsac.pipeline.graph import Graph, Step, read_yaml
 from gsac.pipeline.params import plain
-from gsac.pipeline.workspace import PARAMS, Workspace, write_text
+from gsac.pipeline.run_folder import PARAMS, RunFolder, write_text
 from gsac.stages.contract import BadInput
 
 LOCK = "dvc.lock"
 MEMO_KIND = "md5"
 
 
-def write_lock(workspace: Workspace, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
+def write_lock(workspace: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
     """Entries of the steps that have just finished; those of others stay as they were."""
     import yaml
 
@@ -45,7 +45,7 @@ def _entries(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _entry(workspace: Workspace, step: Step, config: Any, store: Store) -> dict[str, Any]:
+def _entry(workspace: RunFolder, step: Step, config: Any, store: Store) -> dict[str, Any]:
     entry: dict[str, Any] = {"cmd": step.cmd, "deps": [_hash(workspace, port, store) for port in sorted(step.deps)]}
     if step.params:
         entry["params"] = {PARAMS: {step.name: plain(config)}}
@@ -53,7 +53,7 @@ def _entry(workspace: Workspace, step: Step, config: Any, store: Store) -> dict[
     return entry
 
 
-def _hash(workspace: Workspace, port: str, store: Store) -> dict[str, Any]:
+def _hash(workspace: RunFolder, port: str, store: Store) -> dict[str, Any]:
     path = workspace.path(port).resolve()
     files = tree_files(path)
     sizes = sum(file.stat().st_size for file in files.values())

@@ -10,10 +10,10 @@ from gsac.avatar.cuda import why_not
 from gsac.cache.code import code_parts
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
-from gsac.pipeline.models import Models
-from gsac.pipeline.packages import package_version
+from gsac.pipeline.model_store import Models
 from gsac.pipeline.params import plain
 from gsac.pipeline.project import Project
+from gsac.pipeline.versions import package_version
 from gsac.stages.contract import BadInput, Stage
 
 DEVICE = "GSAC_DEVICE"

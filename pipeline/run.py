@@ -15,15 +15,15 @@ from gsac.cache.lease import in_use
 from gsac.cache.record import Record
 from gsac.cache.store import Store
 from gsac.pipeline import dvc_sync
-from gsac.pipeline.action import Actor
-from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.params import plain
 from gsac.pipeline.plan import Verdict, judge, waits
 from gsac.pipeline.project import Project
-from gsac.pipeline.workspace import METRICS, RUN, Workspace
+from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run_folder import METRICS, RUN, RunFolder
+from gsac.pipeline.stage_runner import Actor
 from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
@@ -91,7 +91,7 @@ class Options:
 class Chain:
     """The stages of one clip in one workspace over one store."""
 
-    def __init__(self, project: Project, configs: dict[str, Any], store: Store, workspace: Workspace,
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, workspace: RunFolder,
                  reporter: PlainReporter):
         self.graph = project.graph
         self.configs = configs

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from gsac.avatar.cuda.recipe import Drawn, Recipe, no_rates
 from gsac.avatar.cuda.trainer import CudaTrainer
 

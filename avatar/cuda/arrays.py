@@ -6,13 +6,14 @@ import ctypes
 from typing import NamedTuple
 
 import numpy as np
+
 from gsac.avatar.binding import face_frames
 from gsac.avatar.camera import Camera
+from gsac.avatar.cuda.adjacency import children, joint_levels, joints_of, neighbours, vertices_of
 from gsac.avatar.cuda.device import Buffer
-from gsac.avatar.cuda.lists import children, joint_levels, joints_of, neighbours, vertices_of
 from gsac.avatar.cuda.recipe import Drawn, Recipe
-from gsac.avatar.cuda.scene import FRAME, POINTERS, Scene, State
 from gsac.avatar.cuda.smoothing import series
+from gsac.avatar.cuda.structs import FRAME, POINTERS, Scene, State
 from gsac.avatar.gaussians import Gaussians
 
 TILE, SEGMENT, JOINTS = 16, 128, 55

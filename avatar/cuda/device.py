@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable, Iterable
 
 import numpy as np
+
 from gsac.avatar.cuda import why_not
 from gsac.avatar.cuda.kernels import KERNELS, cubin
 

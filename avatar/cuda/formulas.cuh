@@ -348,7 +348,7 @@ FORMULA void adam_pulled(real &value, real grad, real &first, real &second, int 
     value -= rate * (first / (1 - pow(real(0.9), real(n)))) / (sqrt(second / (1 - pow(real(0.99), real(n)))) + real(1e-12));
 }
 
-// Bounds of stages/train/kernels.py `limit`, for one gaussian.
+// Bounds of stages/train/gaussians/kernels.py `limit`, for one gaussian.
 template <class real> struct Bounds { real needle, largest, reach; };
 
 template <class real>

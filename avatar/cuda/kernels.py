@@ -7,7 +7,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from gsac.avatar.cuda.scene import declarations
+from gsac.avatar.cuda.structs import declarations
 
 SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "perceptual.cuh", "update.cuh",
            "offsets.cuh", "shape.cuh", "paper.cuh")

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
+
 from gsac.avatar.binding import face_frames
 from gsac.avatar.cuda.recipe import Drawn, Recipe, draw
 from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
-from scipy.sparse import csr_matrix
 
 NEAREST = 3
 COLUMNS = 10

@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
-from gsac.avatar.cuda.scene import MOST_BATCH, PLAN
+
+from gsac.avatar.cuda.structs import MOST_BATCH, PLAN
 
 
 @dataclass(kw_only=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+
 from gsac.avatar.cuda.recipe import Drawn, Recipe, rates_of
 from gsac.avatar.cuda.trainer import CudaTrainer
 

@@ -9,10 +9,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from gsac.avatar.cuda.lists import neighbours
 from numpy.polynomial.chebyshev import chebvander
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import eigsh
+
+from gsac.avatar.cuda.adjacency import neighbours
 
 TERMS = 72
 """At lambda 30 on the open body the series are right to 0.2 and 2 percent in the worst mode, and to a tenth of that in most."""

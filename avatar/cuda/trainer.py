@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.cuda.arrays import JOINTS, TILE, Arrays, BodyArrays, Shot
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.cuda.recipe import Drawn, Recipe, draw
-from gsac.avatar.cuda.scene import State
+from gsac.avatar.cuda.structs import State
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import ArtifactError, read_arrays
 from gsac.avatar.motion import quat
 from gsac.avatar.motion.source import LARGEST, MotionError, Source

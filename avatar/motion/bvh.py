@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.motion import quat
 from gsac.avatar.motion.source import LARGEST, MotionError, Source
 

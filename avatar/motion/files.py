@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.motion.amass import read_amass
 from gsac.avatar.motion.bvh import read_bvh
 from gsac.avatar.motion.retarget import retarget

@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.motion import quat
 from gsac.avatar.motion.names import match
 from gsac.avatar.motion.source import Motion, MotionError, Source

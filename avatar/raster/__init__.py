@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+
 from gsac.avatar import binding, light
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import backward, forward, project, tiles
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.threads import Workspace
 
 
 @dataclass

@@ -7,10 +7,11 @@ dL/d(alpha) at a pixel is T (v . c) - V_behind / (1 - alpha): no colour of what 
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.kernel import kernel
-from gsac.avatar.lanes import below_or_equal, falloff, load, lowest_bit, spread, store, store_totals, total
 from gsac.avatar.raster.forward import BLOCK, BLOCKS, LANES, MAX_ALPHA, STOP
 from gsac.avatar.raster.project import BLUE, GREEN, HA, HC, OPACITY, RED, S_MAX, TILE, B, X, Y
+from gsac.avatar.simd import below_or_equal, falloff, load, lowest_bit, spread, store, store_totals, total
 
 PLANES = 6
 """Transmittance, V, and the image gradient of red, green, blue, alpha of a block, 16 numbers each."""

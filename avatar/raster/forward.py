@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.kernel import kernel
-from gsac.avatar.lanes import any_above, below_or_equal, falloff, load, lowest_bit, spread, store
 from gsac.avatar.raster.project import (
     BLUE,
     CHORD,
@@ -24,6 +24,7 @@ from gsac.avatar.raster.project import (
     X,
     Y,
 )
+from gsac.avatar.simd import any_above, below_or_equal, falloff, load, lowest_bit, spread, store
 
 BLOCK = 4
 BLOCKS = TILE // BLOCK

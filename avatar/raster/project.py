@@ -7,6 +7,7 @@ alpha is min(0.999, opacity exp(-s)) where s <= `S_MAX` (that is, alpha >= 1/255
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.kernel import kernel
 
 X, Y, HA, B, HC, S_MAX, OPACITY, RED, GREEN, BLUE, HALF_WIDTH, HALF_HEIGHT, RIGHTMOST, CHORD, SLOPE, RIM = range(16)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import torch
+
 from gsac.avatar.camera import Camera
 from gsac.avatar.raster.forward import MAX_ALPHA, STOP
 from gsac.avatar.raster.project import BLUR, FRUSTUM, NEAR

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.kernel import kernel
 
 RADIX_BITS = 11

@@ -41,7 +41,7 @@ def main(argv: list[str] | None = None) -> int:
     from gsac.benchmarks.handgap import table as gap_table
     from gsac.benchmarks.handgap.clips import turning_body
     from gsac.cache.store import Store
-    from gsac.pipeline.events import PlainReporter
+    from gsac.pipeline.reporter import PlainReporter
 
     say = PlainReporter(sys.stderr)
     store = Store.open(say=say.note)

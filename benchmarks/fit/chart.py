@@ -6,6 +6,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+
 from gsac.benchmarks.fit.trial import Trial
 from gsac.benchmarks.handgap.table import draw as draw_gaps
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from gsac.benchmarks.fit.truth import Truth, read_truth
 from gsac.cache.store import Store
-from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
+from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import Chain, Options
-from gsac.pipeline.workspace import Workspace
+from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
 from gsac.stages.smplx import STAGE
 
@@ -33,7 +33,7 @@ class Case:
 def truth_folder(folder: Path, seed: int, say: PlainReporter, clothing: float = 1.0) -> Path:
     """The turntable's clip of a seed, rendered unless it is there; clothing: thickness of clothes and hair, a factor."""
     if not (folder / "truth.npz").is_file():
-        from gsac.benchmarks.turntable.clip import make_clip
+        from gsac.turntable.clip import make_clip
 
         make_clip(folder, seed=seed, frames=FRAMES, height=HEIGHT, clothing=clothing,
                   progress=lambda done, total, unit: say.progress(folder.name, done, total, unit))
@@ -43,10 +43,10 @@ def truth_folder(folder: Path, seed: int, say: PlainReporter, clothing: float = 
 def seen(folder: Path, store: Store, out: Path, say: PlainReporter) -> Case:
     """Runs what `smplx` takes with the default parameters, or takes it from the store. folder: clip.mp4, mask/, truth.npz."""
     if not (folder / "clip.mp4").is_file() or not (folder / "truth.npz").is_file():
-        raise BadInput(f"{folder}: expected a truth clip (clip.mp4, mask/, truth.npz), as gsac.benchmarks.turntable makes it")
+        raise BadInput(f"{folder}: expected a truth clip (clip.mp4, mask/, truth.npz), as gsac.turntable makes it")
     project = Project.at_hand()
     configs = resolve(project)
-    workspace = Workspace(out)
+    workspace = RunFolder(out)
     clip = (folder / "clip.mp4").resolve()
     workspace.prepare(clip, project, configs)
     for last in dict.fromkeys(port.split("/")[0] for port in STAGE.inputs):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
 from gsac.avatar.wholebody import ARM, HANDS

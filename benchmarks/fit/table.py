@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+
 from gsac.benchmarks.fit.trial import Trial
 
 COLUMNS = (

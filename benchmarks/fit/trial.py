@@ -54,8 +54,9 @@ def fit(case: Case, method: str, focal_given: bool) -> Trial:
 def warm_up() -> None:
     """Loads and compiles what the methods need on a few frames of a body whose pose is known, so that no trial pays for it."""
     import numpy as np
-    from gsac.stages.smplx import paper
+
     from gsac.stages.smplx.fit import Sightings, fit_clip
+    from gsac.stages.smplx.paper import fit as paper
 
     body = Body.load()
     pose = np.zeros((3, 55, 3))

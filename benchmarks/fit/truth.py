@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from gsac.avatar.artifacts import ArtifactError, frame_paths, read_arrays
 from gsac.avatar.body import SMPLX_JOINTS
 from gsac.avatar.wholebody import BODY_NAMES, FEET_NAMES
@@ -49,7 +50,7 @@ def read_truth(folder: Path) -> Truth:
         points = arrays["coco2d"][:, [names.index(n) for n in POINTS]]
         return Truth(joint, arrays["joints_cam"][:, columns], None, points, focal, center, masks)
     if not {"joints", "keypoints"} <= arrays.keys():
-        raise ArtifactError(f"{folder / 'truth.npz'}: expected joints and keypoints (gsac.benchmarks.turntable) or joints_cam")
+        raise ArtifactError(f"{folder / 'truth.npz'}: expected joints and keypoints (gsac.turntable) or joints_cam")
     points = arrays["keypoints"][:, :23]
     return Truth(np.arange(22), arrays["joints"][:, :22], arrays.get("vertices"), points, focal, center, masks)
 

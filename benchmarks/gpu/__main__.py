@@ -6,13 +6,14 @@ import argparse
 import time
 
 import numpy as np
+
 from gsac.avatar.cuda import why_not
 
 
 def paper_losses(count: int = 25000, **more):
     """Recipe `fast` with the Sobel term and without the displaced surface."""
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import recipe_of
 
     return recipe_of(TrainConfig(sobel=0.1), count, **({"offset_rate": 0.0} | more))
 
@@ -97,8 +98,8 @@ def measure_paper(device, figure, ceilings: tuple[float, float]) -> None:
     from gsac.avatar.body import Body
     from gsac.avatar.cuda.paper import PaperTrainer
     from gsac.benchmarks.gpu.timing import evaluations, kernel_microseconds, nearest_milliseconds
-    from gsac.stages.train import paper_cuda
     from gsac.stages.train.config import TrainConfig
+    from gsac.stages.train.paper import cuda as paper_cuda
 
     model = Body.load()
     body = figure.body._replace(shape=model.shapedirs, joint_shape=np.tensordot(model.J_regressor, model.shapedirs, 1))
@@ -118,11 +119,11 @@ def measure_rounds(device, figure) -> None:
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import kernel_microseconds, step_milliseconds
-    from gsac.stages.train import bundle
-    from gsac.stages.train.fast import OFFSET_RATE
+    from gsac.stages.train.fast import prealign
+    from gsac.stages.train.fast.trainer import OFFSET_RATE
 
-    recipe = paper_losses(bundle.COUNT, steps=600, sobel=0.0, pose_rate=0.0, offset_rate=OFFSET_RATE, offset_share=1.0)
-    trainer = CudaTrainer(figure.body, [figure.scaled(8)], figure.pose, figure.transl, start(figure.body, bundle.COUNT), recipe,
+    recipe = paper_losses(prealign.COUNT, steps=600, sobel=0.0, pose_rate=0.0, offset_rate=OFFSET_RATE, offset_share=1.0)
+    trainer = CudaTrainer(figure.body, [figure.scaled(8)], figure.pose, figure.transl, start(figure.body, prealign.COUNT), recipe,
                           device)
     steps = step_milliseconds(trainer)
     trainer.scene.offset_every = 1

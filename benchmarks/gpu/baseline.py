@@ -9,17 +9,18 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+from torch.nn import functional
+
+from gsac.avatar.cuda.adjacency import joint_levels
 from gsac.avatar.cuda.arrays import BodyArrays, Shot
-from gsac.avatar.cuda.lists import joint_levels
 from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import BRIGHTEST, DARKEST, FROM_CAMERA
 from gsac.benchmarks.gpu.figure import Figure
-from gsac.stages.train import bundle, fast
-from gsac.stages.train.cuda import body_arrays, learning, recipe_of
-from gsac.stages.train.poses import BODY, HAND_SHARE, JAW_EYES
+from gsac.stages.train.fast import prealign, trainer
+from gsac.stages.train.fast.cuda import body_arrays, learning, recipe_of
+from gsac.stages.train.poses.poses import BODY, HAND_SHARE, JAW_EYES
 from gsac.stages.train.task import Fit, Task
-from torch.nn import functional
 
 RATES = {"mu": "mu_rate", "quat": "quat_rate", "log_scale": "scale_rate", "rgb": "rgb_rate", "opacity": "opacity_rate",
          "pose": "pose_rate"}
@@ -50,9 +51,9 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
 
 def fit(task: Task) -> Fit:
     """Recipe fast as the stage knows recipes, eager: frames, sizes, backgrounds and rates as on the GPU."""
-    bundle.adjust(task, learning)
-    fine, coarse = fast.crops(task)
-    gaussians = fast.start(task, coarse, task.config.gaussians)
+    prealign.adjust(task, learning)
+    fine, coarse = trainer.crops(task)
+    gaussians = trainer.start(task, coarse, task.config.gaussians)
     recipe = recipe_of(task.config, len(gaussians))
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]
     poses = task.poses
@@ -71,7 +72,7 @@ def fit(task: Task) -> Fit:
         poses.pose[task.trained], poses.transl[task.trained] = loop.poses()
         task.checkpoint(mark, recipe.steps, float(loss), loop.gaussians, seconds)
         done = mark
-    return Fit(*fast.Trainer(loop.gaussians(), task, settled=True).recoloured(coarse))
+    return Fit(*trainer.Trainer(loop.gaussians(), task, settled=True).recoloured(coarse))
 
 
 def on_device(shots: list[Shot]) -> list[tuple]:

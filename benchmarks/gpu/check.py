@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar import losses
 from gsac.avatar.cuda.arrays import Shot
 from gsac.avatar.cuda.recipe import Recipe

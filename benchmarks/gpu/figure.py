@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
@@ -13,7 +14,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
 from gsac.avatar.rotation import log
 from gsac.avatar.skinning import joint_transforms, rotation_matrices, skin
-from gsac.avatar.workspace import Workspace
+from gsac.avatar.threads import Workspace
 
 SHARE = 0.8
 """Of the image's height that the person fills."""

@@ -11,6 +11,7 @@ import csv
 import sys
 
 import numpy as np
+
 from gsac.avatar.cuda import why_not
 from gsac.benchmarks import training
 
@@ -28,7 +29,7 @@ def main() -> None:
     if why := why_not():
         raise SystemExit(f"benchmarks.gpu.people: {why}")
     from gsac.benchmarks.speed_accuracy.novel import judge_poses
-    from gsac.pipeline.events import PlainReporter
+    from gsac.pipeline.reporter import PlainReporter
 
     def one(case: training.Case, recipe: str, cores: list[int] | None) -> dict:
         folder = options.out / "trainings" / f"{case.name}_{recipe}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from time import perf_counter
 
 import numpy as np
+
 from gsac.avatar.cuda import perceptual
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.cuda.perceptual import SIDE, Window

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.cuda.kernels import KERNELS, compiled, cubin, source
 from gsac.avatar.cuda.trainer import CudaTrainer

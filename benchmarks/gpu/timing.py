@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 
 import numpy as np
+
 from gsac.avatar.cuda.device import Buffer, Device, _call
 from gsac.avatar.cuda.kernels import compiled
 from gsac.avatar.cuda.paper import PaperTrainer

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.camera import Camera
 from gsac.avatar.wholebody import LEFT_HAND
-from gsac.benchmarks.turntable.clip import place, posed
-from gsac.benchmarks.turntable.motion import make_motion
-from gsac.benchmarks.turntable.options import TurntableOptions
-from gsac.benchmarks.turntable.person import make_person
-from gsac.benchmarks.turntable.render import View
+from gsac.turntable.clip import place, posed
+from gsac.turntable.motion import make_motion
+from gsac.turntable.options import TurntableOptions
+from gsac.turntable.person import make_person
+from gsac.turntable.render import View
 
 BODY_NOISE, HAND_NOISE = 2.4, 1.0
 """px a frame, of a person 930 px tall, as measured on rendered clips; so are the next three."""

@@ -6,10 +6,11 @@ from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
+
 from gsac.avatar.wholebody import ARM, HANDS
 from gsac.benchmarks.handgap.clips import BODY_NOISE, HAND_NOISE, Clip
 from gsac.stages.handgap.config import HandgapConfig
-from gsac.stages.handgap.find import SIDES, find_missing
+from gsac.stages.handgap.missing_hands import SIDES, find_missing
 
 
 def failures(clip: Clip, rng) -> dict[str, tuple[Clip, np.ndarray]]:

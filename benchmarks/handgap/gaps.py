@@ -6,11 +6,12 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
+
 from gsac.avatar.wholebody import ARM, HANDS, PALM
 from gsac.benchmarks.handgap.clips import Clip
 from gsac.stages.handgap.config import METHODS, HandgapConfig
 from gsac.stages.handgap.fill import fill_gaps
-from gsac.stages.handgap.find import SIDES, Found, find_missing
+from gsac.stages.handgap.missing_hands import SIDES, Found, find_missing
 from gsac.stages.handgap.sigma import detection_sigma, person_height
 
 GAPS = (2, 4, 8, 16, 24, 32, 40)

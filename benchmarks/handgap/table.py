@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import matplotlib
+
 from gsac.stages.handgap.config import METHODS, HandgapConfig
 
 matplotlib.use("Agg")

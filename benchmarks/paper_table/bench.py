@@ -34,7 +34,7 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.paper_table import table
-    from gsac.pipeline.events import PlainReporter
+    from gsac.pipeline.reporter import PlainReporter
 
     say = PlainReporter(sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)

@@ -38,7 +38,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.gpu import curve
     from gsac.benchmarks.speed_accuracy import chart, table
-    from gsac.pipeline.events import PlainReporter
+    from gsac.pipeline.reporter import PlainReporter
 
     say = PlainReporter(sys.stderr)
     on_gpu = curve.read(options.gpu_curve) if options.gpu_curve else []

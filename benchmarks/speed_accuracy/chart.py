@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
+
 from gsac.benchmarks.gpu.curve import TORCH, Curve
 from gsac.benchmarks.speed_accuracy.trial import Trial, pareto
 

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from gsac.avatar.artifacts import frame_paths, read_arrays, read_frame
 from gsac.avatar.body import Body, BodyParams, J
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
-from gsac.stages.train.alignment import converge
-from gsac.stages.train.evaluate import judge
-from gsac.stages.train.poses import Poses
+from gsac.stages.train.judge.heldout import judge
+from gsac.stages.train.poses.photometric import converge
+from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
 ALIGN_ROUNDS = 16

@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+
 from gsac.benchmarks.speed_accuracy.trial import NOVEL, Trial, hypervolume, seconds_to
 
 QUALITIES = (22.0, 24.0, 25.0, 26.0, 28.0)

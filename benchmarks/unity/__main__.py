@@ -8,11 +8,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.benchmarks.unity.frame import Frame
 from gsac.benchmarks.unity.gpu import Gpu, Painting
 from gsac.benchmarks.unity.shaders import compile_frame, missing_packages, read_frame
 from gsac.benchmarks.unity.timing import Clock, draw_times, pass_times
-from gsac.stages.export.rigged import RiggedAvatar
 
 LIMITS = {"vertices": 1e-5, "means": 1e-5, "order": 0}
 """Largest error in m; order: 1 where the gaussians are not sorted."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
+from gsac.avatar.gsac_file.rigged import BLEND, RiggedAvatar
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.gpu import Gpu, projection
 from gsac.benchmarks.unity.packing import packed
 from gsac.benchmarks.unity.spirv import Program
-from gsac.stages.export.rigged import BLEND, RiggedAvatar
 
 BLOCK_BITS, HAND, ACROSS_THREADS, THREADS = 12, 16, 64, 64
 """Of Gsac.compute: keys of a block, keys of a thread, threads of a group of SortAcross, of Skin and Bind."""

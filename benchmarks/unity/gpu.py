@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+
 from gsac.benchmarks.unity.spirv import Program
 
 LAVAPIPE = Path("/usr/share/vulkan/icd.d")

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 from gsac.benchmarks.unity.spirv import Program
-from gsac.stages.export.wgsl import CORE, spirv
+from gsac.viewer.wgsl import CORE, spirv
 
 PROGRAMS = {"glslangValidator": "glslang-tools", "spirv-val": "spirv-tools"}
 STEREO = Path(__file__).parent / "stereo"

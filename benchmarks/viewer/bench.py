@@ -19,8 +19,8 @@ from gsac.stages.contract import BadInput, StageError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.benchmarks.viewer.race import Count
-    from gsac.stages.export.rigged import RiggedAvatar
 
 PACKAGE = "playcanvas@2.23.3"
 PAGE = Path(__file__).with_name("playcanvas.html")
@@ -64,11 +64,11 @@ def main(argv: list[str] | None = None) -> int:
 
 def prepare(options: argparse.Namespace) -> RiggedAvatar:
     """Writes the two pages and the splats, and has npm bring PlayCanvas. Returns the avatar."""
+    from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.benchmarks.viewer.person import person
-    from gsac.stages.export.page import page_bytes
     from gsac.stages.export.ply import ply_bytes
-    from gsac.stages.export.rigged import RiggedAvatar
     from gsac.stages.export.stage import posed_gaussians
+    from gsac.viewer.page import page_bytes
 
     avatar = person(options.gaussians) if options.avatar is None else RiggedAvatar.read(options.avatar)
     if "walk" not in avatar.clips:

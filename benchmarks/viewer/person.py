@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
-from gsac.stages.export.motion import add_motion
-from gsac.stages.export.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.stages.export.animations import add_motion
 from gsac.stages.export.stage import rigged
 
 SEED = 1

@@ -9,8 +9,8 @@ import re
 from gsac.cache import gc, listing, verify
 from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, answers, open_store
-from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
 
 UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from gsac.pipeline.commands.options import open_store
 from gsac.pipeline.commands.run import run_clip
-from gsac.pipeline.events import PlainReporter, reporter
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.report_hook import REPORT
-from gsac.pipeline.workspace import OWN_STORE
+from gsac.pipeline.reporter import PlainReporter, reporter
+from gsac.pipeline.run_folder import OWN_STORE, REPORT
 
 CLIP_FILE = "clip.mp4"
 
@@ -37,7 +36,7 @@ def truth_clip(folder: Path, voice: PlainReporter) -> Path:
     """clip.mp4 in the folder; made if it is not there yet, whole or not at all."""
     if (folder / CLIP_FILE).is_file():
         return folder / CLIP_FILE
-    from gsac.benchmarks.turntable.clip import make_clip
+    from gsac.turntable.clip import make_clip
 
     voice.starts("truth", f"a clip is made in {folder}")
     began = time.monotonic()

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, answers, open_store
-from gsac.pipeline.events import PlainReporter
-from gsac.pipeline.models import Models
+from gsac.pipeline.model_store import Models
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.reporter import PlainReporter
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -28,7 +28,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.models import BROUGHT, MODELS
+    from gsac.avatar.network_files import BROUGHT, MODELS
 
     people = answers(arguments)
     models = Models(open_store(people))
@@ -46,7 +46,7 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
 
 
 def do_pull(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.models import MODELS
+    from gsac.avatar.network_files import MODELS
 
     people = PlainReporter()
     models = Models(open_store(people))

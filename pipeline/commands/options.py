@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.store import Store
-from gsac.pipeline.events import PlainReporter
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.workspace import OWN_STORE, Workspace
+from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 
 
 def add_params(command: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
     return Store(instead, say=reporter.note, below=store)
 
 
-def open_store_of(workspace: Workspace, reporter: PlainReporter) -> Store:
+def open_store_of(workspace: RunFolder, reporter: PlainReporter) -> Store:
     """The store that a run in this folder would use now: its own where the cache may only be read."""
     store, own = Store.open(say=reporter.note), workspace.root / OWN_STORE
     return store if store.writable or not own.is_dir() else Store(own, say=reporter.note, below=store)
@@ -53,9 +53,9 @@ def open_store_of(workspace: Workspace, reporter: PlainReporter) -> Store:
 
 def open_workspace(
     arguments: argparse.Namespace, start: Path, only: str = ""
-) -> tuple[Workspace, Project, dict[str, Any]]:
+) -> tuple[RunFolder, Project, dict[str, Any]]:
     """The folder of a run, its stages, and its parameters (of `only` one stage) with --params and --set on top."""
-    workspace = Workspace.around(start)
+    workspace = RunFolder.around(start)
     project = workspace.project(Project.at_hand())
     file = getattr(arguments, "params", None) or workspace.params
     return workspace, project, resolve(project, file, arguments.set, only)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json
-from gsac.pipeline.events import PlainReporter, reporter
 from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.reporter import PlainReporter, reporter
 from gsac.stages.contract import BadInput, StageError
 
 FILE = "avatar.gsac"
@@ -61,10 +61,11 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
          voice: PlainReporter) -> tuple[int, float]:
     """Writes the video. Returns its frames and the seconds that it took."""
     import numpy as np
+
     from gsac.avatar.artifacts import ArtifactError
+    from gsac.avatar.film import frames, performance, turntable
+    from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.avatar.video import Video, VideoError
-    from gsac.stages.export.film import frames, performance, turntable
-    from gsac.stages.export.rigged import RiggedAvatar
 
     began = time.monotonic()
     voice.starts("render", f"{file.name} to {out}")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.workspace import RUN
+from gsac.pipeline.run_folder import RUN
 from gsac.stages.contract import BadInput
 
 
@@ -18,7 +18,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     if not (arguments.folder / RUN).is_file():
         raise BadInput(f"{arguments.folder}: not the folder of a run (no {RUN}); `gsac run CLIP --out DIR` makes one")
-    from gsac.pipeline.report import write_report
+    from gsac.pipeline.report.page import write_report
     from gsac.pipeline.report.results import Results
 
     if not Results(arguments.folder).has_run:

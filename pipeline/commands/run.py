@@ -8,13 +8,13 @@ from pathlib import Path
 from gsac.cache.store import Store
 from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, add_params, open_store
-from gsac.pipeline.events import PlainReporter, reporter
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.report_hook import Early, refresh_report
+from gsac.pipeline.report.refresh import Early, refresh_report
+from gsac.pipeline.reporter import PlainReporter, reporter
 from gsac.pipeline.run import Chain, Options, StageFailedError
-from gsac.pipeline.workspace import OWN_STORE, Workspace
+from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
 
 
@@ -36,7 +36,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     project = Project.at_hand()
     configs = resolve(project, arguments.params, arguments.set)
     clip = find_clip(arguments.clip)
-    workspace = Workspace(arguments.out or default_out(clip))
+    workspace = RunFolder(arguments.out or default_out(clip))
     options = Options(arguments.until, arguments.start, tuple(arguments.force))
     with reporter(plain=arguments.json) as voice:
         store = open_store(voice, None if arguments.dry_run else workspace.root / OWN_STORE)
@@ -95,11 +95,11 @@ def default_out(clip: Path) -> Path:
     return Path.cwd() / f"{clip.stem}-avatar"
 
 
-def run_clip(clip: Path, out: Path, store: Store, voice: PlainReporter) -> Workspace:
+def run_clip(clip: Path, out: Path, store: Store, voice: PlainReporter) -> RunFolder:
     """A whole run with the defaults."""
     project = Project.at_hand()
     configs = resolve(project)
-    workspace = Workspace(out)
+    workspace = RunFolder(out)
     workspace.prepare(find_clip(clip), project, configs)
     carry_out(Chain(project, configs, store, workspace, voice), find_clip(clip), Options(), voice, json=False)
     return workspace

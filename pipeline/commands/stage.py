@@ -8,18 +8,18 @@ from pathlib import Path
 from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
 from gsac.cache.store import Store
-from gsac.pipeline.action import Actor
 from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, add_params, open_store, open_workspace
-from gsac.pipeline.events import PlainReporter, reporter
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.plan import judge
 from gsac.pipeline.project import Project
+from gsac.pipeline.reporter import PlainReporter, reporter
 from gsac.pipeline.run import StageFailedError, StageResult
-from gsac.pipeline.workspace import OWN_STORE, link
+from gsac.pipeline.run_folder import OWN_STORE, link
+from gsac.pipeline.stage_runner import Actor
 from gsac.stages.contract import BadInput, StageError
 
 

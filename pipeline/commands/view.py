@@ -45,8 +45,8 @@ def find_page(path: Path, spare: Path) -> Path:
 def made_page(path: Path, folder: Path) -> Path:
     """The page of an avatar file. BadInput where the file is none."""
     from gsac.avatar.artifacts import ArtifactError
-    from gsac.stages.export.page import page_bytes
-    from gsac.stages.export.rigged import RiggedAvatar
+    from gsac.avatar.gsac_file.rigged import RiggedAvatar
+    from gsac.viewer.page import page_bytes
 
     try:
         RiggedAvatar.read(path)

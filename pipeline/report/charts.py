@@ -6,11 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup, escape
+
 from gsac.avatar.wholebody import BODY, HANDS
 from gsac.pipeline.report.pictures import SEEN
 from gsac.pipeline.report.results import number
 from gsac.pipeline.report.sheets import seen_part
-from markupsafe import Markup, escape
 
 W, H = 480, 260
 LEFT, RIGHT, TOP, BOTTOM = 54, 14, 26, 40

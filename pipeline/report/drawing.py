@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+
 from gsac.avatar.wholebody import ARM, BODY, FACE, FEET, HANDS, NAMES
 
 SIDE_COLOURS = {"left": (255, 122, 26), "right": (20, 190, 255), "middle": (245, 245, 245)}

@@ -15,9 +15,8 @@ from urllib.parse import quote
 
 from gsac.pipeline.report.results import AbsentError, Results, number, read_json, tree_size
 from gsac.pipeline.report.tables import foot, parameters, stage_rows, totals
-from gsac.pipeline.workspace import RUN
+from gsac.pipeline.run_folder import REPORT, RUN
 
-REPORT = "report.html"
 TEMPLATE = "report.html.jinja"
 
 

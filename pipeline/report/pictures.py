@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from gsac.avatar.artifacts import (
     FILLED_SHAPES,
     KEYPOINT_SHAPES,

@@ -11,7 +11,7 @@ from typing import Any
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.project import Project
-from gsac.pipeline.workspace import DAG, RUN
+from gsac.pipeline.run_folder import DAG, RUN
 from gsac.stages.contract import StageError
 
 DONE = (Outcome.RAN.value, Outcome.CACHED.value)

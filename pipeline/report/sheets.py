@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import frame_paths, read_frame
-from gsac.avatar.turn import turn_seen
 from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
+from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
 from gsac.pipeline.report.pictures import SEEN, Footage, Picture, fitted, picture, spread
 from gsac.pipeline.report.results import AbsentError, Results, number

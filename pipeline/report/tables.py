@@ -82,7 +82,7 @@ def foot(results: Results) -> dict[str, list]:
 
 
 def networks(results: Results) -> list[dict[str, str]]:
-    from gsac.avatar.models import MODELS
+    from gsac.avatar.network_files import MODELS
     from gsac.stages.contract import make_config
 
     found: dict[str, dict[str, str]] = {}

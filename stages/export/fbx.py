@@ -9,11 +9,12 @@ from __future__ import annotations
 from itertools import count
 
 import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gsac.avatar.gsac_file.rigged import Clip, RiggedAvatar
 from gsac.avatar.normals import vertex_normals
 from gsac.stages.export.fbx_file import CREATED, FILE_ID, Long, Node, fbx_bytes
 from gsac.stages.export.glb import vertex_colours
-from gsac.stages.export.rigged import Clip, RiggedAvatar
-from scipy.spatial.transform import Rotation
 
 SECOND = 46186158000
 """FBX counts time in these."""

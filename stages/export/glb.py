@@ -12,11 +12,12 @@ import json
 import struct
 
 import numpy as np
-from gsac.avatar.normals import vertex_normals
-from gsac.stages.export.ply import SH0
-from gsac.stages.export.rigged import Clip, RiggedAvatar
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+
+from gsac.avatar.gsac_file.rigged import Clip, RiggedAvatar
+from gsac.avatar.normals import vertex_normals
+from gsac.stages.export.ply import SH0
 
 FLOAT, U16, U32, U8 = 5126, 5123, 5125, 5121
 CODES = {np.dtype("<f4"): FLOAT, np.dtype("<u2"): U16, np.dtype("<u4"): U32, np.dtype("u1"): U8}

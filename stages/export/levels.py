@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from gsac.avatar.binding import bind, face_frames
-from gsac.stages.export.rigged import RiggedAvatar
 from scipy.spatial.transform import Rotation
+
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 
 MEMBERS = (3, 9)
 """How many gaussians become one, level by level."""

@@ -12,6 +12,7 @@ import gzip
 import struct
 
 import numpy as np
+
 from gsac.stages.export.ply import MIN_SCALE, SH0
 
 HEADER = struct.Struct("<IIIBBBB")

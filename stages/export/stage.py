@@ -6,23 +6,24 @@ from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 
 import numpy as np
+from scipy.spatial.transform import Rotation
+
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import EACH, Gaussians
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
+from gsac.stages.export.animations import add_motion
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.levels import MEMBERS, coarser
-from gsac.stages.export.motion import add_motion
-from gsac.stages.export.page import page_bytes
 from gsac.stages.export.ply import ply_bytes
-from gsac.stages.export.rehearsal import rehearse
-from gsac.stages.export.rigged import RiggedAvatar
 from gsac.stages.export.spz import spz_bytes
-from gsac.stages.export.unity_package import write_unity
-from scipy.spatial.transform import Rotation
+from gsac.stages.export.warmup import rehearse
+from gsac.unity.package import write_unity
+from gsac.viewer.page import page_bytes
 
 MOVED = 1e-4
 """m: a vertex that an expression moves less than this is left out."""

@@ -11,10 +11,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import read_arrays
 
 TABLE = Path(__file__).with_name("actions.npz")
-"""Written by `gsac.benchmarks.face_actions`."""
+"""Written by `gsac.tools.face_actions`."""
 BLIND = ("eyeLook", "tongueOut", "cheekPuff", "mouthClose")
 """Actions whose names begin so leave no mark on the points that could tell them from others: they stay at 0."""
 COMMON = ("jawOpen", "eyeBlink", "mouthSmile", "brow", "cheekSquint", "mouthPucker", "mouthFunnel")

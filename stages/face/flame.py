@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.flame_file import Flame, FlamePoints, read_flame, read_flame_points
 from gsac.avatar.rotation import hat

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from gsac.avatar.body import Body
 from gsac.stages.face.actions import Actions
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+
 from gsac.avatar.facemesh import LEFT_EYE, LEFT_SIDE, RIGHT_EYE, RIGHT_SIDE, Face, FaceMesh
 
 STABLE = np.array([168, 6, 197, 195, 5, 10, 151, 9, 8, RIGHT_EYE, 133, 362, LEFT_EYE, RIGHT_SIDE, LEFT_SIDE, 127, 356,

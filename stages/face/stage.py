@@ -5,10 +5,11 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS, FaceMesh
+from gsac.avatar.threads import available
 from gsac.avatar.wholebody import INDEX
-from gsac.avatar.workspace import available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face.actions import Actions, fill, pace, smooth, solve
 from gsac.stages.face.flame import FlameHead

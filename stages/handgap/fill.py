@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from gsac.stages.handgap import chain, segments, turning
-from gsac.stages.handgap.find import SIDES, Found, torso_length
+
+from gsac.stages.handgap import arm_gp, segments, turning_body
+from gsac.stages.handgap.missing_hands import SIDES, Found, torso_length
 
 
 def fill_gaps(xy: np.ndarray, score: np.ndarray, world: np.ndarray, found: Found, times: np.ndarray, config,
@@ -16,7 +17,7 @@ def fill_gaps(xy: np.ndarray, score: np.ndarray, world: np.ndarray, found: Found
     """
     xy, filled = xy.copy(), np.zeros(xy.shape[:2], bool)
     drift = np.zeros(filled.shape)
-    body = turning.watch(xy, score, world, times, torso_length(xy, score)) if config.method == "turning" else None
+    body = turning_body.watch(xy, score, world, times, torso_length(xy, score)) if config.method == "turning" else None
     for i, side in enumerate(SIDES):
         hand = found.hand[:, i]
         lost = np.stack([hand & found.elbow[:, i], hand & found.wrist[:, i], hand])
@@ -24,7 +25,7 @@ def fill_gaps(xy: np.ndarray, score: np.ndarray, world: np.ndarray, found: Found
             continue
         if body:
             unsure = np.stack([found.elbow[:, i], found.wrist[:, i], hand])
-            chain.fill_arm(xy, filled, drift, side, lost, unsure, body, config)
+            arm_gp.fill_arm(xy, filled, drift, side, lost, unsure, body, config)
         else:
             segments.fill_arm(xy, filled, drift, side, lost, times, config)
     return xy, filled, drift

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.wholebody import ARM, HANDS
 from gsac.stages.handgap import gp, hermite, paper, paper_literal
-from gsac.stages.handgap.find import runs
+from gsac.stages.handgap.missing_hands import runs
 
 METHODS = {"paper": paper.fill, "paper-literal": paper_literal.fill, "hermite": hermite.fill, "gp": gp.fill}
 """Each: (segment (T, 2), seen (T,), before, after, times (T,)) -> (after - before - 1, 2)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.wholebody import BODY, FACE, FEET, LEFT_HAND, RIGHT_HAND
 
 BY_GROUP = ((BODY, 0.010), (FEET, 0.010), (FACE, 0.005), (LEFT_HAND, 0.005), (RIGHT_HAND, 0.005))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from threadpoolctl import threadpool_limits
+
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, write_arrays
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import Job, StageError
 from gsac.stages.handgap.fill import fill_gaps
-from gsac.stages.handgap.find import SIDES, find_missing, runs
+from gsac.stages.handgap.missing_hands import SIDES, find_missing, runs
 from gsac.stages.handgap.sigma import detection_sigma, person_height
-from threadpoolctl import threadpool_limits
 
 FILLED_SCORE = 0.5
 """Score of a filled point that is as sure as a detection; it falls as sigma grows."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.detections import anchor_centers, decode, suppress
 from gsac.avatar.region import Region, around_circle, crop, upright_angle
 from gsac.avatar.tflite import Network

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.facemesh import EYE_POINTS, IBUG68, NOSE_TIP, Face, FaceMesh, head_yaw, region_of_head
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.stages.keypoints.config import KeypointsConfig
-from gsac.stages.keypoints.follow import Follower
-from gsac.stages.keypoints.frame import Frame
+from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.hands import Arm, Hand, HandNetworks
 from gsac.stages.keypoints.pose import Pose
+from gsac.stages.keypoints.tracking import Follower
 
 POSE33 = {
     "nose": 0, "left_eye": 2, "right_eye": 5, "left_ear": 7, "right_ear": 8, "left_shoulder": 11, "right_shoulder": 12,

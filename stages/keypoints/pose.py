@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.detections import anchor_centers, decode, suppress
 from gsac.avatar.region import Region, around_circle, crop, full_frame
 from gsac.avatar.tflite import Network, sigmoid

@@ -10,14 +10,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.facemesh import FaceMesh, head_yaw, region_of_head
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
-from gsac.stages.keypoints.follow import Follower
-from gsac.stages.keypoints.frame import Frame
+from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.mediapipe import write_body
 from gsac.stages.keypoints.pose import Pose
+from gsac.stages.keypoints.tracking import Follower
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)
 DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)

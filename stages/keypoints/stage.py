@@ -10,12 +10,13 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
+
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
+from gsac.avatar.threads import ahead, available
 from gsac.avatar.wholebody import FACE, HANDS
-from gsac.avatar.workspace import ahead, available
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.frame_names import name_frames
-from gsac.stages.keypoints.frame import ARRAYS, Frame
+from gsac.stages.keypoints.detection import ARRAYS, Frame
 from gsac.stages.keypoints.mediapipe import Mediapipe
 from gsac.stages.keypoints.simcc import Wholebody
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from gsac.avatar.region import Region, around_points, crop
 from gsac.avatar.tflite import Network, sigmoid
 

@@ -6,16 +6,17 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
-from gsac.avatar.workspace import ahead, available
+from gsac.avatar.threads import ahead, available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
-from gsac.stages.segment.edge import soften
+from gsac.stages.segment.components import keep_person
 from gsac.stages.segment.grabcut import cut_out
+from gsac.stages.segment.matting import soften
 from gsac.stages.segment.network import PoseMask, SelfieMask, person_region
-from gsac.stages.segment.parts import keep_person
 from gsac.stages.segment.plate import HALF, Plate, compare
-from gsac.stages.segment.still import learn_plate
+from gsac.stages.segment.plate_from_video import learn_plate
 
 METHODS = {"pose": PoseMask, "selfie": SelfieMask}
 """Each: (models) -> ((image (H, W, 3), region) -> (H, W) probability)."""

@@ -10,13 +10,14 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.smplx.mirrored import mirrored
+from gsac.stages.smplx.symmetry import mirrored
 
 FILES = {"mediapipe": Path(__file__).parent / "offsets" / "mediapipe.npz"}
-"""`benchmarks/detector_offsets.py` measures them on truth clips."""
+"""`tools/detector_offsets.py` measures them on truth clips."""
 HARMONICS = 3
 UNKNOWN, UNKNOWN_FACE = 0.006, 0.009
 """Spreads of a detector that was not measured; eyes, ears and nose: it means other places than the body's points."""

@@ -6,21 +6,22 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
-from gsac.avatar.turn import yaw
+from gsac.avatar.threads import available
 from gsac.avatar.wholebody import INDEX, LEFT_HAND, RIGHT_HAND
-from gsac.avatar.workspace import available
-from gsac.stages.smplx import start
+from gsac.avatar.yaw import yaw
+from gsac.stages.smplx import initial
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.ground import Ground
-from gsac.stages.smplx.personal import Personal
-from gsac.stages.smplx.points import pairs_of, positions
+from gsac.stages.smplx.jacobians import pairs_of, positions
+from gsac.stages.smplx.lm.ground import Ground
+from gsac.stages.smplx.lm.person_offsets import Personal
+from gsac.stages.smplx.lm.problem import ROBUST, Observations, Problem, State
+from gsac.stages.smplx.lm.solver import levenberg_marquardt
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
-from gsac.stages.smplx.problem import ROBUST, Observations, Problem, State
 from gsac.stages.smplx.silhouette import Outline, outline_points
-from gsac.stages.smplx.solver import levenberg_marquardt
 
 HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
 """Hand points that no finger joint moves: they turn the wrist."""
@@ -180,16 +181,16 @@ def starting_state(body: Body, sightings: Sightings, focal: float, center: np.nd
     frames = len(sightings.xy)
     rest = body.keypoints(body.v_template)
     pelvis = body.J_regressor[0] @ body.v_template
-    turns = [start.trunk_turn(rest, sightings.world[t], sightings.xy[t], sightings.seen[t], focal, center) for t in range(frames)]
-    turns = start.fill_gaps(turns)
-    local = start.start_rotations(frames, 55, body.joint_names)
+    turns = [initial.trunk_turn(rest, sightings.world[t], sightings.xy[t], sightings.seen[t], focal, center) for t in range(frames)]
+    turns = initial.fill_gaps(turns)
+    local = initial.start_rotations(frames, 55, body.joint_names)
     local[:, 0] = turns
     transl = np.full((frames, 3), np.nan)
     for t in range(frames):
-        use = [i for i in start.TRUNK if sightings.seen[t, i]]
+        use = [i for i in initial.TRUNK if sightings.seen[t, i]]
         if len(use) >= 2:
             turned = (rest[use] - pelvis) @ turns[t].T + pelvis
-            transl[t] = start.place(turned, sightings.xy[t, use], focal, center)
+            transl[t] = initial.place(turned, sightings.xy[t, use], focal, center)
     known = np.isfinite(transl).all(1) & (np.nan_to_num(transl[:, 2]) > 0.3)
     if not known.any():
         transl[:], known[:] = [0, 0, focal * 1.7 / sightings.person_height], True

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scipy.spatial import cKDTree
+
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, INDEX
 from gsac.stages.contract import StageError
-from scipy.spatial import cKDTree
 
 VERTEX, LAPLACIAN, EDGE = 10.0, 10000.0, 1.0
 """Weights of the paper's L_face."""

@@ -7,6 +7,7 @@ what the pictures leave open.
 from __future__ import annotations
 
 import numpy as np
+
 from gsac.avatar.body import SMPLX_JOINTS
 
 BODY_JOINTS = np.arange(22)

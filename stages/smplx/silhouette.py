@@ -11,11 +11,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from gsac.avatar.artifacts import read_alpha
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
 from gsac.avatar.zbuffer import rasterise
-from gsac.stages.smplx.points import Pairs, surface_pairs
+from gsac.stages.smplx.jacobians import Pairs, surface_pairs
 
 FIELD_HEIGHT = 320
 """Alpha is looked at this high: finer edges than this do not move a joint."""

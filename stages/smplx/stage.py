@@ -5,21 +5,22 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from threadpoolctl import threadpool_limits
+
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
 from gsac.avatar.body import LOST
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
+from gsac.stages.smplx.expression import mimic
 from gsac.stages.smplx.fit import THREADS, Sightings, fit_clip, to_params
-from gsac.stages.smplx.mimic import mimic
-from gsac.stages.smplx.rehearsal import rehearse
+from gsac.stages.smplx.lost_frames import lost_frames, sentences
 from gsac.stages.smplx.silhouette import read_outline
-from gsac.stages.smplx.trust import lost_frames, sentences
-from threadpoolctl import threadpool_limits
+from gsac.stages.smplx.warmup import rehearse
 
 
 def published(*clip):
     """The paper's fit; torch takes seconds to load, so only who asks for it does."""
-    from gsac.stages.smplx.paper import fit_clip as fit_as_published
+    from gsac.stages.smplx.paper.fit import fit_clip as fit_as_published
 
     return fit_as_published(*clip)
 

@@ -8,11 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
+
 from gsac.avatar.artifacts import write_frame
 from gsac.stages.contract import BadInput
 from gsac.stages.split import focal
 from gsac.stages.split.pick import fitted_size, pick_evenly
-from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
 SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"}
 UNSUPPORTED = {".heic", ".heif", ".dng", ".raw", ".cr2", ".nef"}

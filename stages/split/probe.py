@@ -8,6 +8,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+
 from gsac.stages.contract import BadInput
 
 HLG, PQ, BT2020_PRIMARIES, BT2020_MATRIX, UNSPECIFIED = 18, 16, 9, 9, 2

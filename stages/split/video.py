@@ -10,6 +10,7 @@ from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
+
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.split import focal
 from gsac.stages.split.pick import fitted_size, pick_by_time

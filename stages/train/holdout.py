@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from gsac.avatar import rotation
-from gsac.avatar.turn import yaw
 from scipy.spatial.transform import Rotation
+
+from gsac.avatar import rotation
+from gsac.avatar.yaw import yaw
 
 FEWEST = 5
 """Frames below which every one is needed for training."""

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from threadpoolctl import threadpool_limits
+
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import Clip, frame_paths, write_frame
 from gsac.avatar.body import BodyParams
@@ -15,24 +17,23 @@ from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.lpips import LEAST_SIDE, Lpips
 from gsac.avatar.metrics import figures, summary
-from gsac.avatar.turn import turn_seen
+from gsac.avatar.yaw import turn_seen
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.config import AUTO, NETWORKS, TrainConfig
-from gsac.stages.train.evaluate import Look, judge, judge_all, turned
-from gsac.stages.train.guard import finite, result, values
+from gsac.stages.train.fast.lod import judged
+from gsac.stages.train.finite import finite, result, values
 from gsac.stages.train.holdout import spaced_in_yaw, to_choose_by
-from gsac.stages.train.levels import judged
-from gsac.stages.train.novel import judge_novel
-from gsac.stages.train.parts import unseen_parts
-from gsac.stages.train.poses import Poses, carried
+from gsac.stages.train.judge.coverage import unseen_parts
+from gsac.stages.train.judge.heldout import Look, judge, judge_all, turned
+from gsac.stages.train.judge.novel_poses import judge_novel
+from gsac.stages.train.poses.poses import Poses, carried
 from gsac.stages.train.recipes import ALIGN, RECIPES
-from gsac.stages.train.rehearsal import rehearse
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
-from threadpoolctl import threadpool_limits
+from gsac.stages.train.warmup import rehearse
 
 LOSS_ROWS = 20
 """How many rows of the curve tell the loss."""

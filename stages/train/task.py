@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.config import TrainConfig
-from gsac.stages.train.poses import Poses
+from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from gsac.avatar.artifacts import frame_paths, read_alpha, read_frame
 from gsac.avatar.camera import Camera
-from gsac.avatar.workspace import available
+from gsac.avatar.threads import available
 from gsac.stages.contract import StageError
 
 MARGIN = 0.06

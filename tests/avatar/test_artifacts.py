@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import ArtifactError, check_arrays, read_arrays, write_arrays
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
 from gsac.avatar.wholebody import INDEX

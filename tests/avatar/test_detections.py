@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from gsac.avatar.detections import Detections, anchor_centers, decode, iou, suppress
 
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from gsac.avatar.facemesh import IBUG68, LEFT_SIDE, POINTS, RIGHT_SIDE, Face, FaceMesh, head_yaw
 
 

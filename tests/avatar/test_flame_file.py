@@ -2,6 +2,7 @@ import pickle
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.flame_file import ARRAYS, read_flame, read_flame_points
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gsac.avatar.flip import flip
 
 

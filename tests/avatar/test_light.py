@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from gsac.avatar import artifacts, light, raster
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians

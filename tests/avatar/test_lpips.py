@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import torch
+
 from gsac.avatar.lpips import NETS, SHIFT, Lpips, gather, shapes
 from gsac.avatar.weight_file import WeightsError, read_weights
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from gsac.avatar.region import Region, around_circle, around_points, crop, full_frame, upright_angle
 
 TURNED = Region((62.0, 55.0), 35.0, 0.7)

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from gsac.avatar.skinning import joint_transforms, rotation_matrices, skin, skin_backward
 from scipy.spatial.transform import Rotation
+
+from gsac.avatar.skinning import joint_transforms, rotation_matrices, skin, skin_backward
 
 PARENTS = np.array([-1, 0, 0, 1, 1, 3, 2], np.int64)
 

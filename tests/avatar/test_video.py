@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from gsac.avatar.video import Video, VideoError
 
 

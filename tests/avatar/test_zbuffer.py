@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from gsac.avatar.camera import Camera
 from gsac.avatar.zbuffer import interpolate, rasterise, silhouette, visible_points
 

@@ -5,22 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.facemesh import MODELS, Face, FaceMesh
-from gsac.avatar.models import ModelMissingError, model_path
+from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.avatar.region import Region
 from gsac.benchmarks import face_people
-from gsac.benchmarks.face_actions import SEEDS, measure
 from gsac.benchmarks.face_drawing import Head, Look
 from gsac.benchmarks.face_people import DRAWN, Reader, any_expression
 from gsac.benchmarks.perception import ACTIONS
-from gsac.benchmarks.turntable.motion import expressions
-from gsac.benchmarks.turntable.options import TurntableOptions
 from gsac.stages.face.actions import TABLE, Actions, pace, smooth, solve
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.landmarks import align, look
-from scipy.spatial.transform import Rotation
+from gsac.tools.face_actions import SEEDS, measure
+from gsac.turntable.motion import expressions
+from gsac.turntable.options import TurntableOptions
 
 UNKNOWN = (5001, 5002)
 FILMED = (5002, 5003, 5004)

@@ -2,6 +2,7 @@ import csv
 
 import numpy as np
 import pytest
+
 from gsac.avatar.wholebody import ARM, HANDS
 from gsac.benchmarks.fit import bench, chart, hidden, table
 from gsac.benchmarks.fit.clips import seen
@@ -68,7 +69,7 @@ def test_clips_that_measured_the_detector_are_not_what_is_reported():
 
 def test_a_bare_clip_is_rendered_without_clothes(tmp_path, monkeypatch):
     from gsac.benchmarks.fit import clips
-    from gsac.benchmarks.turntable import clip
+    from gsac.turntable import clip
 
     asked = []
     monkeypatch.setattr(clip, "make_clip", lambda folder, **options: asked.append((folder.name, options["clothing"])))

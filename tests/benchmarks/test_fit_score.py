@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.fit.score import joint_distances, score

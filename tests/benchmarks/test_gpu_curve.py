@@ -1,6 +1,7 @@
 """The GPU's curve: from metrics to the chart's file and back, and drawn beside the CPU's."""
 
 import pytest
+
 from gsac.benchmarks.gpu import curve
 from gsac.benchmarks.speed_accuracy import chart
 from gsac.stages.contract import BadInput

@@ -1,6 +1,7 @@
 """The paper's table: its figures from metrics, its rows from the settings of the hand fill."""
 
 import pytest
+
 from gsac.benchmarks.paper_table import table
 from gsac.benchmarks.paper_table.bench import FILLS, parser
 from gsac.pipeline.params import resolve

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from gsac.benchmarks import training
 from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from gsac.cache.key import KeyParts
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from gsac.cache import code, memo
 from gsac.cache.code import code_parts
 from gsac.cache.errors import CacheError

@@ -2,6 +2,7 @@ import hashlib
 import os
 
 import pytest
+
 from gsac.cache import digest, memo
 from gsac.cache.digest import file_digest, tree_digest, typed_digest
 from gsac.cache.errors import CacheError

@@ -2,11 +2,12 @@ import dataclasses
 import shutil
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
 from gsac.cache.digest import tree_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.key import ChangeKind, KeyParts
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 PARTS = KeyParts(
     stage="fill",

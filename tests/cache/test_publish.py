@@ -7,6 +7,7 @@ import subprocess
 import time
 
 import pytest
+
 from gsac.cache.errors import CacheFullError
 from gsac.cache.gc import collect
 from gsac.cache.publish import STEPS

@@ -7,11 +7,12 @@ import signal
 import subprocess
 from types import SimpleNamespace
 
-import gsac
 import pytest
+
+import gsac
 from gsac.pipeline.cli import execute
-from gsac.pipeline.events import PlainReporter, progress_words
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.reporter import PlainReporter, progress_words
 from gsac.stages.contract import BadInput, Output, Stage, make_config
 
 
@@ -118,7 +119,7 @@ def test_a_number_that_is_none_is_refused_by_the_name_of_its_parameter(value):
 
 
 def test_a_failed_write_names_the_file_and_leaves_nothing(tmp_path):
-    from gsac.pipeline.workspace import write_text
+    from gsac.pipeline.run_folder import write_text
 
     (tmp_path / "run.json").mkdir()
     with pytest.raises(OSError, match="run.json") as caught:
@@ -129,19 +130,19 @@ def test_a_failed_write_names_the_file_and_leaves_nothing(tmp_path):
 
 @pytest.mark.parametrize(("free", "words"), [(1000, "no room left in the cache folder"), (10**12, "no person")])
 def test_a_stage_that_fails_on_a_full_disk_says_so_whatever_its_library_said(toy, monkeypatch, capsys, free, words):
-    from gsac.pipeline import action
+    from gsac.pipeline import stage_runner
 
     for name, value in toy.env.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setattr("gsac.__path__", [*gsac.__path__, str(toy.root / "lib" / "gsac")], raising=False)
-    monkeypatch.setattr(action.shutil, "disk_usage", lambda folder: SimpleNamespace(free=free))
+    monkeypatch.setattr(stage_runner.shutil, "disk_usage", lambda folder: SimpleNamespace(free=free))
     code = execute(["run", str(toy.clip), "--out", str(toy.out), "--set", "cut.trouble=stage"])
     assert code == ExitCode.FAILED and words in capsys.readouterr().err
 
 
 def test_the_rate_counts_from_the_first_sign_of_progress(monkeypatch):
     now = iter([0.0, 60.0, 60.0, 70.0, 70.0])
-    monkeypatch.setattr("gsac.pipeline.events.time.monotonic", lambda: next(now))
+    monkeypatch.setattr("gsac.pipeline.reporter.time.monotonic", lambda: next(now))
 
     lines = io.StringIO()
     reporter = PlainReporter(lines)

@@ -1,6 +1,7 @@
 import signal
 
 import pytest
+
 from gsac.pipeline.batch import find_clips, make_jobs
 
 pytestmark = pytest.mark.slow

@@ -1,6 +1,7 @@
 """Where a stage computes: one place decides, the key and the job are told the same."""
 
 import pytest
+
 from gsac.cache.store import Store
 from gsac.pipeline import keys
 from gsac.pipeline.keys import Keys, device_class

@@ -1,4 +1,5 @@
 import pytest
+
 from gsac.pipeline.graph import Graph
 from gsac.stages.contract import BadInput
 

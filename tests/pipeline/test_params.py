@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 import yaml
+
 from gsac.pipeline.params import meanings, to_yaml
 from gsac.stages.contract import BadInput, Stage, make_config
 

@@ -1,25 +1,13 @@
 """gsac render by its command line, on the small figure of the export's tests."""
 
-import importlib.util
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.pipeline.cli import execute
-
-TESTS = Path(__file__).parents[1]
-
-
-def helpers(path, name):
-    spec = importlib.util.spec_from_file_location(name, TESTS / path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-export = helpers("stages/export/conftest.py", "export_helpers")
-motion = helpers("avatar/motion/conftest.py", "motion_helpers")
+from support import dances
+from support.figure import make_figure
 
 
 @pytest.fixture(scope="module")
@@ -27,15 +15,15 @@ def run(tmp_path_factory):
     """A run's folder with avatar.gsac, and in it a walk to the left as Mixamo would name and measure it, z up."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "export").mkdir()
-    figure = export.make_figure()
+    figure = make_figure()
     (folder / "export" / "avatar.gsac").write_bytes(figure.to_bytes())
     clip = figure.clips["walk"]
     rotation = np.zeros((len(clip.rotation), len(figure.joints), 3), np.float32)
     rotation[:, [figure.joint_names.index(name) for name in clip.joints]] = clip.rotation
-    skeleton = motion.Skeleton(figure.joint_names, figure.parents, figure.joints)
-    walk = motion.Motion(clip.fps, rotation, clip.transl)
-    names = [motion.mixamo(n) for n in figure.joint_names]
-    (folder / "walk.bvh").write_text(motion.bvh_text(skeleton, walk, names, unit=100, world=motion.Z_UP))
+    skeleton = dances.Skeleton(figure.joint_names, figure.parents, figure.joints)
+    walk = dances.Motion(clip.fps, rotation, clip.transl)
+    names = [dances.mixamo(n) for n in figure.joint_names]
+    (folder / "walk.bvh").write_text(dances.bvh_text(skeleton, walk, names, unit=100, world=dances.Z_UP))
     return folder
 
 

@@ -11,15 +11,15 @@ from urllib.parse import unquote
 import cv2
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.viewer import browser as chromium
-from gsac.pipeline.report import draw_sections, write_report
 from gsac.pipeline.report.charts import curve_chart
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
-from gsac.pipeline.report.page import seconds, size
+from gsac.pipeline.report.page import draw_sections, seconds, size, write_report
 from gsac.pipeline.report.pictures import MOST_BYTES, picture
 from gsac.pipeline.report.verdict import BAD, grade, weaknesses
 

@@ -8,7 +8,8 @@ import subprocess
 
 import pytest
 import yaml
-from gsac.pipeline import workspace
+
+from gsac.pipeline import run_folder
 
 
 def test_until_stops_after_a_stage_and_runs_only_what_it_needs(toy):
@@ -79,12 +80,12 @@ def test_a_folder_without_links_gets_copies(monkeypatch, tmp_path):
     def no_links(self, target, target_is_directory=False):
         raise OSError("no links here")
 
-    monkeypatch.setattr(workspace.Path, "symlink_to", no_links)
+    monkeypatch.setattr(run_folder.Path, "symlink_to", no_links)
     source = tmp_path / "frames"
     source.mkdir()
     (source / "1.txt").write_text("one")
-    workspace.link(source, tmp_path / "shown" / "frames")
-    workspace.link(source / "1.txt", tmp_path / "shown" / "1.txt")
+    run_folder.link(source, tmp_path / "shown" / "frames")
+    run_folder.link(source / "1.txt", tmp_path / "shown" / "1.txt")
     assert not (tmp_path / "shown" / "frames").is_symlink()
     assert (tmp_path / "shown" / "frames" / "1.txt").read_text() == (tmp_path / "shown" / "1.txt").read_text() == "one"
 

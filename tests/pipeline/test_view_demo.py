@@ -1,20 +1,16 @@
-import importlib.util
 import threading
 import urllib.error
 import urllib.request
-from pathlib import Path
 
 import pytest
-from gsac.benchmarks.turntable import clip as turntable
+
 from gsac.pipeline.commands.demo import truth_clip
 from gsac.pipeline.commands.view import address, find_page, serve
-from gsac.pipeline.events import PlainReporter
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
-from gsac.stages.export.page import page_bytes
-
-spec = importlib.util.spec_from_file_location("export_helpers", Path(__file__).parents[1] / "stages" / "export" / "conftest.py")
-export = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(export)
+from gsac.turntable import clip as turntable
+from gsac.viewer.page import page_bytes
+from support.figure import make_figure
 
 
 @pytest.fixture
@@ -47,7 +43,7 @@ def test_the_page_is_found_from_the_run_from_its_export_and_from_a_file_beside_i
 
 
 def test_an_avatar_file_that_lies_alone_gets_a_page_and_a_damaged_one_is_named(tmp_path):
-    whole = export.make_figure().to_bytes()
+    whole = make_figure().to_bytes()
     (tmp_path / "me.gsac").write_bytes(whole)
     (tmp_path / "spare").mkdir()
     page = find_page(tmp_path / "me.gsac", tmp_path / "spare")

@@ -7,10 +7,11 @@ import sys
 import zipfile
 
 import pytest
+
 from gsac.pipeline.project import shipped_dag
 
 ROOT = shipped_dag().parent
-TOPS = ("pipeline", "stages", "cache", "avatar", "benchmarks")
+TOPS = tuple(sorted(link.name for link in (ROOT / "src" / "gsac").iterdir()))
 NOT_SHIPPED = {"__pycache__"}
 
 pytestmark = pytest.mark.slow
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     source = tmp_path_factory.mktemp("source")
-    for name in (*TOPS, "pyproject.toml", "README.md", "dvc.yaml"):
+    for name in (*TOPS, "src", "pyproject.toml", "README.md", "dvc.yaml"):
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, source / name, symlinks=True, ignore=shutil.ignore_patterns(*NOT_SHIPPED))
         else:

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+
 from gsac.cache.publish import STEPS
 
 pytestmark = pytest.mark.slow

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.body import Body
 from gsac.avatar.facemesh import IBUG68
 from gsac.stages.face.actions import Actions

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages import export, smplx, train
 from gsac.stages.contract import BadInput, Job, make_config
-from gsac.stages.export.rigged import RiggedAvatar
 from gsac.stages.export.stage import run as run_export
 from gsac.stages.smplx.stage import run as run_smplx
 from gsac.stages.train.stage import run as run_train

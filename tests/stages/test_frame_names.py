@@ -1,4 +1,5 @@
 import numpy as np
+
 from gsac.stages.frame_names import name_frames
 
 

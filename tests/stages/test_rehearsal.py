@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
-from gsac.stages.smplx.rehearsal import written
+from gsac.stages.smplx.warmup import written
 
 CHILD = """
 import importlib, json, sys

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+
 from gsac.avatar import binding, raster
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians

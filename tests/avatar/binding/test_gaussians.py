@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from gsac.avatar import artifacts, binding
 from gsac.avatar.gaussians import Gaussians
 

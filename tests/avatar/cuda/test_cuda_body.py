@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from gsac.avatar.cuda import why_not
 
 pytestmark = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
@@ -16,8 +17,8 @@ def both():
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import figure, start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.cuda import body_arrays, recipe_of
-    from gsac.stages.train.poses import Poses
+    from gsac.stages.train.fast.cuda import body_arrays, recipe_of
+    from gsac.stages.train.poses.poses import Poses
 
     opened = []
 
@@ -69,7 +70,7 @@ def test_expression_and_joints_take_the_vertices_gradient_as_on_the_cpu(both, ba
 
 def test_a_training_follows_the_cpus(both):
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train.fast import Trainer
+    from gsac.stages.train.fast.trainer import Trainer
     from gsac.stages.train.views import View
 
     trainer, task, made, gaussians = both(steps=24)

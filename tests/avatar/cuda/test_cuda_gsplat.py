@@ -4,6 +4,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+
 from gsac.avatar.cuda import why_not
 
 pytestmark = [
@@ -19,7 +20,7 @@ def test_image_loss_and_gradients_are_those_of_gsplat(size, count):
     from gsac.benchmarks.gpu.check import LIMIT, PER_GAUSSIAN, SWAPS, cuda_step, relative
     from gsac.benchmarks.gpu.figure import figure, start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import recipe_of
 
     made = figure(3, *size, 3000)
     gaussians, recipe = start(made.body, count), recipe_of(TrainConfig(sobel=0.1), count, steps=1, offset_rate=0.0)

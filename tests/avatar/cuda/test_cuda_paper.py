@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from gsac.avatar.cuda import why_not
 
 pytestmark = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
@@ -21,7 +22,7 @@ def task_of(figure, **values):
     """The figure's frames as a stage's task; betas off zero."""
     from gsac.avatar.body import Body, BodyParams
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.poses import Poses
+    from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.task import Task
     from gsac.stages.train.views import View
 
@@ -40,8 +41,9 @@ def trainers(figure):
     """trainers(batch, steps): the same start in a PaperTrainer and in the CPU's Trainer, and the CPU's views."""
     from gsac.avatar.cuda.paper import PaperTrainer
     from gsac.avatar.gaussians import Gaussians
-    from gsac.stages.train import paper, paper_cuda
-    from gsac.stages.train.cuda import training
+    from gsac.stages.train.fast.cuda import training
+    from gsac.stages.train.paper import cuda as paper_cuda
+    from gsac.stages.train.paper import trainer
     from gsac.stages.train.views import person_crop
 
     opened = []
@@ -49,7 +51,7 @@ def trainers(figure):
     def make(batch, steps):
         task, other = task_of(figure, steps=steps), task_of(figure, steps=steps)
         rng = np.random.default_rng(1)
-        cpu = paper.Trainer(other, rng)
+        cpu = trainer.Trainer(other, rng)
         shape = {name: v.shape for name, v in cpu.values.items()}
         cpu.values = {"mu": rng.normal(0, 0.1, shape["mu"]), "quat": rng.normal(size=shape["quat"]),
                       "scale": rng.normal(-1.5, 0.7, shape["scale"]), "rgb": rng.normal(0.5, 0.3, shape["rgb"])}
@@ -154,15 +156,16 @@ def test_forty_steps_follow_the_cpu_path(trainers):
 
 
 def test_a_whole_training_grows_and_ends_as_on_the_cpu_and_a_seed_gives_one_result(figure):
-    from gsac.stages.train import paper, paper_cuda
-    from gsac.stages.train.evaluate import judge
+    from gsac.stages.train.judge.heldout import judge
+    from gsac.stages.train.paper import cuda as paper_cuda
+    from gsac.stages.train.paper import trainer
 
     def quality(fit, task):
         rows = judge(fit.gaussians, task.poses, range(5), task.views)
         return 10 * np.log10(1 / np.mean([row["mse_fg"] for row in rows]))
 
     tasks = [task_of(figure, steps=340) for _ in range(3)]
-    ours, again, theirs = paper_cuda.fit(tasks[0]), paper_cuda.fit(tasks[1]), paper.fit(tasks[2])
+    ours, again, theirs = paper_cuda.fit(tasks[0]), paper_cuda.fit(tasks[1]), trainer.fit(tasks[2])
     assert len(ours.gaussians) > len(tasks[0].poses.body.faces)
     for name in ("face", "mu", "quat", "log_scale", "rgb", "opacity"):
         np.testing.assert_array_equal(getattr(ours.gaussians, name), getattr(again.gaussians, name))

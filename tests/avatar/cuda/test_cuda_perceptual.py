@@ -4,6 +4,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+
 from gsac.avatar.cuda import why_not
 
 pytestmark = [pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")]
@@ -34,7 +35,7 @@ def trainer_of(figure, network, **more):
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import recipe_of
 
     recipe = recipe_of(TrainConfig(), 4000, **({"offset_rate": 0.0, "frame_size": FRAME, "perceptual": WEIGHT} | more))
     shots = [shot._replace(corner=CORNER) for shot in figure.shots]
@@ -43,7 +44,7 @@ def trainer_of(figure, network, **more):
 
 def test_the_window_is_the_cpus_and_its_slope_and_value_come_into_gradient_and_loss(figure, network):
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train.paper_losses import perceptual
+    from gsac.stages.train.paper.losses import perceptual
 
     found = []
     for steps in (1, 0):
@@ -119,6 +120,7 @@ def through_features_of(window, network, images, monkeypatch):
 def test_value_and_slope_are_those_of_the_cpus_network_the_slope_through_the_same_features(network, precision, values, slopes,
                                                                                            monkeypatch):
     import torch
+
     from gsac.avatar.cuda.device import Device
     from gsac.avatar.cuda.perceptual import Window
     from gsac.benchmarks.gpu.check import relative

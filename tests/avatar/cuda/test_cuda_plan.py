@@ -7,7 +7,8 @@ import sys
 
 import numpy as np
 import pytest
-from gsac.avatar.cuda import lists, scene, why_not
+
+from gsac.avatar.cuda import adjacency, structs, why_not
 from gsac.avatar.cuda.recipe import Recipe, draw
 
 
@@ -30,14 +31,14 @@ def test_structs_are_laid_out_alike_for_host_and_kernels(tmp_path):
     if compiler is None:
         pytest.skip("no gcc here: the structs' layout is not compiled")
     sizes = ", ".join(f"sizeof({name})" for name in ("Frame", "Plan", "State", "Scene"))
-    text = scene.declarations() + f"\n#include <cstddef>\nextern \"C\" void sizes(int *out) {{ int all[] = {{{sizes}, " \
+    text = structs.declarations() + f"\n#include <cstddef>\nextern \"C\" void sizes(int *out) {{ int all[] = {{{sizes}, " \
         "(int)offsetof(Scene, ssim), (int)offsetof(Frame, fx)}; for (int i = 0; i < 6; ++i) out[i] = all[i]; }"
     (tmp_path / "sizes.cpp").write_text(text)
     subprocess.run([compiler, "-shared", "-fPIC", "-o", tmp_path / "sizes.so", tmp_path / "sizes.cpp"], check=True)
     out = (ctypes.c_int * 6)()
     ctypes.CDLL(str(tmp_path / "sizes.so")).sizes(out)
-    assert list(out) == [*(ctypes.sizeof(getattr(scene, name)) for name in ("Frame", "Plan", "State", "Scene")),
-                         scene.Scene.ssim.offset, scene.Frame.fx.offset]
+    assert list(out) == [*(ctypes.sizeof(getattr(structs, name)) for name in ("Frame", "Plan", "State", "Scene")),
+                         structs.Scene.ssim.offset, structs.Frame.fx.offset]
 
 
 def test_the_plan_draws_what_the_cpu_recipe_draws():
@@ -100,16 +101,16 @@ def test_a_step_never_holds_a_frame_twice():
 def test_lists_hold_every_corner_weight_and_child_once():
     random = np.random.default_rng(0)
     faces, face = random.integers(0, 9, (20, 3)), random.integers(0, 20, 50)
-    start, item = lists.vertices_of(faces, face, 9)
+    start, item = adjacency.vertices_of(faces, face, 9)
     assert sorted(item) == list(range(150))
     for v in range(9):
         mine = item[start[v]:start[v + 1]]
         assert (faces[face].reshape(-1)[mine] == v).all() and (np.diff(mine) > 0).all()
     index, weight = random.integers(0, 5, (30, 4)), random.random((30, 4)) * (random.random((30, 4)) > 0.3)
-    start, vertex, kept = lists.joints_of(index, weight, 5)
+    start, vertex, kept = adjacency.joints_of(index, weight, 5)
     for j in range(5):
         np.testing.assert_allclose(kept[start[j]:start[j + 1]].sum(), weight[index == j].sum())
     assert start[-1] == (weight != 0).sum() and len(vertex) == start[-1]
-    start, child = lists.children(np.array([-1, 0, 0, 1, 3]))
+    start, child = adjacency.children(np.array([-1, 0, 0, 1, 3]))
     assert [list(child[start[j]:start[j + 1]]) for j in range(5)] == [[1, 2], [3], [], [4], []]
-    assert list(lists.joint_levels(np.array([-1, 0, 0, 1, 3]))) == [0, 1, 1, 2, 3]
+    assert list(adjacency.joint_levels(np.array([-1, 0, 0, 1, 3]))) == [0, 1, 1, 2, 3]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gsac.avatar.cuda import why_not
 
 pytestmark = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
@@ -26,10 +27,10 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     from gsac.benchmarks.gpu.check import relative
     from gsac.benchmarks.gpu.figure import start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.cuda import recipe_of
-    from gsac.stages.train.fast import GAIN_RATE, OFFSET_SHARE, Trainer
-    from gsac.stages.train.offsets import fold
-    from gsac.stages.train.poses import Poses
+    from gsac.stages.train.fast.cuda import recipe_of
+    from gsac.stages.train.fast.trainer import GAIN_RATE, OFFSET_SHARE, Trainer
+    from gsac.stages.train.gaussians.cloth_offsets import fold
+    from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.views import View
 
     still = replace(figure, pose=figure.pose.copy())
@@ -77,8 +78,9 @@ def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_s
     from gsac.avatar.body import Body, BodyParams
     from gsac.benchmarks.gpu.check import relative
     from gsac.benchmarks.gpu.figure import start
-    from gsac.stages.train import cuda, evaluate
-    from gsac.stages.train.poses import Poses
+    from gsac.stages.train.fast import cuda
+    from gsac.stages.train.judge import heldout
+    from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.views import View
 
     body, camera = Body.load(), figure.shots[0].camera
@@ -88,7 +90,7 @@ def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_s
                                   camera.focal, camera.center)
     views, gaussians, moved = [View(camera, shot.pixels, (0, 0)) for shot in figure.shots], start(figure.body, 3000), []
     gaussians.log_scale[:, 0] += 3  # beyond recipe fast's limits, which must not touch a finished avatar
-    for align in (cuda.align_poses, evaluate.align_poses):
+    for align in (cuda.align_poses, heldout.align_poses):
         poses = Poses(body, params)
         align(gaussians, poses, np.array([0, 1, 3]), views, 15)
         assert (poses.pose[2] == poses.fit_pose[2]).all() and (poses.transl[2] == poses.fit_transl[2]).all()
@@ -102,7 +104,7 @@ def turning(holdout=(), size=(101, 67), **values):
     from gsac.avatar.body import Body, BodyParams
     from gsac.benchmarks.gpu.figure import figure
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.poses import Poses
+    from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.task import Task
     from gsac.stages.train.views import View
 
@@ -117,20 +119,21 @@ def turning(holdout=(), size=(101, 67), **values):
 
 def test_rounds_that_move_the_poses_end_as_with_the_cpus_learning():
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train import bundle, cuda
+    from gsac.stages.train.fast import cuda, prealign
 
     found = []
-    for learning in (cuda.learning, bundle.learning_on_cpu):
+    for learning in (cuda.learning, prealign.learning_on_cpu):
         task = turning((2, 7), pose_rounds=4)
-        bundle.adjust(task, learning)
+        prealign.adjust(task, learning)
         found.append((task.poses.pose - task.poses.fit_pose, task.poses.transl - task.poses.fit_transl, task.poses.offset))
     for got, expected in zip(*found, strict=True):
         assert np.linalg.norm(expected) > 1e-3 and relative(got, expected) < 0.1
 
 
 def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_cpus():
-    from gsac.stages.train import cuda, fast
-    from gsac.stages.train.evaluate import judge
+    from gsac.stages.train.fast import cuda
+    from gsac.stages.train.fast import trainer as fast
+    from gsac.stages.train.judge.heldout import judge
 
     found = []
     for train in (cuda.train, fast.train):
@@ -149,8 +152,9 @@ def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_
 
 def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu():
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train import cuda, fast
-    from gsac.stages.train.evaluate import judge
+    from gsac.stages.train.fast import cuda
+    from gsac.stages.train.fast import trainer as fast
+    from gsac.stages.train.judge.heldout import judge
 
     found = []
     for train in (cuda.train, fast.train):

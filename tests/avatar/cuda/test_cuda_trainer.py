@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gsac.avatar.cuda import why_not
 
 pytestmark = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
@@ -11,7 +12,7 @@ LIGHT = np.float32([[0.7, 0.8, 0.7], [0.5, 0.3, 0.3], [-0.2, 0, 0.1], [0.3, 0.2,
 def fast(count=12000, **more):
     """Recipe `fast` without the displaced surface."""
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import recipe_of
 
     return recipe_of(TrainConfig(), count, **({"offset_rate": 0.0} | more))
 
@@ -115,7 +116,7 @@ def test_offsets_are_those_of_the_cpu_recipe(figure):
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.check import relative
     from gsac.benchmarks.gpu.figure import start
-    from gsac.stages.train.offsets import Offsets
+    from gsac.stages.train.gaussians.cloth_offsets import Offsets
 
     body = figure.body
     offsets = Offsets(SimpleNamespace(faces=body.faces, v_template=body.rest[0], skin_index=body.skin_index,

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar import binding, light, skinning
 from gsac.avatar.camera import Camera
 from gsac.avatar.raster import render, render_backward
-from gsac.stages.train import kernels
-from gsac.stages.train.densify import LARGEST
-from gsac.stages.train.neighbours import K, Neighbours
-from gsac.stages.train.paper_losses import WINDOW, dice, perceptual, sobel_magnitude
+from gsac.stages.train.gaussians import kernels
+from gsac.stages.train.paper.densify import LARGEST
+from gsac.stages.train.paper.knn import K, Neighbours
+from gsac.stages.train.paper.losses import WINDOW, dice, perceptual, sobel_magnitude
 
 HERE = Path(__file__).parent
 SOURCES = Path(binding.__file__).parent / "cuda"
@@ -203,7 +204,7 @@ def test_the_window_that_lpips_sees_is_that_of_the_cpu_path(host):
 
 def test_a_step_of_the_joints_at_rest_is_that_of_the_cpu_path(host):
     from gsac.avatar.body import Body, BodyParams
-    from gsac.stages.train.poses import JOINT, Poses
+    from gsac.stages.train.poses.poses import JOINT, Poses
 
     body, rng = Body.load(), np.random.default_rng(8)
     poses = Poses(body, BodyParams.from_pose(np.zeros((1, 55, 3)), np.zeros((1, 3)), np.zeros(4),

@@ -1,14 +1,15 @@
 """The series that stand for the CPU's solves of the displaced surface."""
 
 import numpy as np
+from scipy.sparse import csr_matrix, diags
+
 from gsac.avatar.body import Body
 from gsac.avatar.cuda.smoothing import series
-from gsac.stages.train.offsets import SMOOTHNESS, Offsets
-from scipy.sparse import csr_matrix, diags
+from gsac.stages.train.gaussians.cloth_offsets import SMOOTHNESS, Offsets
 
 
 def test_the_series_are_the_smoothing_once_and_twice_over():
-    from gsac.avatar.cuda.lists import neighbours
+    from gsac.avatar.cuda.adjacency import neighbours
 
     body = Body.load()
     count, solve = len(body.v_template), Offsets(body).solve

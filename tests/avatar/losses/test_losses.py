@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from gsac.avatar import losses
 from torch.nn import functional
+
+from gsac.avatar import losses
 
 
 def mean(map_, weights):

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from gsac.avatar.motion.amass import read_amass
 from gsac.avatar.motion.files import read_motion
 from gsac.avatar.motion.source import Motion, MotionError
-from scipy.spatial.transform import Rotation
 
 
 def z_up(motion, skeleton):

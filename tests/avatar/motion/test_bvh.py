@@ -1,18 +1,14 @@
-import importlib.util
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-from gsac.avatar.motion.bvh import MAX_BYTES, parse_bvh, read_bvh
-from gsac.avatar.motion.source import MotionError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-spec = importlib.util.spec_from_file_location("motion_helpers", Path(__file__).with_name("conftest.py"))
-helpers = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(helpers)
+from gsac.avatar.motion.bvh import MAX_BYTES, parse_bvh, read_bvh
+from gsac.avatar.motion.source import MotionError
+from support import dances
 
 SMALL = """HIERARCHY
 ROOT Hips
@@ -103,6 +99,6 @@ def test_a_skeleton_without_end_and_a_huge_file_are_refused_at_once(tmp_path):
 
 
 def test_what_another_tool_writes_is_the_motion_again(skeleton, dance):
-    source = parse_bvh(helpers.bvh_text(skeleton, dance, unit=100, order="YXZ"))
+    source = parse_bvh(dances.bvh_text(skeleton, dance, unit=100, order="YXZ"))
     order = [source.names.index(name) for name in skeleton.names]
     np.testing.assert_allclose(source.places[:, order] / 100, skeleton.posed(dance.rotation, dance.transl), atol=1e-6)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from gsac.avatar.camera import Camera
 from scipy.spatial.transform import Rotation
+
+from gsac.avatar.camera import Camera
 
 
 @dataclass
@@ -21,6 +22,7 @@ class Scene:
     def reference(self):
         """rgb, alpha and the five gradients by torch autograd in float64."""
         import torch
+
         from gsac.avatar.raster import reference
 
         tensors = [torch.tensor(a, requires_grad=True) for a in self.arguments]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from gsac.avatar import kernel
 from gsac.avatar.raster import forward
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from gsac.avatar import raster
 
 SCENES = [  # gaussians, width, height, seed, size, opacity

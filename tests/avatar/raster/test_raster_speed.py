@@ -8,9 +8,10 @@ import re
 import numba
 import numpy as np
 import pytest
+from llvmlite import binding as llvm
+
 from gsac.avatar import raster
 from gsac.avatar.raster import backward, forward, project
-from llvmlite import binding as llvm
 
 pytestmark = [
     pytest.mark.slow,

@@ -7,7 +7,8 @@ import sys
 
 import numpy as np
 import pytest
-from gsac.avatar.workspace import Workspace
+
+from gsac.avatar.threads import Workspace
 
 
 def mark(worker, workers, out):

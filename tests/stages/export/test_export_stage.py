@@ -6,15 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import write_arrays
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.cache.code import code_parts
 from gsac.stages.contract import BadInput, Job, make_config
-from gsac.stages.export import STAGE, page
+from gsac.stages.export import STAGE
 from gsac.stages.export.config import ExportConfig
-from gsac.stages.export.rigged import RiggedAvatar
 from gsac.stages.export.stage import rigged, run
+from gsac.viewer import page
 
 
 def test_every_declared_output_is_there_and_passes_its_check(exported):
@@ -102,8 +104,8 @@ def test_gaussians_that_lie_on_no_face_are_refused_and_said(person, tmp_path, fa
 
 
 def test_an_edit_of_any_viewer_file_counts_as_an_edit_of_the_stage():
-    named = {name.rsplit("/", 2)[-1] for name in code_parts("gsac.stages.export.stage") if "/viewer/" in name}
-    there = {path.name for path in (Path(page.__file__).parent / "viewer").iterdir()}
+    named = {name.partition("/")[2] for name in code_parts("gsac.stages.export.stage") if name.startswith("gsac.viewer.page/")}
+    there = {path.name for path in Path(page.__file__).parent.iterdir() if path.is_file() and path.suffix != ".py"}
     assert named == there - {"page.hlsl"}, "page.hlsl reaches the page through shaders.js"
 
 

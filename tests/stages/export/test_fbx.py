@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.stage import posed_gaussians
 

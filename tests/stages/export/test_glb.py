@@ -8,10 +8,11 @@ import subprocess
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
+
 from gsac.avatar.binding import bind, face_frames
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.stage import posed_gaussians
-from scipy.spatial.transform import Rotation
 
 VALIDATOR = "gltf-validator@2.0.0-dev.3.10"
 KNOWN_FALSE = {f"/meshes/1/primitives/0/attributes/KHR_gaussian_splatting:{n}"

@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
+
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.config import ExportConfig
 from gsac.stages.export.levels import MEMBERS, coarser
-from gsac.stages.export.rigged import RiggedAvatar
 from gsac.stages.export.stage import run
 
 TALL = 120

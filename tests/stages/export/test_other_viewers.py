@@ -5,10 +5,11 @@ import shutil
 
 import numpy as np
 import pytest
+
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.benchmarks.viewer.bench import CAMERA, PACKAGE, PAGE, pages
 from gsac.benchmarks.viewer.race import served
-from gsac.stages.export.rigged import RiggedAvatar
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]

@@ -4,11 +4,12 @@ import io
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from gsac.avatar.camera import Camera
 from gsac.avatar.raster import render
 from gsac.stages.export.ply import SH0, ply_bytes
 from gsac.stages.export.stage import posed_gaussians
-from scipy.spatial.transform import Rotation
 
 FLIP = np.array([1, -1, -1])
 

@@ -5,11 +5,12 @@ import subprocess
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
 from gsac.stages.export.ply import SH0, ply_bytes
 from gsac.stages.export.spz import smallest_three, spz_bytes
 from gsac.stages.export.stage import posed_gaussians
-from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 SPLAT_TRANSFORM = "@playcanvas/splat-transform@2.7.1"
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from gsac.avatar.body import Body
 from gsac.avatar.facemesh import IBUG68
 from gsac.stages.contract import BadInput

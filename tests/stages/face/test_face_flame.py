@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gsac.avatar import rotation
 from gsac.avatar.flame_file import read_flame, read_flame_points
 from gsac.stages.contract import BadInput, Job

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.face.actions import Actions

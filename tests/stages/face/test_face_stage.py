@@ -3,9 +3,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, read_arrays, write_arrays
 from gsac.avatar.body import Body
-from gsac.avatar.models import ModelMissingError, model_path
+from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.benchmarks.perception import run_face, run_keypoints, score_expression, video_frames, write_split
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face import STAGE

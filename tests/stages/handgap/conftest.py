@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, check_filled_keypoints, read_arrays, write_arrays
 from gsac.avatar.wholebody import ARM, HANDS, INDEX
 from gsac.stages.contract import Job

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gsac.benchmarks.handgap.clips import turning_body
 from gsac.benchmarks.handgap.failures import detection
 from gsac.benchmarks.handgap.gaps import measure, summary

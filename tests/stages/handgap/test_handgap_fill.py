@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+
 from gsac.avatar.wholebody import ARM, HANDS, PALM
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.handgap import STAGE
 from gsac.stages.handgap.config import METHODS as NAMES
 from gsac.stages.handgap.fill import fill_gaps
-from gsac.stages.handgap.find import Found
+from gsac.stages.handgap.missing_hands import Found
 from gsac.stages.handgap.segments import METHODS, carried
 
 SEGMENTWISE = ("paper", "hermite", "gp")

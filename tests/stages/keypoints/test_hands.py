@@ -2,6 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+
 from gsac.avatar.region import Region
 from gsac.stages.keypoints.hands import Arm, Hand, assign, distinct, merged, rough_region, same_hand
 

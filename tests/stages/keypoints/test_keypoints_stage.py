@@ -4,14 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, read_arrays
-from gsac.avatar.models import ModelMissingError, model_path
+from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.benchmarks.perception import run_keypoints, run_stage, score_squats, score_truth, video_frames, write_split
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.keypoints import STAGE
 from gsac.stages.keypoints.config import KeypointsConfig
-from gsac.stages.keypoints.frame import Frame
+from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.stage import run, say, touches_edge
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"

@@ -2,10 +2,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
-from gsac.stages.keypoints.frame import Frame
+from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.simcc import SimccNetwork, crop_matrix, decode, drop_doubled_hand
 
 BRIGHTEST = Path(__file__).resolve().parents[2] / "fixtures" / "keypoints" / "brightest.onnx"

@@ -6,8 +6,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, frame_paths, read_alpha, write_arrays, write_frame
-from gsac.avatar.models import ModelMissingError, model_path
+from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.stages.contract import Job, StageError
 from gsac.stages.segment import stage
 from gsac.stages.segment.config import SegmentConfig

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image, ImageCms
+
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.stage import run
-from PIL import Image, ImageCms
 
 ORIENTATION, FOCAL_35MM, EXIF_IFD = 0x0112, 0xA405, 0x8769
 

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from gsac.avatar.artifacts import ArtifactError, Clip
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.split import STAGE
 from gsac.stages.split.check import check_clip
 from gsac.stages.split.pick import fitted_size, pick_by_time
-from hypothesis import given
-from hypothesis import strategies as st
 
 steps = st.lists(st.floats(1e-3, 0.5), min_size=0, max_size=60)
 

@@ -9,6 +9,7 @@ import cv2
 import imageio_ffmpeg
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.split.config import SplitConfig

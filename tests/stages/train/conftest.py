@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+
 from gsac.avatar.artifacts import Clip, write_alpha, write_frame
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams

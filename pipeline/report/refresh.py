@@ -1,0 +1,51 @@
+"""When report.html is written: after a run that changed something, or where it is missing."""
+
+from __future__ import annotations
+
+import contextlib
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.run_folder import REPORT
+
+if TYPE_CHECKING:
+    from gsac.pipeline.run import StageResult
+    from gsac.pipeline.run_folder import RunFolder
+
+
+class Early:
+    """Sections of the report that are drawn while the last stage is at work."""
+
+    def __init__(self, workspace: RunFolder):
+        self.workspace, self._pool, self._drawn = workspace, ThreadPoolExecutor(1), None
+
+    def begin(self, running: str) -> None:
+        """running: the last stage."""
+        self._drawn = self._pool.submit(self._draw, running)
+
+    def _draw(self, running: str) -> dict[str, Any]:
+        from gsac.pipeline.report.page import draw_sections
+
+        return draw_sections(self.workspace.root, running)
+
+    def sections(self) -> dict[str, Any]:
+        """By name; what is not among them is still to be drawn."""
+        with contextlib.suppress(Exception):
+            return self._drawn.result() if self._drawn else {}
+        return {}
+
+
+def refresh_report(workspace: RunFolder, results: list[StageResult], early: Early | None = None) -> str | None:
+    """Writes the report if it is due. A report that fails does not spoil a run: the answer is a warning then."""
+    page = workspace.root / REPORT
+    if page.exists() and all(result.outcome is Outcome.CACHED for result in results):
+        return None
+    try:
+        from gsac.pipeline.report.page import write_report
+
+        write_report(workspace.root, early.sections() if early else None)
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}"
+        return f"{page} could not be written ({why}); `gsac report {workspace.root}` tries again"
+    return None

@@ -1,0 +1,169 @@
+"""The folder of one clip: dvc.yaml, params.yaml, `clip`, and the outputs of every stage as links into the store.
+
+    clip  dvc.yaml  params.yaml  dvc.lock
+    <stage>/<output>        link into the store (a copy where links cannot be made)
+    logs/<stage>.log        what the stage printed
+    run.json  metrics.json  report.html
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.digest import tree_digest
+from gsac.cache.record import Record
+from gsac.cache.store import Store
+from gsac.pipeline.graph import CLIP, Graph
+from gsac.pipeline.params import to_yaml
+from gsac.pipeline.project import Project
+from gsac.stages.contract import BadInput
+
+DAG, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "params.yaml", "run.json", "metrics.json", "report.html"
+LOGS = "logs"
+
+OWN_STORE = ".store"
+"""Where results lie if the cache cannot be written."""
+
+
+class Workspace:
+    """Paths of one clip's folder."""
+
+    def __init__(self, root: Path):
+        self.root = Path(root).absolute()
+
+    @classmethod
+    def around(cls, start: Path) -> Workspace:
+        """The nearest folder with a dvc.yaml, from `start` upwards."""
+        start = Path(start).absolute()
+        for folder in (start, *start.parents):
+            if (folder / DAG).is_file():
+                return cls(folder)
+        raise BadInput(f"{start} is not in the output folder of a run: no {DAG} here or above; "
+                       "give the folder, or `gsac run` first")
+
+    @property
+    def clip(self) -> Path:
+        return self.root / CLIP
+
+    @property
+    def params(self) -> Path | None:
+        """params.yaml, None without one."""
+        path = self.root / PARAMS
+        return path if path.is_file() else None
+
+    def project(self, at_hand: Project) -> Project:
+        """The stages at hand, joined as this folder's dvc.yaml says."""
+        return Project(at_hand.package, self.root / DAG)
+
+    def path(self, port: str) -> Path:
+        return self.root / port
+
+    def require_clip(self) -> Path:
+        """The source clip, links followed."""
+        if not self.clip.exists():
+            dead = f" (a link to {os.readlink(self.clip)}, which is gone)" if self.clip.is_symlink() else ""
+            raise BadInput(f"{self.clip}: no clip here{dead}; `gsac run CLIP --out {self.root}` puts it there")
+        return self.clip.resolve()
+
+    def digest(self, port: str, store: Store) -> str:
+        """Tree digest of what lies at a port. BadInput where there is nothing."""
+        if port == CLIP:
+            self.require_clip()
+        path = self.path(port)
+        if not path.exists():
+            maker = port.partition("/")[0]
+            raise BadInput(f"{path} is missing; run `gsac stage {maker}` or `gsac run` first")
+        return tree_digest(path.resolve(), store.memo)[0]
+
+    def prepare(self, clip: Path, project: Project, configs: dict[str, Any]) -> None:
+        """Makes the folder a workspace for this clip and these parameters."""
+        self._refuse_foreign(project)
+        if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
+            raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
+                           "folder elsewhere")
+        self.root.mkdir(parents=True, exist_ok=True)
+        write_text(self.root / DAG, project.dag.read_text())
+        write_text(self.root / PARAMS, to_yaml(configs, notes=False))
+        if self.clip.is_symlink() or not self.clip.exists():
+            if not self.clip.is_symlink() or os.readlink(self.clip) != str(clip):
+                link(clip, self.clip)
+        elif not self.clip.samefile(clip):
+            raise BadInput(f"{self.clip} is there and is not a link; move it away or choose another --out")
+
+    def place(self, store: Store, record: Record) -> None:
+        """Shows a finished run's outputs in this folder."""
+        for output in record.outputs:
+            link(store.path(record, output), self.root / record.parts.stage / output)
+
+    def shows(self, store: Store, record: Record) -> bool:
+        """Whether the outputs in this folder are those of the record."""
+        return all(self._shows(store, record, output) for output in record.outputs)
+
+    def _shows(self, store: Store, record: Record, output: str) -> bool:
+        path = self.root / record.parts.stage / output
+        if path.is_symlink() and os.readlink(path) == str(store.path(record, output)):
+            return True
+        return path.exists() and tree_digest(path.resolve(), store.memo)[0] == record.outputs[output]
+
+    def _refuse_foreign(self, project: Project) -> None:
+        """Nobody's other dvc.yaml is written over."""
+        if self.root.exists() and not self.root.is_dir():
+            raise BadInput(f"{self.root} is a file; --out must be a folder")
+        if self.root == project.dag.parent:
+            raise BadInput(f"--out {self.root} is where gsac itself lies; choose another folder")
+        if (self.root / DAG).exists():
+            try:
+                Graph.load(self.root / DAG)
+            except BadInput as e:
+                raise BadInput(f"--out {self.root} holds another project's {DAG} ({e}); choose another folder") from e
+            return
+        for name in (*project.graph.steps, PARAMS, RUN, METRICS, REPORT, LOGS):
+            if os.path.lexists(self.root / name):
+                raise BadInput(f"--out {self.root} is not the folder of a run and holds {name}, which would be written "
+                               "over; choose another folder, or move it away")
+
+    def write_json(self, name: str, content: Any) -> None:
+        write_text(self.root / name, json.dumps(content, indent=1) + "\n")
+
+    def outputs(self, ports: Iterable[str]) -> dict[str, str]:
+        """Port -> absolute path, of those that are there."""
+        return {port: str(self.path(port)) for port in ports if self.path(port).exists()}
+
+
+def write_text(path: Path, text: str) -> None:
+    """Whole or not at all; an equal file is left as it is."""
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        if path.read_text() == text:
+            return
+    temp = path.with_name(f".{path.name}-{os.getpid()}")
+    try:
+        temp.write_text(text)
+        os.replace(temp, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            temp.unlink()
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def link(target: Path, path: Path) -> None:
+    """`path` becomes a link to `target`, a copy where the filesystem has no links; what was there goes."""
+    if path.is_symlink() and os.readlink(path) == str(target):
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temp = path.with_name(f".{path.name}-{os.getpid()}")
+    try:
+        temp.symlink_to(target)
+    except (OSError, NotImplementedError):
+        if target.is_dir():
+            shutil.copytree(target, temp, copy_function=shutil.copyfile)
+        else:
+            shutil.copyfile(target, temp)
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    os.replace(temp, path)

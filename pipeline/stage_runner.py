@@ -1,0 +1,182 @@
+"""One stage, once: from the cache if it is there, else computed in a process of its own, checked and published."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gsac.cache import objects
+from gsac.cache.errors import FULL, CacheError, CacheFullError
+from gsac.cache.key import KeyParts
+from gsac.cache.lease import single_flight
+from gsac.cache.record import Record, RunInfo
+from gsac.cache.store import Store
+from gsac.pipeline.child import Child, StageBugError, tail
+from gsac.pipeline.keys import Keys
+from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.params import plain
+from gsac.pipeline.plan import Verdict
+from gsac.pipeline.reporter import PlainReporter
+from gsac.stages.contract import BadInput, StageError
+
+METRICS_OUTPUT = "metrics.json"
+"""An output of this name is also kept in the action record."""
+LITTLE_ROOM = 16 << 20
+"""A stage that fails with fewer bytes than this left had no room: many libraries that write do not say so."""
+
+
+@dataclass
+class Ready:
+    """A process that has loaded a stage's code."""
+
+    code: dict[str, str]
+    """Digests of that code, before it was loaded."""
+    child: Child
+
+
+@dataclass
+class Actor:
+    """Does stages for one run; as a context, it ends what it has started."""
+
+    keys: Keys
+    store: Store
+    reporter: PlainReporter
+    logs: Path
+    """Folder for `<stage>.log`."""
+    begun: Callable[[], None] = lambda: None
+    """Called when a stage's process has its order: what can be done meanwhile."""
+    ready: dict[str, Ready] = field(default_factory=dict)
+    """By stage."""
+    done: list[Child] = field(default_factory=list)
+    """Processes that may still be leaving, which takes a while where they held much memory."""
+
+    def __enter__(self) -> Actor:
+        return self
+
+    def __exit__(self, *exc) -> None:
+        self._drop()
+        while self.done:
+            self.done.pop().close()
+
+    def prepare(self, *names: str) -> None:
+        """Starts a process for each stage that loads its code, to be there when the stage's inputs are; ends those of others."""
+        self._drop(keep=names)
+        for name in names:
+            if name not in self.ready:
+                with contextlib.suppress(CacheError, BadInput):  # it will be raised again when the stage's turn comes
+                    code = self.keys.code(name)
+                    self.ready[name] = Ready(code, self._child(name, self._log(name, ".next")))
+
+    def _drop(self, keep: tuple[str, ...] = ()) -> None:
+        for name in self.ready.keys() - set(keep):
+            child = self.ready.pop(name).child
+            child.close()
+            child.log.unlink(missing_ok=True)
+
+    def _child(self, name: str, log: Path) -> Child:
+        self.logs.mkdir(parents=True, exist_ok=True)
+        project, device = self.keys.project, self.keys.device_of(name) or self.keys.device
+        return Child(f"{project.package}.{name}", project.entry(name), device, log)
+
+    def _log(self, name: str, more: str = "") -> Path:
+        return self.logs / f"{name}.log{more}"
+
+    def _taken(self, parts: KeyParts) -> Child:
+        """A process for the stage: the one that is ready, if it has loaded the code that the key names, else a new one."""
+        name, log = parts.stage, self._log(parts.stage)
+        if name in self.ready and self.ready[name].code == parts.code:
+            child = self.ready.pop(name).child
+            child.rename_log(log)
+            return child
+        self._drop(keep=tuple(self.ready.keys() - {name}))
+        return self._child(name, log)
+
+    def act(self, verdict: Verdict, inputs: dict[str, Path], forced: bool = False,
+            still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
+        """inputs: port -> read-only path. `still_valid` runs before publishing; it raises if inputs changed.
+
+        Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
+        """
+        name, parts = verdict.stage, verdict.parts
+        with single_flight(self.store, parts.key(), lambda: self._waiting(name)) as there:
+            if there is not None and not forced:
+                return Outcome.CACHED, there
+            models = self.keys.models.need(parts.models, self.reporter.note)
+            self.reporter.starts(name, verdict.reason.value)
+            stage = self.keys.project.stage(name)
+            scratch = self.store.partial(parts.key())
+            if forced:
+                objects.remove(scratch)
+            with self.store.private(name) as folder:
+                try:
+                    info = self._compute(parts, inputs, models, folder, scratch)
+                except StageError as error:
+                    self._check_code(parts, error)
+                    raise
+                self._check_code(parts)
+                still_valid()
+                outputs = tuple(output.path for output in stage.outputs)
+                if METRICS_OUTPUT in outputs:
+                    info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
+                record = self.store.publish(parts, folder, outputs, info, replace=forced)
+            objects.remove(scratch)
+        self.reporter.ends(name, Outcome.RAN, info.seconds)
+        return Outcome.RAN, record
+
+    def _check_code(self, parts: KeyParts, because: StageError | None = None) -> None:
+        """StageError where the stage's code is no longer what the key names: what ran may be neither the old nor the new."""
+        now = self.keys.code(parts.stage)
+        edited = sorted(name for name in now.keys() | parts.code.keys() if now.get(name) != parts.code.get(name))
+        if edited:
+            more = f" and {len(edited) - 3} more" if len(edited) > 3 else ""
+            said = f"; meanwhile it failed: {because}" if because else ""
+            raise StageError(f"its code was edited while it ran ({', '.join(edited[:3])}{more}); run again{said}") from because
+
+    def _compute(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], folder: Path,
+                 scratch: Path) -> RunInfo:
+        name = parts.stage
+        now = datetime.datetime.now(datetime.UTC)
+        info = RunInfo(started=now.isoformat(timespec="seconds"), device=parts.device or self.keys.device)
+
+        def hear(event: dict[str, Any]) -> None:
+            if event["event"] == "progress":
+                self.reporter.progress(name, event["done"], event["total"], event["unit"])
+            else:
+                message = event["message"].removeprefix(f"{name}: ")  # the reporter names the stage
+                info.warnings.append(message)
+                self.reporter.warning(name, message)
+
+        order = {
+            "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
+            "scratch": str(scratch),
+            "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
+            "device": info.device,
+        }
+        try:
+            child = self._taken(parts)
+            self.done.append(child)
+            try:
+                child.order(order)
+                self.begun()
+                end = child.follow(hear)
+            except BaseException:
+                child.close()  # before the folder goes that it writes to
+                raise
+        except StageError as error:
+            if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
+                raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
+            if not isinstance(error, StageBugError):  # it would only come to the same end again
+                objects.remove(scratch)
+            raise
+        info.seconds, info.cpu_seconds, info.peak_rss_mb = end["seconds"], end["cpu_seconds"], end["peak_rss_mb"]
+        info.log_tail = tail(self._log(name))
+        return info
+
+    def _waiting(self, name: str) -> None:
+        self.reporter.note(f"{name}: another run computes the same result; waiting for it")

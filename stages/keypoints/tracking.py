@@ -1,0 +1,82 @@
+"""Whom to look at: one person, from frame to frame, and whether there is a second."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gsac.avatar.region import Region
+from gsac.avatar.threads import available
+from gsac.stages.keypoints.config import KeypointsConfig
+from gsac.stages.keypoints.detection import Frame
+from gsac.stages.keypoints.pose import Person, Pose, PoseNetworks
+
+SECOND_SCORE = 0.7
+"""A second person is reported when detector and landmark network together are this sure."""
+
+
+class Follower:
+    """Follows the largest and most central person at first, then the nearest to where it was.
+
+    models: name -> file, `pose_detection` and `pose_landmark_full`.
+    """
+
+    def __init__(self, models: dict[str, Path], config: KeypointsConfig):
+        self._least = config.person_threshold
+        self._pose = PoseNetworks(models, threads=max(1, min(4, available() // 4)))  # the other cores have other frames
+        self._last: Region | None = None
+
+    def look(self, image: np.ndarray, frame: Frame) -> Pose | None:
+        """image: (H, W, 3) uint8, the next frame. The followed person's pose, None when it is not seen; a second person
+        is written into the frame."""
+        persons = self._pose.persons(image, self._least)
+        pose = self._follow(image, persons)
+        if pose is not None:
+            self._last = pose.region
+            self._second(image, persons, pose, frame)
+        return pose
+
+    def _follow(self, image: np.ndarray, persons: list[Person]) -> Pose | None:
+        """The followed person's pose, which is anybody's after it was lost."""
+        if self._last is None:
+            order = sorted(persons, key=lambda p: -prominence(p.region, image.shape[1], image.shape[0]))
+        else:
+            last = self._last
+            order = sorted(persons, key=lambda p: apart(p.region, last))
+            if not order or apart(order[0].region, last) > 0.5:
+                # The detector may have missed the person whom the landmark network still sees where it was.
+                pose = self._pose.pose(image, last)
+                if pose.score >= self._least:
+                    return pose
+        for person in order:
+            pose = self._pose.pose(image, person.region)
+            if pose.score >= self._least:
+                return pose
+        return None
+
+    def _second(self, image: np.ndarray, persons: list[Person], pose: Pose, frame: Frame) -> None:
+        """Writes the surest person who is not the followed one."""
+        for person in persons:
+            if apart(person.region, pose.region) < 0.4:
+                continue
+            other = self._pose.pose(image, person.region)
+            score = min(person.score, other.score)
+            middles = [points[[11, 12, 23, 24]].mean(axis=0) for points in (other.points, pose.points)]
+            far = np.hypot(*(middles[0] - middles[1])) > 0.15 * min(other.region.side, pose.region.side)
+            if far and score >= SECOND_SCORE and score > frame.person2_score:
+                low, high = other.points.min(axis=0), other.points.max(axis=0)
+                frame.person2 = np.concatenate([low, high])
+                frame.person2_score = score
+
+
+def prominence(region: Region, width: int, height: int) -> float:
+    """Size in the frame, less what lies off the middle."""
+    off = np.hypot(region.center[0] / width - 0.5, region.center[1] / height - 0.5)
+    return region.side / max(width, height) * (1 - off)
+
+
+def apart(a: Region, b: Region) -> float:
+    """Distance of two persons' regions in sizes, plus how much their sizes differ."""
+    away = np.hypot(a.center[0] - b.center[0], a.center[1] - b.center[1]) / max(a.side, b.side)
+    return float(away + 0.5 * abs(np.log(a.side / b.side)))

@@ -1,0 +1,66 @@
+"""Where the fit begins: trunk turned onto the detector's 3D points, then placed so that its 2D points agree."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.avatar.wholebody import INDEX
+from gsac.stages.smplx.prior import MEAN
+
+TRUNK = [INDEX[n] for n in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
+TURNING = TRUNK + [INDEX[n] for n in ("nose", "left_ear", "right_ear")]
+UPRIGHT = np.diag([1.0, -1.0, -1.0])
+"""Canonical axes to the camera's for a person who stands and looks at it."""
+
+
+def start_rotations(frames: int, joints: int, joint_names: tuple[str, ...]) -> np.ndarray:
+    """(T, J, 3, 3) arms hanging, everything else at rest."""
+    local = np.tile(np.eye(3), (frames, joints, 1, 1))
+    for name, degrees in MEAN.items():
+        local[:, joint_names.index(name)] = rotation.exp(np.radians(np.array(degrees, float)))
+    return local
+
+
+def trunk_turn(rest: np.ndarray, world: np.ndarray, xy: np.ndarray, known: np.ndarray, focal: float,
+               center: np.ndarray) -> np.ndarray | None:
+    """Rotation (3, 3) of the body in one frame, or None where too little was seen.
+
+    rest: (133, 3) keypoints of the shaped body at the start pose; world: (133, 3) detector points, m, NaN where absent.
+    """
+    use = [i for i in TURNING if known[i] and np.isfinite(world[i]).all()]
+    if sum(i in TRUNK for i in use) >= 3:
+        weight = np.array([1.0 if i in TRUNK else 0.3 for i in use])
+        return rotation.align(rest[use], world[use], weight)
+    use = [i for i in range(23) if known[i] and np.isfinite(rest[i]).all()]
+    if len(use) < 5:
+        return None
+    intrinsics = np.array([[focal, 0, center[0]], [0, focal, center[1]], [0, 0, 1.0]])
+    ok, turn, _ = cv2.solvePnP(rest[use].astype(np.float64), xy[use].astype(np.float64), intrinsics, None, flags=cv2.SOLVEPNP_SQPNP)
+    return cv2.Rodrigues(turn)[0] if ok else None
+
+
+def place(points: np.ndarray, xy: np.ndarray, focal: float, center: np.ndarray) -> np.ndarray:
+    """Translation (3,) that brings turned points (P, 3) onto pixels (P, 2), by linear least squares."""
+    rows, want = [], []
+    for p, u in zip(points, (xy - center) / focal, strict=True):
+        for c in (0, 1):
+            row = np.zeros(3)
+            row[c], row[2] = 1, -u[c]
+            rows.append(row)
+            want.append(u[c] * p[2] - p[c])
+    return np.linalg.lstsq(np.array(rows), np.array(want), rcond=None)[0]
+
+
+def fill_gaps(turns: list[np.ndarray | None]) -> np.ndarray:
+    """(T, 3, 3): frames without a rotation take the one between their neighbours' (shortest way)."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    known = [i for i, r in enumerate(turns) if r is not None]
+    if not known:
+        return np.tile(UPRIGHT, (len(turns), 1, 1))
+    if len(known) == 1:
+        return np.tile(turns[known[0]], (len(turns), 1, 1))
+    slerp = Slerp(known, Rotation.from_matrix([turns[i] for i in known]))
+    return slerp(np.clip(np.arange(len(turns)), known[0], known[-1])).as_matrix()

@@ -1,0 +1,192 @@
+"""Body points and their exact derivatives, without skinning the whole mesh.
+
+A point is a weighted sum of skinned vertices. Grouped by joint k it is  x = sum_k G_k m_k + w_k t_k + transl,  where the
+moment m_k = sum_v a_v w_vk v is linear in the betas: a few 3-vectors a point instead of 13,718 vertices.
+T frames, J joints, A active joints, P points, M (point, joint) pairs, B betas. The shape unknowns are the betas and what
+`personal.py` adds to them, joints or points.
+A step turns joint j by R_j <- R_j exp(delta_j); then dx/ddelta_j = (G_j delta_j) x (the part of x carried by j, about j).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy import sparse
+
+from gsac.avatar.body import Body
+
+
+@dataclass
+class Pairs:
+    """P points as M (point, joint) pairs; the pairs of point p are `start[p]:start[p + 1]`."""
+
+    start: np.ndarray  # (P + 1,) int64
+    joint: np.ndarray  # (M,) int64
+    mass: np.ndarray  # (M,)
+    moment: np.ndarray  # (M, 3) at zero betas
+    moment_dirs: np.ndarray  # (M, 3, S) by the first S shape unknowns
+
+    @property
+    def count(self) -> int:
+        return len(self.start) - 1
+
+    def moments(self, shape: np.ndarray) -> np.ndarray:
+        """(M, 3) of a shape that may have more unknowns than move these points."""
+        return self.moment + self.moment_dirs @ shape[: self.moment_dirs.shape[2]]
+
+
+def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, moves: np.ndarray | None = None) -> Pairs:
+    """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m added in the axes of the heaviest joint;
+    moves: (P, 3, B + K) how these offsets move by the shape unknowns.
+
+    The points are the person's own: clothes do not move them.
+    """
+    matrix = matrix.tocsr()
+    moves = np.zeros((matrix.shape[0], 3, body.num_betas)) if moves is None else moves
+    start, joint, mass, moment, dirs, added = [0], [], [], [], [], []
+    for p in range(matrix.shape[0]):
+        span = slice(matrix.indptr[p], matrix.indptr[p + 1])
+        vertices, a = matrix.indices[span], matrix.data[span].astype(np.float64)
+        carried = a[:, None] * body.weights[vertices]  # (n, 55)
+        heaviest = np.abs(carried).sum(0).argmax()
+        for k in np.nonzero(np.abs(carried).sum(0) > 1e-4)[0]:
+            w = carried[:, k]
+            joint.append(k)
+            mass.append(w.sum())
+            moment.append(w @ body.v_template[vertices] + (offsets[p] if offsets is not None and k == heaviest else 0))
+            dirs.append(np.tensordot(w, body.shapedirs[vertices], 1))
+            added.append(moves[p] * (k == heaviest))
+        start.append(len(joint))
+    added = np.array(added).reshape(-1, *moves.shape[1:])
+    added[:, :, : body.num_figure] += np.array(dirs).reshape(-1, 3, body.num_betas)[:, :, : body.num_figure]
+    return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), added)
+
+
+def surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:
+    """Points on the surface: face (P,), bary (P, 3). Twelve pairs a point, some of no weight."""
+    vertices = body.faces[face]  # (P, 3)
+    w = bary[:, :, None] * body.skin_weight[vertices]  # (P, 3, 4)
+    mass = w.reshape(-1).astype(np.float64)
+    vertex = np.repeat(vertices.reshape(-1), 4)
+    return Pairs(np.arange(len(face) + 1) * 12, body.skin_index[vertices].reshape(-1).astype(np.int64), mass,
+                 mass[:, None] * body.v_template[vertex], mass[:, None, None] * body.shapedirs[vertex])
+
+
+class Skeleton:
+    """Joint chain of one body with the derivatives that the fit needs."""
+
+    def __init__(self, body: Body, active: np.ndarray, joint_moves: np.ndarray | None = None):
+        """joint_moves: (J, 3, K) how joints move by the shape unknowns after the betas."""
+        self.parents = np.asarray(body.parents, np.int64)
+        self.active = np.asarray(active, np.int64)  # (A,) joints that the fit may turn
+        self.rest = (body.J_regressor @ body.v_template).astype(np.float64)  # (J, 3)
+        self.rest_dirs = np.einsum("jv,vcb->jcb", body.J_regressor, body.shapedirs).astype(np.float64)
+        if joint_moves is not None:
+            self.rest_dirs = np.concatenate([self.rest_dirs, joint_moves], 2)
+        carries = np.eye(len(self.parents), dtype=bool)
+        for j, p in enumerate(self.parents):
+            if p >= 0:
+                carries[j] |= carries[p]
+        self.carries = carries[:, self.active]  # (J, A): whether turning the active joint moves what the joint carries
+
+    def pose(self, local: np.ndarray, shape: np.ndarray) -> Chain:
+        """local: (T, J, 3, 3) joint rotations. Returns the posed chain of every frame."""
+        shape = shape[: self.rest_dirs.shape[2]]
+        rest = self.rest + self.rest_dirs @ shape
+        world, place, dirs = local.copy(), np.empty((*local.shape[:2], 3)), np.empty((*local.shape[:2], 3, len(shape)))
+        place[:, 0], dirs[:, 0] = rest[0], self.rest_dirs[0]
+        for j, p in enumerate(self.parents[1:], 1):
+            world[:, j] = world[:, p] @ local[:, j]
+            place[:, j] = place[:, p] + world[:, p] @ (rest[j] - rest[p])
+            dirs[:, j] = dirs[:, p] + world[:, p] @ (self.rest_dirs[j] - self.rest_dirs[p])
+        shift = place - np.einsum("tjab,jb->tja", world, rest)
+        shift_dirs = dirs - np.einsum("tjab,jbc->tjac", world, self.rest_dirs)
+        return Chain(world, place, shift, shift_dirs)
+
+
+@dataclass
+class Chain:
+    """T posed skeletons."""
+
+    world: np.ndarray  # (T, J, 3, 3) joint to camera, rotations
+    place: np.ndarray  # (T, J, 3) joints, without transl
+    shift: np.ndarray  # (T, J, 3): skinned = world @ rest + shift
+    shift_dirs: np.ndarray  # (T, J, 3, S) by the first S shape unknowns
+
+    def frame(self, t: int) -> Chain:
+        """The chain of one frame alone."""
+        return Chain(self.world[t: t + 1], self.place[t: t + 1], self.shift[t: t + 1], self.shift_dirs[t: t + 1])
+
+
+def positions(chain: Chain, pairs: Pairs, shape: np.ndarray) -> np.ndarray:
+    """(T, P, 3) the same points in every frame, without transl."""
+    return _positions(pairs.start, pairs.joint, pairs.mass, pairs.moments(shape), chain.world, chain.shift)
+
+
+def pulled_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray, covectors: np.ndarray) -> np.ndarray:
+    """Rows of the Jacobian: how g . x moves with the unknowns of its frame, for R covectors g of every point.
+
+    covectors: (T, P, R, 3). Returns (T, P, R, 3 A + 3 + S): joint steps, transl, shape as far as it moves them.
+    """
+    moment = pairs.moments(shape)
+    size = max(pairs.moment_dirs.shape[2], chain.shift_dirs.shape[3])
+    rows = np.zeros((*covectors.shape[:3], 3 * len(skeleton.active) + 3 + size))
+    for t, g in enumerate(covectors):
+        _pulled_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
+                     chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries, g, rows[t])
+    return rows
+
+
+@njit(cache=True, nogil=True)
+def _positions(start, joint, mass, moment, world, shift):
+    x = np.zeros((len(world), len(start) - 1, 3))
+    for t in range(len(world)):
+        for p in range(x.shape[1]):
+            for m in range(start[p], start[p + 1]):
+                g, k = world[t, joint[m]], joint[m]
+                for c in range(3):
+                    x[t, p, c] += (g[c, 0] * moment[m, 0] + g[c, 1] * moment[m, 1] + g[c, 2] * moment[m, 2]
+                                   + mass[m] * shift[t, k, c])
+    return x
+
+
+@njit(cache=True, nogil=True)
+def _pulled_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors, rows):
+    points, joints, size = len(start) - 1, len(active), rows.shape[2] - 3 * len(active) - 3
+    own, shaped = moment_dirs.shape[2], shift_dirs.shape[2]
+    arm = np.zeros((joints, 3))
+    by_shape = np.zeros((3, size))
+    for p in range(points):
+        arm[:] = 0
+        by_shape[:] = 0
+        for m in range(start[p], start[p + 1]):
+            w = mass[m]
+            if w == 0.0:
+                continue
+            k = joint[m]
+            g = world[k]
+            for c in range(3):
+                part = g[c, 0] * moment[m, 0] + g[c, 1] * moment[m, 1] + g[c, 2] * moment[m, 2] + w * shift[k, c]
+                for a in range(joints):
+                    if carries[k, a]:
+                        arm[a, c] += part - w * place[active[a], c]
+                for b in range(own):
+                    by_shape[c, b] += (g[c, 0] * moment_dirs[m, 0, b] + g[c, 1] * moment_dirs[m, 1, b]
+                                       + g[c, 2] * moment_dirs[m, 2, b])
+                for b in range(shaped):
+                    by_shape[c, b] += w * shift_dirs[k, c, b]
+        for r in range(covectors.shape[1]):
+            v = covectors[p, r]
+            for a in range(joints):
+                x = arm[a, 1] * v[2] - arm[a, 2] * v[1]
+                y = arm[a, 2] * v[0] - arm[a, 0] * v[2]
+                z = arm[a, 0] * v[1] - arm[a, 1] * v[0]
+                g = world[active[a]]
+                for d in range(3):
+                    rows[p, r, 3 * a + d] = g[0, d] * x + g[1, d] * y + g[2, d] * z
+            for c in range(3):
+                rows[p, r, 3 * joints + c] = v[c]
+            for b in range(size):
+                rows[p, r, 3 * joints + 3 + b] = v[0] * by_shape[0, b] + v[1] * by_shape[1, b] + v[2] * by_shape[2, b]

@@ -1,0 +1,1 @@
+"""`smplx.method lm`: all frames at once by Levenberg-Marquardt."""

@@ -1,0 +1,124 @@
+"""What a clip keeps to: who turns before a camera stands upright and holds a pose.
+
+One view leaves open how far a body and its limbs lean along the line of sight; the views from the other sides show it. So every
+joint's turn has a mean over the clip, and so has the lean of the pelvis against the upright; both are unknowns of the clip, and
+its frames lie around them by spreads that are learned from the fit itself. Who moves is let go: legs and trunk together, with
+them or alone each arm.
+T frames, A active joints, the pelvis first; H = 3 A + 2 unknowns: lean x, one that rests, lean z; the other joints' rotation
+vectors; the upright as camera-frame slopes towards x and z.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.stages.smplx.lm.solver import System
+from gsac.stages.smplx.prior import pose_prior
+
+TRUNK, ARMS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15), ((13, 16, 18, 20), (14, 17, 19, 21))
+"""Joints that are held or let go together."""
+MOVERS = (1, 2, 4, 5, 16, 17, 18, 19)
+"""Joints by whose unrest that is decided."""
+UNREST = np.radians(15)
+"""Spread of a mover's turns, root mean square of its worst axis, at which what it belongs to is half let go; it fades fast."""
+USUAL, USUAL_LEAN = np.radians(4), np.radians(3)
+"""Spreads of joints and lean in people who hold a pose, before the clip has told."""
+USUAL_WEIGHT = 0.3
+"""How much they count against what the clip tells."""
+LEAN, PITCH, ROLL = np.radians((2, 4)), np.radians(10), np.radians(4)
+"""Spreads over clips: of the mean lean to the side and to the front, of the camera's pitch and roll."""
+FREE = 0.5
+"""Spread of the mean turn of a joint, rad, at least: frames know it better."""
+
+
+class Held:
+    """The term of one clip; without a say until `learn` was called."""
+
+    def __init__(self, active: np.ndarray):
+        self.active = np.asarray(active)
+        self.spread = np.full((len(active), 3), np.inf)  # rad
+        mean, spread = pose_prior(active)
+        mean[0], spread[0] = 0, (LEAN[0], 1, LEAN[1])
+        spread[1:] = np.maximum(spread[1:], FREE)
+        self.mean = np.concatenate([mean.ravel(), [0, 0]])  # (H,)
+        self.mean_spread = np.concatenate([spread.ravel(), [ROLL, PITCH]])  # (H,)
+
+    def residual(self, local: np.ndarray, vector: np.ndarray, held: np.ndarray) -> np.ndarray:
+        """local: (T, A, 3, 3); vector: (T, A, 3) its logarithm; held: (H,). Returns (T, A, 3), in spreads."""
+        return self._away(local, vector, held) / self.spread
+
+    def add(self, system: System, local: np.ndarray, vector: np.ndarray, held: np.ndarray, first: int) -> None:
+        """Adds the term to the normal equations; `first` is the place of `held` among the shared unknowns."""
+        if not np.isfinite(self.spread).any():
+            return
+        residual = self.residual(local, vector, held)
+        slope = rotation.log_derivative(vector)  # (T, A, 3, 3)
+        slope[:, 0] = _cross(local[:, 0].swapaxes(1, 2) @ upright(held)[0])
+        slope /= self.spread[:, :, None]
+        for i in range(len(self.active)):
+            rows, weight = slope[:, i], 1 / self.spread[i]
+            block, shared = slice(3 * i, 3 * i + 3), slice(first + 3 * i, first + 3 * i + 3)
+            system.band[:, block, block] += rows.swapaxes(1, 2) @ rows
+            system.gradient[:, block] += np.einsum("tab,ta->tb", rows, residual[:, i])
+            system.arrow[:, block, shared] -= rows.swapaxes(1, 2) * weight
+            system.shared[shared, shared] += len(vector) * np.diag(weight**2)
+            system.shared_gradient[shared] -= (residual[:, i] * weight).sum(0)
+        self._add_upright(system, local, held, residual[:, 0], slope[:, 0], first)
+
+    def _add_upright(self, system: System, local: np.ndarray, held: np.ndarray, residual: np.ndarray, rows: np.ndarray,
+                     first: int) -> None:
+        """How the lean (T, 3) moves with the upright. rows: (T, 3, 3) by the pelvis' turn."""
+        weight = 1 / self.spread[0]
+        by_up = local[:, 0].swapaxes(1, 2) @ upright(held)[1] * weight[:, None]  # (T, 3, 2)
+        lean, up = slice(first, first + 3), slice(first + len(held) - 2, first + len(held))
+        across = -(by_up * weight[:, None]).sum(0)  # (3, 2)
+        system.arrow[:, :3, up] += rows.swapaxes(1, 2) @ by_up
+        system.shared[lean, up] += across
+        system.shared[up, lean] += across.T
+        system.shared[up, up] += np.einsum("tab,tac->bc", by_up, by_up)
+        system.shared_gradient[up] += np.einsum("tab,ta->b", by_up, residual)
+
+    def learn(self, local: np.ndarray, held: np.ndarray) -> np.ndarray:
+        """Sets the spreads by what the frames show. Returns held (H,): the frames' means where there was none yet."""
+        vector = rotation.log(local)
+        if not np.isfinite(self.spread).any():
+            up = local[:, 0, :, 1].mean(0)
+            held = np.concatenate([vector.mean(0).ravel(), -up[[0, 2]] / min(up[1], -0.3)])
+            held[:3] = 0
+        unrest = np.sqrt(((vector - vector.mean(0)) ** 2).mean(0)).max(1)  # (A,)
+        spread = np.sqrt((USUAL_WEIGHT * USUAL**2 + (self._away(local, vector, held) ** 2).mean(0)) / (USUAL_WEIGHT + 1))
+        spread[0] = np.sqrt(spread[0] ** 2 + USUAL_WEIGHT * (USUAL_LEAN**2 - USUAL**2) / (USUAL_WEIGHT + 1))
+        spread[0, 1] = np.inf
+        trunk = self._calm(unrest, TRUNK)
+        for joints, calm in ((TRUNK, trunk), *((arm, trunk * self._calm(unrest, arm)) for arm in ARMS)):
+            spread[np.isin(self.active, joints)] *= 1 / np.sqrt(calm) if calm > 0.01 else np.inf
+        self.spread = spread
+        return held
+
+    def _calm(self, unrest: np.ndarray, joints: tuple[int, ...]) -> float:
+        """1 where the movers among the joints rest, 0 where they move. unrest: (A,) rad."""
+        worst = unrest[np.isin(self.active, np.intersect1d(joints, MOVERS))].max(initial=0)
+        return 1 / (1 + (worst / UNREST) ** 8)
+
+    def _away(self, local: np.ndarray, vector: np.ndarray, held: np.ndarray) -> np.ndarray:
+        """(T, A, 3) rad."""
+        away = vector - held[:-2].reshape(-1, 3)
+        away[:, 0] = local[:, 0].swapaxes(1, 2) @ upright(held)[0] - held[:3]
+        away[:, 0, 1] = 0
+        return away
+
+
+def upright(held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unit vector (3,) that points up in the camera frame, and how it moves with its slopes (3, 2)."""
+    v = np.array([held[-2], -1, held[-1]])
+    length = np.linalg.norm(v)
+    u = v / length
+    return u, (np.eye(3) - np.outer(u, u))[:, [0, 2]] / length
+
+
+def _cross(v: np.ndarray) -> np.ndarray:
+    """v: (T, 3). (T, 3, 3), times w: v x w."""
+    x, y, z = v.T
+    o = np.zeros_like(x)
+    return np.stack([o, -z, y, z, o, -x, -y, x, o], 1).reshape(-1, 3, 3)

@@ -1,0 +1,34 @@
+"""Which frames the fit got wrong, and why: nothing is learned from them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsac.stages.frame_names import name_frames
+from gsac.stages.smplx.fit import Fit
+
+POOR_IOU = 0.7
+FALL = 0.12
+"""IoU below the clip's usual; a wide coat covers more than the body in every frame, a wrong pose in one."""
+FAR = 0.05
+"""Median distance of fitted from seen body points, as a share of the person's height: a good fit has a tenth of it."""
+
+
+def lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarray]:
+    """seen: (T,) bool, whether somebody was; height: px, of the person. Returns reason -> (T,) bool; a frame has one reason."""
+    iou, off = np.nan_to_num(fit.iou, nan=1.0), np.nan_to_num(fit.reprojection, nan=0.0)
+    usual = np.median(iou[seen]) if seen.any() else 1.0
+    uncovered = seen & (iou < min(POOR_IOU, usual - FALL))
+    away = seen & ~uncovered & (off > FAR * height)
+    return {"no person is seen": ~seen, f"the body covers the silhouette badly (IoU below {POOR_IOU})": uncovered,
+            f"the body lies more than {FAR:.0%} of its height off the seen points": away}
+
+
+def sentences(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[str]:
+    """What the user reads: lost frames by their reason, and a body that covers the silhouette badly all along."""
+    out = [f"Not fitted, and not learned from: {name_frames(mask)}; {reason}." for reason, mask in lost.items() if mask.any()]
+    poor = (np.nan_to_num(iou, nan=1.0) < POOR_IOU) & ~np.any(list(lost.values()), axis=0)
+    if poor.any():
+        out.append(f"The body covers the silhouette badly (IoU below {POOR_IOU}) in {name_frames(poor)}, as in the clip's other "
+                   "frames: wide clothes, or a mask that holds more than the person.")
+    return out

@@ -1,0 +1,1 @@
+"""`smplx.method paper`: the published co-registration by Adam."""

@@ -1,0 +1,111 @@
+"""The posed skeleton and points on the body as torch functions of the unknowns, for methods that descend a gradient.
+
+T frames, J joints, P points, B betas. As in `points.py` a point is  x = sum_k G_k m_k + w_k t_k  with its moment m_k and mass
+w_k on joint k; here all joints are written out, so that T frames of P points are one matrix product.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy import sparse
+
+from gsac.avatar.body import Body
+
+
+def matrices(six: torch.Tensor) -> torch.Tensor:
+    """six: (..., 6), the first two columns of a rotation, not normalised. Returns (..., 3, 3) (Zhou et al. 2019)."""
+    a, b = six[..., :3], six[..., 3:]
+    x = torch.nn.functional.normalize(a, dim=-1)
+    y = torch.nn.functional.normalize(b - (x * b).sum(-1, keepdim=True) * x, dim=-1)
+    return torch.stack([x, y, torch.linalg.cross(x, y)], -1)
+
+
+def six_of(rotation: torch.Tensor) -> torch.Tensor:
+    """rotation: (..., 3, 3). Returns (..., 6)."""
+    return torch.cat([rotation[..., 0], rotation[..., 1]], -1)
+
+
+def rotation_vectors(rotation: torch.Tensor) -> torch.Tensor:
+    """rotation: (..., 3, 3) by less than pi. Returns (..., 3) rad."""
+    r = rotation
+    axis = torch.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], -1) / 2
+    cos = ((r.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2).clamp(-0.999, 1 - 1e-6)
+    angle = torch.arccos(cos)
+    return axis * (angle / torch.sin(angle))[..., None]
+
+
+class Kinematics:
+    """One body's joint chain."""
+
+    def __init__(self, body: Body):
+        self.parents = [int(p) for p in body.parents]
+        rest = body.J_regressor @ body.v_template
+        self.rest = torch.tensor(rest, dtype=torch.float32)  # (J, 3)
+        self.rest_dirs = torch.tensor(np.einsum("jv,vcb->jcb", body.J_regressor, body.shapedirs), dtype=torch.float32)
+        depth = np.zeros(len(self.parents), int)
+        for j, p in enumerate(self.parents[1:], 1):
+            depth[j] = depth[p] + 1
+        self.levels = [np.flatnonzero(depth == d).tolist() for d in range(depth.max() + 1)]
+        self.order = torch.tensor(np.argsort(np.concatenate(self.levels)))
+
+    def joints(self, betas: torch.Tensor, joint_offset: torch.Tensor) -> torch.Tensor:
+        """(J, 3) joints of the T-pose, moved by their offsets (J, 3)."""
+        return self.rest + self.rest_dirs @ betas + joint_offset
+
+    def pose(self, local: torch.Tensor, rest: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """local: (T, J, 3, 3); rest: (J, 3). Returns rotations (T, J, 3, 3) and places (T, J, 3), without transl."""
+        worlds, places = [local[:, :1]], [rest[None, :1].expand(len(local), 1, 3)]
+        for before, level in zip(self.levels, self.levels[1:], strict=False):
+            above = [before.index(self.parents[j]) for j in level]
+            parents = [self.parents[j] for j in level]
+            turn = worlds[-1][:, above]
+            bone = (rest[level] - rest[parents])[None, :, :, None]
+            places.append(places[-1][:, above] + (turn @ bone)[..., 0])
+            worlds.append(turn @ local[:, level])
+        return torch.cat(worlds, 1)[:, self.order], torch.cat(places, 1)[:, self.order]
+
+
+class Points:
+    """P points of the body as moments over all joints."""
+
+    def __init__(self, body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None):
+        """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m, in the axes of the heaviest joint."""
+        matrix = matrix.tocsr()
+        points, joints = matrix.shape[0], body.weights.shape[1]
+        mass = np.asarray(matrix @ body.weights)
+        moment = np.stack([matrix @ (body.weights * body.v_template[:, c:c + 1]) for c in range(3)], -1)
+        if offsets is not None:
+            moment[np.arange(points), np.abs(mass).argmax(1)] += offsets
+        dirs = np.zeros((points, joints, 3, body.num_betas), np.float32)
+        for p in range(points):
+            span = slice(matrix.indptr[p], matrix.indptr[p + 1])
+            vertices = matrix.indices[span]
+            dirs[p] = np.einsum("v,vk,vcb->kcb", matrix.data[span], body.weights[vertices], body.shapedirs[vertices])
+        dirs[..., body.num_figure:] = 0  # clothes do not move a person's points
+        self.mass = torch.tensor(mass, dtype=torch.float32)  # (P, J)
+        self.moment = torch.tensor(moment, dtype=torch.float32).flatten(1)  # (P, 3 J)
+        self.dirs = torch.tensor(dirs).flatten(1, 2)  # (P, 3 J, B)
+
+    def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
+        """Rotations (T, J, 3, 3) and places (T, J, 3) of the joints, which rest at (J, 3). Returns (T, P, 3) without transl."""
+        moment = self.moment + self.dirs @ betas
+        shift = place - (world @ rest[None, :, :, None])[..., 0]
+        turned = world.transpose(1, 2).flatten(2) @ moment.T  # (T, 3, P)
+        return turned.transpose(1, 2) + self.mass @ shift
+
+
+class Mesh:
+    """All vertices of the body: linear blend skinning, T frames as one matrix product over the joints."""
+
+    def __init__(self, body: Body):
+        self.template = torch.tensor(body.v_template, dtype=torch.float32)  # (V, 3)
+        self.dirs = torch.tensor(body.shapedirs, dtype=torch.float32)  # (V, 3, B)
+        self.weights = torch.tensor(body.weights.T.copy(), dtype=torch.float32)  # (J, V)
+
+    def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
+        """As `Points.at`; returns (T, 3, V)."""
+        vertices = (self.template + self.dirs @ betas).T  # (3, V)
+        moment = (self.weights[:, None] * vertices).flatten(0, 1)  # (3 J, V)
+        shift = place - (world @ rest[None, :, :, None])[..., 0]
+        return world.transpose(1, 2).flatten(2) @ moment + shift.transpose(1, 2) @ self.weights

@@ -1,0 +1,176 @@
+"""The loss of the published co-registration: L_kpt + 0.1 L_init + L_face + L_reg, all of them means (GSAC eq. 5-8)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+
+from gsac.avatar.body import Body
+from gsac.avatar.wholebody import FACE, HANDS, INDEX
+from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.fit import Sightings
+from gsac.stages.smplx.head import Head, HeadTerms, visible
+from gsac.stages.smplx.lm.problem import State
+from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
+from gsac.stages.smplx.prior import BODY_JOINTS
+
+SPACE = 8.0
+"""Side of the square that the person's box is projected to: pixel weights do not depend on the resolution."""
+INIT, SHAPE, JOINT_OFFSET, SYMMETRY, UPRIGHT = 0.1, 0.01, 100.0, 1.0, 1.0
+OVERLAP = 0.5
+"""Hand boxes that cover each other more than this: the farther hand does not count."""
+BODY = len(BODY_JOINTS)
+HANDS_FROM = BODY + 3
+"""After jaw and eyes: nothing here sees them, they stay."""
+FIXED_OFFSETS = [0, 1, 2]
+"""Pelvis and hips stay where the shape puts them."""
+SPINE = [3, 6, 9, 12, 15]
+
+
+class Unknowns:
+    """What Adam moves: 6D rotations and translation of each frame, betas and joint offsets of the clip."""
+
+    def __init__(self, local: torch.Tensor, transl: torch.Tensor, betas: int):
+        six = six_of(local)
+        self.root, self.transl = six[:, :1].clone(), transl.clone()
+        self.body, self.hands = six[:, 1:BODY].clone(), six[:, HANDS_FROM:].clone()
+        self.face = local[:, BODY:HANDS_FROM]
+        self.betas, self.joint_offset = torch.zeros(betas), torch.zeros(local.shape[1], 3)
+        self.movable = torch.ones(local.shape[1], 1)
+        self.movable[FIXED_OFFSETS] = 0
+
+    def leaves(self, frames: slice, root_only: bool, shared: bool) -> Iterator[torch.Tensor]:
+        """Opens the batch's leaves and closes all others; the frames' leaves are views that Adam writes through."""
+        for tensor in (self.betas, self.joint_offset):
+            tensor.requires_grad_(shared and not root_only)
+            if tensor.requires_grad:
+                yield tensor
+        self.batch = [t[frames].detach() for t in (self.root, self.body, self.hands, self.transl)]
+        for i, tensor in enumerate(self.batch):
+            tensor.requires_grad_(not root_only or i in (0, 3))
+            if tensor.requires_grad:
+                yield tensor
+
+    def local(self, frames: slice) -> torch.Tensor:
+        """(n, J, 3, 3) of the batch that is open."""
+        root, body, hands, _ = self.batch
+        return torch.cat([matrices(root), matrices(body), self.face[frames], matrices(hands)], 1)
+
+    def offsets(self) -> torch.Tensor:
+        """(J, 3) m."""
+        return self.joint_offset * self.movable
+
+    def found(self) -> tuple[np.ndarray, ...]:
+        """Rotations (T, J, 3, 3), transl (T, 3), betas (B,), joint offsets (J, 3)."""
+        parts = (matrices(self.root), matrices(self.body), self.face, matrices(self.hands))
+        return tuple(t.detach().numpy().astype(np.float64) for t in (torch.cat(parts, 1), self.transl, self.betas, self.offsets()))
+
+
+class Objective:
+    """The loss of a batch of frames."""
+
+    def __init__(self, body: Body, sightings: Sightings, start: State, center: np.ndarray):
+        self.kinematics = Kinematics(body)
+        offsets = Detector.measured(sightings.detector, body).offsets
+        self.known = np.flatnonzero(body.known_keypoints)
+        self.points = Points(body, body.keypoint_matrix[self.known], offsets[self.known])
+        self.mesh = Mesh(body)
+        self.focal, self.center = float(np.exp(start.log_focal)), torch.tensor(center, dtype=torch.float32)
+        corner, side = boxes(sightings)
+        seen = sightings.seen[:, self.known]
+        xy = np.where(seen[..., None], sightings.xy[:, self.known], 0)
+        self.corner, self.side = torch.tensor(corner)[:, None], torch.tensor(side)[:, None, None]
+        self.target = (torch.tensor(xy, dtype=torch.float32) - self.corner) / self.side * SPACE
+        self.weight = torch.tensor(seen, dtype=torch.float32)
+        column = {int(k): i for i, k in enumerate(self.known)}
+        self.hands = [[column[k] for k in range(s.start, s.stop) if k in column] for s in HANDS.values()]
+        self.wrists = [column[INDEX[f"{side}_wrist"]] for side in HANDS]
+        self.inner_face = [column[k] for k in range(FACE.start, FACE.stop) if k in column]
+        arrays = sightings.face
+        found = None if arrays is None else Head.from_arrays(arrays, body)
+        self.head = None if found is None else HeadTerms(body, found)
+        self.face_valid = np.ones(len(xy), bool) if arrays is None else np.asarray(arrays["valid"], bool)
+        left = [i for i, n in enumerate(body.joint_names) if n.startswith("left_")]
+        self.left = left
+        self.right = [body.joint_names.index("right_" + body.joint_names[i][5:]) for i in left]
+        self.start = torch.tensor(start.local, dtype=torch.float32)
+        rest = self.kinematics.joints(torch.zeros(body.num_betas), torch.zeros(len(body.joint_names), 3))
+        self.start_mesh = self._mesh(self.start, rest, torch.zeros(body.num_betas))
+
+    def loss(self, unknowns: Unknowns, frames: slice, hand_hold: float) -> torch.Tensor:
+        local, betas, offset = unknowns.local(frames), unknowns.betas, unknowns.offsets()
+        rest = self.kinematics.joints(betas, offset)
+        world, place = self.kinematics.pose(local, rest)
+        x = self.points.at(world, place, rest, betas) + unknowns.batch[3][:, None]
+        uv = self.project(x, frames)
+        seen = self.weight[frames] * self._countable(x, uv, frames)
+        total = ((uv - self.target[frames]).abs() * seen[..., None]).mean()
+        mesh = self._relative(self.mesh.at(world, place, rest, betas), place)
+        total = total + INIT * (mesh - self.start_mesh[frames]).abs().mean() + INIT * (local - self.start[frames]).abs().mean()
+        total = total + SHAPE * (betas**2).mean() + UPRIGHT * (rotation_vectors(local[:, SPINE])[..., 0] ** 2).mean()
+        hold = torch.ones(len(offset), 1)
+        hold[HANDS_FROM:] = hand_hold
+        total = total + JOINT_OFFSET * (hold * offset**2).mean()
+        mirrored = offset[self.right] * torch.tensor([-1.0, 1, 1])
+        total = total + SYMMETRY * (offset[self.left] - mirrored).abs().mean()
+        if self.head is not None:
+            total = total + float(self.face_seen(x, frames).mean()) * self.head.loss(betas)
+        return total
+
+    def project(self, x: torch.Tensor, frames: slice) -> torch.Tensor:
+        """x: (n, P, 3) m. Returns (n, P, 2) in the person's square."""
+        px = self.focal * x[..., :2] / x[..., 2:].clamp(min=0.05) + self.center
+        return (px - self.corner[frames]) / self.side[frames] * SPACE
+
+    def pixels(self, local: np.ndarray, transl: np.ndarray, betas: np.ndarray, joint_offset: np.ndarray) -> np.ndarray:
+        """(T, K, 2) px of the known key points."""
+        as_float = [torch.tensor(a, dtype=torch.float32) for a in (local, transl, betas, joint_offset)]
+        rest = self.kinematics.joints(as_float[2], as_float[3])
+        x = self.points.at(*self.kinematics.pose(as_float[0], rest), rest, as_float[2]) + as_float[1][:, None]
+        return (self.focal * x[..., :2] / x[..., 2:] + self.center).numpy()
+
+    def face_seen(self, x: torch.Tensor, frames: slice) -> np.ndarray:
+        """(n,) bool: the face looks at the camera and the face method saw it."""
+        points = np.full((len(x), 133, 3), np.nan)
+        points[:, self.known] = x.detach().numpy()
+        return visible(points) & self.face_valid[frames]
+
+    def _mesh(self, local: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
+        world, place = self.kinematics.pose(local, rest)
+        return self._relative(self.mesh.at(world, place, rest, betas), place)
+
+    @staticmethod
+    def _relative(mesh: torch.Tensor, place: torch.Tensor) -> torch.Tensor:
+        return mesh - place[:, 0, :, None]
+
+    def _countable(self, x: torch.Tensor, uv: torch.Tensor, frames: slice) -> torch.Tensor:
+        """(n, K) 0 for the face that is turned away, and for the farther of two hands (with its wrist) that lie on each other."""
+        with torch.no_grad():
+            out = torch.ones(uv.shape[:2])
+            if self.inner_face:
+                seen = torch.tensor(self.face_seen(x, frames), dtype=torch.float32)
+                out[:, self.inner_face] = seen[:, None]
+            if all(self.hands):
+                low, high = zip(*[(uv[:, h].amin(1), uv[:, h].amax(1)) for h in self.hands], strict=True)
+                both = (torch.minimum(*high) - torch.maximum(*low)).clamp(min=0).prod(1)
+                union = sum((b - a).prod(1) for a, b in zip(low, high, strict=True)) - both
+                covered = both > OVERLAP * union
+                depth = [x[:, h, 2].mean(1) for h in self.hands]
+                for mine, other, hand, wrist in ((0, 1, self.hands[0], self.wrists[0]), (1, 0, self.hands[1], self.wrists[1])):
+                    far = covered & (depth[mine] > depth[other])
+                    out[:, [*hand, wrist]] *= (~far).float()[:, None]
+        return out
+
+
+def boxes(sightings: Sightings) -> tuple[np.ndarray, np.ndarray]:
+    """Corner (T, 2) and side (T,) px of the square around each frame's person: its points' box x 1.2, squared, x 1.25."""
+    corner = np.zeros((len(sightings.xy), 2), np.float32)
+    side = np.full(len(corner), max(sightings.width, sightings.height), np.float32)
+    for t, seen in enumerate(sightings.seen):
+        if seen.sum() > 1:
+            low, high = sightings.xy[t, seen].min(0), sightings.xy[t, seen].max(0)
+            side[t] = max(float((high - low).max()) * 1.2 * 1.25, 1.0)
+            corner[t] = (low + high) / 2 - side[t] / 2
+    return corner, side

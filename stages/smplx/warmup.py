@@ -1,0 +1,57 @@
+"""A fit in miniature: it calls what a real one calls, so that kernels are compiled or loaded, and libraries imported, before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from gsac.avatar.artifacts import Clip, write_alpha, write_arrays
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.zbuffer import silhouette
+from gsac.stages.contract import Job
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.fit import HIPS
+
+FRAMES, FPS = 6, 10.0
+WIDTH, HEIGHT, FOCAL, DISTANCE = 54, 96, 100.0, 2.4
+"""px and m of images that the body nearly fills."""
+TURN = 1.0
+"""rad from frame to frame."""
+SIGMA = 0.5
+"""px"""
+
+
+def rehearse(run: Callable[[Job], None]) -> None:
+    """run: the stage's. Takes what the compiler takes at the very first; a second and a half once its cache holds everything."""
+    with TemporaryDirectory() as folder:
+        inputs = written(Body.load(), Path(folder))
+        out = Path(folder) / "out"
+        out.mkdir()
+        run(Job(inputs, out, SmplxConfig(rounds=1, iterations=1)))
+
+
+def written(body: Body, folder: Path) -> dict[str, Path]:
+    """Artifacts of a body that turns, by port."""
+    pose = np.zeros((FRAMES, len(body.parents), 3))
+    for t in range(FRAMES):
+        pose[t, 0] = np.pi * np.array([np.cos(t * TURN / 2), 0, np.sin(t * TURN / 2)])
+    params = BodyParams.from_pose(pose, np.tile([0.0, 0.0, DISTANCE], (FRAMES, 1)), np.zeros(body.num_betas),
+                                  np.zeros((FRAMES, body.exprdirs.shape[2])), FOCAL, (WIDTH / 2, HEIGHT / 2), model=body.digest)
+    camera, vertices = params.camera(WIDTH, HEIGHT), body.posed(params)[0]
+    points = body.keypoints(vertices)
+    score = np.isfinite(points).all(-1).astype(np.float32)
+    inputs = {port: folder / Path(port).name for port in ("split/clip.json", "handgap/keypoints.npz", "face/face.npz",
+                                                          "segment/alpha")}
+    Clip(FPS, [t / FPS for t in range(FRAMES)], WIDTH, HEIGHT, None, "").write(inputs["split/clip.json"])
+    write_arrays(inputs["handgap/keypoints.npz"], xy=np.nan_to_num(camera.project(points)).astype(np.float32), score=score,
+                 world=(points - points[:, HIPS].mean(1, keepdims=True)).astype(np.float32), detector=np.array("mediapipe"),
+                 sigma=np.full(score.shape, SIGMA, np.float32))
+    write_arrays(inputs["face/face.npz"], valid=np.ones(FRAMES, bool), jaw=np.zeros((FRAMES, 3), np.float32),
+                 expression=np.zeros((FRAMES, body.exprdirs.shape[2]), np.float32))
+    inputs["segment/alpha"].mkdir()
+    for t in range(FRAMES):
+        write_alpha(inputs["segment/alpha"] / f"{t:06d}.exr", silhouette(vertices[t], body.faces, camera).astype(np.float32))
+    return inputs

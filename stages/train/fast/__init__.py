@@ -1,0 +1,1 @@
+"""Recipe `fast`: one gaussian budget, coarse to fine, on the CPU and on the GPU."""

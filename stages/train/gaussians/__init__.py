@@ -1,0 +1,1 @@
+"""The gaussians themselves: first colours, merging, what no frame shows, the offset to clothes."""

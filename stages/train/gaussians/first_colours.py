@@ -1,0 +1,130 @@
+"""Colours to start from, and the light they were seen in, read off the frames.
+
+What no frame sees takes the colour of what lies beside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.light import FROM_CAMERA, basis, shade
+from gsac.avatar.threads import Workspace, side_by_side
+from gsac.avatar.zbuffer import rasterise, visible_points
+
+TOLD = 10.0
+"""Independent values that a frame says of the light: what is wrong in it is wrong over large parts of the body."""
+NOISE = 0.1
+EVEN = 0.3
+"""Spread of the light's directed part, before anything is seen."""
+ROUNDS = 12
+LEAST_FACING = 0.1
+"""Cosine between the face's normal and the ray to the camera below which a colour is not read."""
+SURE = 200
+"""Mask value (of 255) from which on a pixel shows the person alone."""
+
+
+@dataclass
+class PosedFrame:
+    vertices: np.ndarray
+    """(V, 3) m, camera frame."""
+    camera: Camera
+    pixels: np.ndarray
+    """(h, w, 4) uint8, premultiplied RGB and mask."""
+
+
+@dataclass
+class Sight:
+    """What one frame shows of M gaussians' places."""
+
+    which: np.ndarray
+    """(M,) indices of the gaussians."""
+    colour: np.ndarray
+    """(M, 3) in 0..1."""
+    normal: np.ndarray
+    """(M, 3) of the faces, in the light's axes."""
+    weight: np.ndarray
+    """(M,): straight views count more."""
+
+
+def read_sights(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussians) -> list[Sight]:
+    """The colours that the frames show where gaussians are."""
+
+    def read(frame: PosedFrame, _: Workspace) -> Sight:
+        posed = face_frames(frame.vertices, faces)
+        places = bind(posed, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means.astype(np.float64)
+        facing = -(posed.R[gaussians.face, :, 1] * places).sum(1) / np.maximum(np.linalg.norm(places, axis=1), 1e-9)
+        depth = rasterise(frame.vertices, faces, frame.camera)[2]
+        visible = np.flatnonzero(visible_points(places, depth, frame.camera) & (facing > LEAST_FACING))
+        x, y = frame.camera.project(places[visible]).astype(np.int64).T
+        pixel = frame.pixels[y, x].astype(np.float64)
+        sure = pixel[:, 3] > SURE
+        chosen = visible[sure]
+        return Sight(chosen, pixel[sure, :3] / pixel[sure, 3:], posed.R[gaussians.face[chosen], :, 1] * FROM_CAMERA,
+                     facing[chosen] ** 2)
+
+    return side_by_side(read, frames)
+
+
+def mean_colours(sights: list[Sight], count: int, light: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Of `count` gaussians, what was seen of them with the light (4, 3) taken off.
+
+    Returns rgb (N, 3) float32 in 0..1, grey where unseen, and seen (N,) bool.
+    """
+    return _mean_colours(_joined(sights), count, light)
+
+
+def _joined(sights: list[Sight]) -> Sight:
+    """All that the frames show, as if one did."""
+    parts = zip(*((s.which, s.colour, s.normal, s.weight) for s in sights), strict=True)
+    return Sight(*map(np.concatenate, parts)) if sights else Sight(np.zeros(0, np.int64), *np.zeros((2, 0, 3)), np.zeros(0))
+
+
+def _mean_colours(sight: Sight, count: int, light: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    factor = np.ones_like(sight.colour) if light is None else shade(light, sight.normal)
+    weighted, square = sight.weight[:, None] * sight.colour * factor, sight.weight[:, None] * factor**2
+    total, weight = (np.stack([np.bincount(sight.which, channel, count) for channel in values.T], 1)
+                     for values in (weighted, square))
+    seen = weight[:, 0] > 0
+    rgb = np.full((count, 3), 0.5, np.float32)
+    rgb[seen] = np.clip(total[seen] / weight[seen], 0, 1)
+    return rgb, seen
+
+
+def find_light(sights: list[Sight], count: int) -> np.ndarray:
+    """(4, 3) float32: the white light under which `count` gaussians, each of one colour, look most as they were seen.
+
+    Colours and light in turns, each by least squares. How strong the light is as a whole cannot be told from how bright the
+    colours are: its mean over what was seen is 1. A clip that shows no turn says nothing of it, and it stays even. Coloured lamps
+    are not looked for: a turn seen in part takes them for stains, and whole turns are drawn as well without.
+    """
+    light = np.concatenate([np.ones((1, 3)), np.zeros((3, 3))])
+    every = _joined(sights)
+    seen = float(every.weight.sum())
+    if not seen:
+        return light.astype(np.float32)
+    trust, terms = TOLD * len(sights) / NOISE**2 / seen, basis(every.normal).astype(np.float64)
+    for _ in range(ROUNDS):
+        rgb = _mean_colours(every, count, light)[0].astype(np.float64)[every.which]
+        square = terms.T @ (terms * (every.weight * (rgb**2).mean(1))[:, None])
+        product = terms.T @ (every.weight * (rgb * every.colour).mean(1))
+        prior = np.diag([0, 1, 1, 1]) / EVEN**2
+        white = np.linalg.solve(trust * square + prior, trust * product)
+        mean = float(every.weight @ (terms @ white))
+        light = np.tile((white * seen / mean)[:, None], 3)
+    return light.astype(np.float32)
+
+
+def fill_unseen(rgb: np.ndarray, seen: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """rgb (N, 3) with the unseen rows replaced by the mean of the 4 nearest seen ones; places: (N, 3) m at rest."""
+    if seen.all() or not seen.any():
+        return rgb
+    out = rgb.copy()
+    near = cKDTree(places[seen]).query(places[~seen], k=min(4, int(seen.sum())))[1]
+    out[~seen] = rgb[seen][near.reshape(len(near), -1)].mean(1)
+    return out

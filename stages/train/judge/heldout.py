@@ -1,0 +1,154 @@
+"""Judging: renders of frames that were not trained on, beside the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from gsac.avatar import wholebody
+from gsac.avatar.artifacts import write_frame
+from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.lpips import Lpips
+from gsac.avatar.metrics import WHITE, composite, score
+from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.threads import Workspace, side_by_side
+from gsac.avatar.zbuffer import rasterise, visible_points
+from gsac.stages.train.finite import finite, pose
+from gsac.stages.train.gaussians.kernels import on_background, through_background
+from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.views import View, person_crop
+
+TEST_RATE = 1e-3
+"""Adam rate of the test-time pose optimisation."""
+TEST_END, TEST_MASK = 0.05, 0.1
+"""What that rate falls to, and the weight of the mask beside the image."""
+FACE_WIDTH, HAND_MARGIN = 1.3, 0.15
+"""Sides of the boxes that are judged apart: over the way from ear to ear; room round a hand's key points."""
+BOX_SLACK, LEAST_VISIBLE = 0.03, 0.4
+"""m that a key point lies inside the body, and the share of them that must be in view."""
+ERROR_FULL = 0.5
+"""Error that the error maps draw in their last colour."""
+
+
+def render_view(gaussians: Gaussians, poses: Poses, t: int, view: View, workspace: Workspace):
+    """rgb (H, W, 3) premultiplied and alpha (H, W) of frame t as it stands in poses; copies."""
+    rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
+    return rendering.rgb.copy(), rendering.alpha.copy()
+
+
+def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
+    """(H, W, 3) premultiplied and mask (H, W), 0..1."""
+    return view.pixels[..., :3] / np.float32(255), view.pixels[..., 3] / np.float32(255)
+
+
+class Look(NamedTuple):
+    """What is to be judged: an avatar, posed, in some frames."""
+
+    gaussians: Gaussians
+    poses: Poses
+    frames: Iterable[int]
+    views: Mapping[int, View] | list[View]
+
+
+def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
+          flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
+    """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
+    return judge_all([Look(gaussians, poses, frames, views)], folder, flip, lpips)[0]
+
+
+def judge_all(looks: list[Look], folder: Path | None = None, flip: bool = False,
+              lpips: Mapping[str, Lpips] | None = None) -> list[list[dict]]:
+    """`judge` of each look, all their frames side by side."""
+
+    def row(frame: tuple[Look, int], workspace: Workspace) -> dict:
+        (gaussians, poses, _, views), t = frame
+        finite("when it is judged", pose(poses, t))
+        rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
+        finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
+        true_rgb, mask = truth(views[t])
+        scores = score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips)
+        if folder is not None:
+            render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
+            error = np.abs(render - real).mean(2) / ERROR_FULL
+            heat = cv2.applyColorMap(np.uint8(np.clip(error, 0, 1) * 255), cv2.COLORMAP_INFERNO)
+            write_frame(folder / f"{t:06d}_truth.png", np.uint8(np.round(real * 255)))
+            write_frame(folder / f"{t:06d}_render.png", np.uint8(np.round(render * 255)))
+            write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(heat, cv2.COLOR_BGR2RGB))
+        return scores
+
+    rows = iter(side_by_side(row, [(look, int(t)) for look in looks for t in look.frames]))
+    return [[next(rows) for _ in look.frames] for look in looks]
+
+
+def boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:
+    """x0, y0, x1, y1 px of face, left_hand and right_hand, of those that the body itself does not hide.
+
+    The face is a square between nose and ears, FACE_WIDTH times the way from ear to ear; a hand is the box of its key points.
+    """
+    vertices = poses.vertices(t)
+    points = poses.body.keypoints(vertices)
+    depth = rasterise(vertices, poses.body.faces, camera)[2]
+    nose, ears = points[wholebody.BODY][0], points[wholebody.BODY][3:5]
+    middle = 0.6 * nose + 0.4 * ears.mean(0)
+    half = FACE_WIDTH / 2 * np.linalg.norm(ears[1] - ears[0]) * np.array([1.0, 1.0, 0.0])
+    areas = {"face": (points[:3], np.stack([middle - half, middle + half]), 0.0)}
+    for side, part in wholebody.HANDS.items():
+        areas[f"{side}_hand"] = points[part], points[part], HAND_MARGIN
+    found = {}
+    for name, (shown, extent, margin) in areas.items():
+        if not np.isfinite(extent).all() or visible_points(shown, depth, camera, BOX_SLACK).mean() < LEAST_VISIBLE:
+            continue
+        xy = camera.project(extent)
+        low, high = xy.min(0), xy.max(0)
+        room = margin * (high - low).max()
+        (x0, y0), (x1, y1) = np.floor(low - room).astype(int), np.ceil(high + room).astype(int)
+        found[name] = max(x0, 0), max(y0, 0), min(x1, camera.width), min(y1, camera.height)
+    return found
+
+
+def align_poses(gaussians: Gaussians, poses: Poses, frames, views: list[View], steps: int) -> None:
+    """`align_pose` of some frames; views: of all T."""
+    for t in map(int, frames):
+        align_pose(gaussians, poses, t, views[t], steps)
+
+
+def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: int) -> None:
+    """Test-time pose optimisation: moves the pose of frame t in `poses` to its own image; the avatar stays as it is."""
+    view, workspace = person_crop(view), Workspace()
+    background, gain, grad_gain = np.full(3, 1, np.float32), np.ones(3, np.float32), np.empty(3)
+    for step in range(steps):
+        rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
+        image, target = np.empty_like(rendering.rgb), np.empty_like(rendering.rgb)
+        on_background(rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
+        grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(rendering.alpha)
+        grad_image = (image - target) * np.float32(2 / image.size)
+        through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK, grad_rgb,
+                           grad_alpha, grad_gain)
+        grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
+        finite(f"at step {step} of its pose at test time", {f"gradient of frame {t}": grads.vertices})
+        poses.step(t, grads.vertices, TEST_RATE * TEST_END ** (step / steps), 0.0)
+
+
+def turned(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:
+    """(2 size, 3 size, 3) uint8: the avatar in its T-pose from the front, both sides, the back, below and above."""
+    vertices, _ = poses.rest(0)
+    middle = (vertices.min(0) + vertices.max(0)) / 2
+    half = float(np.abs(vertices - middle).max()) * 1.1
+    upright = np.diag([1.0, -1.0, -1.0])
+
+    def tile(degrees: tuple[int, int], workspace: Workspace) -> np.ndarray:
+        y, x = np.radians(degrees)
+        turn = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
+        tilt = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
+        posed = (vertices - middle) @ (tilt @ upright @ turn).T + np.array([0, 0, 5 * half])
+        camera = Camera((size * 2.4, size * 2.4), (size / 2, size / 2), size, size)
+        rendering = render_bound(posed.astype(np.float32), poses.body.faces, gaussians, camera, workspace)
+        return np.uint8(np.round(composite(rendering.rgb, rendering.alpha, WHITE) * 255))
+
+    tiles = side_by_side(tile, ((0, 0), (90, 0), (180, 0), (-90, 0), (20, -65), (20, 50)))
+    return np.vstack([np.hstack(tiles[:3]), np.hstack(tiles[3:])])

@@ -1,0 +1,78 @@
+"""The avatar in poses that no clip of a turning person shows: what stands off the body there, and needles.
+
+Arms that hang beside the trunk while training are lifted, knees bend: gaussians that were hidden, or that hung on to a neighbour's
+image, show themselves as fur and floaters.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.camera import Camera
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.raster import render_bound
+from gsac.avatar.skinning import joint_transforms, skin
+from gsac.avatar.threads import Workspace, side_by_side
+from gsac.avatar.zbuffer import rasterise
+from gsac.stages.train.poses.poses import Poses
+
+POSES = {
+    "T-pose": {},
+    "arms up": {"left_shoulder": (0, 0, 60), "right_shoulder": (0, 0, -60)},
+    "arms forward": {"left_shoulder": (0, -70, 0), "right_shoulder": (0, 70, 0)},
+    "squat": {"left_hip": (-80, 0, 10), "right_hip": (-80, 0, -10), "left_knee": (90, 0, 0), "right_knee": (90, 0, 0)},
+    "stride": {"left_hip": (-45, 0, 0), "right_hip": (25, 0, 0), "left_knee": (30, 0, 0), "right_knee": (15, 0, 0)},
+}
+"""Degrees about a joint's own axes, on top of the T-pose."""
+TURNS = (0, 90, 180, 270, 45)
+"""Degrees about the upright axis from which each pose is looked at."""
+SIZE = 240
+OFF = 0.06
+"""m that cloth and hair may stand off the body."""
+NEEDLE, LONG = 4.5, 0.02
+"""Longest axis over the middle one, and m, above which a gaussian is a needle."""
+
+
+def judge_novel(gaussians: Gaussians, poses: Poses) -> dict[str, float]:
+    """`stray_alpha`: alpha farther than OFF outside of the body's silhouette, over the silhouette, worst view; `needle_share`:
+    share of gaussians that are needles in the worst pose."""
+
+    def of_pose(turns: dict, workspace: Workspace) -> tuple[float, float]:
+        posed = in_pose(poses, turns)
+        bound = bind(face_frames(posed, poses.body.faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+        axes = np.sort(bound.scales, 1)
+        needles, stray = float(((axes[:, 2] > NEEDLE * axes[:, 1]) & (2 * axes[:, 2] > LONG)).mean()), 0.0
+        for turn in TURNS:
+            vertices, camera, metre = before_camera(posed, turn)
+            body = rasterise(vertices, poses.body.faces, camera)[0] >= 0
+            reach = int(np.ceil(OFF * metre))
+            near = cv2.dilate(np.uint8(body), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
+            alpha = render_bound(vertices, poses.body.faces, gaussians, camera, workspace).alpha
+            stray = max(stray, float(alpha[near == 0].sum() / max(body.sum(), 1)))
+        return stray, needles
+
+    stray, needles = map(max, zip(*side_by_side(of_pose, POSES.values()), strict=True))
+    return {"stray_alpha": stray, "needle_share": needles}
+
+
+def in_pose(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.ndarray:
+    """(V, 3) m, the canonical body with some joints turned by degrees about x, y and z."""
+    body, (rest, joints) = poses.body, poses.rest(0)
+    pose = np.zeros((1, len(body.parents), 3))
+    for name, degrees in turns.items():
+        pose[0, body.joint_names.index(name)] = np.radians(degrees)
+    transforms = joint_transforms(pose, joints, body.parents)[0].astype(np.float32)
+    return skin(rest, transforms, body.skin_index, body.skin_weight)
+
+
+def before_camera(vertices: np.ndarray, degrees: float) -> tuple[np.ndarray, Camera, float]:
+    """The body turned about the upright axis before a camera that sees all of it: vertices (V, 3), camera, px for each m."""
+    a = np.radians(degrees)
+    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    middle = (vertices.min(0) + vertices.max(0)) / 2
+    half = float(np.linalg.norm(vertices - middle, axis=1).max())
+    placed = (vertices - middle) @ (np.diag([1.0, -1.0, -1.0]) @ turn).T + [0, 0, 6 * half]
+    focal = SIZE * 2.8
+    return placed.astype(np.float32), Camera((focal, focal), (SIZE / 2, SIZE / 2), SIZE, SIZE), focal / (6 * half)

@@ -1,0 +1,1 @@
+"""Recipe `paper`: the published optimisation, on the CPU and on the GPU."""

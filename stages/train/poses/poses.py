@@ -1,0 +1,191 @@
+"""The poses of all frames while they are refined: vertices from poses, and poses from the vertices' gradients."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+
+from gsac.avatar.skinning import joint_transforms, skin, skin_backward
+from gsac.stages.train.holdout import carry_corrections
+from gsac.stages.train.poses.interpolate import follow_neighbours
+
+BODY, JAW_EYES = slice(0, 22), slice(22, 25)
+HAND_SHARE = 0.1
+"""Rate of the fingers, relative to the body's: an image says little about them."""
+TURN, SHIFT = 0.05, 0.02
+"""rad and m in which the distance from the start is measured."""
+EXPRESSION, JOINT = 0.3, 0.01
+"""Coefficient and m, likewise."""
+KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "beta_moments", "beta_count",
+        "expression", "expression_moments", "joint_offset", "joint_moments", "joint_count")
+"""Attributes of Poses that training changes."""
+
+
+def carried(poses: Poses, trained: np.ndarray) -> Poses:
+    """A copy in which frames that are not among `trained` (indices) follow their trained neighbours, or are corrected alike."""
+    is_trained = np.zeros(len(poses.pose), bool)
+    is_trained[trained] = True
+    out = poses.copy()
+    out.pose, out.transl = carry_corrections(out.base_pose, out.base_transl, out.pose, out.transl, is_trained)
+    out.pose, out.transl = follow_neighbours(out.fit_pose, out.fit_transl, out.pose, out.transl, is_trained)
+    if out.expression.any():
+        frames, at = np.arange(len(out.pose)), np.flatnonzero(is_trained)
+        out.expression = np.stack([np.interp(frames, at, column[at]) for column in out.expression.T], 1)
+        out.forget_expressions()
+    return out
+
+
+def adam(moments: np.ndarray, count: int, grad: np.ndarray, rate: float) -> np.ndarray:
+    """How far to step back (...) at the count-th gradient (...); moments (2, ...) are moved on in place."""
+    first, second = moments
+    first += 0.1 * (grad - first)
+    second += 0.01 * (grad**2 - second)
+    return rate * (first / (1 - 0.9**count)) / (np.sqrt(second / (1 - 0.99**count)) + 1e-12)
+
+
+class Poses:
+    """Poses of T frames with Adam's state; a frame's count of steps is its own."""
+
+    def __init__(self, body, params):
+        """body: avatar.body.Body; params: BodyParams of T frames, left as they are."""
+        self.body, self.params = body, params
+        self.fit_pose = np.array(params.pose, np.float64)
+        self.fit_transl = np.array(params.transl, np.float64)
+        self.base_pose, self.base_transl = self.fit_pose.copy(), self.fit_transl.copy()
+        """Where the corrections of single frames start from; the fit, until `settle`."""
+        self.pose, self.transl = self.fit_pose.copy(), self.fit_transl.copy()
+        self.share = np.full((self.pose.shape[1], 1), HAND_SHARE)
+        self.share[BODY] = 1
+        self.share[JAW_EYES] = 0
+        frames = len(self.pose)
+        self.moments = np.zeros((2, frames, self.pose.shape[1] + 1, 3))
+        self.count = np.zeros(frames, np.int64)
+        self.offset = np.zeros((len(body.v_template), 3), np.float32)
+        """(V, 3) m, added to the vertices at rest."""
+        self.rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self.shaped: tuple[np.ndarray, np.ndarray] | None = None
+        self.moved: dict[int, np.ndarray] = {}
+        self.expression = np.zeros((frames, body.exprdirs.shape[2]))
+        """(T, E), what has been learned on top of the fit's; as `joint_offset` (55, 3) m of the joints at rest."""
+        self.expression_moments = np.zeros((2, *self.expression.shape))
+        self.joint_offset, self.joint_moments, self.joint_count = np.zeros((55, 3)), np.zeros((2, 55, 3)), 0
+        self.joint_share = self.share.copy()
+        self.joint_share[0] = 0  # the pelvis is where the translation puts it
+        self.betas, self.beta_moments, self.beta_count = np.array(params.betas, np.float64), np.zeros((2, len(params.betas))), 0
+
+    def copy(self) -> Poses:
+        """The same poses, to be changed apart; Adam starts anew."""
+        other = copy.copy(self)
+        other.pose, other.transl = self.pose.copy(), self.transl.copy()
+        other.moments, other.count = np.zeros_like(self.moments), np.zeros_like(self.count)
+        other.expression_moments = np.zeros_like(self.expression_moments)
+        return other
+
+    def state(self) -> dict:
+        """What training has changed, for a checkpoint."""
+        return {name: getattr(self, name) for name in KEPT}
+
+    def restore(self, state: dict) -> None:
+        for name in KEPT:
+            setattr(self, name, state[name])
+        self.forget_rests()
+
+    def forget_rests(self) -> None:
+        """To be called when the betas have changed."""
+        self.rests = {}
+        self.shaped = None
+
+    def forget_expressions(self) -> None:
+        """To be called when expressions have changed."""
+        self.rests, self.moved = {}, {}
+
+    def rest(self, t: int) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (V, 3) float32 and joints (55, 3) at rest, with the frame's expression."""
+        if t not in self.rests:
+            p = self.params
+            if self.shaped is None:
+                self.shaped = self.body.rest(self.betas, None, p.joint_offset)
+            if t not in self.moved:
+                expression = np.asarray(self.body.effective_expression(p, t) + self.expression[t], np.float32)
+                self.moved[t] = self.body.exprdirs @ expression if expression.any() else np.float32(0)
+            vertices, joints = self.shaped
+            self.rests[t] = np.ascontiguousarray(vertices + self.moved[t], np.float32), np.asarray(joints, np.float64)
+        vertices, joints = self.rests[t]
+        return vertices, joints + self.joint_offset
+
+    def vertices(self, t: int) -> np.ndarray:
+        """(V, 3) float32 m, camera frame, posed as the frame stands now."""
+        rest, joints = self.rest(t)
+        transforms = joint_transforms(self.pose[t:t + 1], joints, self.body.parents)[0].astype(np.float32)
+        posed = skin(rest + self.offset, transforms, self.body.skin_index, self.body.skin_weight)
+        return posed + self.transl[t].astype(np.float32)
+
+    def settle(self) -> None:
+        """The poses as they stand become the base that single frames are corrected from; Adam starts anew."""
+        self.base_pose, self.base_transl = self.pose.copy(), self.transl.copy()
+        self.moments, self.count = np.zeros_like(self.moments), np.zeros_like(self.count)
+        self.expression_moments = np.zeros_like(self.expression_moments)
+
+    def transforms(self, t: int) -> np.ndarray:
+        """(55, 3, 4) rest to posed, without transl."""
+        return joint_transforms(self.pose[t:t + 1], self.rest(t)[1], self.body.parents)[0]
+
+    def gradients(self, t: int, grad_vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of a loss with gradient grad_vertices (V, 3): of pose (55, 3), transl (3,), rest vertices (V, 3), joints (55, 3)."""
+        rest, joints = self.rest(t)
+        return skin_backward(np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest + self.offset, joints,
+                             self.body.parents, self.body.skin_index, self.body.skin_weight)
+
+    def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> np.ndarray:
+        """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradients of rest vertices (V, 3) and joints (55, 3)."""
+        grad_pose, grad_transl, grad_rest, grad_joints = self.gradients(t, grad_vertices)
+        grad = np.concatenate([grad_pose, grad_transl[None]]).astype(np.float64)
+        grad[:-1] += 2 * pull * (self.pose[t] - self.base_pose[t]) / TURN**2
+        grad[-1] += 2 * pull * (self.transl[t] - self.base_transl[t]) / SHIFT**2
+        self.count[t] += 1
+        move = adam(self.moments[:, t], self.count[t], grad, rate)
+        self.pose[t] -= self.share * move[:-1]
+        self.transl[t] -= move[-1]
+        return grad_rest, grad_joints
+
+    def shape_gradient(self, grad_rest: np.ndarray, grad_joints: np.ndarray) -> np.ndarray:
+        """(B,) gradient of the betas from those of the rest vertices (V, 3) and joints (55, 3)."""
+        on_vertices = grad_rest + self.body.J_regressor.T @ grad_joints
+        return np.tensordot(on_vertices, self.body.shapedirs[:, :, :len(self.betas)], 2)
+
+    def step_betas(self, grad: np.ndarray, rate: float) -> None:
+        """One Adam step of the betas (B,), which all frames share."""
+        self.beta_count += 1
+        self.betas -= adam(self.beta_moments, self.beta_count, grad, rate)
+        self.forget_rests()
+
+    def expression_gradient(self, grad_rest: np.ndarray) -> np.ndarray:
+        """(E,) gradient of a frame's expression from that of its rest vertices (V, 3)."""
+        return np.tensordot(grad_rest, self.body.exprdirs, 2)
+
+    def step_expression(self, t: int, grad: np.ndarray, rate: float, pull: float) -> None:
+        """One Adam step of the expression of frame t, after `step`. grad: (E,)."""
+        grad = grad + 2 * pull * self.expression[t] / EXPRESSION**2
+        self.expression[t] -= adam(self.expression_moments[:, t], self.count[t], grad, rate)
+        self.rests.pop(t, None)
+        self.moved.pop(t, None)
+
+    def step_joints(self, grad: np.ndarray, rate: float, pull: float) -> None:
+        """One Adam step of the joints at rest, which all frames share. grad: (55, 3)."""
+        grad = grad + 2 * pull * self.joint_offset / JOINT**2
+        self.joint_count += 1
+        self.joint_offset -= self.joint_share * adam(self.joint_moments, self.joint_count, grad, rate)
+
+    def refined(self):
+        """BodyParams with the poses as they stand; `joints` computed anew."""
+        flat = self.pose.astype(np.float32).reshape(len(self.pose), -1)
+        params = replace(self.params, betas=self.betas.astype(np.float32), global_orient=flat[:, :3],
+                         body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69],
+                         leye_pose=flat[:, 69:72], reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120],
+                         right_hand_pose=flat[:, 120:165], transl=self.transl.astype(np.float32),
+                         expression=(self.params.expression + self.expression).astype(np.float32),
+                         joint_offset=(self.params.joint_offset + self.joint_offset).astype(np.float32))
+        params.joints = self.body.posed_joints(params)
+        return params

@@ -1,0 +1,40 @@
+"""A training in miniature: it calls the kernels of recipe `fast` as a real one does, so that they are compiled or loaded before."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.camera import Camera
+from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.judge.heldout import align_poses, judge
+from gsac.stages.train.poses.photometric import converge
+from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.recipes import RECIPES
+from gsac.stages.train.task import Task
+from gsac.stages.train.views import View
+
+FRAMES, STEPS, GAUSSIANS = 3, 6, 330
+WIDTH, HEIGHT, FOCAL, DISTANCE = 54, 96, 150.0, 3.2
+"""px and m of images that the body nearly fills."""
+TURN = 0.2
+"""rad from frame to frame."""
+
+
+def rehearse() -> None:
+    """Takes what the compiler takes, some fifteen seconds, at the very first; one second once its cache holds everything."""
+    body = Body.load()
+    pose = np.zeros((FRAMES, len(body.parents), 3))
+    for t in range(FRAMES):
+        pose[t, 0] = np.pi * np.array([np.cos(t * TURN / 2), 0, np.sin(t * TURN / 2)])
+    params = BodyParams.from_pose(pose, np.tile([0.0, 0.0, DISTANCE], (FRAMES, 1)), np.zeros(4),
+                                  np.zeros((FRAMES, body.exprdirs.shape[2])), FOCAL, (WIDTH / 2, HEIGHT / 2), model=body.digest)
+    pixels = np.full((HEIGHT, WIDTH, 4), 255, np.uint8)
+    views = [View(Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT), pixels, (0, 0)) for _ in range(FRAMES)]
+    frames, poses = np.arange(FRAMES), Poses(body, params)
+    config = TrainConfig(gaussians=GAUSSIANS, steps=STEPS, pose_rounds=1)
+    gaussians = RECIPES["fast", "cpu"](Task(views, frames, frames[:1], poses, config, lambda done, total, unit: None)).gaussians
+    converge(gaussians, poses, frames[:1], views, 1)
+    align_poses(gaussians, poses, frames[:1], views, 1)
+    judge(gaussians, poses, frames[:1], views)
+    poses.refined()

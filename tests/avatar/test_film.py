@@ -1,0 +1,89 @@
+"""Films of the asymmetric figure: its left hand is red, its right one blue, its front green."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gsac.avatar.film import FOLLOW_S, frames, performance, turntable
+from gsac.avatar.motion.source import Motion
+
+WIDTH, HEIGHT = 120, 160
+BLACK = np.zeros(3)
+
+
+def drawn(figure, film):
+    return np.stack(list(frames(figure, film, WIDTH, HEIGHT, BLACK))).astype(float)
+
+
+def columns(image, channel):
+    """Mean column of the pixels where a channel outshines the two others."""
+    others = [c for c in range(3) if c != channel]
+    mask = image[..., channel] > image[..., others].max(-1) + 80
+    assert mask.any()
+    return np.nonzero(mask)[1].mean()
+
+
+def raised(figure, joint, turn, T=4):
+    rotation = np.zeros((T, len(figure.joints), 3), np.float32)
+    rotation[:, figure.joint_names.index(joint)] = turn
+    return Motion(10.0, rotation, np.zeros((T, 3), np.float32))
+
+
+def test_the_turn_begins_at_the_front_goes_all_round_and_the_left_hand_is_at_the_right(figure):
+    seen = drawn(figure, turntable(figure, 0.8, 10))
+    assert len(seen) == 8
+    assert columns(seen[0], 0) > WIDTH / 2 > columns(seen[0], 2)
+    assert columns(seen[4], 0) < WIDTH / 2 < columns(seen[4], 2), "half way round we see the back"
+    green = [(image[..., 1] > image[..., 0] + 40).mean() for image in seen]
+    assert green[0] > 5 * green[4]
+    assert columns(seen[1], 0) < columns(seen[0], 0), "the camera goes to our right, so the left hand comes to the middle"
+
+
+def test_a_raised_right_arm_is_raised_at_the_left_of_the_picture(figure):
+    film = performance(raised(figure, "right_shoulder", (0, 0, -1.2)), 10)
+    image = drawn(figure, film)[0]
+    blue = image[..., 2] > image[..., :2].max(-1) + 80
+    red = image[..., 0] > image[..., 1:].max(-1) + 80
+    (blue_y, blue_x), (red_y, red_x) = (np.array(np.nonzero(m)).mean(1) for m in (blue, red))
+    assert blue_x < WIDTH / 2 < red_x and blue_y < red_y - 20
+
+
+def test_every_pose_is_inside_the_picture_and_fills_it(figure):
+    figure_out = raised(figure, "left_hip", (0, 0, 1.4), 9)
+    figure_out.rotation[:5] = 0
+    for film in (turntable(figure, 1, 12), performance(figure_out, 10)):
+        lit = drawn(figure, film).max(-1) > 8
+        assert not lit[:, [0, -1]].any() and not lit[:, :, [0, -1]].any()
+        used = lit.any(0)
+        assert max(np.ptp(np.nonzero(used)[0]) / HEIGHT, np.ptp(np.nonzero(used)[1]) / WIDTH) > 0.75
+
+
+def test_the_camera_goes_along_and_a_step_is_still_seen_as_one(figure):
+    walk = raised(figure, "left_elbow", 0, 41)
+    walk.transl[:, 0] = np.linspace(0, 8, 41)
+    seen = drawn(figure, performance(walk, 10))
+    assert np.abs(np.array([columns(i, 0) for i in seen[10:30]]) - columns(seen[20], 0)).max() < 3
+    jump = raised(figure, "left_elbow", 0, 3)
+    jump.transl[1, 0] = 0.3
+    seen = drawn(figure, performance(jump, 10))
+    assert FOLLOW_S > 0.3 and columns(seen[1], 0) > columns(seen[0], 0) + 5
+
+
+def test_the_light_stands_still_in_the_room_while_the_camera_goes_round(figure):
+    grey = replace(figure, gaussians=figure.gaussians | {"rgb": np.full_like(figure.gaussians["rgb"], .4)})
+    from_its_left = replace(grey, light=np.float32([[1] * 3, [.8] * 3, [0] * 3, [0] * 3]))
+    film = turntable(figure, 0.8, 10)
+    even, lit = drawn(grey, film).mean(-1), drawn(from_its_left, film).mean(-1)
+    person = even > 90
+    at_left, front, at_right, back = (lit[t][person[t]].mean() / even[t][person[t]].mean() for t in (2, 0, 6, 4))
+    assert at_left > 1.25 and at_right < .75 and abs(front - 1) < .1 and abs(back - 1) < .1
+
+
+@pytest.mark.parametrize(("fps", "seconds", "count"), [(10, None, 11), (20, None, 21), (7, None, 8), (10, 0.5, 6), (10, 9, 11)])
+def test_a_film_has_the_frames_of_its_rate_and_length(figure, fps, seconds, count):
+    motion = raised(figure, "left_elbow", 0, 11)
+    motion.rotation[:, 4, 0] = np.arange(11) * 0.1
+    film = performance(motion, fps, seconds)
+    assert len(film) == count
+    np.testing.assert_allclose(film.pose[:, 4, 0], np.arange(count) / fps, atol=1e-5)

@@ -1,0 +1,70 @@
+"""Frames that the fit got wrong are named with their reason and count for nothing; all others are left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gsac.avatar.body import LOST, Body, BodyParams
+from gsac.stages.smplx.fit import Fit
+from gsac.stages.smplx.lost_frames import lost_frames, sentences
+
+HEIGHT = 1000.0
+
+
+@pytest.fixture
+def good() -> Fit:
+    return Fit(None, np.full((10, 55), 0.01), np.full(10, 0.88), np.full(10, 6.0), 20)
+
+
+def said(fit: Fit, seen: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
+    lost = lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT)
+    assert np.sum(list(lost.values()), axis=0).max() <= 1  # one reason a frame
+    return np.any(list(lost.values()), axis=0), sentences(lost, fit.iou)
+
+
+def test_a_good_fit_loses_nothing_and_says_nothing(good):
+    lost, words = said(good)
+    assert not lost.any() and words == []
+
+
+def test_one_badly_covered_frame_is_lost_and_named(good):
+    iou = good.iou.copy()
+    iou[7] = 0.4
+    lost, words = said(replace(good, iou=iou))
+    assert np.flatnonzero(lost).tolist() == [7]
+    assert len(words) == 1 and "frame 7; the body covers the silhouette badly" in words[0]
+
+
+def test_a_body_off_its_points_is_lost_with_another_reason(good):
+    off = good.reprojection.copy()
+    off[2:4] = 80
+    lost, words = said(replace(good, reprojection=off))
+    assert np.flatnonzero(lost).tolist() == [2, 3]
+    assert "2 of 10 frames (2-3)" in words[0] and "off the seen points" in words[0]
+
+
+def test_frames_without_a_person_are_lost_whatever_their_numbers(good):
+    seen = np.ones(10, bool)
+    seen[0] = False
+    iou = good.iou.copy()
+    iou[0] = np.nan
+    lost, words = said(replace(good, iou=iou, reprojection=np.where(seen, 6, np.nan)), seen)
+    assert np.flatnonzero(lost).tolist() == [0] and "no person is seen" in words[0]
+
+
+def test_wide_clothes_in_every_frame_are_told_but_nothing_is_lost(good):
+    lost, words = said(replace(good, iou=np.full(10, 0.6)))
+    assert not lost.any()
+    assert len(words) == 1 and "wide clothes" in words[0] and "10 of 10 frames (0-9)" in words[0]
+
+
+def test_the_mark_is_read_back_from_the_joints_spread():
+    body = Body.load()
+    still = np.zeros((3, 52))
+    params = BodyParams.from_pose(np.zeros((3, 55, 3)), np.zeros((3, 3)), np.zeros(body.num_betas), still, 500.0, (1, 1))
+    params.sigma_joints[:] = 0.1
+    params.sigma_joints[1] = LOST
+    assert params.lost.tolist() == [False, True, False]

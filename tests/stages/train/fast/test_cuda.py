@@ -1,0 +1,75 @@
+"""What the GPU's side of `train` refuses and promises without a GPU, and, where there is one, the stage's bytes."""
+
+import json
+from dataclasses import fields
+
+import pytest
+
+from gsac.avatar.cuda import why_not
+from gsac.stages.contract import BadInput, make_config
+from gsac.stages.train import STAGE, config
+from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.fast import trainer
+from gsac.stages.train.fast.cuda import STEPS, recipe_of
+from gsac.stages.train.recipes import RECIPES
+from gsac.stages.train.stage import check_device, run
+
+
+def test_every_recipe_has_an_entry_for_every_device():
+    assert set(RECIPES) == {(name, device) for name in config.RECIPES for device in config.DEVICES if device != config.AUTO}
+
+
+@pytest.mark.parametrize("device", ["auto", "cpu", "cuda"])
+def test_exposure_is_refused_where_the_recipe_learns_none(device):
+    with pytest.raises(BadInput, match="train.exposure.*train.recipe to fast"):
+        make_config(STAGE, {"recipe": "paper", "device": device, "exposure": True})
+    assert make_config(STAGE, {"recipe": "fast", "device": device, "exposure": True}).exposure
+
+
+@pytest.mark.skipif(why_not() is None, reason="there is a GPU here")
+def test_cuda_without_a_gpu_says_what_is_missing_and_what_to_do():
+    with pytest.raises(BadInput, match="cuda, but .*(GPU|driver|gsac\\[gpu\\]).*train.device to cpu"):
+        check_device("cuda")
+
+
+def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
+    made = recipe_of(TrainConfig(mask=0.5, mu_rate=2e-3, exposure=True), 3000, batch=3)
+    assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, STEPS)
+    assert made.largest == trainer.largest(TrainConfig(), 3000) == TrainConfig().largest * 2
+    assert made.coarse_share * STEPS == trainer.coarse_steps(STEPS)
+    assert trainer.coarse_steps(STEPS) == trainer.coarse_steps(trainer.STEPS) > trainer.coarse_steps(400)
+    assert (made.offset_share, made.gain_rate) == (trainer.OFFSET_SHARE, trainer.GAIN_RATE)
+    assert recipe_of(TrainConfig(steps=7), 12000).steps == 7 and recipe_of(TrainConfig(), 12000).gain_rate == 0
+    shared = {f.name for f in fields(TrainConfig)} & {f.name for f in fields(made)}
+    config = TrainConfig(steps=9)
+    assert {n: getattr(recipe_of(config, 12000), n) for n in shared} == {n: getattr(config, n) for n in shared}
+
+
+def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_able(monkeypatch):
+    from gsac.avatar.camera import Camera
+    from gsac.avatar.cuda import perceptual
+    from gsac.stages.train.stage import without_lpips
+
+    told = {(recipe, lpips): TrainConfig(recipe=recipe, lpips=lpips).in_loss()
+            for recipe in config.RECIPES for lpips in config.LPIPS}
+    assert {wish for wish, it_is in told.items() if it_is} == {("paper", "auto"), ("paper", "loss"), ("fast", "loss")}
+    frames, small = Camera((500, 500), (150, 200), 300, 400), Camera((50, 50), (31, 40), 63, 80)
+    paper, fast = (TrainConfig(recipe=recipe, lpips="loss") for recipe in ("paper", "fast"))
+    assert without_lpips(paper, "cpu", frames) is None and "recipe paper" in without_lpips(fast, "cpu", frames)
+    assert "64 px" in without_lpips(paper, "cpu", small)
+    for why in (None, "torch cannot use the GPU"):
+        monkeypatch.setattr(perceptual, "why_not", lambda why=why: why)
+        assert without_lpips(fast, "cuda", frames) is why and without_lpips(paper, "cuda", frames) is why
+        assert "train.lpips is loss" in without_lpips(TrainConfig(recipe="paper"), "cuda", frames)
+
+
+@pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
+def test_one_seed_gives_the_same_bytes_on_a_gpu_and_the_same_choice_of_a_size(job):
+    found = []
+    for name in ("a", "b"):
+        made = job(name, device="cuda", gaussians="auto", steps=400)
+        run(made)
+        figures = json.loads((made.out / "metrics.json").read_text())
+        found.append([*((made.out / file).read_bytes() for file in ("avatar.npz", "body.npz")), figures["size_curve"],
+                      [row["loss"] for row in figures["curve"]], figures["heldout"]])
+    assert found[0] == found[1] and len(found[0][2]) > 1

@@ -1,0 +1,71 @@
+"""The loop's kernels against plain numpy."""
+
+import numpy as np
+import pytest
+
+from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on_background, through_background
+
+
+def images(seed=0, h=7, w=5):
+    rng = np.random.default_rng(seed)
+    alpha = rng.random((h, w))
+    rgb = rng.random((h, w, 3)) * alpha[..., None]
+    pixels = rng.integers(0, 256, (h, w, 4)).astype(np.uint8)
+    return rgb, alpha, pixels, rng.random(3), rng.random(3) + 0.5
+
+
+def test_backgrounds_gradient_agrees_with_central_differences():
+    rgb, alpha, pixels, background, gain = images()
+    weight = np.random.default_rng(1).normal(size=rgb.shape)
+
+    def loss(rgb, alpha, gain):
+        image, target = np.empty_like(rgb), np.empty_like(rgb)
+        on_background(rgb, alpha, pixels, background, gain, image, target)
+        return (image * weight).sum() + 0.3 * ((alpha - pixels[..., 3] / 255) ** 2).mean()
+
+    got = [np.empty_like(rgb), np.empty_like(alpha), np.empty(3)]
+    term = through_background(weight, rgb, alpha, pixels, background, gain, 0.3, *got)
+    assert term == pytest.approx(0.3 * ((alpha - pixels[..., 3] / 255) ** 2).mean())
+    values = [rgb, alpha, gain]
+    for which in range(3):
+        want = np.empty_like(values[which])
+        for i in np.ndindex(want.shape):
+            step = np.zeros_like(want)
+            step[i] = 1e-6
+            args = [[a + s * step if n == which else a for n, a in enumerate(values)] for s in (1, -1)]
+            want[i] = (loss(*args[0]) - loss(*args[1])) / 2e-6
+        np.testing.assert_allclose(got[which], want, rtol=1e-6, atol=1e-8)
+
+
+def test_frame_and_render_of_the_same_content_agree_on_any_background():
+    _, _, pixels, background, _ = images()
+    alpha = pixels[..., 3] / 255
+    image, target = np.empty((*alpha.shape, 3)), np.empty((*alpha.shape, 3))
+    on_background(pixels[..., :3] / 255, alpha, pixels, background, np.ones(3), image, target)
+    np.testing.assert_allclose(image, target, atol=1e-12)
+
+
+def test_adam_moves_a_row_by_the_rate_at_first_and_leaves_rows_without_gradient():
+    value, grad = np.ones((3, 2), np.float32), np.array([[1.0, -50], [0, 0], [1e-6, 1]], np.float32)
+    first, second, count = np.zeros((3, 2)), np.zeros((3, 2)), np.zeros(3, np.int64)
+    count_rows(grad, count)
+    adam_rows(value, grad, first, second, count, 0.1)
+    np.testing.assert_allclose(value, [[0.9, 1.1], [1, 1], [0.9, 0.9]], atol=1e-5)
+    np.testing.assert_array_equal(count, [1, 0, 1])
+
+
+def test_no_needle_giant_or_floater_survives_the_limits():
+    rng = np.random.default_rng(2)
+    n = 200
+    mu, start = rng.normal(0, 3, (n, 3)), rng.normal(0, 0.01, (n, 3))
+    quat = rng.normal(size=(n, 4))
+    quat[0] = 0
+    log_scale, rgb, logit = rng.normal(0, 5, (n, 3)), rng.normal(0, 2, (n, 3)), rng.normal(0, 20, (n, 1))
+    k = rng.uniform(0.05, 1, n)
+    limit(mu, quat, log_scale, rgb, logit, start, k, 4.0, 0.05, 0.08, 0.0)
+    scales = np.sort(np.exp(log_scale), axis=1)
+    assert (scales[:, 2] <= 4.0 * scales[:, 1] * 1.0001).all() and (scales[:, 2] <= 10.001 * scales[:, 0]).all()
+    assert (scales[:, 2] * k <= 0.05001).all()
+    assert (np.linalg.norm(mu - start, axis=1) * k <= 0.08001).all()
+    np.testing.assert_allclose(np.linalg.norm(quat, axis=1), 1)
+    assert rgb.min() >= 0 and rgb.max() <= 1 and abs(logit).max() <= 9

@@ -1,0 +1,1 @@
+"""What tests of several packages share: a small figure, dances, damaged files, Mono, the toy project."""

@@ -1,0 +1,56 @@
+"""Compiles the package's C# with Mono's `mcs`, warnings as errors, and runs programs of the tests with it."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parents[1] / "unity"
+PROGRAMS = {"mcs": "mono-mcs", "mono": "mono-runtime"}
+
+
+def missing_packages():
+    return sorted(package for program, package in PROGRAMS.items() if not shutil.which(program))
+
+
+def compile_csharp(sources, out, *options):
+    """out: .exe or .dll. AssertionError with the compiler's words."""
+    kind = "library" if Path(out).suffix == ".dll" else "exe"
+    done = subprocess.run(["mcs", "-langversion:latest", "-warnaserror", f"-target:{kind}", f"-out:{out}", *options,
+                           *map(str, sources)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out
+
+
+def run(program, *args, heap="256m", collector=""):
+    """Standard output; heap: what the program may allocate before it is ended with an error."""
+    done = subprocess.run(["mono", "--debug", str(program), *map(str, args)], capture_output=True, text=True,
+                          env=os.environ | {"MONO_GC_PARAMS": f"max-heap-size={heap}{collector}"})
+    assert done.returncode == 0, (done.stdout[-2000:], done.stderr[-2000:])
+    return done.stdout
+
+
+def compile_package(package, out):
+    """The package over the stubs of Unity, Runtime without the editor's, as Unity does. Returns the tests' program."""
+    stubs, editor = sorted((HERE / "stubs").glob("*.cs")), HERE / "stubs" / "UnityEditor.cs"
+    compile_csharp([s for s in stubs if s != editor], out / "UnityEngine.dll")
+    options = [f"-r:{out / 'UnityEngine.dll'}"]
+    compile_csharp(sorted((package / "Runtime").rglob("*.cs")), out / "Gsac.dll", *options)
+    compile_csharp([editor], out / "UnityEditor.dll", *options)
+    options += [f"-r:{out / 'UnityEditor.dll'}", f"-r:{out / 'Gsac.dll'}"]
+    compile_csharp(sorted((package / "Editor").rglob("*.cs")), out / "Gsac.Editor.dll", *options)
+    options.append(f"-r:{out / 'Gsac.Editor.dll'}")
+    return compile_csharp(sorted((HERE / "programs").glob("[ADP]*.cs")), out / "Play.exe", *options)
+
+
+def arrays(path):
+    """Name -> array of what programs/Dump.cs wrote."""
+    raw, at, out = Path(path).read_bytes(), 0, {}
+    while at < len(raw):
+        end = raw.index(b"\n", at)
+        name, kind, count = raw[at:end].decode().rsplit(" ", 2)
+        out[name] = np.frombuffer(raw, f"<{kind}4", int(count), end + 1)
+        at = end + 1 + 4 * int(count)
+    return out

@@ -1,0 +1,110 @@
+"""The shader that Unity draws splats with: it compiles for every render pipeline, and its picture is the trainer's."""
+
+import numpy as np
+import pytest
+
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.camera import Camera
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.raster import render
+from gsac.avatar.rotation import exp
+from gsac.benchmarks.unity.gpu import Painting, projection
+from gsac.benchmarks.unity.packing import packed
+
+pytestmark = pytest.mark.slow
+
+PIPELINES = ["", "UniversalPipeline", "HDRenderPipeline"]
+SIZE = 256
+
+
+def test_every_render_pipeline_has_a_pass_that_compiles(passes):
+    assert sorted(passes) == sorted([*PIPELINES, "stereo"])
+
+
+@pytest.fixture(scope="module")
+def scene(exported):
+    """2,500 gaussians of an avatar in its own space, a turned and shifted root, an off-centre camera, and the truth."""
+    avatar = RiggedAvatar.read(exported / "avatar.gsac")
+    pick = np.arange(2500) * len(avatar.gaussians["face"]) // 2500
+    avatar.gaussians = {name: array[pick] for name, array in avatar.gaussians.items()}
+    avatar.gaussians["log_scale"] = avatar.gaussians["log_scale"] + .4
+    g = avatar.gaussians
+    bound = bind(face_frames(avatar.posed(avatar.pose("A")), avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    turn = exp(np.array([.1, .7, 0]))
+    model = np.concatenate([turn, [[.3], [-.35], [.2]]], 1)
+    view = np.concatenate([exp(np.array([.15, 0, .1])), [[.1], [-.1], [-2.6]]], 1)  # y up, -z ahead
+    camera = Camera((240.0, 250.0), (119.0, 131.5), SIZE, SIZE)
+    flip = np.diag([1.0, -1, -1])
+    total = flip @ view[:, :3] @ model[:, :3]
+    place = flip @ (view[:, :3] @ model[:, 3] + view[:, 3])
+    truth = render((bound.means @ total.T + place).astype(np.float32), (total @ bound.rotations).astype(np.float32),
+                   bound.scales, g["rgb"], g["opacity"], camera)
+    return {"avatar": avatar, "bound": bound, "model": model, "view": view, "camera": camera, "total": total, "place": place,
+            "truth": np.concatenate([truth.rgb, truth.alpha[..., None]], 2)}
+
+
+def picture(gpu, passes, scene, pipeline, flipped=False, linear=0):
+    g, bound = scene["avatar"].gaussians, scene["bound"]
+    N = len(g["face"])
+    half = bound.rotations * bound.scales[:, None]
+    c = half @ half.transpose(0, 2, 1)
+    splats = np.zeros((N, 12), np.float32)
+    splats[:, :3], splats[:, 3:9], splats[:, 9:] = bound.means, c[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], scene.get("shade", 1)
+    order = np.argsort(-(bound.means @ scene["total"][2]), kind="stable").astype(np.uint32)
+    gpu.put("GsacSplats", splats)
+    gpu.put("GsacColours", packed(scene["avatar"])["GsacColours"])
+    gpu.put("GsacKeys", order | np.uint32(5 << 13))
+    view = np.vstack([scene["view"], [0, 0, 0, 1]])
+    eye = -scene["view"][:, :3].T @ scene["view"][:, 3]
+    if pipeline == "HDRenderPipeline":
+        view[:3, 3] = 0
+    screen = np.array([SIZE, SIZE, 0, 0])
+    parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(scene["camera"], flipped).T,
+                  "_ScreenParams": screen, "_ScaledScreenParams": screen, "_ScreenSize": screen,
+                  "_WorldSpaceCameraPos": [*eye, 0], "GsacBlend": np.array([.3, .999, 1 / 255, linear]), "GsacIndexBits": 13,
+                  **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
+    return Painting(gpu, *passes[pipeline], SIZE, SIZE, N).draw(parameters)
+
+
+@pytest.mark.parametrize("pipeline", PIPELINES)
+def test_the_picture_is_the_trainers_at_55_db(gpu, passes, scene, pipeline):
+    got = picture(gpu, passes, scene, pipeline)
+    assert (scene["truth"][..., 3] > .5).mean() > .05, "the figure is in the picture"
+    mse = ((got - scene["truth"]) ** 2).mean()
+    print(f"{pipeline or 'built-in'}: PSNR {-10 * np.log10(mse):.1f} dB, max {abs(got - scene['truth']).max():.4f}")
+    assert -10 * np.log10(mse) > 55
+
+
+def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, passes, scene):
+    got = picture(gpu, passes, scene, "", flipped=True)[::-1]
+    assert -10 * np.log10(((got - scene["truth"]) ** 2).mean()) > 55
+
+
+def test_each_eye_of_a_headset_is_drawn_by_its_own_matrices_in_one_pass(gpu, passes, scene):
+    shifted = scene | {"view": scene["view"] + [[0, 0, 0, .25], [0, 0, 0, 0], [0, 0, 0, 0]]}
+    alone = [picture(gpu, passes, s, "") for s in (shifted, scene)]  # the last leaves the buffers
+    assert abs(alone[0] - alone[1]).max() > .3, "the eyes see different things"
+    views = [np.vstack([s["view"], [0, 0, 0, 1]]).T for s in (shifted, scene)]
+    parameters = {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(scene["camera"]).T] * 2,
+                  "_ScreenParams": [SIZE, SIZE, 0, 0], "GsacBlend": [.3, .999, 1 / 255, 0], "GsacIndexBits": 13,
+                  **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
+    painting = Painting(gpu, *passes["stereo"], SIZE, SIZE, len(scene["bound"].means))
+    for eye in (0, 1):
+        assert abs(painting.draw(parameters, instance=eye) - alone[eye]).max() < 1e-3
+
+
+def test_in_a_linear_project_an_opaque_colour_is_the_lit_display_colour_made_linear(gpu, passes, scene):
+    factor = np.array([.5, 1, 1.5])
+    first = type(scene["bound"])(*(a[:1] for a in scene["bound"]))
+    one = scene | {"shade": factor, "bound": first, "avatar": _first(scene["avatar"])}
+    got = picture(gpu, passes, one, "", linear=1)
+    peak = got.reshape(-1, 4)[got[..., 3].argmax()]
+    rgb = one["avatar"].gaussians["rgb"][0].astype(np.float64) * factor
+    linear = np.where(rgb > .04045, ((rgb + .055) / 1.055) ** 2.4, rgb / 12.92)
+    np.testing.assert_allclose(peak[:3] / peak[3], linear, atol=2e-3)
+
+
+def _first(avatar):
+    from dataclasses import replace
+
+    return replace(avatar, gaussians={name: array[:1] for name, array in avatar.gaussians.items()})

@@ -1,0 +1,126 @@
+"""viewer.html on WebGPU: its shaders are Unity's, it is taken where there is a graphics card, and what stops is followed up."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from gsac.benchmarks.viewer import browser as chromium
+from gsac.viewer import wgsl
+from gsac.viewer.page import page_bytes
+
+SIZE = 300
+needs_chromium = pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")
+CARD = """(() => {
+  if (!window.GPUAdapter) return;
+  const info = Object.getOwnPropertyDescriptor(GPUAdapter.prototype, 'info').get;
+  Object.defineProperty(GPUAdapter.prototype, 'info', { get() { info.call(this); return { vendor: 'acme', architecture: 'one',
+    description: 'a card', isFallbackAdapter: false }; } });
+})()"""
+"""Makes the software adapter say that it is a graphics card."""
+
+
+def test_the_shaders_are_of_the_present_hlsl():
+    assert wgsl.digest() in wgsl.WRITTEN.read_text(), "run `make shaders`"
+
+
+@pytest.mark.slow
+def test_the_hlsl_gives_these_very_shaders(node_package):
+    if not shutil.which("glslangValidator"):
+        pytest.skip("needs the Debian package glslang-tools")
+    written = wgsl.WRITTEN.read_text()
+    if f"glslang {wgsl.glslang_version()}," not in written:
+        pytest.skip("shaders.js was written with another version of glslang")
+    assert wgsl.script(wgsl.wgsl(node_package(wgsl.NAGA) / "node_modules")) == written
+
+
+@pytest.mark.slow
+def test_the_other_browsers_compiler_takes_them_too():
+    """naga, which Firefox has; chromium has tint."""
+    wgpu = pytest.importorskip("wgpu", reason="needs the package wgpu (pip install gsac[dev])")
+    adapters = wgpu.gpu.enumerate_adapters_sync()
+    if not adapters:
+        pytest.skip("needs a Vulkan device (Debian package mesa-vulkan-drivers)")
+    device = adapters[0].request_device_sync()
+    shaders = re.findall(r"^  (\w+): \{ bindings.*?code: `\n(.*?)` \},$", wgsl.WRITTEN.read_text(), re.S | re.M)
+    assert [entry for entry, _ in shaders] == list(wgsl.ENTRIES)
+    for entry, code in shaders:
+        module = device.create_shader_module(code=code)
+        if wgsl.ENTRIES[entry] == "comp":
+            device.create_compute_pipeline(layout="auto", compute={"module": module, "entry_point": entry})
+
+
+def test_parameters_stand_where_wgsl_lays_them():
+    text = "struct P {\n a: u32,\n b: vec2<f32>,\n c1_: vec4<f32>,\n}\n@group(0) @binding(3) \nvar<uniform> unnamed: P;\n" \
+           "@group(0) @binding(1) \nvar<storage, read_write> Keys_1: Keys;"
+    assert wgsl.places(text) == ({"parameters": 3, "Keys": 1}, {"a": 0, "b": 8, "c1": 16})
+
+
+@pytest.fixture(scope="module")
+def page():
+    it = chromium.Browser(SIZE, SIZE, chromium.WEBGPU)
+    yield it
+    it.close()
+
+
+@pytest.fixture(scope="module")
+def address(figure, tmp_path_factory):
+    path = tmp_path_factory.mktemp("gpu") / "viewer.html"
+    path.write_bytes(page_bytes(figure.to_bytes()))
+    return path.as_uri()
+
+
+def picture(page, script):
+    page.run(script)
+    page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert page.errors == []
+    return page.picture().astype(int)
+
+
+@needs_chromium
+@pytest.mark.slow
+def test_a_software_adapter_is_left_alone(page, address):
+    page.open(f"{address}#pose=A")
+    assert page.run("gsac.painter.kind") == "software" and page.errors == []
+
+
+@needs_chromium
+@pytest.mark.slow
+def test_what_stops_is_followed_by_the_next_way_with_the_same_picture(page, address, shadowed):
+    got = page.call("Page.addScriptToEvaluateOnNewDocument", source=CARD)
+    try:
+        page.open(f"{address}?card#pose=A&bg=a0b0c0&yaw=20&pitch=12&joints=left_elbow:0,-40,0&expression=jawOpen:1")
+        if not page.has_webgpu():
+            pytest.skip("this chromium has no WebGPU")
+        assert page.run("gsac.painter.kind") == "webgpu", "a card is taken"
+        seen = [picture(page, shadowed)]
+        for stop, kind in (("gsac.painter.device.destroy()", "webgl"),
+                           ("gsac.painter.gl.getExtension('WEBGL_lose_context').loseContext()", "software")):
+            page.run(stop)
+            page.until(f"gsac.painter?.kind === '{kind}'")
+            page.until("/now drawn/.test(document.getElementById('note').textContent)")
+            seen.append(picture(page, shadowed))
+        for other in seen[1:]:
+            assert np.abs(seen[0] - other).max() <= 12 and np.abs(seen[0] - other).mean() < 0.5
+        assert (np.abs(seen[0] - (0xA0, 0xB0, 0xC0)).max(-1) > 20).mean() > 0.03
+    finally:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=got["identifier"])
+
+
+@needs_chromium
+@pytest.mark.slow
+@pytest.mark.parametrize("broken", [
+    "GPUDevice.prototype.createComputePipelineAsync = async () => { throw new Error('no such thing'); }",
+    "GPUAdapter.prototype.requestDevice = async () => { throw new Error('no device'); }",
+    "GPU.prototype.requestAdapter = async () => null"])
+def test_a_webgpu_that_does_not_begin_makes_room_for_webgl(page, address, broken):
+    card = "HTMLCanvasElement.prototype.getContext = ((get) => function (...asked) { const gl = get.apply(this, asked);" \
+              "if (asked[0] === 'webgl2') gl.getParameter = () => 'a card'; return gl; })(HTMLCanvasElement.prototype.getContext);"
+    got = page.call("Page.addScriptToEvaluateOnNewDocument", source=f"if (window.GPU) {{ {CARD}; {broken}; }} {card}")
+    try:
+        page.open(f"{address}?{len(broken)}#pose=A&bg=a0b0c0&still")
+        assert page.run("gsac.painter.kind") == "webgl"
+        assert (np.abs(page.picture().astype(int) - (0xA0, 0xB0, 0xC0)).max(-1) > 20).mean() > 0.03 and page.errors == []
+    finally:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=got["identifier"])

@@ -1,0 +1,83 @@
+"""The README's pictures, from the folder that `make demo` made."""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+VIEWS = 4
+"""Frames in the strips of clip and body."""
+HIGH = 420
+"""Height of every picture, px."""
+QUALITY = 82
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m gsac.tools.demo_pictures", description=__doc__)
+    parser.add_argument("--run", type=Path, default=Path("demo/avatar"), metavar="DIR", help="default: demo/avatar")
+    parser.add_argument("--out", type=Path, default=Path("docs"), metavar="DIR", help="default: docs")
+    options = parser.parse_args(argv)
+    from gsac.pipeline.report.pictures import Footage
+    from gsac.pipeline.report.results import Results
+    from gsac.pipeline.report.sheets import body_sheet, contact_sheet, heldout_sheet
+
+    results = Results(options.run)
+    footage = Footage(results)
+    save(options.out / "demo-clip.jpg", strip(contact_sheet(footage).pictures))
+    save(options.out / "demo-body.jpg", strip(body_sheet(footage).pictures))
+    held = heldout_sheet(results).pictures
+    save(options.out / "demo-heldout.jpg", decoded(held[len(held) // 2].uri))
+    save(options.out / "demo-viewer.jpg", viewed(options.run / "export" / "viewer.html"))
+    return 0
+
+
+def decoded(uri: str):
+    """(H, W, 3) uint8 BGR of a data URI, made `HIGH` px high."""
+    import cv2
+    import numpy as np
+
+    image = cv2.imdecode(np.frombuffer(base64.b64decode(uri.partition(",")[2]), np.uint8), cv2.IMREAD_COLOR)
+    return cv2.resize(image, (round(image.shape[1] * HIGH / image.shape[0]), HIGH), interpolation=cv2.INTER_AREA)
+
+
+def strip(pictures: list):
+    """Evenly chosen pictures side by side."""
+    import numpy as np
+
+    return np.hstack([decoded(pictures[i * len(pictures) // VIEWS].uri) for i in range(VIEWS)])
+
+
+def viewed(page: Path):
+    """A browser's screenshot of the viewer page, (H, W, 3) uint8 BGR."""
+    import cv2
+
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if not browser:
+        sys.exit(f"demo_pictures: needs a browser to photograph {page}: one of {', '.join(BROWSERS)}")
+    with tempfile.TemporaryDirectory() as home:
+        shot = Path(home) / "shot.png"
+        subprocess.run([browser, "--headless", "--no-sandbox", "--hide-scrollbars", "--use-angle=swiftshader",
+                        "--enable-unsafe-swiftshader", f"--user-data-dir={home}/user", f"--screenshot={shot}",
+                        "--window-size=760,760", "--virtual-time-budget=6000", page.resolve().as_uri()],
+                       check=True, capture_output=True)
+        image = cv2.imread(str(shot))
+    return cv2.resize(image, (HIGH, HIGH), interpolation=cv2.INTER_AREA)
+
+
+def save(path: Path, image) -> None:
+    import cv2
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(path), image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY]):
+        sys.exit(f"demo_pictures: cannot write {path}")
+    print(path)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

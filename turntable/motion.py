@@ -1,0 +1,225 @@
+"""How the person moves: the turn of a clip, or the second pose set. World: y up, person at the origin, camera at +z."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from gsac.avatar.skinning import joint_transforms
+from gsac.turntable.options import TurntableOptions
+from gsac.turntable.planted import plant
+
+SIDES = {"left": 1.0, "right": -1.0}
+
+
+@dataclass
+class Motion:
+    """T frames."""
+
+    pose: np.ndarray
+    """(T, 55, 3) axis-angle in SMPL-X order; the first turns the person in the world."""
+    place: np.ndarray
+    """(T, 2) m, where the pelvis goes along world x and z."""
+    yaw: np.ndarray
+    """(T,) rad, 0 faces the camera, growing to the person's left."""
+    expression: np.ndarray
+    """(T, 52) in 0..1."""
+
+
+def make_motion(body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
+    """joints: (55, 3) the person's rest joints, m."""
+    return (_turn if options.poses == "turn" else _novel)(body, joints, options, rng)
+
+
+def _turn(body, joints, options: TurntableOptions, rng) -> Motion:
+    T = options.frames
+    index = {name: i for i, name in enumerate(body.joint_names)}
+    s = np.arange(T) / T
+    uneven = options.sway * (0.018 * np.sin(2 * np.pi * (2 * s + rng.random())) + 0.009 * np.sin(
+        2 * np.pi * (5 * s + rng.random())))
+    yaw = 2 * np.pi * (s + uneven - uneven[0])
+    pose = np.repeat(a_pose(body, rng)[None], T, 0)
+    stir(pose, index, options.arm_swing, rng)
+    if options.feet == "turning":
+        steps(pose, index, yaw, options.sway)
+    if options.hidden_hand != "none":
+        hide_hand(pose, index, body.parents, joints, options)
+    turns = Rotation.from_euler("YX", np.stack([yaw, wander(rng, T, 0.015 * options.sway)], 1))
+    pose[:, 0] = turns.as_rotvec()
+    place = np.stack([wander(rng, T, 0.03 * options.sway), wander(rng, T, 0.03 * options.sway)], 1)
+    if options.feet == "planted":
+        plant(pose, index, joints, yaw, place, turns.as_matrix())
+    return Motion(pose, place, yaw, expressions(body, options, rng))
+
+
+def _novel(body, joints, options: TurntableOptions, rng) -> Motion:
+    """Key poses one after another, smoothly blended, seen from slowly changing sides."""
+    T = options.frames
+    index = {name: i for i, name in enumerate(body.joint_names)}
+    rest = a_pose(body, rng)
+    keys = [_changed(rest, index, change) for change in NOVEL_POSES]
+    at = np.linspace(0, len(keys), T, endpoint=False)
+    first = at.astype(int)
+    blend = _smooth(np.clip((at - first - 0.35) / 0.65, 0, 1))[:, None, None]
+    keys = np.stack(keys)
+    pose = keys[first] * (1 - blend) + keys[(first + 1) % len(keys)] * blend
+    stir(pose, index, options.arm_swing, rng)
+    yaw = 0.9 * np.sin(2 * np.pi * np.arange(T) / T * 2 + rng.random())
+    lean = pose[:, 0].copy()
+    pose[:, 0] = (Rotation.from_euler("Y", yaw[:, None]) * Rotation.from_rotvec(lean)).as_rotvec()
+    return Motion(pose, np.zeros((T, 2)), yaw, expressions(body, options, rng))
+
+
+def a_pose(body, rng) -> np.ndarray:
+    """(55, 3): arms 25-35 degrees from the body, elbows and fingers a little bent, feet apart."""
+    index = {name: i for i, name in enumerate(body.joint_names)}
+    pose = np.zeros((len(index), 3))
+    away = np.radians(rng.uniform(25, 35))
+    feet = np.radians(rng.uniform(-4, -2))  # the T-pose stands astride
+    for side, sign in SIDES.items():
+        pose[index[f"{side}_collar"]] = [0, 0, -sign * 0.06]
+        pose[index[f"{side}_shoulder"]] = (
+            Rotation.from_euler("z", -sign * (np.pi / 2 - away - 0.06)) * Rotation.from_euler("x", 0.1)).as_rotvec()
+        pose[index[f"{side}_elbow"]] = [0, -sign * rng.uniform(0.22, 0.34), 0]
+        pose[index[f"{side}_hip"]] = [0, sign * 0.1, sign * feet]
+        pose[index[f"{side}_ankle"]] = [0, 0.05 * sign, -sign * feet]
+        for finger, curl in (("index", 0.16), ("middle", 0.2), ("ring", 0.24), ("pinky", 0.26)):
+            for k, share in ((1, 1.0), (2, 1.5), (3, 0.8)):
+                pose[index[f"{side}_{finger}{k}"]] = [0, 0, -sign * curl * share * rng.uniform(0.8, 1.2)]
+        pose[index[f"{side}_thumb2"]] = [0, -sign * 0.15, 0]
+        pose[index[f"{side}_thumb3"]] = [0, -sign * 0.2, 0]
+    return pose
+
+
+STIR = {"spine1": 1.0, "spine2": 1.0, "spine3": 1.2, "neck": 1.6, "head": 2.4, "collar": 0.8, "shoulder": 3.5,
+        "elbow": 3.5, "wrist": 4.0, "index1": 4.0, "middle1": 3.0, "ring1": 3.0, "pinky1": 4.0, "thumb1": 3.0}
+"""Degrees (standard deviation) that a joint wanders about each axis."""
+
+
+def stir(pose: np.ndarray, index: dict, amount: float, rng) -> None:
+    """Adds smooth small motion to pose (T, 55, 3), in place."""
+    for name, i in index.items():
+        degrees = STIR.get(name.removeprefix("left_").removeprefix("right_"))
+        if degrees:
+            for axis in range(3):
+                pose[:, i, axis] += wander(rng, len(pose), np.radians(degrees) * amount)
+
+
+def steps(pose: np.ndarray, index: dict, yaw: np.ndarray, amount: float) -> None:
+    """Small steps on the spot, each foot in turn, one every 30 degrees of the turn."""
+    for side, phase in (("left", 0.0), ("right", np.pi)):
+        lift = amount * np.clip(np.sin(6 * yaw + phase), 0, None) ** 2
+        pose[:, index[f"{side}_hip"], 0] -= 0.16 * lift
+        pose[:, index[f"{side}_knee"], 0] += 0.34 * lift
+        pose[:, index[f"{side}_ankle"], 0] -= 0.10 * lift
+
+
+def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.ndarray,
+              options: TurntableOptions) -> None:
+    """Moves one hand behind the back or before the belly for a while; pose (T, 55, 3) in place."""
+    side, where = options.hidden_hand.split("_")
+    sign = SIDES[side]
+    back = where == "back"
+    depth = -0.12 if back else 0.19
+    target = joints[index["spine1"]] + [sign * 0.10, 0.0, depth]
+    chain = [index[f"{side}_{name}"] for name in ("shoulder", "elbow", "wrist")]
+    hand, knuckle, elbow = chain[2], index[f"{side}_middle1"], chain[1]
+    start = pose[0].copy()
+    start[0] = 0
+    aim = start[chain].copy()
+    aim[0] = Rotation.from_euler("zy", [-sign * 1.15, sign * (0.4 if back else -0.3)]).as_rotvec()
+    aim[1] = [0, -sign * 1.6, 0] if not back else [0, -sign * 1.2, 0]
+    shoulder = joints[index[f"{side}_shoulder"]]
+    elbow_goal = shoulder + [sign * 0.17, -0.22, -0.12 if back else 0.02]
+
+    def miss(x):
+        trial = start.copy()
+        trial[chain] = x.reshape(3, 3)
+        a = joint_transforms(trial[None], joints, parents)[0]
+        at = {j: a[j, :, :3] @ joints[j] + a[j, :, 3] for j in (hand, knuckle, elbow)}
+        along = at[knuckle] - at[hand]
+        across = along / np.linalg.norm(along) - np.array([-0.7 * sign, -0.7, 0])
+        return np.concatenate([(at[hand] - target) * 30, across * 1.0, (at[elbow] - elbow_goal) * 4,
+                               (x - aim.ravel()) * 0.15, x[6:] * 0.8])
+
+    goal = least_squares(miss, aim.ravel()).x.reshape(3, 3)
+    s = np.arange(len(pose)) / len(pose)
+    ramp = 0.10
+    arrive, leave = options.hidden
+    gone = _smooth(np.clip((s - arrive + ramp) / ramp, 0, 1)) * _smooth(np.clip((leave + ramp - s) / ramp, 0, 1))
+    pose[:, chain] += gone[:, None, None] * (goal - start[chain])
+
+
+def expressions(body, options: TurntableOptions, rng) -> np.ndarray:
+    """(T, 52): talking, smiling, brows, and a blink every half second or so."""
+    T = options.frames
+    out = np.zeros((T, len(body.expression_names)), np.float32)
+    if not options.expression:
+        return out
+    names = {n: i for i, n in enumerate(body.expression_names)}
+
+    def set_to(curve, *actions):
+        for a in actions:
+            out[:, names[a]] = np.clip(curve, 0, 1)
+
+    set_to(0.08 + wander(rng, T, 0.22, 4), "jawOpen")
+    smile = 0.25 + wander(rng, T, 0.35, 2)
+    set_to(smile + wander(rng, T, 0.05), "mouthSmileLeft")
+    set_to(smile + wander(rng, T, 0.05), "mouthSmileRight")
+    set_to(0.5 * smile, "cheekSquintLeft", "cheekSquintRight")
+    brow = wander(rng, T, 0.4, 2)
+    set_to(brow, "browInnerUp", "browOuterUpLeft", "browOuterUpRight")
+    set_to(-brow * 0.8, "browDownLeft", "browDownRight")
+    set_to(wander(rng, T, 0.25, 3), "mouthPucker")
+    set_to(wander(rng, T, 0.2, 2), "mouthFunnel")
+    blink = np.zeros(T)
+    at = int(rng.integers(2, 6))
+    while at < T:
+        for k, v in ((-1, 0.5), (0, 1.0), (1, 0.6)):
+            if 0 <= at + k < T:
+                blink[at + k] = v
+        at += int(rng.integers(6, 14))
+    set_to(blink, "eyeBlinkLeft", "eyeBlinkRight")
+    return out
+
+
+def wander(rng, frames: int, scale: float, cycles: int = 3) -> np.ndarray:
+    """(frames,) smooth, periodic, of standard deviation `scale`: four random waves of up to `cycles` + 1 a clip."""
+    s = np.arange(frames) / frames
+    waves = [np.sin(2 * np.pi * (k * s + rng.random())) * rng.uniform(0.5, 1) for k in (1, 2, cycles, cycles + 1)]
+    return scale * np.sum(waves, 0) * 0.9
+
+
+def _smooth(x):
+    return x * x * (3 - 2 * x)
+
+
+def _changed(rest: np.ndarray, index: dict, change: dict) -> np.ndarray:
+    """rest (55, 3) with named joints set; a name without side mirrors onto both."""
+    pose = rest.copy()
+    for name, rotvec in change.items():
+        rotvec = np.radians(np.asarray(rotvec, float))
+        if name in index:
+            pose[index[name]] = rotvec
+            continue
+        pose[index[f"left_{name}"]] = rotvec
+        pose[index[f"right_{name}"]] = rotvec * [1, -1, -1]
+    return pose
+
+
+NOVEL_POSES = (
+    {},
+    {"hip": (-55, 12, 10), "knee": (75, 0, 0), "ankle": (-25, 0, 0), "spine1": (15, 0, 0), "spine2": (10, 0, 0),
+     "pelvis": (20, 0, 0), "shoulder": (0, -75, -10), "elbow": (0, -15, 0)},
+    {"shoulder": (0, 0, 45), "collar": (0, 0, 15), "elbow": (0, -15, 0), "head": (-12, 0, 0)},
+    {"left_shoulder": (0, -70, 8), "left_elbow": (0, -10, 0), "spine2": (8, -12, 0), "left_hip": (-15, 0, 3),
+     "left_knee": (20, 0, 0)},
+    {"spine1": (0, 14, 0), "spine2": (0, 14, 0), "spine3": (0, 14, 0), "neck": (0, -10, 0), "shoulder": (0, -30, -30),
+     "elbow": (0, -70, 0)},
+    {"shoulder": (0, 0, 0), "elbow": (0, -4, 0), "spine2": (0, 0, 10)},
+    {"right_shoulder": (0, 20, -30), "right_elbow": (0, 95, 0), "right_hip": (-60, 0, -6), "right_knee": (80, 0, 0)},
+)
+"""Degrees, axis-angle: stand, squat, arms raised, reach, twist, T-pose with a side bend, knee up."""

@@ -1,0 +1,233 @@
+"""Who turns: a body that the fit's basis does not span, in clothes and hair that its model does not have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gsac.avatar.body import Body
+from gsac.avatar.skinning import skin
+from gsac.turntable.options import TurntableOptions
+from gsac.turntable.shell import Shell, capped, cut, draped, lifted
+
+REGIONS = Path(__file__).with_name("regions.npz")
+"""(6, V) shares of lips, ears, eyelids, nails, inner mouth, face: MakeHuman's CC0 texture masks at the vertices, in 255ths;
+`tools/open_body/bake_regions.py` makes it."""
+OUTSIDE = Path(__file__).with_name("outside.npz")
+"""What single local shape sliders do: `vertices` (S, V, 3) and `joints` (S, 55, 3), m; from the open body's bake."""
+EYES = slice(13574, 13718)
+"""Both eyeballs in the open body's vertices."""
+MATERIALS = ("skin", "eye", "shirt", "trousers", "shoes", "hair")
+
+
+@dataclass
+class Look:
+    """Choices that shape and colour share."""
+
+    sleeve: float
+    """m from the middle to the end of the sleeve, in the T-pose."""
+    hem: float
+    """m, height of the shirt's hem in the template."""
+    cuff: float
+    """m, height of the trousers' end."""
+    hair: str
+    """`short` or `bob`."""
+    neckline: float
+    """m that the collar is open in front."""
+
+
+@dataclass
+class Person:
+    """C control vertices are skinned; N vertices of the drawn mesh lie between two of them."""
+
+    body: Body
+    look: Look
+    betas: np.ndarray
+    rest: np.ndarray
+    """(C, 3) m: the bare body's V first."""
+    joints: np.ndarray
+    """(55, 3) m."""
+    joint_offset: np.ndarray
+    """(55, 3) m beyond what the betas explain."""
+    skin_index: np.ndarray
+    skin_weight: np.ndarray
+    pair: np.ndarray
+    """(N, 2) control vertices."""
+    share: np.ndarray
+    """(N,) of the second."""
+    faces: np.ndarray
+    """(F, 3) of the drawn mesh: skin that shows, clothes, hair."""
+    material: np.ndarray
+    """(F,) uint8 into MATERIALS."""
+    paint: np.ndarray
+    """(N, 3) m, what patterns are painted by: place on the plain template, equal for all bodies; shoes: height above the sole."""
+    region: np.ndarray
+    """(N, 6) shares as in regions.npz."""
+
+    def posed(self, transforms: np.ndarray, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """transforms: (55, 3, 4); expression: (52,). Returns bare body (V, 3) and drawn mesh (N, 3), m."""
+        count = len(self.body.v_template)
+        rest = self.rest.copy()
+        if expression.any():
+            rest[:count] += self.body.exprdirs @ expression.astype(np.float32)
+        control = skin(rest, transforms.astype(np.float32), self.skin_index, self.skin_weight)
+        first, second = control[self.pair[:, 0]], control[self.pair[:, 1]]
+        return control[:count], first + (second - first) * self.share[:, None]
+
+    @property
+    def height_m(self) -> float:
+        """Crown to sole of the bare body in the T-pose."""
+        y = self.rest[: len(self.body.v_template), 1]
+        return float(y.max() - y.min())
+
+
+def make_person(options: TurntableOptions, rng: np.random.Generator) -> Person:
+    body = Body.load()
+    spread = np.linspace(0.8, 0.32, body.num_figure)
+    betas = (rng.normal(0, 1, body.num_figure) * spread).clip(-1.6, 1.6).astype(np.float32)
+    shift, joint_offset = outside(body, options.outside, rng)
+    rest, joints = body.rest(betas, None, joint_offset)
+    rest = rest + shift
+    look = Look(sleeve=float(rng.choice([0.36, 0.42, 0.66])), hem=float(rng.uniform(0.07, 0.12)),
+                cuff=float(rng.choice([-0.755, -0.755, -0.755, -0.24])), hair=str(rng.choice(["short", "bob"])),
+                neckline=float(rng.uniform(0.5, 0.9)))
+    region = np.load(REGIONS)["share"].T.astype(np.float32) / 255
+    shells, hidden = dress(body, rest, region, look, options.clothing, rng)
+    return assemble(body, look, betas, rest, joints, joint_offset, region, shells, hidden)
+
+
+def outside(body: Body, amount: float, rng) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement (V, 3) and joint offset (55, 3) in m that no betas reach: local shape sliders, and a slow wobble."""
+    with np.load(OUTSIDE) as z:
+        fields, joints = z["vertices"].astype(np.float32), z["joints"]
+    pick = rng.choice(len(fields), 5, replace=False)
+    share = rng.uniform(-0.5, 0.5, 5).astype(np.float32) * amount
+    shift = np.tensordot(share, fields[pick], 1)
+    wave = sum(np.sin(body.v_template @ rng.normal(0, 9, 3) + rng.uniform(0, 6.28))[:, None] * rng.normal(0, 1, 3)
+               for _ in range(5))
+    calm = np.clip(1 - 4 * np.abs(np.abs(body.v_template[:, :1]) - 0.85), 0, 1) + (body.v_template[:, 1:2] > 0.76)
+    shift = shift + 0.0025 * amount * wave * (1 - np.clip(calm, 0, 1))  # not on hands and head
+    return shift.astype(np.float32), np.tensordot(share, joints[pick], 1).astype(np.float32)
+
+
+def dress(body: Body, rest: np.ndarray, region: np.ndarray, look: Look, thick: float, rng,
+          ) -> tuple[list[Shell], np.ndarray]:
+    """Shells over rest (V, 3), and the skin (V,) bool that they hide for certain."""
+    template, faces = body.v_template, body.faces
+    x, y, z = template.T
+    arm = np.abs(x)
+    skin_only = np.ones(len(template), bool)
+    skin_only[13348:] = False  # tongue and eyeballs
+    fold = folds(template, rng)
+    neck = 0.775 - look.neckline * np.clip(z - 0.01, -0.05, 0.2)
+    near_neck = np.clip((0.16 - arm) / 0.04, 0, 1)
+    fields = {
+        "shirt": np.minimum.reduce([y - look.hem, (look.sleeve - arm) * 1.0, np.where(near_neck > 0, neck - y, 0.2)]),
+        "trousers": np.minimum.reduce([look.hem + 0.07 - y, y - look.cuff, 0.4 - arm]),
+        "shoes": np.minimum(-0.715 - y, 0.6 - arm),
+        "hair": hair_field(template, region, look),
+    }
+    waist = np.clip((0.36 - y) / 0.25, 0, 1) * (arm < 0.3)
+    sleeve = np.clip((arm - 0.25) / (look.sleeve - 0.2), 0, 1.2) * (y > 0.45)
+    leg = np.clip((0.0 - y) / 0.7, 0, 1)
+    thickness = {
+        "shirt": 0.008 + 0.010 * waist + 0.014 * sleeve * (look.sleeve < 0.5) + 0.006 * sleeve + fold * 0.006,
+        "trousers": np.where(y > look.hem - 0.03, 0.004, 0.008 + 0.020 * leg + fold * 0.008 * (0.4 + leg)),
+        "shoes": np.full(len(template), 0.010),
+        "hair": hair_thickness(template, fields["hair"], look, rng),
+    }
+    shells = []
+    hidden = np.zeros(len(template), bool)
+    for name, field in fields.items():
+        field = np.where(skin_only, field, -1.0)
+        member = field > -0.06
+        lift = lifted(rest, faces, member, np.maximum(thickness[name], 0.003) * thick,
+                      {"shirt": 16, "trousers": 12, "shoes": 6, "hair": 6}[name])
+        if name == "shirt":
+            lift = draped(lift, np.clip((0.52 - y) / 0.08, 0, 1) * (arm < 0.3) * member)
+        paint = template
+        if name == "shoes":
+            for sign in (1, -1):
+                lift = capped(lift, np.clip((z - 0.07) / 0.06, 0, 1) * (field > 0) * (sign * x > 0))
+            sole = rest[skin_only, 1].min() - 0.018
+            low = np.clip((-0.806 - y) / 0.014, 0, 1)
+            lift[:, 1] += low * (sole - lift[:, 1]) * 0.9
+            paint = np.stack([x, lift[:, 1] - sole, z], 1)
+        if name == "hair" and look.hair == "bob":
+            lift = hang(lift, template, field, thick)
+        pair, share, cut_faces = cut(faces, field)
+        shells.append(Shell(name, lift.astype(np.float32), pair, share, cut_faces, paint.astype(np.float32)))
+        hidden |= field > {"shirt": 0.03, "trousers": 0.02, "shoes": 0.02, "hair": 0.03}[name]
+    return shells, hidden
+
+
+def hair_field(template: np.ndarray, region: np.ndarray, look: Look) -> np.ndarray:
+    """> 0 on the scalp. The line runs from the forehead over the ears to the nape."""
+    x, y, z = template.T
+    around = np.arctan2(np.abs(x), z - 0.045)  # 0 in front, pi behind
+    line = np.interp(around, [0, 0.55, 0.9, 1.25, 1.75, 2.3, np.pi],
+                     [0.967, 0.962, 0.940, 0.885, 0.860, 0.812, 0.800])
+    return np.where((y > 0.77) & (np.abs(x) < 0.13), np.minimum(y - line, 0.03 - 0.08 * region[:, 1]), -1.0)
+
+
+def hair_thickness(template: np.ndarray, field: np.ndarray, look: Look, rng) -> np.ndarray:
+    x, y, z = template.T
+    rise = 0.15 + 0.85 * np.clip(field / 0.04, 0, 1) if look.hair == "short" else 0.3 + 0.7 * np.clip(field / 0.04, 0, 1)
+    up = np.clip((y - 0.86) / 0.12, 0, 1)
+    behind = np.clip((0.08 - z) / 0.1, 0, 1)
+    tuft = sum(np.sin(template @ rng.normal(0, 60, 3) + rng.uniform(0, 6.28)) for _ in range(4)) / 4
+    base = 0.006 + 0.020 * up if look.hair == "short" else 0.014 + 0.014 * up + 0.008 * behind
+    return (base + 0.006 * tuft * up) * rise
+
+
+def hang(lift: np.ndarray, template: np.ndarray, field: np.ndarray, thick: float) -> np.ndarray:
+    """Draws the lower rows of long hair down to the shoulders, behind the ears."""
+    x, y, z = template.T
+    around = np.arctan2(np.abs(x), z - 0.045)
+    side = np.clip((around - 1.75) / 0.3, 0, 1)
+    low = np.clip(1 - field / 0.05, 0, 1) ** 1.5 * side * (field > -0.02) * (y > 0.78)
+    out = lift.copy()
+    out[:, 1] -= 0.095 * low * thick
+    radial = np.stack([x, np.zeros_like(x), z - 0.03], -1)
+    radial /= np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-9)
+    return out + radial * (0.018 * low * thick)[:, None]
+
+
+def folds(template: np.ndarray, rng) -> np.ndarray:
+    """(V,) about -1..1: drapery that runs mostly across the limbs."""
+    waves = [np.sin(template @ (rng.normal(0, 1, 3) * [14, 34, 16]) + rng.uniform(0, 6.28)) for _ in range(6)]
+    return np.sum(waves, 0) / 3
+
+
+def assemble(body, look, betas, rest, joints, joint_offset, region, shells: list[Shell], hidden: np.ndarray) -> Person:
+    """One control mesh and one drawn mesh of everything."""
+    count = len(rest)
+    own = np.arange(count)
+    bare = body.faces[~hidden[body.faces].all(1)]
+    control, pairs, shares, faces = [rest], [np.stack([own, own], 1)], [np.zeros(count)], [bare]
+    eye = (bare >= EYES.start).all(1)
+    materials = [np.where(eye, MATERIALS.index("eye"), MATERIALS.index("skin"))]
+    source, paints = [own], [body.v_template]
+    at_control, at_drawn = count, count
+    for shell in shells:
+        used, pair = np.unique(shell.pair, return_inverse=True)
+        control.append(shell.rest[used])
+        source.append(used)
+        paints.append(shell.paint[used])
+        pairs.append(pair.reshape(-1, 2) + at_control)
+        shares.append(shell.share)
+        faces.append(shell.faces + at_drawn)
+        materials.append(np.full(len(shell.faces), MATERIALS.index(shell.material)))
+        at_control += len(used)
+        at_drawn += len(shell.share)
+    source, pair, share = np.concatenate(source), np.concatenate(pairs), np.concatenate(shares).astype(np.float32)
+
+    def spread(values):
+        a, b = values[pair[:, 0]], values[pair[:, 1]]
+        return (a + (b - a) * share[:, None]).astype(np.float32)
+
+    return Person(body, look, betas, np.concatenate(control).astype(np.float32), joints, joint_offset,
+                  body.skin_index[source], body.skin_weight[source], pair, share, np.concatenate(faces),
+                  np.concatenate(materials).astype(np.uint8), spread(np.concatenate(paints)), spread(region[source]))

@@ -1,0 +1,1 @@
+"""The web page that shows an avatar: its scripts, its shaders, and what makes one file of them."""
