@@ -31,14 +31,14 @@ OWN_STORE = ".store"
 """Where results lie if the cache cannot be written."""
 
 
-class Workspace:
+class RunFolder:
     """Paths of one clip's folder."""
 
     def __init__(self, root: Path):
         self.root = Path(root).absolute()
 
     @classmethod
-    def around(cls, start: Path) -> Workspace:
+    def around(cls, start: Path) -> RunFolder:
         """The nearest folder with a dvc.yaml, from `start` upwards."""
         start = Path(start).absolute()
         for folder in (start, *start.parents):

@@ -19,7 +19,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m gsac.tools.demo_pictures", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python tools/demo_pictures.py", description=__doc__)
     parser.add_argument("--run", type=Path, default=Path("demo/avatar"), metavar="DIR", help="default: demo/avatar")
     parser.add_argument("--out", type=Path, default=Path("docs"), metavar="DIR", help="default: docs")
     options = parser.parse_args(argv)

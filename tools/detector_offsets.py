@@ -1,7 +1,7 @@
 """Where a detector's key points lie on the body, and how that changes with the turn: measured on truth clips, kept with the fit.
 
     python -m gsac.turntable CLIPS/201 --seed 201 --frames 30 --fps 5; gsac run CLIPS/201/clip.mp4 --until keypoints ...
-    python -m gsac.tools.detector_offsets RUN TRUTH [RUN TRUTH ...] --out stages/smplx/offsets/mediapipe.npz
+    python tools/detector_offsets.py RUN TRUTH [RUN TRUTH ...] --out stages/smplx/offsets/mediapipe.npz
 
 The kept file was measured on 120 people, seeds 201 to 320, those that end in 1 or 2 with `--feet planted`.
 

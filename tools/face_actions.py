@@ -1,6 +1,6 @@
 """Measures how the face network answers to facial actions; writes `stages/face/actions.npz`.
 
-    python -m gsac.tools.face_actions STORE FOLDER
+    python tools/face_actions.py STORE FOLDER
 
 STORE is the cache folder that `gsac models pull` filled; the people that are drawn and looked at stay in FOLDER (10 s each).
 

@@ -11,7 +11,7 @@ from gsac.avatar.motion import names
 
 HERE = Path(__file__).parent
 PAGE, STYLE = "page.html", "style.css"
-SCRIPTS = ("gsac.js", "math.js", "skin.js", "bind.js", "sort.js", "draw.js",
+SCRIPTS = ("reader.js", "math.js", "skin.js", "bind.js", "sort.js", "draw.js",
            "soft.js", "shaders.js", "pack.js", "gpu.js", "painter.js", "camera.js",
            "quat.js", "source.js", "names.js", "bvh.js", "gltf.js", "retarget.js",
            "files.js", "rate.js", "viewer.js", "xr.js", "drawer.js", "ui.js")

@@ -15,7 +15,7 @@ import numpy as np
 from gsac.avatar.artifacts import read_arrays
 
 TABLE = Path(__file__).with_name("actions.npz")
-"""Written by `gsac.tools.face_actions`."""
+"""Written by `tools/face_actions.py`."""
 BLIND = ("eyeLook", "tongueOut", "cheekPuff", "mouthClose")
 """Actions whose names begin so leave no mark on the points that could tell them from others: they stay at 0."""
 COMMON = ("jawOpen", "eyeBlink", "mouthSmile", "brow", "cheekSquint", "mouthPucker", "mouthFunnel")

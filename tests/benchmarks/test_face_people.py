@@ -19,9 +19,11 @@ from gsac.benchmarks.perception import ACTIONS
 from gsac.stages.face.actions import TABLE, Actions, pace, smooth, solve
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.landmarks import align, look
-from gsac.tools.face_actions import SEEDS, measure
 from gsac.turntable.motion import expressions
 from gsac.turntable.options import TurntableOptions
+from support.scripts import script
+
+face_actions = script("face_actions")
 
 UNKNOWN = (5001, 5002)
 FILMED = (5002, 5003, 5004)
@@ -73,7 +75,7 @@ def aligned(landmarks: np.ndarray, actions: Actions) -> tuple[np.ndarray, np.nda
 
 
 def test_nobody_is_measured_on_whom_truth_clips_show():
-    assert not set(SEEDS) & {*range(100), *UNKNOWN} and min(SEEDS) < DRAWN <= max(SEEDS)
+    assert not set(face_actions.SEEDS) & {*range(100), *UNKNOWN} and min(face_actions.SEEDS) < DRAWN <= max(face_actions.SEEDS)
 
 
 def test_expressions_are_in_range_and_now_and_then_at_rest():
@@ -118,7 +120,7 @@ def test_faces_of_another_renderer_are_read_as_well(store):
 
 
 def test_a_table_of_a_few_looks_has_the_shipped_ones_arrays(people):
-    small, shipped = measure(people), read_arrays(TABLE)
+    small, shipped = face_actions.measure(people), read_arrays(TABLE)
     assert {name: (a.shape, a.dtype) for name, a in small.items()} == {name: (a.shape, a.dtype) for name, a in shipped.items()}
     assert (small["mirror"] != shipped["mirror"]).sum() <= 4
     assert np.abs(small["neutral"] - shipped["neutral"]).max() < 0.02

@@ -1,24 +1,19 @@
 """What paints a truth clip's skin is what its bake gives."""
 
 import hashlib
-import importlib.util
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gsac.avatar import body
 from gsac.turntable.person import REGIONS
+from support.scripts import script
 
 
 @pytest.fixture(scope="module")
 def bake():
     """The script is no module of the product."""
-    path = Path(__file__).parents[2] / "tools" / "open_body" / "bake_regions.py"
-    spec = importlib.util.spec_from_file_location("bake_regions", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script("open_body/bake_regions")
 
 
 def test_the_shipped_file_is_what_the_bake_gave(bake):

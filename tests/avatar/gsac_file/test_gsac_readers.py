@@ -59,7 +59,7 @@ def javascript_words(folder, tmp_path):
         pytest.skip("needs node")
     script = tmp_path / "read.js"
     script.write_text(JS)
-    done = subprocess.run(["node", "--max-old-space-size=64", str(script), str(Path(viewer.__file__).with_name("gsac.js")),
+    done = subprocess.run(["node", "--max-old-space-size=64", str(script), str(Path(viewer.__file__).with_name("reader.js")),
                            str(folder)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     return words_of(done.stdout)

@@ -10,16 +10,9 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX
 from gsac.avatar.yaw import yaw as turn_yaw
 from gsac.stages.smplx.detector import HARMONICS, PERSONAL, Detector, harmonics
-from gsac.tools.detector_offsets import (
-    Sight,
-    figure,
-    measure_habits,
-    measure_offsets,
-    measure_people,
-    mirror,
-    own_offsets,
-    world_rotations,
-)
+from support.scripts import script
+
+detector_offsets = script("detector_offsets")
 
 WRIST, OTHER = INDEX["left_wrist"], INDEX["right_wrist"]
 
@@ -38,13 +31,13 @@ def turn(frames: int) -> tuple[np.ndarray, np.ndarray]:
     return pose, yaw
 
 
-def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> Sight:
+def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> detector_offsets.Sight:
     """One turn as a detector with this offset (3,) m and habit (2 H + 1, 2) at the left wrist, mirrored at the right, sees it."""
     pose, _ = turn(48)
     still = np.zeros((48, 52))
     params = BodyParams.from_pose(pose, np.tile([0, 0, 3.0], (48, 1)), np.zeros(body.num_betas), still, 900.0, (360, 640))
     points = body.keypoints(body.posed(params)[0])
-    turns = world_rotations(body, params.pose)
+    turns = detector_offsets.world_rotations(body, params.pose)
     yaw = turn_yaw(turns[:, 0])
     moved = points.astype(float).copy()
     for point, joint, sign in ((WRIST, 20, 1), (OTHER, 21, -1)):
@@ -54,12 +47,12 @@ def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> Sight:
     xy[:, WRIST] += 500.0 * harmonics(yaw) @ habit
     xy[:, OTHER] += 500.0 * harmonics(-yaw) @ habit * [-1, 1]
     known = np.tile(body.known_keypoints, (48, 1))
-    return Sight(xy, known, 500.0, points, turns, 900.0, np.array([360.0, 640.0]), np.zeros(body.num_figure))
+    return detector_offsets.Sight(xy, known, 500.0, points, turns, 900.0, np.array([360.0, 640.0]), np.zeros(body.num_figure))
 
 
 def test_a_planted_offset_is_found_and_other_points_keep_theirs(body):
     planted = np.array([0.02, -0.01, 0.03])
-    offsets, quality = measure_offsets(body, [sight(body, planted, np.zeros((2 * HARMONICS + 1, 2)))])
+    offsets, quality = detector_offsets.measure_offsets(body, [sight(body, planted, np.zeros((2 * HARMONICS + 1, 2)))])
     assert np.allclose(offsets[WRIST], planted, atol=2e-3)
     assert np.allclose(offsets[OTHER], planted * [-1, 1, 1], atol=2e-3)
     assert np.abs(offsets[INDEX["left_knee"]]).max() < 1e-3
@@ -70,7 +63,7 @@ def test_a_planted_habit_is_found_on_both_sides_and_adds_nothing_elsewhere(body)
     planted = np.zeros((2 * HARMONICS + 1, 2))
     planted[[0, 1, 5], [1, 0, 1]] = 0.01, 0.02, -0.015
     seen = sight(body, np.zeros(3), planted)
-    habit, spread = measure_habits(body, [seen], np.zeros((133, 3)))
+    habit, spread = detector_offsets.measure_habits(body, [seen], np.zeros((133, 3)))
     assert np.allclose(habit[WRIST], planted, atol=1.5e-3)
     assert np.abs(habit[INDEX["left_knee"]]).max() < 1e-6
     found = Detector(np.zeros((133, 3)), None, None, habit, spread).error(turn_yaw(seen.turn[:, 0])) * seen.height
@@ -83,7 +76,7 @@ def test_a_persons_own_offset_is_found_beside_what_all_share(body):
     offsets = np.zeros((133, 3))
     offsets[[WRIST, OTHER]] = shared, shared * [-1, 1, 1]
     habit = np.zeros((133, 2 * HARMONICS + 1, 2))
-    found = own_offsets(body, sight(body, shared + own, habit[WRIST]), offsets, habit)
+    found = detector_offsets.own_offsets(body, sight(body, shared + own, habit[WRIST]), offsets, habit)
     wrist = list(PERSONAL).index("wrist")
     assert np.allclose(found[wrist], own, atol=1e-3)
     assert np.abs(np.delete(found, wrist, 0)).max() < 1e-3
@@ -95,7 +88,7 @@ def test_offsets_that_follow_the_figure_are_told_from_those_that_do_not(body):
     common, alone = rng.normal(0, 0.01, (len(PERSONAL), 3)), rng.normal(0, 1, (len(PERSONAL), 3))
     alone *= 0.02 / np.linalg.norm(alone)
     people = common + np.einsum("pcf,nf->npc", by, figures) + rng.normal(0, 1, (400, 1, 1)) * alone
-    shared, by_betas, directions = measure_people(figures, people)
+    shared, by_betas, directions = detector_offsets.measure_people(figures, people)
     left, right = ([INDEX[f"{side}_{n}"] for n in PERSONAL] for side in ("left", "right"))
     assert np.allclose(shared[left], common, atol=2e-3) and np.allclose(by_betas[left], by, atol=1e-3)
     assert np.array_equal(by_betas[right], by_betas[left] * np.array([-1, 1, 1])[:, None])
@@ -108,13 +101,13 @@ def test_the_figure_of_a_person_beyond_the_basis_is_the_nearest_one(body):
     betas = rng.normal(0, 1, body.num_figure)
     shift = (body.shapedirs[:, :, : body.num_figure] @ betas).astype(float) + rng.normal(0, 1e-4, body.v_template.shape)
     moved = np.array([[0.01, 0.02, 0.0]])
-    found = figure(body, {"betas": betas, "shift": shift + moved, "joint_offset": moved})
+    found = detector_offsets.figure(body, {"betas": betas, "shift": shift + moved, "joint_offset": moved})
     assert np.allclose(found, 2 * betas, atol=0.02)
 
 
 def test_what_is_kept_was_measured_on_the_embedded_body_and_is_mirror_symmetric(body):
     kept = Detector.measured("mediapipe", body)
-    other = mirror()
+    other = detector_offsets.mirror()
     assert np.abs(kept.offsets).max() > 0.005
     paired = other != np.arange(133)
     assert np.allclose(kept.offsets[paired], kept.offsets[other][paired] * [-1, 1, 1], atol=1e-6)
