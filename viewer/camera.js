@@ -53,7 +53,7 @@ class OrbitCamera {
     return height / 2 / Math.tan(this.fov * Math.PI / 360);
   }
 
-  // What the painter draws with, for a picture of width x height px.
+  // What the renderer draws with, for a picture of width x height px.
   eye(width, height) {
     this.update();
     const focal = this.focal(height);

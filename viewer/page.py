@@ -11,10 +11,10 @@ from gsac.avatar.motion import names
 
 HERE = Path(__file__).parent
 PAGE, STYLE = "page.html", "style.css"
-SCRIPTS = ("reader.js", "math.js", "skin.js", "bind.js", "sort.js", "draw.js",
-           "soft.js", "shaders.js", "pack.js", "gpu.js", "painter.js", "camera.js",
-           "quat.js", "source.js", "names.js", "bvh.js", "gltf.js", "retarget.js",
-           "files.js", "rate.js", "viewer.js", "xr.js", "drawer.js", "ui.js")
+SCRIPTS = ("reader.js", "flat_quat.js", "skin.js", "binding.js", "sort.js", "webgl.js",
+           "software.js", "shaders.js", "pack.js", "webgpu.js", "renderer.js", "camera.js",
+           "quat.js", "motion.js", "match_names.js", "bvh.js", "gltf.js", "retarget.js",
+           "motion_files.js", "rate.js", "viewer.js", "xr.js", "sliders.js", "ui.js")
 """Plain scripts, in the order in which they lean on each other. Whole names, so that the cache sees these files."""
 
 

@@ -114,7 +114,7 @@ class Controls {
 
   showRate({ fps, p95 }) {
     const { viewer } = this, count = viewer.binding.count.toLocaleString("en");
-    find("fps").textContent = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms · ${count} gaussians · ${WAYS[viewer.painter?.kind] ?? "…"}`;
+    find("fps").textContent = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms · ${count} gaussians · ${WAYS[viewer.renderer?.kind] ?? "…"}`;
     if (viewer.length) {
       if (document.activeElement !== find("time") || !viewer.paused) find("time").value = viewer.clock / viewer.length;
       find("clock").textContent = `${viewer.clock.toFixed(1)} / ${viewer.length.toFixed(1)} s`;

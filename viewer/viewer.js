@@ -10,7 +10,7 @@ const FRAME_LOOKS = 16;
 const RECOVER_MS = 1000;
 
 class Viewer {
-  // asked: how to draw, for makePainter.
+  // asked: how to draw, for makeRenderer.
   static async open(avatar, asked) {
     const viewer = new Viewer(avatar);
     await viewer.drawBy(asked);
@@ -25,7 +25,7 @@ class Viewer {
     this.binding = new Binding(avatar);
     this.sort = new DepthSort(this.binding.count);
     this.stage = document.getElementById("stage");
-    this.painter = null;
+    this.renderer = null;
     this.camera = new OrbitCamera();
     [this.low, this.high] = bounds(avatar.vertices);
     this.rate = new FrameRate();
@@ -49,22 +49,22 @@ class Viewer {
     return this.stage.firstElementChild;
   }
 
-  // asked: for makePainter. A painter that stops later is followed by the next plainer one.
+  // asked: for makeRenderer. A renderer that stops later is followed by the next plainer one.
   async drawBy(asked) {
-    const painter = await makePainter(asked, this.canvas, this);
-    painter.onLost = async (why) => {
-      if (this.painter !== painter) return;
-      this.painter = null;
-      painter.device?.destroy();
+    const renderer = await makeRenderer(asked, this.canvas, this);
+    renderer.onLost = async (why) => {
+      if (this.renderer !== renderer) return;
+      this.renderer = null;
+      renderer.device?.destroy();
       freshCanvas(this.canvas);
       await new Promise((done) => setTimeout(done, RECOVER_MS));
-      await this.drawBy(painter.kind === "webgpu" ? "webgl" : "software");
+      await this.drawBy(renderer.kind === "webgpu" ? "webgl" : "software");
       this.move();
       this.draw();
-      const way = this.painter.kind === "webgl" ? "by WebGL" : "without the graphics card";
+      const way = this.renderer.kind === "webgl" ? "by WebGL" : "without the graphics card";
       this.onChange(`${why || "The graphics driver stopped"}: now drawn ${way}.`);
     };
-    this.painter = painter;
+    this.renderer = renderer;
   }
 
   play(what) {
@@ -124,9 +124,9 @@ class Viewer {
   // All that the picture depends on, in words; two equal ones need no new picture.
   get state() {
     this.camera.update();
-    const { pose, camera, stage, binding, painter, background, expression } = this, panel = document.getElementById("panel").offsetTop;
+    const { pose, camera, stage, binding, renderer, background, expression } = this, panel = document.getElementById("panel").offsetTop;
     return [pose.quats, pose.transl, Array.from(camera.view, (x) => x.toFixed(5)), camera.fov, stage.clientWidth, stage.clientHeight,
-      window.devicePixelRatio, panel, binding.lit, painter?.kind, background, JSON.stringify(expression)].join(" ");
+      window.devicePixelRatio, panel, binding.lit, renderer?.kind, background, JSON.stringify(expression)].join(" ");
   }
 
   // pose: Pose, set to what plays at a place in the clip, s.
@@ -144,9 +144,9 @@ class Viewer {
 
   // Brings the gaussians to the pose: on the graphics card where that can, else here.
   move() {
-    if (this.painter?.move && !this.session) {
+    if (this.renderer?.move && !this.session) {
       this.skin.moveBones(this.pose);
-      this.painter.move(this.expression);
+      this.renderer.move(this.expression);
     } else {
       this.skin.update(this.pose, this.expression);
       this.binding.update(this.skin.vertices);
@@ -159,17 +159,17 @@ class Viewer {
   }
 
   draw() {
-    if (!this.painter) return;
+    if (!this.renderer) return;
     if (this.resize() && !this.camera.moved) this.frame();
     const eye = this.camera.eye(this.canvas.width, this.canvas.height);
-    this.painter.prepare(eye.view);
-    this.painter.clear([...colour(this.background), 1]);
-    this.painter.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
+    this.renderer.prepare(eye.view);
+    this.renderer.clear([...colour(this.background), 1]);
+    this.renderer.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
   }
 
   // Returns whether the room for the figure has another size than before.
   resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, this.painter?.kind === "software" ? 1 : MAX_PIXEL_RATIO);
+    const ratio = Math.min(window.devicePixelRatio || 1, this.renderer?.kind === "software" ? 1 : MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     const { offsetHeight, offsetTop } = document.getElementById("panel"), panel = offsetHeight ? window.innerHeight - offsetTop : 0;

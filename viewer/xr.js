@@ -21,7 +21,7 @@ async function offerHeadset(viewer, place, tell) {
 
 async function enter(viewer, mode, button) {
   const session = await navigator.xr.requestSession(mode, { optionalFeatures: ["local-floor"] });
-  const painter = headsetPainter(viewer), { gl } = painter;
+  const renderer = headsetRenderer(viewer), { gl } = renderer;
   session.addEventListener("end", () => {
     viewer.session = null;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -50,9 +50,9 @@ async function enter(viewer, mode, button) {
       const seen = xrFrame.getViewerPose(space);
       if (!seen) return;
       gl.bindFramebuffer(gl.FRAMEBUFFER, layer.framebuffer);
-      painter.prepare(viewRows(seen.transform.inverse.matrix, stand));
-      painter.clear(background);
-      for (const view of seen.views) painter.paint(eyeOf(view, layer.getViewport(view), stand), viewer.shadow);
+      renderer.prepare(viewRows(seen.transform.inverse.matrix, stand));
+      renderer.clear(background);
+      for (const view of seen.views) renderer.paint(eyeOf(view, layer.getViewport(view), stand), viewer.shadow);
     };
     session.requestAnimationFrame(frame);
   } catch (error) {
@@ -61,10 +61,10 @@ async function enter(viewer, mode, button) {
   }
 }
 
-// A headset is drawn by WebGL2; where the page is not, by a painter of its own.
-function headsetPainter(viewer) {
-  if (viewer.painter.gl) return viewer.painter;
-  return viewer.headset ??= new Painter(document.createElement("canvas"), viewer.avatar, viewer.binding, viewer.sort);
+// A headset is drawn by WebGL2; where the page is not, by a renderer of its own.
+function headsetRenderer(viewer) {
+  if (viewer.renderer.gl) return viewer.renderer;
+  return viewer.headset ??= new WebglRenderer(document.createElement("canvas"), viewer.avatar, viewer.binding, viewer.sort);
 }
 
 // 3x4 row by row, OpenCV axes, of a column-major OpenGL view matrix; stand: the avatar's place in the room, m.

@@ -1,4 +1,4 @@
-"""Quaternions xyzw in batches, float64: the few operations of retargeting, the same as the viewer's math.js."""
+"""Quaternions xyzw in batches, float64: the few operations of retargeting, the same as the viewer's quat.js."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ WATCH = """
   if (window.drawn !== undefined) return;
   window.drawn = 0;
   document.body.classList.add("bare");
-  const { gl, device } = gsac.painter, pixel = new Uint8Array(4), draw = gsac.draw.bind(gsac);
+  const { gl, device } = gsac.renderer, pixel = new Uint8Array(4), draw = gsac.draw.bind(gsac);
   let waiting = false;
   gsac.draw = () => {
     if (waiting) return;

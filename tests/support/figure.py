@@ -176,7 +176,7 @@ def shadowed():
   document.body.classList.add('bare');
   gsac.resize();
   const eye = gsac.camera.eye(gsac.canvas.width, gsac.canvas.height);
-  gsac.painter.prepare(eye.view);
-  gsac.painter.clear([...colour(gsac.background), 1]);
-  gsac.painter.paint(eye, gsac.shadow);
+  gsac.renderer.prepare(eye.view);
+  gsac.renderer.clear([...colour(gsac.background), 1]);
+  gsac.renderer.paint(eye, gsac.shadow);
 })()"""

@@ -35,7 +35,7 @@ def page(request, browser, exported):
     browser.open(f"{(exported / 'viewer.html').as_uri()}#draw={request.param}")
     if request.param == "webgpu" and not browser.has_webgpu():
         pytest.skip("this chromium has no WebGPU")
-    assert browser.run("gsac.painter.kind") == request.param
+    assert browser.run("gsac.renderer.kind") == request.param
     return browser
 
 
@@ -145,7 +145,7 @@ def test_it_plays_and_the_buttons_answer(page):
 def test_on_a_phone_the_controls_are_inside_the_screen_and_below_the_feet(page):
     page.resize(390, 844, 2, True)
     page.run("location.hash = 'pose=A&x'")
-    page.until("!gsac.still && gsac.playing.pose === 'A' && gsac.canvas.width === (gsac.painter.kind === 'software' ? 390 : 780)")
+    page.until("!gsac.still && gsac.playing.pose === 'A' && gsac.canvas.width === (gsac.renderer.kind === 'software' ? 390 : 780)")
     boxes = page.run("[...document.querySelectorAll('button, select, input')].filter((e) => e.offsetParent)"
                      ".map((e) => e.getBoundingClientRect()).map((r) => [r.left, r.top, r.right, r.bottom])")
     left, top, right, bottom = np.array(boxes).T

@@ -82,7 +82,7 @@ def picture(page, script):
 @pytest.mark.slow
 def test_a_software_adapter_is_left_alone(page, address):
     page.open(f"{address}#pose=A")
-    assert page.run("gsac.painter.kind") == "software" and page.errors == []
+    assert page.run("gsac.renderer.kind") == "software" and page.errors == []
 
 
 @needs_chromium
@@ -93,12 +93,12 @@ def test_what_stops_is_followed_by_the_next_way_with_the_same_picture(page, addr
         page.open(f"{address}?card#pose=A&bg=a0b0c0&yaw=20&pitch=12&joints=left_elbow:0,-40,0&expression=jawOpen:1")
         if not page.has_webgpu():
             pytest.skip("this chromium has no WebGPU")
-        assert page.run("gsac.painter.kind") == "webgpu", "a card is taken"
+        assert page.run("gsac.renderer.kind") == "webgpu", "a card is taken"
         seen = [picture(page, shadowed)]
-        for stop, kind in (("gsac.painter.device.destroy()", "webgl"),
-                           ("gsac.painter.gl.getExtension('WEBGL_lose_context').loseContext()", "software")):
+        for stop, kind in (("gsac.renderer.device.destroy()", "webgl"),
+                           ("gsac.renderer.gl.getExtension('WEBGL_lose_context').loseContext()", "software")):
             page.run(stop)
-            page.until(f"gsac.painter?.kind === '{kind}'")
+            page.until(f"gsac.renderer?.kind === '{kind}'")
             page.until("/now drawn/.test(document.getElementById('note').textContent)")
             seen.append(picture(page, shadowed))
         for other in seen[1:]:
@@ -120,7 +120,7 @@ def test_a_webgpu_that_does_not_begin_makes_room_for_webgl(page, address, broken
     got = page.call("Page.addScriptToEvaluateOnNewDocument", source=f"if (window.GPU) {{ {CARD}; {broken}; }} {card}")
     try:
         page.open(f"{address}?{len(broken)}#pose=A&bg=a0b0c0&still")
-        assert page.run("gsac.painter.kind") == "webgl"
+        assert page.run("gsac.renderer.kind") == "webgl"
         assert (np.abs(page.picture().astype(int) - (0xA0, 0xB0, 0xC0)).max(-1) > 20).mean() > 0.03 and page.errors == []
     finally:
         page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=got["identifier"])

@@ -93,7 +93,7 @@ const NEAR = 0.05;
 const WIDE = 1.3;
 const SHADOW = 0.4;
 
-class Painter {
+class WebglRenderer {
   constructor(canvas, avatar, binding, sort) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: false,
       powerPreference: "high-performance" });

@@ -11,19 +11,19 @@ const PARAMETER_BYTES = 256;
 const ANSWER_MS = 10000;
 const PREMULTIPLIED = { srcFactor: "one", dstFactor: "one-minus-src-alpha", operation: "add" };
 
-class GpuPainter {
+class WebgpuRenderer {
   // Returns null where there is no graphics card to reach; asked: a software one will do.
   static async open(canvas, avatar, skin, binding, asked) {
     const late = new Promise((done) => setTimeout(done, ANSWER_MS, null)), device = await Promise.race([reachDevice(asked), late]);
     if (!device) return null;
     device.pushErrorScope("validation");
-    const painter = new GpuPainter(device, canvas, avatar, skin, binding);
-    await painter.build();
+    const renderer = new WebgpuRenderer(device, canvas, avatar, skin, binding);
+    await renderer.build();
     const wrong = await device.popErrorScope();
     if (wrong) throw new Error(wrong.message);
-    device.lost.then(({ message }) => painter.onLost(message));
-    device.addEventListener("uncapturederror", ({ error }) => painter.onLost(error.message));
-    return painter;
+    device.lost.then(({ message }) => renderer.onLost(message));
+    device.addEventListener("uncapturederror", ({ error }) => renderer.onLost(error.message));
+    return renderer;
   }
 
   constructor(device, canvas, avatar, skin, binding) {
@@ -33,7 +33,7 @@ class GpuPainter {
     this.context = canvas.getContext("webgpu");
     this.format = navigator.gpu.getPreferredCanvasFormat();
     this.context.configure({ device, format: this.format, alphaMode: "opaque" });
-    this.buffers = Object.fromEntries(Object.entries(packedForGpu(avatar)).map(([name, data]) => [name, this.buffer(data)]));
+    this.buffers = Object.fromEntries(Object.entries(packForGpu(avatar)).map(([name, data]) => [name, this.buffer(data)]));
     const { names, vertices, expressions } = avatar, size = (bytes) => new Uint8Array(Math.max(bytes, 16));
     this.weights = new Float32Array(Math.max(expressions.length, 4));
     Object.assign(this.buffers, { GsacWeights: this.buffer(this.weights), GsacBones: this.buffer(size(names.length * 48)),
@@ -128,7 +128,7 @@ class GpuPainter {
     this.background = background;
   }
 
-  // eye, shadow: as for Painter. After prepare, once.
+  // eye, shadow: as for WebglRenderer. After prepare, once.
   paint({ view, focal, centre, box: [, , width, height] }, shadow) {
     const { device } = this, { low_pass_px2: lowPass = 0.3, alpha_max: most = 0.999, alpha_min: least = 1 / 255 } = this.avatar.head.blend || {};
     setParameters(this.eyeParameters, 0, SHADERS.SplatVertex.parameters, {

@@ -12,9 +12,9 @@ function hasNoGraphicsCard() {
 }
 
 // asked: "webgpu", "webgl", "software", or whatever suits the device. What cannot draw makes room for the next.
-async function makePainter(asked, canvas, { avatar, skin, binding, sort }) {
+async function makeRenderer(asked, canvas, { avatar, skin, binding, sort }) {
   if (asked !== "webgl" && asked !== "software") {
-    const gpu = await GpuPainter.open(canvas, avatar, skin, binding, asked === "webgpu").catch((error) => {
+    const gpu = await WebgpuRenderer.open(canvas, avatar, skin, binding, asked === "webgpu").catch((error) => {
       console.info(`no WebGPU: ${error.message}`);
       return null;
     });
@@ -22,12 +22,12 @@ async function makePainter(asked, canvas, { avatar, skin, binding, sort }) {
   }
   if (asked !== "software" && (asked === "webgl" || !hasNoGraphicsCard())) {
     try {
-      return new Painter(freshCanvas(canvas), avatar, binding, sort);
+      return new WebglRenderer(freshCanvas(canvas), avatar, binding, sort);
     } catch (error) {
       console.info(`no WebGL2: ${error.message}`);
     }
   }
-  return new SoftPainter(freshCanvas(canvas), avatar, binding, sort);
+  return new SoftwareRenderer(freshCanvas(canvas), avatar, binding, sort);
 }
 
 // In the place of the canvas, one that nothing has drawn on.

@@ -1,9 +1,9 @@
 // Draws the gaussians without a graphics card: splat by splat from the nearest to the farthest, a row of each ellipse at a
-// time, until a pixel is full. The picture is that of draw.js; where GL itself is software this is several times faster.
+// time, until a pixel is full. The picture is that of webgl.js; where GL itself is software this is several times faster.
 
 const FULL = 1e-3;
 
-class SoftPainter {
+class SoftwareRenderer {
   constructor(canvas, avatar, binding, sort) {
     this.context = canvas.getContext("2d", { alpha: false });
     Object.assign(this, { kind: "software", canvas, avatar, binding, sort, width: 0, height: 0 });
@@ -19,7 +19,7 @@ class SoftPainter {
     this.background = background;
   }
 
-  // eye, shadow: as for Painter.
+  // eye, shadow: as for WebglRenderer.
   paint(eye, shadow) {
     const [, , width, height] = eye.box;
     this.resize(width, height);
