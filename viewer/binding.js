@@ -2,11 +2,13 @@
 // b = a x n, R = [a n b], T = mean, k = 0.5 (h + L)/0.05, L = |v0-v2|, h = 2 area/L: mean k R mu + T, axes k R r s.
 // The light of the clip's room multiplies a colour with light . (1, n_x, n_y, |n_z|), between DARKEST and BRIGHTEST.
 
+import { quatMix, quatToMatrix } from "./flat_quat.js";
+
 const DARKEST = 0.25;
 const BRIGHTEST = 2.5;
-const EVEN_LIGHT = Float32Array.of(1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+export const EVEN_LIGHT = Float32Array.of(1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0);
 
-class Binding {
+export class Binding {
   constructor(avatar) {
     this.avatar = avatar;
     // Whether the colours are those in the light of the clip's room, where the file has it.

@@ -1,9 +1,12 @@
 // Reader of Biovision BVH text. Rest: all rotations zero. A fault names the file and the line.
 
+import { MotionError, MotionSource } from "./motion.js";
+import { Quat, Vec } from "./quat.js";
+
 const BVH_CHANNELS = ["xposition", "yposition", "zposition", "xrotation", "yrotation", "zrotation"];
 const BVH_MOST_JOINTS = 1000;
 
-function readBvh(text, where) {
+export function readBvh(text, where) {
   return new BvhReader(text, where).source();
 }
 

@@ -2,7 +2,7 @@
 
 const GLIDE_S = 0.25;
 
-class OrbitCamera {
+export class OrbitCamera {
   constructor() {
     this.fov = 30;
     // Share of the picture's height that controls cover at the bottom; the figure stands above it.

@@ -1,12 +1,12 @@
 // Rotations: quaternions are xyzw in flat arrays, axis-angle in radians.
 
-function quatFromAxisAngle(out, o, x, y, z) {
+export function quatFromAxisAngle(out, o, x, y, z) {
   const angle = Math.hypot(x, y, z), s = angle > 1e-9 ? Math.sin(angle / 2) / angle : 0.5;
   out[o] = x * s; out[o + 1] = y * s; out[o + 2] = z * s; out[o + 3] = Math.cos(angle / 2);
 }
 
 // out = a turned towards b by t along the shorter arc, normalised.
-function quatMix(out, o, a, i, b, j, t) {
+export function quatMix(out, o, a, i, b, j, t) {
   const dot = a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2] + a[i + 3] * b[j + 3];
   const u = dot < 0 ? -t : t;
   let x = a[i] + (u * b[j] - t * a[i]), y = a[i + 1] + (u * b[j + 1] - t * a[i + 1]);
@@ -16,7 +16,7 @@ function quatMix(out, o, a, i, b, j, t) {
 }
 
 // 3x3 rotation, row by row, of q[i..i+3] into out[o..o+8].
-function quatToMatrix(out, o, q, i) {
+export function quatToMatrix(out, o, q, i) {
   const x = q[i], y = q[i + 1], z = q[i + 2], w = q[i + 3];
   out[o] = 1 - 2 * (y * y + z * z); out[o + 1] = 2 * (x * y - w * z); out[o + 2] = 2 * (x * z + w * y);
   out[o + 3] = 2 * (x * y + w * z); out[o + 4] = 1 - 2 * (x * x + z * z); out[o + 5] = 2 * (y * z - w * x);

@@ -1,13 +1,17 @@
 // Reader of the animations of a glTF 2.0 file: .glb, or .gltf with its buffers inside or beside it. Rest: the skin's bind
 // pose where there is one, else the nodes as they stand. A fault names the file and the part.
 
+import { isTable } from "./json.js";
+import { MotionError, MotionSource } from "./motion.js";
+import { Quat, Vec } from "./quat.js";
+
 const GLTF_MAGIC = 0x46546c67;
 const GLTF_RATE = 30;
 const GLTF_TYPES = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
 const GLTF_WIDTHS = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
 
 // bytes: Uint8Array; beside: file name -> Uint8Array. Returns [{name, source: MotionSource}].
-function readGltf(bytes, where, beside = {}) {
+export function readGltf(bytes, where, beside = {}) {
   return new GltfReader(bytes, where, beside).motions();
 }
 

@@ -1,16 +1,17 @@
-// Which joint of a strange skeleton is which of ours, by name. JOINT_NAMES is avatar/motion/names.py's table.
+// Which joint of a strange skeleton is which of ours, by name. As avatar/motion/names.py, whose table joint_names.js holds.
+
+import { NOISE, RULES, SIDES } from "./joint_names.js";
 
 // Side ("left_", "right_" or nothing) and the bare word of a joint's name.
 function plainName(name) {
   const words = name.split(/[:|]/).at(-1).match(/[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+/g) || [];
-  const { sides, noise } = JOINT_NAMES;
   let side = "", out = "";
   words.forEach((given, i) => {
     const word = given.toLowerCase(), long = word.match(/^(left|right)([a-z]+)$/);
-    if (!side && (Object.hasOwn(sides, word) || long)) {
-      side = sides[long ? long[1] : word];
+    if (!side && (Object.hasOwn(SIDES, word) || long)) {
+      side = SIDES[long ? long[1] : word];
       out += long ? long[2] : "";
-    } else if (!noise.includes(word) && !(/^\d/.test(word) && i && words[i - 1].toLowerCase() === "bip")) {
+    } else if (!NOISE.includes(word) && !(/^\d/.test(word) && i && words[i - 1].toLowerCase() === "bip")) {
       out += /^\d/.test(word) ? String(Number(word)) : word;
     }
   });
@@ -18,13 +19,13 @@ function plainName(name) {
 }
 
 // Joint of ours -> index into names, for those that are found.
-function matchNames(names) {
+export function matchNames(names) {
   const known = new Map(), found = {}, taken = new Set();
   names.forEach((name, i) => {
     const key = plainName(name).join();
     if (!known.has(key)) known.set(key, i);
   });
-  for (const [joint, side, spellings] of JOINT_NAMES.rules) {
+  for (const [joint, side, spellings] of RULES) {
     const at = spellings.map((word) => known.get(`${side},${word}`)).find((i) => i !== undefined && !taken.has(i));
     if (at === undefined) continue;
     found[joint] = at;

@@ -1,9 +1,9 @@
 // A motion as a file has it: P joints of some skeleton over T frames, in its own axes and units; parents come first.
 // What is wrong with a file is told by a MotionError that names the file and the place.
 
-class MotionError extends Error {}
+export class MotionError extends Error {}
 
-class MotionSource {
+export class MotionSource {
   // parents: [P], -1 for a root; restTurns, restPlaces: [P] of [x, y, z, w] and [x, y, z] in the file's world.
   constructor(fps, frames, names, parents, restTurns, restPlaces) {
     if (!(frames * names.length <= MotionSource.MOST)) {

@@ -1,5 +1,10 @@
 // Motion files that are dropped on the page or chosen: each becomes a clip of the avatar, and the first plays.
 
+import { readBvh } from "./bvh.js";
+import { readGltf } from "./gltf.js";
+import { MotionError } from "./motion.js";
+import { retarget } from "./retarget.js";
+
 const MOST_BYTES = 128 * 2 ** 20;
 const READERS = { bvh: bvhMotions, glb: readGltf, gltf: readGltf, vrma: readGltf };
 
@@ -8,7 +13,7 @@ function bvhMotions(bytes, where) {
 }
 
 // files: File[]. Adds clips to the avatar and returns their names; throws MotionError.
-async function addMotions(avatar, files) {
+export async function addMotions(avatar, files) {
   const kind = (file) => file.name.split(".").at(-1).toLowerCase(), motions = files.filter((file) => Object.hasOwn(READERS, kind(file)));
   if (!motions.length) {
     const names = files.map((file) => file.name).join(", ") || "nothing";
@@ -39,7 +44,7 @@ function freeName(clips, name) {
 }
 
 // Listens for files that are dragged over the page; onFiles is called with those dropped.
-function listenForDrops(sign, onFiles) {
+export function listenForDrops(sign, onFiles) {
   const carriesFiles = (e) => [...(e.dataTransfer?.types ?? [])].includes("Files");
   document.addEventListener("dragover", (e) => {
     if (!carriesFiles(e)) return;

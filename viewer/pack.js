@@ -1,7 +1,7 @@
 // The arrays that Gsac.compute reads, from an avatar; Unity's GsacPacking.cs makes the same.
 
 // Returns buffer name -> typed array.
-function packForGpu({ vertices, expressions, start, moved, delta, skinIndex, skinWeight, faces, face, mu, quat, logScale, rgb, opacity }) {
+export function packForGpu({ vertices, expressions, start, moved, delta, skinIndex, skinWeight, faces, face, mu, quat, logScale, rgb, opacity }) {
   const V = vertices.length / 3, N = face.length;
   // Moves of an expression, by vertex: a counting sort.
   const first = new Uint32Array(V + 1), moves = new Float32Array(Math.max(moved.length, 1) * 4);

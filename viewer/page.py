@@ -1,32 +1,40 @@
-"""`viewer.html`: the viewer's scripts and the avatar in one page that needs no network."""
+"""`viewer.html`: the viewer's modules and the avatar in one page that opens from disk without a network."""
 
 from __future__ import annotations
 
 import base64
-import json
+import re
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
-
-from gsac.avatar.motion import names
 
 HERE = Path(__file__).parent
 PAGE, STYLE = "page.html", "style.css"
-SCRIPTS = ("reader.js", "flat_quat.js", "skin.js", "binding.js", "sort.js", "webgl.js",
-           "software.js", "shaders.js", "pack.js", "webgpu.js", "renderer.js", "camera.js",
-           "quat.js", "motion.js", "match_names.js", "bvh.js", "gltf.js", "retarget.js",
-           "motion_files.js", "rate.js", "viewer.js", "xr.js", "sliders.js", "ui.js")
-"""Plain scripts, in the order in which they lean on each other. Whole names, so that the cache sees these files."""
+MODULES = ("json.js", "container.js", "reader.js",
+           "flat_quat.js", "skin.js", "binding.js", "sort.js",
+           "projection.js", "webgl.js", "software.js", "shaders.js", "pack.js", "device.js", "webgpu.js", "renderer.js",
+           "quat.js", "motion.js", "joint_names.js", "match_names.js", "bvh.js", "gltf.js", "retarget.js", "motion_files.js",
+           "camera.js", "rate.js", "viewer.js", "xr.js", "sliders.js", "controls.js", "main.js")
+"""Each after those that it imports; main.js runs the page. Whole names, so that the cache sees these files."""
+_IMPORT = re.compile(r'^import \{ [\w, ]+ \} from "\./\w+\.js";\n', re.MULTILINE)
+_EXPORT = re.compile(r"^export (?=(async )?function |class |const )", re.MULTILINE)
 
 
 def page_bytes(container: bytes) -> bytes:
     """container: the bytes of avatar.gsac. The same bytes give the same page."""
-    packed = base64.b64encode(zlib.compress(container, 9)).decode()
     page = (HERE / PAGE).read_text()
-    joint_names = json.dumps({"noise": names.NOISE, "sides": names.SIDES, "rules": names.RULES}, separators=(",", ":"))
-    scripts = "\n".join([f"const JOINT_NAMES = {joint_names};", *(f"// {name}\n{(HERE / name).read_text()}" for name in SCRIPTS)])
-    for mark, text in (("STYLE", (HERE / STYLE).read_text()), ("SCRIPTS", scripts), ("AVATAR", packed)):
+    for mark, text in (("STYLE", (HERE / STYLE).read_text()), ("SCRIPT", join_modules(MODULES)),
+                       ("AVATAR", base64.b64encode(zlib.compress(container, 9)).decode())):
         before, found, after = page.partition(f"<!--{mark}-->")
         if not found:
             raise ValueError(f"{PAGE} has no <!--{mark}-->")
         page = before + text + after
     return page.encode()
+
+
+def join_modules(modules: Iterable[str]) -> str:
+    """One module's text in place of several, in an order in which each comes after those that it imports.
+
+    Their top-level names share one scope, so that what they import is there already: imports and the word `export` go.
+    """
+    return "\n".join(f"// {name}\n{_EXPORT.sub('', _IMPORT.sub('', (HERE / name).read_text()))}" for name in modules)

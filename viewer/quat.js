@@ -1,6 +1,6 @@
 // Quaternions [x, y, z, w] and vectors [x, y, z] as small arrays of doubles: what reading and retargeting a motion needs.
 
-const Quat = {
+export const Quat = {
   // First b, then a.
   multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
     return [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
@@ -57,7 +57,7 @@ const Quat = {
   },
 };
 
-const Vec = {
+export const Vec = {
   dot: (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
   cross: (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]],
   add: (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]],

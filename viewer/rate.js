@@ -1,6 +1,6 @@
 // How smoothly the page draws: frames a second over the last second, and the frame time that 95 of 100 frames stay below.
 
-class FrameRate {
+export class FrameRate {
   constructor() {
     this.times = [];
     this.told = 0;

@@ -1,8 +1,12 @@
 // A motion of another skeleton on the avatar's joints: the steps of avatar/motion/retarget.py, one by one.
 
-const SIDES = ["left_", "right_"];
-const NEEDED = SIDES.flatMap((s) => ["hip", "knee", "shoulder", "elbow"].map((joint) => s + joint));
-const LIMBS = SIDES.flatMap((s) => [["hip", "knee"], ["knee", "ankle"], ["shoulder", "elbow"], ["elbow", "wrist"]]
+import { matchNames } from "./match_names.js";
+import { MotionError } from "./motion.js";
+import { Quat, Vec } from "./quat.js";
+
+const SIDE_PREFIXES = ["left_", "right_"];
+const NEEDED = SIDE_PREFIXES.flatMap((s) => ["hip", "knee", "shoulder", "elbow"].map((joint) => s + joint));
+const LIMBS = SIDE_PREFIXES.flatMap((s) => [["hip", "knee"], ["knee", "ankle"], ["shoulder", "elbow"], ["elbow", "wrist"]]
   .map(([a, b]) => [s + a, s + b]));
 const HAND = ["index", "middle", "pinky", "ring", "thumb"];
 const SPINE = ["spine1", "spine2", "spine3"];
@@ -12,7 +16,7 @@ const UPRIGHT = 0.7;
 const FLOOR_SHARE = 0.02;
 
 // source: MotionSource; avatar: as readAvatar gives it. Returns a clip for avatar.clips.
-function retarget(source, avatar, where) {
+export function retarget(source, avatar, where) {
   const ours = Object.fromEntries(avatar.names.map((name, j) => [name, Array.from(avatar.joints.subarray(j * 3, j * 3 + 3))]));
   const { found, torso } = matchSkeleton(source, where);
   const reference = new Reference(source, found, torso, ours);
@@ -135,7 +139,7 @@ class Reference {
   // Turns of our joints in the source's world.
   lay() {
     const standing = this.standing(this.places).turn, laid = { pelvis: standing };
-    for (const s of SIDES) {
+    for (const s of SIDE_PREFIXES) {
       laid[`${s}hip`] = this.along(`${s}hip`, `${s}knee`, standing);
       laid[`${s}knee`] = this.along(`${s}knee`, `${s}ankle`, laid[`${s}hip`]);
       laid[`${s}ankle`] = laid[`${s}foot`] = this.turned(standing, this.up, `${s}ankle`, `${s}foot`);

@@ -1,7 +1,7 @@
 // Written by `python -m gsac.viewer.wgsl` from the HLSL of the Unity package and page.hlsl. Do not edit.
 // glslang 11, naga-wasm@30.1.0, HLSL fe8fb44bae0a20a8acb056df176c0196a81a0656fbecedbf2deb895b45030cba
 
-const SHADERS = {
+export const SHADERS = {
   Skin: { bindings: {"parameters": 0, "GsacSkin": 2, "GsacRest": 1, "GsacMoves": 3, "GsacWeights": 4, "GsacBones": 5, "GsacPosed": 6}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
 struct GsacParams {
 GsacVertexCount: u32,

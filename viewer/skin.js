@@ -1,6 +1,8 @@
 // Pose of the skeleton over time, and linear blend skinning of the mesh.
 
-class Pose {
+import { quatFromAxisAngle, quatMix, quatToMatrix } from "./flat_quat.js";
+
+export class Pose {
   constructor(avatar) {
     this.avatar = avatar;
     this.quats = new Float32Array(avatar.names.length * 4);
@@ -59,7 +61,7 @@ class Pose {
   }
 }
 
-class Skin {
+export class Skin {
   constructor(avatar) {
     this.avatar = avatar;
     this.bones = new Float32Array(avatar.names.length * 12);

@@ -22,7 +22,7 @@ const DEGREES = 170;
 const AXIS_LABELS = ["x, degrees", "y, degrees", "z, degrees"];
 
 // Fills `rows` with a choice of joint and its three turns. Returns what makes them show the viewer's state.
-function jointSliders(viewer, rows) {
+export function jointSliders(viewer, rows) {
   const choice = Object.assign(document.createElement("select"), { id: "joint" });
   choice.setAttribute("aria-label", "Joint");
   for (const name of viewer.avatar.names) choice.append(new Option(name.replaceAll("_", " ").replace(" smplhf", ""), name));
@@ -40,7 +40,7 @@ function jointSliders(viewer, rows) {
 }
 
 // Fills `rows` with a slider for each expression.
-function faceSliders(viewer, rows) {
+export function faceSliders(viewer, rows) {
   const sliders = viewer.avatar.expressions.map((name) => sliderRow(name.replace(/([a-z])([A-Z])/g, "$1 $2").toLowerCase(), 0, 1, 0.01,
     () => viewer.expression[name] ?? 0, (weight) => { viewer.expression[name] = weight; }));
   rows.append(...sliders.map((slider) => slider.row));

@@ -1,9 +1,11 @@
 // Draws the gaussians without a graphics card: splat by splat from the nearest to the farthest, a row of each ellipse at a
 // time, until a pixel is full. The picture is that of webgl.js; where GL itself is software this is several times faster.
 
+import { NEAR, SHADOW, WIDE } from "./projection.js";
+
 const FULL = 1e-3;
 
-class SoftwareRenderer {
+export class SoftwareRenderer {
   constructor(canvas, avatar, binding, sort) {
     this.context = canvas.getContext("2d", { alpha: false });
     Object.assign(this, { kind: "software", canvas, avatar, binding, sort, width: 0, height: 0 });

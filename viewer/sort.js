@@ -1,6 +1,6 @@
 // Order of the gaussians from the farthest to the nearest: a counting sort on 16 bits of depth, stable.
 
-class DepthSort {
+export class DepthSort {
   constructor(count) {
     this.count = count;
     this.order = new Uint32Array(Math.max(1, Math.ceil(count / DepthSort.PER_ROW)) * DepthSort.PER_ROW);

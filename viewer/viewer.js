@@ -1,5 +1,12 @@
 // The avatar on the canvas: what it plays, how it is turned by hand, what its face does, and the picture of that.
 
+import { Binding } from "./binding.js";
+import { OrbitCamera } from "./camera.js";
+import { FrameRate } from "./rate.js";
+import { freshCanvas, makeRenderer } from "./renderer.js";
+import { Pose, Skin } from "./skin.js";
+import { DepthSort } from "./sort.js";
+
 const FADE_S = 0.35;
 const FOLLOW_S = 0.6;
 const BACKGROUND = "#2b303b";
@@ -9,7 +16,7 @@ const FRAME_LOOKS = 16;
 // What a browser takes to start its graphics process again.
 const RECOVER_MS = 1000;
 
-class Viewer {
+export class Viewer {
   // asked: how to draw, for makeRenderer.
   static async open(avatar, asked) {
     const viewer = new Viewer(avatar);
@@ -163,7 +170,7 @@ class Viewer {
     if (this.resize() && !this.camera.moved) this.frame();
     const eye = this.camera.eye(this.canvas.width, this.canvas.height);
     this.renderer.prepare(eye.view);
-    this.renderer.clear([...colour(this.background), 1]);
+    this.renderer.clear([...this.rgb, 1]);
     this.renderer.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
   }
 
@@ -247,6 +254,11 @@ class Viewer {
     this.draw();
   }
 
+  // The background, [r, g, b] in 0..1.
+  get rgb() {
+    return parseColour(this.background);
+  }
+
   // The whole figure, wherever its clip takes the limbs; the camera walks along by itself.
   // how: `frame` at once or `glide`, see OrbitCamera.
   frame(how = "frame") {
@@ -278,6 +290,7 @@ function bounds(vertices) {
   return [low, high];
 }
 
-function colour(hex) {
+// #rrggbb -> [r, g, b] in 0..1.
+function parseColour(hex) {
   return [1, 3, 5].map((i) => Number.parseInt(hex.slice(i, i + 2), 16) / 255);
 }

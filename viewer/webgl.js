@@ -1,6 +1,10 @@
 // Draws the sorted gaussians with WebGL2: one indexed draw of four corners a gaussian, blended from far to near.
 // As trained: covariance + 0.3 px, alpha = min(0.999, opacity exp(-s)), nothing below 1/255.
 
+import { Binding } from "./binding.js";
+import { NEAR, SHADOW, WIDE } from "./projection.js";
+import { DepthSort } from "./sort.js";
+
 const SPLAT_VERTEX = `#version 300 es
 precision highp float;
 precision highp int;
@@ -89,11 +93,7 @@ void main() {
   pixel = vec4(0, 0, 0, strength * smoothstep(1.0, 0.0, r) * smoothstep(1.0, 0.0, r));
 }`;
 
-const NEAR = 0.05;
-const WIDE = 1.3;
-const SHADOW = 0.4;
-
-class WebglRenderer {
+export class WebglRenderer {
   constructor(canvas, avatar, binding, sort) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: false,
       powerPreference: "high-performance" });

@@ -1,6 +1,12 @@
 // Skins, binds, sorts and draws on the graphics card through WebGPU, by the shaders that Unity runs (shaders.js).
 // Nothing is read back: a frame sends the bones, the expression's weights and the eye.
 
+import { EVEN_LIGHT } from "./binding.js";
+import { reachDevice } from "./device.js";
+import { packForGpu } from "./pack.js";
+import { SHADOW } from "./projection.js";
+import { SHADERS } from "./shaders.js";
+
 const SORT_BLOCK_BITS = 12;
 const SORT_HAND = 16;
 const SKIN_THREADS = 64;
@@ -11,7 +17,7 @@ const PARAMETER_BYTES = 256;
 const ANSWER_MS = 10000;
 const PREMULTIPLIED = { srcFactor: "one", dstFactor: "one-minus-src-alpha", operation: "add" };
 
-class WebgpuRenderer {
+export class WebgpuRenderer {
   // Returns null where there is no graphics card to reach; asked: a software one will do.
   static async open(canvas, avatar, skin, binding, asked) {
     const late = new Promise((done) => setTimeout(done, ANSWER_MS, null)), device = await Promise.race([reachDevice(asked), late]);
@@ -152,15 +158,6 @@ class WebgpuRenderer {
     pass.end();
     device.queue.submit([this.encoder.finish()]);
   }
-}
-
-async function reachDevice(asked) {
-  const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
-  return adapter && (asked || !isSoftware(adapter)) ? adapter.requestDevice() : null;
-}
-
-function isSoftware({ info }) {
-  return info.isFallbackAdapter || SOFTWARE.test(`${info.vendor} ${info.architecture} ${info.description}`);
 }
 
 // places: parameter -> byte after `start`; values: a whole number or a list of floats for each.

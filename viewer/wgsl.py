@@ -92,7 +92,7 @@ def places(text: str) -> tuple[dict[str, int], dict[str, int]]:
 def script(texts: dict[str, str]) -> str:
     """shaders.js."""
     lines = ["// Written by `python -m gsac.viewer.wgsl` from the HLSL of the Unity package and page.hlsl. Do not edit.",
-             f"// glslang {glslang_version()}, {NAGA}, HLSL {digest()}", "", "const SHADERS = {"]
+             f"// glslang {glslang_version()}, {NAGA}, HLSL {digest()}", "", "export const SHADERS = {"]
     for entry, text in texts.items():
         bindings, parameters = places(text)
         lines.append(f"  {entry}: {{ bindings: {json.dumps(bindings)}, parameters: {json.dumps(parameters)}, code: `\n{text}` }},")

@@ -1,11 +1,13 @@
 // A headset or a phone's AR, where the device offers one: the avatar stands 1.6 m in front, each eye its own picture,
 // one sort for both from the middle of the head.
 
+import { WebglRenderer } from "./webgl.js";
+
 const XR_MODES = [["immersive-vr", "VR"], ["immersive-ar", "AR"]];
 const XR_DISTANCE = 1.6;
 
 // Adds a button for each mode that the device has.
-async function offerHeadset(viewer, place, tell) {
+export async function offerHeadset(viewer, place, tell) {
   if (!navigator.xr) return;
   for (const [mode, label] of XR_MODES) {
     if (!await navigator.xr.isSessionSupported(mode).catch(() => false)) continue;
@@ -40,7 +42,7 @@ async function enter(viewer, mode, button) {
     viewer.session = session;
     button.setAttribute("aria-pressed", "true");
     const stand = [-(viewer.low[0] + viewer.high[0]) / 2, -viewer.low[1] - height, -XR_DISTANCE];
-    const background = mode === "immersive-ar" ? [0, 0, 0, 0] : [...colour(viewer.background), 1];
+    const background = mode === "immersive-ar" ? [0, 0, 0, 0] : [...viewer.rgb, 1];
     let last = null;
     const frame = (now, xrFrame) => {
       session.requestAnimationFrame(frame);

@@ -177,6 +177,6 @@ def shadowed():
   gsac.resize();
   const eye = gsac.camera.eye(gsac.canvas.width, gsac.canvas.height);
   gsac.renderer.prepare(eye.view);
-  gsac.renderer.clear([...colour(gsac.background), 1]);
+  gsac.renderer.clear([...gsac.rgb, 1]);
   gsac.renderer.paint(eye, gsac.shadow);
 })()"""

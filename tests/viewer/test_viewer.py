@@ -14,6 +14,7 @@ from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.animations import add_motion
 from gsac.stages.export.stage import rigged
 from gsac.viewer.page import page_bytes
+from support.page_modules import expose
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]
@@ -160,6 +161,7 @@ def test_on_a_phone_the_controls_are_inside_the_screen_and_below_the_feet(page):
 def test_the_scripts_reader_names_what_is_wrong_with_a_file(page, figure):
     """The same faults as the Python reader, and never anything but a GsacError."""
     data = base64.b64encode(figure.to_bytes()).decode()
+    expose(page, "readAvatar", "GsacError", "crc32")
     faults = page.run("const encoded = '" + data + "';" + """(() => {
       const whole = Uint8Array.from(atob(encoded), (c) => c.charCodeAt(0));
       const fault = (bytes) => {

@@ -9,6 +9,7 @@ import pytest
 
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer.page import page_bytes
+from support.page_modules import expose
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]
@@ -139,6 +140,7 @@ def test_time_stands_still_on_pause_goes_where_the_slider_is_and_on(page):
 
 
 def test_the_rate_is_frames_over_time_and_the_95th_slowest_frame(page):
+    expose(page, "FrameRate")
     told = page.run("""(() => {
       const rate = new FrameRate(), told = [];
       let now = 1000;
@@ -211,6 +213,7 @@ def test_a_motion_that_leaps_stays_in_the_picture_unless_the_camera_was_moved_by
       gsac.paused = true;
       gsac.step(5);
     })()""")
+    expose(page, "bounds")
     tops = page.run("""[0, 1].map((k) => {
       if (k) gsac.camera.distance = %s;
       const { view, focal, centre } = gsac.camera.eye(SIZE, SIZE), p = [0, bounds(gsac.skin.vertices)[1][1], 0];

@@ -17,6 +17,7 @@ from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.stage import posed_gaussians
 from gsac.viewer.page import page_bytes
 from support import dances
+from support.page_modules import expose
 
 TESTS = Path(__file__).parents[2]
 FOOTAGE = TESTS.parents[1] / "shared" / "footage" / "motion"
@@ -221,6 +222,7 @@ def test_what_is_wrong_with_a_file_is_said_on_the_page_and_what_plays_goes_on(pa
 def test_fuzz_any_damage_to_a_motion_is_a_motion_error_or_a_motion(page, figure, skeleton):
     text = dances.bvh_text(skeleton, dance(figure, 2))
     document = gltf_of(parse_bvh(text))
+    expose(page, "MotionError", "readBvh", "readGltf", "retarget")
     kinds = page.run(f"const bvhWhole = {json.dumps(text)}, gltfWhole = {json.dumps(json.dumps(document))};" + """(() => {
       let seed = 7;
       const random = (n) => { seed = (seed * 48271) % 2147483647; return seed % n; };
@@ -244,6 +246,7 @@ def test_fuzz_any_damage_to_a_motion_is_a_motion_error_or_a_motion(page, figure,
 
 
 def test_names_are_matched_as_python_does(page, figure):
+    expose(page, "matchNames")
     lists = [[dances.mixamo(n) for n in figure.joint_names], list(figure.joint_names),
              ["Bip01 L Thigh", "Bip01 L Calf", "J_Bip_L_UpperArm", "DEF-shin.L", "index_03_l", "LeftHandIndex1", "f_pinky.02.R",
               "leftThumbProximal", "lForearmBend", "Head", "Neck1", "hand_r"]]

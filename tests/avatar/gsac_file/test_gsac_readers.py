@@ -8,16 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsac import unity, viewer
+from gsac import unity
 from gsac.avatar.gsac_file.container import GsacError
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from support import hostile, mono
+from support.page_modules import copy_modules
 
 JS = r"""
-const fs = require("fs"), path = require("path");
-const { readAvatar, GsacError } = new Function(fs.readFileSync(process.argv[2], "utf8") + "; return { readAvatar, GsacError };")();
-for (const name of fs.readdirSync(process.argv[3])) {
-  const bytes = fs.readFileSync(path.join(process.argv[3], name));
+import fs from "node:fs";
+import path from "node:path";
+import { GsacError } from "./container.js";
+import { readAvatar } from "./reader.js";
+for (const name of fs.readdirSync(process.argv[2])) {
+  const bytes = fs.readFileSync(path.join(process.argv[2], name));
   let word = "ok";
   try {
     readAvatar(new Uint8Array(bytes).buffer);
@@ -57,10 +60,11 @@ def csharp_words(folder, tmp_path):
 def javascript_words(folder, tmp_path):
     if not shutil.which("node"):
         pytest.skip("needs node")
-    script = tmp_path / "read.js"
+    modules = tmp_path / "modules"
+    modules.mkdir()
+    script = copy_modules(modules) / "read.js"
     script.write_text(JS)
-    done = subprocess.run(["node", "--max-old-space-size=64", str(script), str(Path(viewer.__file__).with_name("reader.js")),
-                           str(folder)], capture_output=True, text=True)
+    done = subprocess.run(["node", "--max-old-space-size=64", str(script), str(folder)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     return words_of(done.stdout)
 

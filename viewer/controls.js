@@ -1,22 +1,15 @@
-// The page: opens the avatar inside it, plays it, and listens to the buttons and to the address.
-// Address: #pose=T|A or #clip=NAME, t=SECONDS, yaw, pitch, dist, fov (degrees, m), target=x,y,z, bg=rrggbb,
-// expression=NAME:WEIGHT,..., joints=NAME:x,y,z;... (axis-angle, degrees), light=off, turntable,
-// still (one frame, no controls, no floor);
-// draw=webgpu|webgl|software, when the page opens.
+// The page's buttons, sliders and drop place: they change the viewer, and show what it does.
+
+import { MotionError } from "./motion.js";
+import { addMotions, listenForDrops } from "./motion_files.js";
+import { faceSliders, jointSliders } from "./sliders.js";
 
 const NOTE_MS = 9000;
 const WAYS = { webgpu: "WebGPU", webgl: "WebGL", software: "no graphics card" };
 
-async function inlinedAvatar() {
-  if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old: it cannot unpack the avatar");
-  const text = atob(document.getElementById("avatar").textContent.trim());
-  const packed = Uint8Array.from(text, (c) => c.charCodeAt(0));
-  return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
-}
-
 const find = (id) => document.getElementById(id);
 
-class Controls {
+export class Controls {
   constructor(viewer) {
     this.viewer = viewer;
     for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
@@ -135,28 +128,3 @@ class Controls {
     Object.values(this.drawers).forEach((showSliders) => showSliders());
   }
 }
-
-function tell(error) {
-  const box = find("message");
-  box.textContent = `The avatar cannot be shown: ${error.message}`;
-  box.hidden = false;
-  console.error(error);
-}
-
-async function main() {
-  const viewer = await Viewer.open(readAvatar(await inlinedAvatar()), new URLSearchParams(location.hash.slice(1)).get("draw"));
-  window.gsac = viewer;
-  const controls = new Controls(viewer);
-  const follow = () => {
-    viewer.follow(location.hash.slice(1));
-    controls.show();
-  };
-  follow();
-  window.addEventListener("hashchange", follow);
-  await offerHeadset(viewer, find("tools"), (text) => controls.note(text));
-  find("message").hidden = true;
-  viewer.run();
-  document.documentElement.dataset.ready = "yes";
-}
-
-main().catch(tell);

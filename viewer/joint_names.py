@@ -1,0 +1,31 @@
+"""Other tools' names of joints for the page: `python -m gsac.viewer.joint_names` writes joint_names.js from avatar/motion/names.py."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from gsac.avatar.motion import names
+
+WRITTEN = Path(__file__).with_name("joint_names.js")
+
+
+def script() -> str:
+    """joint_names.js."""
+    rules = ",\n".join(f"  {json.dumps(rule)}" for rule in names.RULES)
+    return "\n".join([
+        "// Written by `python -m gsac.viewer.joint_names` from avatar/motion/names.py. Do not edit.", "",
+        "// Words of a name that tell nothing: prefixes of tools.", f"export const NOISE = {json.dumps(names.NOISE)};",
+        "// Word -> side, as our names begin.", f"export const SIDES = {json.dumps(names.SIDES)};",
+        "// [our joint, side, spellings], in the order in which joints are taken.", f"export const RULES = [\n{rules},\n];", ""])
+
+
+def main() -> int:
+    WRITTEN.write_text(script())
+    print(f"wrote {WRITTEN}", file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
