@@ -1,66 +1,83 @@
 // Orbit camera with OpenCV axes (x right, y down, z forward), and the gestures that move it.
 
+// Time constant of the glide to another framing.
 const GLIDE_S = 0.25;
+// Height of the framed figure that the picture's half height has to hold, with room at its top and bottom; likewise the width.
+const ROOM_TALL = 0.57;
+const ROOM_WIDE = 0.58;
+
+/**
+ * What a renderer draws from. view: 3x4, row by row, world to camera; focal: px; centre: px from the middle of the box to the
+ * optical axis; box: x, y, width, height of the picture on the canvas, px.
+ * @typedef {{view: Float32Array, focal: [number, number], centre: [number, number],
+ *   box: [number, number, number, number]}} Eye
+ */
 
 export class OrbitCamera {
   constructor() {
+    // Vertical field of view, degrees.
     this.fov = 30;
-    // Share of the picture's height that controls cover at the bottom; the figure stands above it.
+    // Share of the picture's height that the controls cover at the bottom; the figure stands above them.
     this.covered = 0;
-    // How far the figure has walked from where it was framed, m; the camera goes along.
+    // How far the figure has walked from where it was framed, m; the camera follows.
     this.walked = [0, 0, 0];
     this.view = new Float32Array(12);
+    // Around the target (m), degrees; distance from it, m.
     this.yaw = 0;
     this.pitch = 4;
     this.target = [0, 0, 0];
     this.distance = 3;
-    // What is left of the way from an older framing: target, m, pitch, degrees, distance, m. It dies away.
+    // Offset from the framing that a glide still has to lose: target (m), pitch (degrees), distance (m).
     this.behind = [0, 0, 0, 0, 0];
-    // By hand or by the address: then a new size of the page does not frame the figure again.
+    // Whether the user or the address moved it: a new size of the page does not frame the figure again then.
     this.moved = false;
   }
 
-  // Puts a box, m, into the picture; aspect: width over height.
+  // Frames a box, m; aspect: the picture's width over its height.
   frame(low, high, aspect) {
     this.pitch = 4;
     this.moved = false;
     this.behind = [0, 0, 0, 0, 0];
     this.target = low.map((l, i) => (l + high[i]) / 2);
-    const tall = (high[1] - low[1]) * 0.57 / (1 - this.covered), wide = (high[0] - low[0]) * 0.58 / aspect;
+    const tall = (high[1] - low[1]) * ROOM_TALL / (1 - this.covered), wide = (high[0] - low[0]) * ROOM_WIDE / aspect;
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
   }
 
-  // As frame, but the picture gets there little by little, by `settle`.
+  // As `frame`, but gets there gradually, by `settle`.
   glide(low, high, aspect) {
     const from = this.place();
     this.frame(low, high, aspect);
     this.behind = this.place().map((to, i) => from[i] - to);
   }
 
-  // Seconds of the glide.
+  // Goes on with a glide by some seconds.
   settle(seconds) {
     const left = Math.exp(-seconds / GLIDE_S);
     this.behind = this.behind.map((x) => (Math.abs(x) < 1e-4 ? 0 : x * left));
   }
 
-  // Where it is: the point that it looks at, pitch, distance.
+  // Where it is now: target (m), pitch (degrees), distance (m).
   place() {
     const at = this.target.map((t, i) => t + this.walked[i]);
     return [...at, this.pitch, this.distance].map((x, i) => x + this.behind[i]);
   }
 
+  // Focal length, px, for a picture of this height.
   focal(height) {
     return height / 2 / Math.tan(this.fov * Math.PI / 360);
   }
 
-  // What the renderer draws with, for a picture of width x height px.
+  /**
+   * For a picture of width x height px.
+   * @returns {Eye}
+   */
   eye(width, height) {
     this.update();
     const focal = this.focal(height);
     return { view: this.view, focal: [focal, focal], centre: [0, -this.covered * height / 2], box: [0, 0, width, height] };
   }
 
-  // Fills this.view: 3x4, row by row, world to camera.
+  // Fills this.view.
   update() {
     const place = this.place(), target = place.slice(0, 3), [pitch, distance] = place.slice(3);
     const y = this.yaw * Math.PI / 180, p = pitch * Math.PI / 180;
@@ -75,6 +92,7 @@ export class OrbitCamera {
     });
   }
 
+  // Gestures by dx, dy in px of the page.
   turn(dx, dy) {
     this.yaw -= dx * 0.35;
     this.pitch = Math.min(85, Math.max(-30, this.pitch + dy * 0.3));

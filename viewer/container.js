@@ -1,4 +1,4 @@
-// Reader of .gsac bytes (docs/gsac-format.md). A bad file throws GsacError with one of the format's fault names.
+// The container of a .gsac file: header, checksum, JSON head and blocks of numbers (docs/gsac-format.md).
 
 import { isTable } from "./json.js";
 
@@ -10,6 +10,7 @@ const GSAC_MAX_HEAD = 2 ** 20;
 const GSAC_MAX_BLOCKS = 1024;
 const GSAC_TYPES = { f32: Float32Array, f16: Uint16Array, u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, i16: Int16Array };
 
+// A file that breaks the format. fault: one of the format's fault names.
 export class GsacError extends Error {
   constructor(fault, detail) {
     super(`not a usable avatar (${fault}): ${detail}`);
@@ -17,27 +18,34 @@ export class GsacError extends Error {
   }
 }
 
-function crc32(bytes) {
-  const table = new Uint32Array(256);
-  for (let i = 0; i < 256; i++) {
-    let c = i;
-    for (let k = 0; k < 8; k++) c = c & 1 ? (c >>> 1) ^ 0xedb88320 : c >>> 1;
-    table[i] = c;
-  }
-  let crc = 0xffffffff;
-  for (let i = 0; i < bytes.length; i++) crc = (crc >>> 8) ^ table[(crc ^ bytes[i]) & 255];
-  return (crc ^ 0xffffffff) >>> 0;
-}
+/**
+ * Block name -> shape and numbers; halves and scaled integers are Float32Array, other integers as they are stored.
+ * @typedef {Object<string, {shape: number[], data: any}>} Blocks
+ */
 
-function halfToFloat(h) {
-  const sign = h & 0x8000 ? -1 : 1, exponent = (h >> 10) & 31, fraction = h & 1023;
-  if (exponent === 0) return sign * fraction * 2 ** -24;
-  if (exponent === 31) return fraction ? NaN : sign * Infinity;
-  return sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
-}
-
-// buffer: ArrayBuffer. Returns {head, blocks: name -> {shape, data}}, halves and scaled integers turned to Float32Array.
+/**
+ * @param {ArrayBuffer} buffer the whole file
+ * @returns {{head: Object<string, any>, blocks: Blocks}}
+ */
 export function unpackGsac(buffer) {
+  const start = checkHeader(buffer), head = parseHead(new Uint8Array(buffer, GSAC_HEADER, start - GSAC_HEADER));
+  /** @type {Blocks} */
+  const blocks = {};
+  const spans = [];
+  for (const [name, entry] of Object.entries(head.blocks)) {
+    const size = blockBytes(name, entry, buffer.byteLength - start);
+    spans.push({ name, from: entry.offset, to: entry.offset + size });
+    blocks[name] = { shape: entry.shape, data: readBlock(entry, buffer, start + entry.offset, size) };
+  }
+  spans.sort((a, b) => a.from - b.from || a.to - b.to);
+  for (let i = 1; i < spans.length; i++) {
+    if (spans[i].from < spans[i - 1].to) throw new GsacError("block", `${spans[i - 1].name} and ${spans[i].name} overlap`);
+  }
+  return { head, blocks };
+}
+
+// Checks magic, version, sizes and checksum. Returns the byte at which the blocks begin.
+function checkHeader(buffer) {
   const bytes = new Uint8Array(buffer), view = new DataView(buffer);
   const begins = GSAC_MAGIC.slice(0, bytes.length).every((b, i) => bytes[i] === b);
   if (!begins || bytes.length === 0) throw new GsacError("not_gsac", "it does not begin with the GSAC magic bytes");
@@ -55,32 +63,22 @@ export function unpackGsac(buffer) {
   if (crc32(bytes.subarray(GSAC_HEADER)) !== view.getUint32(24, true)) {
     throw new GsacError("checksum", "it was damaged after it was written");
   }
+  return start;
+}
+
+function parseHead(bytes) {
   let head;
   try {
-    head = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes.subarray(GSAC_HEADER, start)));
+    head = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes));
   } catch (e) {
     throw new GsacError("head", "it does not parse");
   }
   if (!isTable(head) || !isTable(head.blocks)) throw new GsacError("head", "it lacks the table `blocks`");
   if (Object.keys(head.blocks).length > GSAC_MAX_BLOCKS) throw new GsacError("block", "it lists too many blocks");
-  const blocks = {}, spans = [];
-  for (const [name, entry] of Object.entries(head.blocks)) {
-    const size = blockBytes(name, entry, fileBytes - start);
-    spans.push([entry.offset, entry.offset + size, name]);
-    const Type = GSAC_TYPES[entry.dtype];
-    let data = new Type(buffer, start + entry.offset, size / Type.BYTES_PER_ELEMENT);
-    if (entry.dtype === "f16") data = Float32Array.from(data, halfToFloat);
-    if (entry.scale !== undefined) data = Float32Array.from(data, (x) => x * entry.scale);
-    blocks[name] = { shape: entry.shape, data };
-  }
-  spans.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
-  for (let i = 1; i < spans.length; i++) {
-    if (spans[i][0] < spans[i - 1][1]) throw new GsacError("block", `${spans[i - 1][2]} and ${spans[i][2]} overlap`);
-  }
-  return { head, blocks };
+  return head;
 }
 
-// Size in bytes of a block that can be believed; room: bytes after the head.
+// Checks a block's entry in the head. Returns its size in bytes; room: bytes from the head's end to the file's.
 function blockBytes(name, entry, room) {
   const bad = (why) => new GsacError("block", `block ${name} ${why}`);
   if (!isTable(entry) || !Object.hasOwn(GSAC_TYPES, entry.dtype)) throw bad("has an unknown type");
@@ -89,8 +87,39 @@ function blockBytes(name, entry, room) {
     throw bad("has a shape that is not a short list of lengths");
   }
   if (!Number.isInteger(offset) || offset < 0 || offset % 16) throw bad("has a bad offset");
-  if (scale !== undefined && !(typeof scale === "number" && Math.abs(scale) > 0 && Math.abs(scale) < 1e6)) throw bad("has a bad scale");
+  if (scale !== undefined && !(typeof scale === "number" && Math.abs(scale) > 0 && Math.abs(scale) < 1e6)) {
+    throw bad("has a bad scale");
+  }
   const size = shape.reduce((a, b) => a * b, GSAC_TYPES[entry.dtype].BYTES_PER_ELEMENT);
   if (offset + size > room) throw bad("ends after the file");
   return size;
+}
+
+function readBlock({ dtype, scale }, buffer, at, size) {
+  const Type = GSAC_TYPES[dtype];
+  let data = new Type(buffer, at, size / Type.BYTES_PER_ELEMENT);
+  if (dtype === "f16") data = Float32Array.from(data, halfToFloat);
+  if (scale !== undefined) data = Float32Array.from(data, (x) => x * scale);
+  return data;
+}
+
+// As zip and PNG have it.
+function crc32(bytes) {
+  const table = new Uint32Array(256);
+  for (let i = 0; i < 256; i++) {
+    let c = i;
+    for (let k = 0; k < 8; k++) c = c & 1 ? (c >>> 1) ^ 0xedb88320 : c >>> 1;
+    table[i] = c;
+  }
+  let crc = 0xffffffff;
+  for (let i = 0; i < bytes.length; i++) crc = (crc >>> 8) ^ table[(crc ^ bytes[i]) & 255];
+  return (crc ^ 0xffffffff) >>> 0;
+}
+
+// The value of the 16 bits of an IEEE half.
+function halfToFloat(bits) {
+  const sign = bits & 0x8000 ? -1 : 1, exponent = (bits >> 10) & 31, fraction = bits & 1023;
+  if (exponent === 0) return sign * fraction * 2 ** -24;
+  if (exponent === 31) return fraction ? NaN : sign * Infinity;
+  return sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
 }

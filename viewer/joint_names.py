@@ -1,4 +1,7 @@
-"""Other tools' names of joints for the page: `python -m gsac.viewer.joint_names` writes joint_names.js from avatar/motion/names.py."""
+"""Other tools' names of joints for the page: `python -m gsac.viewer.joint_names` writes joint_names.js.
+
+The table is that of avatar/motion/names.py.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-// What all ways of drawing share with the trainer when they project a gaussian.
+// The projection of gaussians that all renderers share with the trainer.
 
-// Nothing nearer to the camera is drawn, m.
+// Nothing nearer to the camera than this is drawn, m.
 export const NEAR = 0.05;
-// A gaussian's slope (x/z, y/z) is kept within this many times the picture's half width and height, where the linear projection
-// of its covariance still holds.
+// A gaussian's slopes x/z and y/z are clamped to this many times the picture's half width and height: beyond that the linear
+// projection of its covariance does not hold.
 export const WIDE = 1.3;
-// How dark the shadow on the floor is in its middle, 0..1.
-export const SHADOW = 0.4;

@@ -1,4 +1,4 @@
-// The avatar of a .gsac file, from its head and blocks (docs/gsac-format.md). A bad file throws GsacError.
+// The avatar of a .gsac file, from its head and blocks (docs/gsac-format.md). A file that breaks the format throws GsacError.
 
 import { GsacError, unpackGsac } from "./container.js";
 import { isTable } from "./json.js";
@@ -6,122 +6,199 @@ import { isTable } from "./json.js";
 const GSAC_MAX_JOINTS = 256;
 const GSAC_MAX_LEVELS = 16;
 
-// The avatar that the viewer plays. Arrays are flat, row by row; shapes as in docs/gsac-format.md.
+/**
+ * What the viewer plays. Arrays are flat, row by row; V vertices, F faces, J joints, E expressions, M moved vertices,
+ * N gaussians of the finest level; canonical axes, m, rad.
+ * @typedef {ReturnType<typeof readAvatar>} Avatar
+ */
+
+/** @param {ArrayBuffer} buffer the whole file */
 export function readAvatar(buffer) {
-  const { head, blocks } = unpackGsac(buffer);
-  const list = (value, what) => {
-    if (!Array.isArray(value)) throw new GsacError("head", `${what} is missing`);
-    return value;
+  const { head, blocks } = unpackGsac(buffer), arrays = new Arrays(blocks);
+  checkHead(head);
+  const skeleton = readSkeleton(head, arrays), mesh = readMesh(arrays, skeleton.names.length);
+  const expressions = readExpressions(head, arrays, mesh.vertices.length / 3);
+  if (mesh.vertices.length === 0) throw new GsacError("value", "the mesh has no vertices");
+  const [finest] = readLevels(head, arrays, mesh.faces.length / 3);
+  checkPoses(head.poses, skeleton.names);
+  checkNumber(head, "ground", -1e6, 1e6);
+  return {
+    ...skeleton, ...mesh, ...expressions, ...finest,
+    // Name -> joint -> axis-angle.
+    poses: head.poses,
+    clips: readClips(head, arrays, skeleton.names),
+    // Spherical harmonics of the clip's light, (4, 3), or null.
+    light: arrays.has("light") ? arrays.real("light", 4, 3) : null,
+    blend: readBlend(head),
   };
-  const block = (name, ...shape) => {
-    const found = blocks[name];
+}
+
+// The file's blocks by name, each with the shape, type and values that its reader expects.
+class Arrays {
+  constructor(blocks) {
+    this.blocks = blocks;
+  }
+
+  has(name) {
+    return Boolean(this.blocks[name]);
+  }
+
+  rows(name) {
+    return this.blocks[name].shape[0];
+  }
+
+  // shape: lengths, null where any will do.
+  take(name, isReal, shape) {
+    const found = this.blocks[name];
     if (!found) throw new GsacError("block", `block ${name} is missing`);
     if (found.shape.length !== shape.length || !shape.every((n, i) => n === null || n === found.shape[i])) {
       throw new GsacError("block", `block ${name} has shape ${found.shape}`);
     }
+    if ((found.data instanceof Float32Array) !== isReal) throw new GsacError("block", `block ${name} has an unexpected type`);
     return found.data;
-  };
-  const typed = (name, real, shape) => {
-    const data = block(name, ...shape);
-    if ((data instanceof Float32Array) !== real) throw new GsacError("block", `block ${name} has another type than expected`);
-    return data;
-  };
-  const index = (name, limit, ...shape) => {
-    const data = typed(name, false, shape);
+  }
+
+  /** @returns {Uint8Array | Uint16Array | Uint32Array} indices below limit */
+  index(name, limit, ...shape) {
+    const data = this.take(name, false, shape);
     for (const i of data) if (!(i >= 0 && i < limit)) throw new GsacError("value", `${name} points outside`);
     return data;
-  };
-  const finite = (name, ...shape) => {
-    const data = typed(name, true, shape);
+  }
+
+  /** @returns {Float32Array} finite numbers */
+  real(name, ...shape) {
+    const data = this.take(name, true, shape);
     for (const x of data) if (!Number.isFinite(x)) throw new GsacError("value", `${name} is not finite`);
     return data;
-  };
-  const words = (value, what) => {
-    if (!isTable(value) || !Object.values(value).every((w) => typeof w === "string")) throw new GsacError("head", `${what} holds more than text`);
-  };
-  const different = (value, what) => {
-    if (!list(value, what).every((n) => typeof n === "string") || new Set(value).size !== value.length) {
-      throw new GsacError("head", `${what} is not a list of different names`);
-    }
-    return value;
-  };
+  }
+}
+
+function checkHead(head) {
   if (head.format !== "gsac") throw new GsacError("head", "format is not gsac");
   if (!isTable(head.joints) || !isTable(head.poses)) throw new GsacError("head", "a table is missing");
-  words(head.licence, "licence");
-  words(head.provenance, "provenance");
-  const names = different(head.joints.names, "joints.names"), parents = list(head.joints.parents, "joints.parents");
+  for (const key of ["licence", "provenance"]) {
+    if (!isTable(head[key]) || !Object.values(head[key]).every((word) => typeof word === "string")) {
+      throw new GsacError("head", `${key} holds more than text`);
+    }
+  }
+}
+
+// Returns names [J], parents [J] (-1 for the root), joints (J, 3).
+function readSkeleton(head, arrays) {
+  const names = checkNames(head.joints.names, "joints.names"), parents = checkList(head.joints.parents, "joints.parents");
   if (!names.length || names.length > GSAC_MAX_JOINTS || parents.length !== names.length ||
       !parents.every((p, j) => Number.isInteger(p) && (j === 0 ? p === -1 : p >= 0 && p < j))) {
     throw new GsacError("value", "parents must name an earlier joint each");
   }
-  const vertices = finite("rest.vertices", null, 3), V = vertices.length / 3;
-  const faces = index("rest.faces", V, null, 3);
-  const expressions = different(head.expressions, "expressions");
-  finite("expression.jaw", expressions.length, 3);
-  const moved = index("expression.vertex", V, null);
-  const start = index("expression.start", moved.length + 1, expressions.length + 1);
-  let rises = start[0] === 0 && start[expressions.length] === moved.length;
-  for (let e = 0; e < expressions.length; e++) rises = rises && start[e] <= start[e + 1];
-  if (!rises) throw new GsacError("value", "expression.start must rise from 0 to the number of moved vertices");
-  const weights = finite("skin.weight", V, 4);
-  for (let w = 0; w < weights.length; w += 4) {
-    const four = weights.subarray(w, w + 4), sum = four.reduce((a, b) => a + b, 0);
-    if (Math.abs(sum - 1) > 1e-3 || Math.min(...four) < 0) throw new GsacError("value", "skin.weight must have rows that sum to 1");
+  return { names, parents, joints: arrays.real("rest.joints", names.length, 3) };
+}
+
+// Returns vertices (V, 3), faces (F, 3), skinIndex and skinWeight (V, 4).
+function readMesh(arrays, jointCount) {
+  const vertices = arrays.real("rest.vertices", null, 3), V = vertices.length / 3;
+  const faces = arrays.index("rest.faces", V, null, 3), skinWeight = arrays.real("skin.weight", V, 4);
+  for (let w = 0; w < skinWeight.length; w += 4) {
+    const four = skinWeight.subarray(w, w + 4), sum = four.reduce((a, b) => a + b, 0);
+    if (Math.abs(sum - 1) > 1e-3 || Math.min(...four) < 0) throw new GsacError("value", "rows of skin.weight must sum to 1");
   }
-  if (V === 0) throw new GsacError("value", "the mesh has no vertices");
-  const levels = list(head.levels, "levels").map((level) => {
+  return { vertices, faces, skinIndex: arrays.index("skin.index", jointCount, V, 4), skinWeight };
+}
+
+// Returns expressions [E], start (E + 1,), moved (M,), delta (M, 3): expression e moves vertex moved[i] by row i of delta, for each i
+// from start[e] to below start[e + 1].
+function readExpressions(head, arrays, vertexCount) {
+  const expressions = checkNames(head.expressions, "expressions"), E = expressions.length;
+  arrays.real("expression.jaw", E, 3);
+  const moved = arrays.index("expression.vertex", vertexCount, null), M = moved.length;
+  const start = arrays.index("expression.start", M + 1, E + 1);
+  if (start[0] !== 0 || start[E] !== M || !expressions.every((_, e) => start[e] <= start[e + 1])) {
+    throw new GsacError("value", "expression.start must rise from 0 to the number of moved vertices");
+  }
+  return { expressions, start, moved, delta: arrays.real("expression.delta", M, 3) };
+}
+
+// Returns the levels of detail, the finest first: face and opacity (N,), mu, logScale and rgb (N, 3), quat (N, 4) wxyz.
+function readLevels(head, arrays, faceCount) {
+  const levels = checkList(head.levels, "levels").map((level) => {
     if (!isTable(level) || typeof level.prefix !== "string") throw new GsacError("head", "a level has no prefix");
-    const face = index(`${level.prefix}.face`, faces.length / 3, null), N = face.length;
+    const face = arrays.index(`${level.prefix}.face`, faceCount, null), N = face.length;
     if (level.count !== N) throw new GsacError("value", `a level says it has other than ${N} gaussians`);
-    const gaussian = (name, ...shape) => finite(`${level.prefix}.${name}`, N, ...shape);
-    const quat = gaussian("quat", 4);
+    const real = (name, ...shape) => arrays.real(`${level.prefix}.${name}`, N, ...shape), quat = real("quat", 4);
     for (let q = 0; q < quat.length; q += 4) {
-      if (Math.abs(Math.hypot(...quat.subarray(q, q + 4)) ** 2 - 1) > 1e-2) throw new GsacError("value", "quat must hold unit quaternions");
+      const length = Math.hypot(...quat.subarray(q, q + 4));
+      if (Math.abs(length ** 2 - 1) > 1e-2) throw new GsacError("value", "quat must hold unit quaternions");
     }
-    return { face, mu: gaussian("mu", 3), quat, logScale: gaussian("log_scale", 3), rgb: gaussian("rgb", 3), opacity: gaussian("opacity") };
+    return { face, mu: real("mu", 3), quat, logScale: real("log_scale", 3), rgb: real("rgb", 3), opacity: real("opacity") };
   });
   if (levels.length === 0 || levels.length > GSAC_MAX_LEVELS) throw new GsacError("head", "levels is empty or too long");
-  if (new Set(head.levels.map((level) => level.prefix)).size !== levels.length) throw new GsacError("head", "two levels have the same gaussians");
-  for (const pose of Object.values(head.poses)) {
-    const rows = isTable(pose) ? Object.entries(pose) : [["", null]];
-    for (const [joint, r] of rows) {
-      if (!names.includes(joint) || !Array.isArray(r) || r.length !== 3 || !r.every((x) => typeof x === "number" && Math.abs(x) < 100)) {
-        throw new GsacError("head", "a pose is not a table of joint -> axis-angle");
-      }
+  const prefixes = new Set(head.levels.map((level) => level.prefix));
+  if (prefixes.size !== levels.length) throw new GsacError("head", "two levels have the same gaussians");
+  return levels;
+}
+
+function checkPoses(poses, names) {
+  for (const pose of Object.values(poses)) {
+    const isTurn = (r) => Array.isArray(r) && r.length === 3 && r.every((x) => typeof x === "number" && Math.abs(x) < 100);
+    if (!isTable(pose) || !Object.entries(pose).every(([joint, r]) => names.includes(joint) && isTurn(r))) {
+      throw new GsacError("head", "a pose is not a table of joint -> axis-angle");
     }
   }
+}
+
+/**
+ * A motion of K keys: rotation (K, joints, 3) axis-angle and transl (K, 3); joints: indices of the joints that it turns.
+ * @typedef {{fps: number, loop: boolean, joints: number[], keys: number, rotation: Float32Array, transl: Float32Array}} MotionClip
+ */
+
+/** @returns {Object<string, MotionClip>} by name, in the file's order */
+function readClips(head, arrays, names) {
+  /** @type {Object<string, MotionClip>} */
   const clips = {};
-  for (const clip of list(head.clips, "clips")) {
+  for (const clip of checkList(head.clips, "clips")) {
     if (!isTable(clip)) throw new GsacError("head", "a clip is not a table");
-    const joints = different(clip.joints, "clip.joints").map((name) => names.indexOf(name));
-    if (typeof clip.name !== "string" || typeof clip.fps !== "number" || typeof clip.loop !== "boolean") {
+    const { name, fps, loop } = clip, joints = checkNames(clip.joints, "clip.joints").map((joint) => names.indexOf(joint));
+    if (typeof name !== "string" || typeof fps !== "number" || typeof loop !== "boolean") {
       throw new GsacError("head", "a clip lacks its name, fps or loop");
     }
-    if (Object.hasOwn(clips, clip.name)) throw new GsacError("value", `clip ${clip.name} comes twice`);
-    if (!(clip.fps >= 0.1 && clip.fps <= 1000) || joints.includes(-1)) throw new GsacError("value", "a clip names unknown joints or has no rate");
-    const rotation = finite(`clip.${clip.name}.rotation`, null, joints.length, 3);
-    const keys = blocks[`clip.${clip.name}.rotation`].shape[0];
+    if (Object.hasOwn(clips, name)) throw new GsacError("value", `clip ${name} comes twice`);
+    if (!(fps >= 0.1 && fps <= 1000) || joints.includes(-1)) {
+      throw new GsacError("value", "a clip names unknown joints or has no rate");
+    }
+    const rotation = arrays.real(`clip.${name}.rotation`, null, joints.length, 3), keys = arrays.rows(`clip.${name}.rotation`);
     if (keys === 0) throw new GsacError("value", "a clip has no keys");
-    clips[clip.name] = { fps: clip.fps, loop: clip.loop, joints, keys, rotation, transl: finite(`clip.${clip.name}.transl`, keys, 3) };
+    clips[name] = { fps, loop, joints, keys, rotation, transl: arrays.real(`clip.${name}.transl`, keys, 3) };
   }
-  const within = (table, key, least, most) => {
-    if (!Object.hasOwn(table, key)) return;
-    if (typeof table[key] !== "number") throw new GsacError("head", `${key} is of the wrong kind`);
-    if (!(table[key] >= least && table[key] <= most)) throw new GsacError("value", `${key} is out of range`);
-  };
-  within(head, "ground", -1e6, 1e6);
-  if (Object.hasOwn(head, "blend")) {
-    if (!isTable(head.blend)) throw new GsacError("head", "blend is of the wrong kind");
-    within(head.blend, "low_pass_px2", 0, 100);
-    within(head.blend, "alpha_max", 0, 1);
-    within(head.blend, "alpha_min", 1e-6, 1);
+  return clips;
+}
+
+// How gaussians become pixels, with the format's defaults: lowPass is added to a projected covariance, px^2; the alpha of a
+// gaussian in a pixel is at most alphaMax, and below alphaMin nothing is drawn.
+function readBlend(head) {
+  const { blend = {} } = head;
+  if (!isTable(blend)) throw new GsacError("head", "blend is of the wrong kind");
+  checkNumber(blend, "low_pass_px2", 0, 100);
+  checkNumber(blend, "alpha_max", 0, 1);
+  checkNumber(blend, "alpha_min", 1e-6, 1);
+  const { low_pass_px2: lowPass = 0.3, alpha_max: alphaMax = 0.999, alpha_min: alphaMin = 1 / 255 } = blend;
+  return { lowPass, alphaMax, alphaMin };
+}
+
+function checkList(value, what) {
+  if (!Array.isArray(value)) throw new GsacError("head", `${what} is missing`);
+  return value;
+}
+
+/** @returns {string[]} */
+function checkNames(value, what) {
+  if (!checkList(value, what).every((name) => typeof name === "string") || new Set(value).size !== value.length) {
+    throw new GsacError("head", `${what} is not a list of different names`);
   }
-  return {
-    names, parents, vertices, faces, expressions, start, moved, clips, head,
-    joints: finite("rest.joints", names.length, 3),
-    skinIndex: index("skin.index", names.length, V, 4), skinWeight: weights,
-    delta: finite("expression.delta", moved.length, 3), poses: head.poses,
-    light: blocks.light ? finite("light", 4, 3) : null,
-    ...levels[0],
-  };
+  return value;
+}
+
+// A number that the table may leave out.
+function checkNumber(table, key, least, most) {
+  if (!Object.hasOwn(table, key)) return;
+  if (typeof table[key] !== "number") throw new GsacError("head", `${key} is of the wrong kind`);
+  if (!(table[key] >= least && table[key] <= most)) throw new GsacError("value", `${key} is out of range`);
 }

@@ -1,69 +1,105 @@
-// The avatar on the canvas: what it plays, how it is turned by hand, what its face does, and the picture of that.
+// The avatar on the canvas: what it plays, how its joints and face are set by hand, the camera, and the picture of it all.
 
 import { Binding } from "./binding.js";
 import { OrbitCamera } from "./camera.js";
 import { FrameRate } from "./rate.js";
-import { freshCanvas, makeRenderer } from "./renderer.js";
+import { makeRenderer, replaceCanvas } from "./renderer.js";
 import { Pose, Skin } from "./skin.js";
 import { DepthSort } from "./sort.js";
 
+// From one motion to the next.
 const FADE_S = 0.35;
+// Time constant of the camera's walk after the figure.
 const FOLLOW_S = 0.6;
 const BACKGROUND = "#2b303b";
 const MAX_PIXEL_RATIO = 2;
-// So many places of a clip are looked at for the frame that holds them all.
-const FRAME_LOOKS = 16;
+const TURNTABLE_DEGREES_PER_S = 30;
+// A longer time between two frames counts as this.
+const MAX_STEP_S = 0.25;
+// Keys of a clip that are looked at for the framing that holds them all.
+const FRAMING_KEYS = 16;
 // What a browser takes to start its graphics process again.
 const RECOVER_MS = 1000;
+// Of the shadow: its radius as a share of the figure's height, and how dark its middle is, 0..1.
+const SHADOW_RADIUS = 0.3;
+const SHADOW_STRENGTH = 0.4;
+
+/**
+ * A round shadow on the floor: middle and radius, m; strength in its middle, 0..1.
+ * @typedef {{x: number, y: number, z: number, radius: number, strength: number}} Shadow
+ */
+
+/**
+ * What plays: a clip or a pose of the avatar, by name.
+ * @typedef {{clip?: string, pose?: string}} Playing
+ */
 
 export class Viewer {
-  // asked: how to draw, for makeRenderer.
+  /**
+   * @param {import("./reader.js").Avatar} avatar
+   * @param {string | null} asked the renderer, as for makeRenderer
+   */
   static async open(avatar, asked) {
     const viewer = new Viewer(avatar);
     await viewer.drawBy(asked);
     return viewer;
   }
 
+  // Use `open`.
   constructor(avatar) {
+    /** @type {import("./reader.js").Avatar} */
     this.avatar = avatar;
     this.pose = new Pose(avatar);
+    // The pose that the present one fades in from; fade: 0..1.
     this.before = new Pose(avatar);
+    this.fade = 1;
     this.skin = new Skin(avatar);
     this.binding = new Binding(avatar);
     this.sort = new DepthSort(this.binding.count);
     this.stage = document.getElementById("stage");
+    /** @type {import("./renderer.js").Renderer | null} */
     this.renderer = null;
     this.camera = new OrbitCamera();
-    [this.low, this.high] = bounds(avatar.vertices);
+    const [low, high] = bounds(avatar.vertices);
+    // Box around the figure at rest, m.
+    this.low = low;
+    this.high = high;
     this.rate = new FrameRate();
+    /** @type {Object<string, number>} weights by name */
     this.expression = {};
-    // Joint -> axis-angle, degrees, on top of what is played.
+    /** @type {Object<string, number[]>} joint -> axis-angle, degrees, on top of what plays */
     this.turned = {};
+    /** @type {Playing} */
     this.playing = { pose: "T" };
+    // Place in the clip, s.
     this.clock = 0;
-    this.fade = 1;
     this.paused = false;
     this.turntable = false;
+    // Whether the page is one frame without controls and floor.
     this.still = false;
     this.background = BACKGROUND;
+    /** @type {XRSession | null} the headset's */
     this.session = null;
-    // Called with {fps, p95} a few times a second, and with a sentence when the way of drawing had to change.
+    /** @type {import("./webgl.js").WebglRenderer | null} the headset's, where the page draws in another way */
+    this.headset = null;
+    /** @type {(rate: {fps: number, p95: number}) => void} called a few times a second */
     this.onRate = () => {};
+    /** @type {(text: string) => void} called when the renderer had to change */
     this.onChange = () => {};
   }
 
   get canvas() {
-    return this.stage.firstElementChild;
+    return /** @type {HTMLCanvasElement} */ (this.stage.firstElementChild);
   }
 
-  // asked: for makeRenderer. A renderer that stops later is followed by the next plainer one.
+  // Makes the renderer; one that is lost later is followed by the next simpler one. asked: as for makeRenderer.
   async drawBy(asked) {
     const renderer = await makeRenderer(asked, this.canvas, this);
     renderer.onLost = async (why) => {
       if (this.renderer !== renderer) return;
       this.renderer = null;
-      renderer.device?.destroy();
-      freshCanvas(this.canvas);
+      if ("device" in renderer) renderer.device.destroy();
+      replaceCanvas(this.canvas);
       await new Promise((done) => setTimeout(done, RECOVER_MS));
       await this.drawBy(renderer.kind === "webgpu" ? "webgl" : "software");
       this.move();
@@ -74,6 +110,7 @@ export class Viewer {
     this.renderer = renderer;
   }
 
+  /** @param {Playing} what fades in, from its beginning */
   play(what) {
     this.before.copy(this.pose);
     this.playing = what;
@@ -82,31 +119,31 @@ export class Viewer {
     this.paused = false;
   }
 
-  // As play, and the camera goes where it sees all of it, unless somebody has moved it.
+  // As `play`, and the camera glides to where it sees all of it, unless the user has moved it.
   choose(what) {
     this.play(what);
     if (!this.camera.moved) this.frame("glide");
   }
 
-  // Seconds of the clip that plays; 0 for a still pose.
+  // Of the clip that plays, s; 0 for a pose.
   get length() {
     const clip = this.avatar.clips[this.playing.clip];
     return clip ? (clip.loop ? clip.keys : clip.keys - 1) / clip.fps : 0;
   }
 
-  // To a place in the clip, s.
+  // Goes to a place in the clip, s.
   seek(seconds) {
     this.clock = seconds;
     this.fade = 1;
   }
 
-  // seconds: since the last frame.
+  // Goes on by some seconds, gaussians included.
   step(seconds) {
     this.advance(seconds);
     this.move();
   }
 
-  // The pose after some seconds, and the camera that follows it.
+  // Moves the pose, and the camera that follows it, on by some seconds.
   advance(seconds) {
     if (!this.paused) this.clock += seconds;
     this.fade = Math.min(1, this.fade + seconds / FADE_S);
@@ -120,38 +157,41 @@ export class Viewer {
         this.clock %= length;
       }
     }
-    this.take(this.pose, this.clock);
+    this.setPose(this.pose, this.clock);
     if (this.fade < 1) this.pose.fadeFrom(this.before, this.fade * this.fade * (3 - 2 * this.fade));
-    this.turn(this.pose);
+    this.addTurns(this.pose);
     const share = 1 - Math.exp(-seconds / FOLLOW_S), { walked } = this.camera;
     for (const i of [0, 2]) walked[i] += share * (this.pose.transl[i] - walked[i]);
     this.camera.settle(seconds);
   }
 
-  // All that the picture depends on, in words; two equal ones need no new picture.
+  // Everything the picture depends on, as text: equal texts need no new picture.
   get state() {
     this.camera.update();
-    const { pose, camera, stage, binding, renderer, background, expression } = this, panel = document.getElementById("panel").offsetTop;
-    return [pose.quats, pose.transl, Array.from(camera.view, (x) => x.toFixed(5)), camera.fov, stage.clientWidth, stage.clientHeight,
-      window.devicePixelRatio, panel, binding.lit, renderer?.kind, background, JSON.stringify(expression)].join(" ");
+    const { pose, camera, stage, binding, renderer, background, expression } = this;
+    const panel = document.getElementById("panel").offsetTop;
+    const view = Array.from(camera.view, (x) => x.toFixed(5));
+    return [pose.quats, pose.transl, view, camera.fov, stage.clientWidth, stage.clientHeight, window.devicePixelRatio, panel,
+      binding.lit, renderer?.kind, background, JSON.stringify(expression)].join(" ");
   }
 
-  // pose: Pose, set to what plays at a place in the clip, s.
-  take(pose, seconds) {
+  // Sets a pose to what plays at a place in the clip, s.
+  setPose(pose, seconds) {
     if (this.playing.clip) pose.clip(this.playing.clip, seconds);
     else pose.still(this.playing.pose);
   }
 
-  // Adds the turns by hand.
-  turn(pose) {
+  // Adds the joints' turns by hand to a pose.
+  addTurns(pose) {
     for (const [joint, degrees] of Object.entries(this.turned)) {
-      pose.turn(this.avatar.names.indexOf(joint), ...degrees.map((d) => d * Math.PI / 180));
+      const [x, y, z] = degrees.map((d) => d * Math.PI / 180);
+      pose.turn(this.avatar.names.indexOf(joint), x, y, z);
     }
   }
 
-  // Brings the gaussians to the pose: on the graphics card where that can, else here.
+  // Moves the gaussians to the pose: on the graphics card where the renderer can, else here.
   move() {
-    if (this.renderer?.move && !this.session) {
+    if (this.renderer && "move" in this.renderer && !this.session) {
       this.skin.moveBones(this.pose);
       this.renderer.move(this.expression);
     } else {
@@ -160,9 +200,16 @@ export class Viewer {
     }
   }
 
+  /** @returns {Shadow} below the figure where it is now */
   get shadow() {
     const [x, , z] = this.low.map((low, i) => (low + this.high[i]) / 2), { transl } = this.pose;
-    return { x: x + transl[0], y: this.low[1], z: z + transl[2], radius: 0.3 * (this.high[1] - this.low[1]) };
+    return { x: x + transl[0], y: this.low[1], z: z + transl[2], radius: SHADOW_RADIUS * (this.high[1] - this.low[1]),
+      strength: SHADOW_STRENGTH };
+  }
+
+  // The background, [r, g, b] in 0..1.
+  get rgb() {
+    return [1, 3, 5].map((i) => Number.parseInt(this.background.slice(i, i + 2), 16) / 255);
   }
 
   draw() {
@@ -174,21 +221,22 @@ export class Viewer {
     this.renderer.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
   }
 
-  // Returns whether the room for the figure has another size than before.
+  // Fits the canvas and the camera to the page and its panel of controls. Returns whether the figure has other room than before.
   resize() {
     const ratio = Math.min(window.devicePixelRatio || 1, this.renderer?.kind === "software" ? 1 : MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
-    const { offsetHeight, offsetTop } = document.getElementById("panel"), panel = offsetHeight ? window.innerHeight - offsetTop : 0;
+    const { offsetHeight, offsetTop } = document.getElementById("panel");
+    const panel = offsetHeight ? window.innerHeight - offsetTop : 0, covered = Math.min(0.5, panel / window.innerHeight);
     document.documentElement.style.setProperty("--panel", `${panel}px`);
-    const covered = Math.min(0.5, panel / window.innerHeight), same = this.canvas.width === width && this.canvas.height === height;
+    const same = this.canvas.width === width && this.canvas.height === height;
     const other = !same || Math.abs(covered - this.camera.covered) > 0.01;
     if (!same) Object.assign(this.canvas, { width, height });
     this.camera.covered = covered;
     return other;
   }
 
-  // Draws from now on; the headset has its own rhythm (xr.js).
+  // Draws from now on whenever something changes; a headset's session draws by itself (xr.js).
   run() {
     let last = null, shown = null;
     const frame = (now) => {
@@ -196,8 +244,8 @@ export class Viewer {
         last = shown = null;
         this.rate.reset();
       } else {
-        const seconds = last === null ? 0 : Math.min((now - last) / 1000, 0.25);
-        if (this.turntable) this.camera.yaw += seconds * 30;
+        const seconds = last === null ? 0 : Math.min((now - last) / 1000, MAX_STEP_S);
+        if (this.turntable) this.camera.yaw += seconds * TURNTABLE_DEGREES_PER_S;
         this.advance(seconds);
         const { state } = this;
         if (state !== shown) {
@@ -213,61 +261,49 @@ export class Viewer {
     requestAnimationFrame(frame);
   }
 
+  // Counts a frame; now: ms.
   tick(now) {
     const rate = this.rate.frame(now);
     if (rate) this.onRate(rate);
   }
 
-  // words: the part of the address after #.
-  follow(words) {
-    const asked = new URLSearchParams(words), number = (name, fallback) => Number.parseFloat(asked.get(name) ?? fallback);
-    this.still = asked.has("still");
+  /** @param {ReturnType<typeof import("./address.js").readAddress>} options */
+  follow(options) {
+    const { avatar, camera } = this, { clip, pose, pitch, distance, target } = options, [first] = Object.keys(avatar.clips);
+    this.still = options.still;
     document.body.classList.toggle("bare", this.still);
-    if (/^[0-9a-f]{6}$/i.test(asked.get("bg") ?? "")) this.background = `#${asked.get("bg")}`;
-    this.turntable = asked.has("turntable");
-    this.binding.lit = asked.get("light") !== "off";
-    this.expression = {};
-    for (const part of (asked.get("expression") ?? "").split(",").filter(Boolean)) {
-      const [name, weight] = part.split(":");
-      this.expression[name] = Number.parseFloat(weight ?? "1");
-    }
-    this.turned = {};
-    for (const part of (asked.get("joints") ?? "").split(";").filter(Boolean)) {
-      const [joint, degrees] = part.split(":"), values = (degrees ?? "").split(",").map(Number);
-      if (this.avatar.names.includes(joint) && values.length === 3 && values.every(Number.isFinite)) this.turned[joint] = values;
-    }
-    const first = Object.keys(this.avatar.clips)[0];
-    const playing = Object.hasOwn(this.avatar.clips, asked.get("clip")) ? { clip: asked.get("clip") }
-      : Object.hasOwn(this.avatar.poses, asked.get("pose")) ? { pose: asked.get("pose") }
-        : first ? { clip: first } : { pose: "T" };
-    this.play(playing);
-    this.seek(number("t", 0));
-    this.camera.walked.fill(0);
+    this.background = options.background ?? this.background;
+    this.turntable = options.turntable;
+    this.binding.lit = options.lit;
+    this.expression = options.expression;
+    this.turned = Object.fromEntries(Object.entries(options.turned).filter(([joint]) => avatar.names.includes(joint)));
+    if (Object.hasOwn(avatar.clips, clip)) this.play({ clip });
+    else if (Object.hasOwn(avatar.poses, pose)) this.play({ pose });
+    else this.play(first ? { clip: first } : { pose: "T" });
+    this.seek(options.seconds);
+    camera.walked.fill(0);
     this.step(0);
-    this.camera.fov = number("fov", 30);
+    camera.fov = options.fov;
     this.frame();
-    this.camera.moved = ["pitch", "dist", "target"].some((name) => asked.has(name));
-    this.camera.yaw = number("yaw", 0);
-    this.camera.pitch = number("pitch", this.camera.pitch);
-    this.camera.distance = number("dist", this.camera.distance);
-    if (asked.has("target")) this.camera.target = asked.get("target").split(",").map(Number);
+    camera.moved = pitch !== null || distance !== null || target !== null;
+    camera.yaw = options.yaw;
+    camera.pitch = pitch ?? camera.pitch;
+    camera.distance = distance ?? camera.distance;
+    camera.target = target ?? camera.target;
     this.draw();
   }
 
-  // The background, [r, g, b] in 0..1.
-  get rgb() {
-    return parseColour(this.background);
-  }
-
-  // The whole figure, wherever its clip takes the limbs; the camera walks along by itself.
-  // how: `frame` at once or `glide`, see OrbitCamera.
+  /**
+   * Frames the whole figure, wherever its clip takes the limbs; the camera follows its walk.
+   * @param {"frame" | "glide"} how see OrbitCamera
+   */
   frame(how = "frame") {
     this.resize();
     const { walked } = this.camera, pose = new Pose(this.avatar), low = Array(3).fill(Infinity), high = Array(3).fill(-Infinity);
-    const clip = this.avatar.clips[this.playing.clip], looks = clip ? Math.min(clip.keys, FRAME_LOOKS) : 1;
+    const clip = this.avatar.clips[this.playing.clip], looks = clip ? Math.min(clip.keys, FRAMING_KEYS) : 1;
     for (let n = 0; n < looks; n++) {
-      this.take(pose, clip ? Math.floor(n * clip.keys / looks) / clip.fps : 0);
-      this.turn(pose);
+      this.setPose(pose, clip ? Math.floor(n * clip.keys / looks) / clip.fps : 0);
+      this.addTurns(pose);
       this.skin.update(pose, this.expression);
       const [least, most] = bounds(this.skin.vertices), off = [pose.transl[0], 0, pose.transl[2]];
       off.forEach((x, i) => {
@@ -281,6 +317,7 @@ export class Viewer {
   }
 }
 
+// The box around vertices (V, 3): its low and its high corner.
 function bounds(vertices) {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   vertices.forEach((x, i) => {
@@ -288,9 +325,4 @@ function bounds(vertices) {
     high[i % 3] = Math.max(high[i % 3], x);
   });
   return [low, high];
-}
-
-// #rrggbb -> [r, g, b] in 0..1.
-function parseColour(hex) {
-  return [1, 3, 5].map((i) => Number.parseInt(hex.slice(i, i + 2), 16) / 255);
 }

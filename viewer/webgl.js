@@ -1,8 +1,8 @@
-// Draws the sorted gaussians with WebGL2: one indexed draw of four corners a gaussian, blended from far to near.
-// As trained: covariance + 0.3 px, alpha = min(0.999, opacity exp(-s)), nothing below 1/255.
+// Draws the gaussians with WebGL2: four corners each in one indexed draw, blended from the farthest to the nearest.
+// The trainer's rule: covariance + lowPass, alpha = min(alphaMax, opacity exp(-s)), nothing below alphaMin.
 
 import { Binding } from "./binding.js";
-import { NEAR, SHADOW, WIDE } from "./projection.js";
+import { NEAR, WIDE } from "./projection.js";
 import { DepthSort } from "./sort.js";
 
 const SPLAT_VERTEX = `#version 300 es
@@ -17,7 +17,7 @@ uniform vec4 view[3];
 uniform vec2 size;
 uniform vec2 focal;
 uniform vec2 centre;
-uniform vec3 blend;
+uniform vec3 blend; // lowPass, alphaMax, alphaMin
 out vec4 colour;
 out vec2 sigmas;
 
@@ -94,16 +94,27 @@ void main() {
 }`;
 
 export class WebglRenderer {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {import("./reader.js").Avatar} avatar
+   * @param {Binding} binding
+   * @param {DepthSort} sort
+   */
   constructor(canvas, avatar, binding, sort) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: false,
       powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser offers no WebGL2, which the viewer draws with");
-    Object.assign(this, { kind: "webgl", gl, canvas, avatar, binding, sort, onLost: () => {} });
-    const { low_pass_px2: lowPass = 0.3, alpha_max: most = 0.999, alpha_min: least = 1 / 255 } = avatar.head.blend || {};
+    this.kind = "webgl";
+    this.gl = gl;
+    this.binding = binding;
+    this.sort = sort;
+    /** @type {(why: string) => void} */
+    this.onLost = () => {};
     canvas.addEventListener("webglcontextlost", () => this.onLost("the graphics driver stopped"));
-    this.blend = [lowPass, most, least];
+    const { lowPass, alphaMax, alphaMin } = avatar.blend;
+    this.blend = [lowPass, alphaMax, alphaMin];
     const constants = { ORDER_ROW: DepthSort.PER_ROW, DATA_ROW: Binding.PER_ROW, NEAR: NEAR.toFixed(3), WIDE: WIDE.toFixed(3) };
-    const vertex = Object.entries(constants).reduce((text, [name, value]) => text.replaceAll(name, value), SPLAT_VERTEX);
+    const vertex = Object.entries(constants).reduce((text, [name, value]) => text.replaceAll(name, String(value)), SPLAT_VERTEX);
     this.splats = this.program(vertex, SPLAT_FRAGMENT);
     this.floor = this.program(FLOOR_VERTEX, FLOOR_FRAGMENT);
     this.gaussians = this.texture(gl.RGBA32F, Binding.PER_ROW * 3, binding.rows);
@@ -124,6 +135,7 @@ export class WebglRenderer {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
+  // Compiles a vertex and a fragment shader. Returns the program and the places of its uniforms by name.
   program(vertex, fragment) {
     const gl = this.gl, program = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
@@ -135,6 +147,7 @@ export class WebglRenderer {
     }
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+    /** @type {Object<string, WebGLUniformLocation>} */
     const places = {};
     for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
       const name = gl.getActiveUniform(program, i).name.replace("[0]", "");
@@ -158,7 +171,7 @@ export class WebglRenderer {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, format, type, data);
   }
 
-  // Sorts and uploads the gaussians; view: 3x4 row by row, of the eye or of the middle between two.
+  // Sorts and uploads the gaussians; view: as Eye's.
   prepare(view) {
     const { gl, binding, sort } = this;
     sort.update(binding.data, view);
@@ -166,30 +179,31 @@ export class WebglRenderer {
     this.fill(this.order, DepthSort.PER_ROW, sort.order.length / DepthSort.PER_ROW, gl.RED_INTEGER, gl.UNSIGNED_INT, sort.order);
   }
 
-  // background: rgba in 0..1.
   clear(background) {
     this.gl.clearColor(...background);
     this.gl.clear(this.gl.COLOR_BUFFER_BIT);
   }
 
-  // eye: {view, focal, centre, box}: 3x4 row by row; px; px from the box's middle to the axis; x, y, width, height in px.
-  // shadow: {x, y, z, radius} on the floor, or null.
+  /**
+   * @param {import("./camera.js").Eye} eye
+   * @param {import("./viewer.js").Shadow | null} shadow
+   */
   paint(eye, shadow) {
     const { gl, binding } = this;
     gl.viewport(...eye.box);
     if (shadow) {
       this.use(this.floor, eye);
       gl.uniform4f(this.floor.places.disc, shadow.x, shadow.y, shadow.z, shadow.radius);
-      gl.uniform1f(this.floor.places.strength, SHADOW);
+      gl.uniform1f(this.floor.places.strength, shadow.strength);
       gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     }
     this.use(this.splats, eye);
     const places = this.splats.places;
     gl.uniform3fv(places.blend, this.blend);
-    [[this.gaussians, places.gaussians], [this.colours, places.colours], [this.order, places.order]].forEach(([texture, place], unit) => {
+    [this.gaussians, this.colours, this.order].forEach((texture, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
-      gl.uniform1i(place, unit);
+      gl.uniform1i([places.gaussians, places.colours, places.order][unit], unit);
     });
     gl.activeTexture(gl.TEXTURE0);
     gl.drawElements(gl.TRIANGLES, binding.count * 6, gl.UNSIGNED_INT, 0);

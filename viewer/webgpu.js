@@ -4,23 +4,36 @@
 import { EVEN_LIGHT } from "./binding.js";
 import { reachDevice } from "./device.js";
 import { packForGpu } from "./pack.js";
-import { SHADOW } from "./projection.js";
 import { SHADERS } from "./shaders.js";
 
+// As in Gsac.compute: a group sorts 2^SORT_BLOCK_BITS keys at once, a thread of SortAcross SORT_HAND.
 const SORT_BLOCK_BITS = 12;
 const SORT_HAND = 16;
 const SKIN_THREADS = 64;
 const ACROSS_THREADS = 64;
-// Parameters of one dispatch; WebGPU wants them this far apart.
+// WebGPU wants the parameters of two dispatches this far apart.
 const PARAMETER_BYTES = 256;
-// A driver that takes longer to answer is left alone.
+// A driver that does not answer within this time is not used.
 const ANSWER_MS = 10000;
-const PREMULTIPLIED = { srcFactor: "one", dstFactor: "one-minus-src-alpha", operation: "add" };
+const PREMULTIPLIED = /** @type {const} */ ({ srcFactor: "one", dstFactor: "one-minus-src-alpha", operation: "add" });
+
+/**
+ * One dispatch of a compute shader; stage, shift and strides: of a step of the sort.
+ * @typedef {{entry: string, groups: number, stage?: number, shift?: number, strides?: number}} Dispatch
+ */
 
 export class WebgpuRenderer {
-  // Returns null where there is no graphics card to reach; asked: a software one will do.
+  /**
+   * Returns null where there is no graphics card to reach; asked: a software one will do.
+   * @param {HTMLCanvasElement} canvas
+   * @param {import("./reader.js").Avatar} avatar
+   * @param {import("./skin.js").Skin} skin
+   * @param {import("./binding.js").Binding} binding
+   * @param {boolean} asked
+   */
   static async open(canvas, avatar, skin, binding, asked) {
-    const late = new Promise((done) => setTimeout(done, ANSWER_MS, null)), device = await Promise.race([reachDevice(asked), late]);
+    const late = /** @type {Promise<null>} */ (new Promise((done) => setTimeout(done, ANSWER_MS, null)));
+    const device = await Promise.race([reachDevice(asked), late]);
     if (!device) return null;
     device.pushErrorScope("validation");
     const renderer = new WebgpuRenderer(device, canvas, avatar, skin, binding);
@@ -32,86 +45,102 @@ export class WebgpuRenderer {
     return renderer;
   }
 
+  // Use `open`.
   constructor(device, canvas, avatar, skin, binding) {
-    Object.assign(this, { kind: "webgpu", device, canvas, avatar, skin, binding, sort: sortSteps(binding.count), onLost: () => {} });
-    this.reach = reachOf(avatar, binding);
+    this.kind = "webgpu";
+    /** @type {GPUDevice} */
+    this.device = device;
+    /** @type {import("./reader.js").Avatar} */
+    this.avatar = avatar;
+    this.skin = skin;
+    this.binding = binding;
+    this.sort = planSort(binding.count);
+    /** @type {(why: string) => void} */
+    this.onLost = () => {};
+    this.reach = jointReach(avatar, binding);
     this.background = [0, 0, 0, 1];
     this.context = canvas.getContext("webgpu");
     this.format = navigator.gpu.getPreferredCanvasFormat();
     this.context.configure({ device, format: this.format, alphaMode: "opaque" });
-    this.buffers = Object.fromEntries(Object.entries(packForGpu(avatar)).map(([name, data]) => [name, this.buffer(data)]));
     const { names, vertices, expressions } = avatar, size = (bytes) => new Uint8Array(Math.max(bytes, 16));
     this.weights = new Float32Array(Math.max(expressions.length, 4));
-    Object.assign(this.buffers, { GsacWeights: this.buffer(this.weights), GsacBones: this.buffer(size(names.length * 48)),
-      GsacPosed: this.buffer(size(vertices.length / 3 * 16)), GsacSplats: this.buffer(size(binding.count * 48)),
-      GsacKeys: this.buffer(size(this.sort.keys * 4)) });
+    const arrays = { ...packForGpu(avatar), GsacWeights: this.weights, GsacBones: size(names.length * 48),
+      GsacPosed: size(vertices.length / 3 * 16), GsacSplats: size(binding.count * 48), GsacKeys: size(this.sort.keys * 4) };
+    this.buffers = Object.fromEntries(Object.entries(arrays).map(([name, data]) => [name, this.buffer(data)]));
     const corners = new Uint32Array(binding.count * 6);
     for (let i = 0; i < binding.count; i++) corners.set([0, 1, 2, 2, 1, 3].map((c) => i * 4 + c), i * 6);
     this.corners = this.buffer(corners, GPUBufferUsage.INDEX);
-    this.jobs = [{ entry: "Skin", groups: Math.ceil(vertices.length / 3 / SKIN_THREADS) },
+    /** @type {Dispatch[]} */
+    this.dispatches = [{ entry: "Skin", groups: Math.ceil(vertices.length / 3 / SKIN_THREADS) },
       { entry: "Bind", groups: Math.ceil(binding.count / SKIN_THREADS) }, ...this.sort.steps];
-    this.jobParameters = new ArrayBuffer(this.jobs.length * PARAMETER_BYTES);
-    this.jobBuffer = this.buffer(new Uint8Array(this.jobParameters), GPUBufferUsage.UNIFORM);
+    this.dispatchParameters = new ArrayBuffer(this.dispatches.length * PARAMETER_BYTES);
+    this.dispatchBuffer = this.buffer(new Uint8Array(this.dispatchParameters), GPUBufferUsage.UNIFORM);
     this.eyeParameters = new ArrayBuffer(PARAMETER_BYTES);
     this.eyeBuffer = this.buffer(new Uint8Array(this.eyeParameters), GPUBufferUsage.UNIFORM);
   }
 
+  // A buffer on the graphics card that begins as `data`.
   buffer(data, usage = GPUBufferUsage.STORAGE) {
-    const made = this.device.createBuffer({ size: Math.max(16, Math.ceil(data.byteLength / 4) * 4), usage: usage | GPUBufferUsage.COPY_DST });
+    const size = Math.max(16, Math.ceil(data.byteLength / 4) * 4);
+    const made = this.device.createBuffer({ size, usage: usage | GPUBufferUsage.COPY_DST });
     this.device.queue.writeBuffer(made, 0, data);
     return made;
   }
 
+  // Compiles the shaders and joins them with their buffers.
   async build() {
     const { device } = this, module = (entry) => device.createShaderModule({ code: SHADERS[entry].code });
-    const kernel = (entry) => device.createComputePipelineAsync({ layout: "auto", compute: { module: module(entry), entryPoint: entry } });
-    const entries = [...new Set(this.jobs.map(({ entry }) => entry))];
+    const kernel = (entry) => device.createComputePipelineAsync({ layout: "auto",
+      compute: { module: module(entry), entryPoint: entry } });
+    const entries = [...new Set(this.dispatches.map(({ entry }) => entry))];
     const draw = (name, topology) => device.createRenderPipelineAsync({ layout: "auto",
       vertex: { module: module(`${name}Vertex`), entryPoint: `${name}Vertex` },
       fragment: { module: module(`${name}Fragment`), entryPoint: `${name}Fragment`,
         targets: [{ format: this.format, blend: { color: PREMULTIPLIED, alpha: PREMULTIPLIED } }] },
       primitive: { topology } });
-    const drawers = [draw("Splat", "triangle-list"), draw("Floor", "triangle-strip")];
-    const [splats, floor, ...kernels] = await Promise.all([...drawers, ...entries.map(kernel)]);
-    for (const [i, job] of this.jobs.entries()) {
-      job.pipeline = kernels[entries.indexOf(job.entry)];
-      job.group = this.group(job.pipeline, job.entry, { buffer: this.jobBuffer, offset: i * PARAMETER_BYTES, size: PARAMETER_BYTES });
-    }
+    const [splats, floor, kernels] = await Promise.all(
+      [draw("Splat", "triangle-list"), draw("Floor", "triangle-strip"), Promise.all(entries.map(kernel))]);
+    this.kernels = this.dispatches.map(({ entry }, i) => {
+      const pipeline = kernels[entries.indexOf(entry)], offset = i * PARAMETER_BYTES;
+      return { pipeline, group: this.group(pipeline, entry, { buffer: this.dispatchBuffer, offset, size: PARAMETER_BYTES }) };
+    });
     this.splats = { pipeline: splats, group: this.group(splats, "SplatVertex", { buffer: this.eyeBuffer }) };
     this.floor = { pipeline: floor, group: this.group(floor, "FloorVertex", { buffer: this.eyeBuffer }) };
   }
 
+  // The buffers that a shader's entry point reads; parameters: what its uniform block is bound to.
   group(pipeline, entry, parameters) {
     const entries = Object.entries(SHADERS[entry].bindings).map(([name, binding]) =>
       ({ binding, resource: name === "parameters" ? parameters : { buffer: this.buffers[name] } }));
     return this.device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries });
   }
 
-  // Takes over the skin's bones and the expression's weights by name.
+  // Sends the skin's bones and the expression's weights, by name.
   move(expression) {
     this.avatar.expressions.forEach((name, e) => { this.weights[e] = expression[name] || 0; });
     this.device.queue.writeBuffer(this.buffers.GsacBones, 0, this.skin.bones);
     this.device.queue.writeBuffer(this.buffers.GsacWeights, 0, this.weights);
   }
 
-  // view: 3x4 row by row, of the eye.
+  // Poses and sorts the gaussians; view: as Eye's.
   prepare(view) {
     const { avatar, binding, device } = this, [near, far] = this.depths(view);
-    const light = (binding.lit && avatar.light) || EVEN_LIGHT, along = (c) => [light[3 + c], light[6 + c], light[9 + c], light[c]];
-    this.jobs.forEach(({ entry, stage = 0, shift = 0, strides = 0 }, i) => {
-      setParameters(this.jobParameters, i * PARAMETER_BYTES, SHADERS[entry].parameters, {
+    const light = (binding.lit && avatar.light) || EVEN_LIGHT;
+    const along = (c) => [light[3 + c], light[6 + c], light[9 + c], light[c]];
+    this.dispatches.forEach(({ entry, stage = 0, shift = 0, strides = 0 }, i) => {
+      setParameters(this.dispatchParameters, i * PARAMETER_BYTES, SHADERS[entry].parameters, {
         GsacVertexCount: avatar.vertices.length / 3, GsacSplatCount: binding.count, GsacIndexBits: this.sort.indexBits,
         GsacSortStage: stage, GsacSortShift: shift, GsacSortStrides: strides, GsacDepthRange: [near, 1 / (far - near)],
         GsacDepthRow: view.subarray(8, 12), GsacLightRed: along(0), GsacLightGreen: along(1), GsacLightBlue: along(2) });
     });
-    device.queue.writeBuffer(this.jobBuffer, 0, this.jobParameters);
+    device.queue.writeBuffer(this.dispatchBuffer, 0, this.dispatchParameters);
     this.encoder = device.createCommandEncoder();
     const pass = this.encoder.beginComputePass();
-    for (const { pipeline, group, groups } of this.jobs) {
-      pass.setPipeline(pipeline);
-      pass.setBindGroup(0, group);
+    this.dispatches.forEach(({ groups }, i) => {
+      pass.setPipeline(this.kernels[i].pipeline);
+      pass.setBindGroup(0, this.kernels[i].group);
       pass.dispatchWorkgroups(groups);
-    }
+    });
     pass.end();
   }
 
@@ -129,20 +158,24 @@ export class WebgpuRenderer {
     return range;
   }
 
-  // background: rgba in 0..1.
   clear(background) {
     this.background = background;
   }
 
-  // eye, shadow: as for WebglRenderer. After prepare, once.
+  /**
+   * Once after `prepare`.
+   * @param {import("./camera.js").Eye} eye
+   * @param {import("./viewer.js").Shadow | null} shadow
+   */
   paint({ view, focal, centre, box: [, , width, height] }, shadow) {
-    const { device } = this, { low_pass_px2: lowPass = 0.3, alpha_max: most = 0.999, alpha_min: least = 1 / 255 } = this.avatar.head.blend || {};
+    const { device, avatar: { blend: { lowPass, alphaMax, alphaMin } } } = this;
     setParameters(this.eyeParameters, 0, SHADERS.SplatVertex.parameters, {
-      GsacModel0: [1, 0, 0, 0], GsacModel1: [0, 1, 0, 0], GsacModel2: [0, 0, 1, 0], GsacBlend: [lowPass, most, least, 0],
+      GsacModel0: [1, 0, 0, 0], GsacModel1: [0, 1, 0, 0], GsacModel2: [0, 0, 1, 0], GsacBlend: [lowPass, alphaMax, alphaMin, 0],
       GsacIndexBits: this.sort.indexBits, PageView0: view.subarray(0, 4), PageView1: view.subarray(4, 8).map((x) => -x),
       PageView2: view.subarray(8, 12).map((x) => -x),
       PageLens: [2 * focal[0] / width, 2 * focal[1] / height, -2 * centre[0] / width, 2 * centre[1] / height],
-      PageDisc: shadow ? [shadow.x, shadow.y, shadow.z, shadow.radius] : [0, 0, 0, 0], PageInk: [width, height, SHADOW, 0] });
+      PageDisc: shadow ? [shadow.x, shadow.y, shadow.z, shadow.radius] : [0, 0, 0, 0],
+      PageInk: [width, height, shadow ? shadow.strength : 0, 0] });
     device.queue.writeBuffer(this.eyeBuffer, 0, this.eyeParameters);
     const pass = this.encoder.beginRenderPass({ colorAttachments: [{ view: this.context.getCurrentTexture().createView(),
       clearValue: this.background, loadOp: "clear", storeOp: "store" }] });
@@ -160,7 +193,7 @@ export class WebgpuRenderer {
   }
 }
 
-// places: parameter -> byte after `start`; values: a whole number or a list of floats for each.
+// Writes a uniform block. places: parameter -> byte after `start`; values: an integer or a list of floats for each.
 function setParameters(block, start, places, values) {
   for (const [name, at] of Object.entries(places)) {
     if (typeof values[name] === "number") new Uint32Array(block, start + at, 1)[0] = values[name];
@@ -168,12 +201,13 @@ function setParameters(block, start, places, values) {
   }
 }
 
-// The bitonic network of Gsac.compute over at least `count` keys: {keys, indexBits, steps}, as GsacSort.cs runs it.
-function sortSteps(count) {
+// The bitonic sorting network of Gsac.compute over at least `count` keys, as Unity's GsacSort.cs runs it.
+function planSort(count) {
   const block = 1 << SORT_BLOCK_BITS;
   let keys = block, merges = 0, indexBits = 1;
   for (; keys < count; merges++) keys *= 2;
   while (indexBits < 31 && 2 ** indexBits < count) indexBits++;
+  /** @type {Dispatch[]} */
   const steps = [{ entry: "SortBlocks", groups: keys / block }];
   for (let m = 1; m <= merges; m++) {
     const stage = block * 2 ** m;
@@ -186,11 +220,12 @@ function sortSteps(count) {
   return { keys, indexBits, steps };
 }
 
-// How far from each joint gaussians that hang on it can lie, m: however the joints turn, a skinned vertex stays in the
-// hull of balls around its joints; gaussians reach half as far again beyond the mesh as at rest.
-function reachOf(avatar, binding) {
-  const { vertices, faces, face, joints, names, skinIndex, skinWeight, moved, delta } = avatar, reach = new Float64Array(names.length);
-  const far = new Float64Array(vertices.length / 3), length = (x, y, z) => Math.hypot(x, y, z);
+// The greatest distance of gaussians from a joint that moves them, m, by joint: however the joints turn, a skinned vertex stays
+// in the hull of balls around its joints; gaussians are let stand half as far again off the mesh as at rest.
+function jointReach(avatar, binding) {
+  const { vertices, faces, face, joints, names, skinIndex, skinWeight, moved, delta } = avatar;
+  const reach = new Float64Array(names.length), far = new Float64Array(vertices.length / 3);
+  const length = (x, y, z) => Math.hypot(x, y, z);
   for (let i = 0; i < moved.length; i++) far[moved[i]] += length(...delta.subarray(i * 3, i * 3 + 3));
   for (let k = 0; k < skinIndex.length; k++) {
     if (skinWeight[k] === 0) continue;

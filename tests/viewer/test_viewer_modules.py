@@ -27,6 +27,8 @@ def code_of(text):
             out.append("\n" if c == "\n" else " ")
         elif text.startswith("//", i):
             i = text.index("\n", i) - 1
+        elif text.startswith("/*", i):
+            i = text.index("*/", i) + 1
         elif c in "'\"":
             i = re.compile(rf"(\\.|[^\\{c}])*").match(text, i + 1).end()
             out.append('""')
