@@ -1,21 +1,27 @@
-// Gaussians on the faces of the posed mesh: for a face (v0, v1, v2) with a = (v2-v1)/|.|, n = (v2-v1) x (v0-v1)/|.|,
-// b = a x n, R = [a n b], T = mean, k = 0.5 (h + L)/0.05, L = |v0-v2|, h = 2 area/L: mean k R mu + T, axes k R r s.
-// The light of the clip's room multiplies a colour with light . (1, n_x, n_y, |n_z|), between DARKEST and BRIGHTEST.
+// Places the gaussians on the faces of the posed mesh: for a face (v0, v1, v2) with a = (v2-v1)/|.|, n = (v2-v1) x (v0-v1)/|.|,
+// b = a x n, R = [a n b], T = mean, k = 0.5 (h + L)/0.05, L = |v0-v2|, h = 2 area/L, a gaussian's mean is k R mu + T and its axes
+// are k R r s.
+// The light of the clip multiplies a colour by light . (1, n_x, n_y, |n_z|), kept between DARKEST and BRIGHTEST.
 
 import { quatMix, quatToMatrix } from "./flat_quat.js";
 
 const DARKEST = 0.25;
 const BRIGHTEST = 2.5;
+// The same from everywhere: colours stay as they are.
 export const EVEN_LIGHT = Float32Array.of(1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0);
 
 export class Binding {
+  // Gaussians in a row of `data`, as WebGL has it in a texture.
+  static PER_ROW = 512;
+
+  /** @param {import("./reader.js").Avatar} avatar */
   constructor(avatar) {
     this.avatar = avatar;
-    // Whether the colours are those in the light of the clip's room, where the file has it.
+    // Whether the light of the clip shines on the colours, where the file has it.
     this.lit = true;
     this.count = avatar.face.length;
     this.axes = new Float32Array(this.count * 9);
-    // Rows of three RGBA texels a gaussian: mean xyz, xx | xy, xz, yy, yz | zz of the covariance, factor of the colour.
+    // Twelve numbers a gaussian: mean x, y, z, covariance xx, xy, xz, yy, yz, zz, and a factor for each colour.
     this.rows = Math.max(1, Math.ceil(this.count / Binding.PER_ROW));
     this.data = new Float32Array(this.rows * Binding.PER_ROW * 12);
     const q = new Float32Array(4), r = new Float32Array(9);
@@ -28,10 +34,13 @@ export class Binding {
     }
   }
 
-  // vertices: (V, 3) posed. Fills this.data.
+  // Fills this.data; vertices: (V, 3) posed.
   update(vertices) {
     const { faces, face, mu } = this.avatar, M = this.axes, D = this.data, light = (this.lit && this.avatar.light) || EVEN_LIGHT;
-    const shade = (c, x, y, z) => Math.min(BRIGHTEST, Math.max(DARKEST, light[c] + x * light[3 + c] + y * light[6 + c] + Math.abs(z) * light[9 + c]));
+    const shade = (c, x, y, z) => {
+      const factor = light[c] + x * light[3 + c] + y * light[6 + c] + Math.abs(z) * light[9 + c];
+      return Math.min(BRIGHTEST, Math.max(DARKEST, factor));
+    };
     for (let i = 0; i < this.count; i++) {
       const f = face[i] * 3, i0 = faces[f] * 3, i1 = faces[f + 1] * 3, i2 = faces[f + 2] * 3;
       const x1 = vertices[i1], y1 = vertices[i1 + 1], z1 = vertices[i1 + 2];
@@ -65,4 +74,3 @@ export class Binding {
     }
   }
 }
-Binding.PER_ROW = 512;

@@ -1,4 +1,4 @@
-// Reader of Biovision BVH text. Rest: all rotations zero. A fault names the file and the line.
+// Reads Biovision BVH text. The rest pose has all rotations zero. An error names the file and the line.
 
 import { MotionError, MotionSource } from "./motion.js";
 import { Quat, Vec } from "./quat.js";
@@ -6,13 +6,26 @@ import { Quat, Vec } from "./quat.js";
 const BVH_CHANNELS = ["xposition", "yposition", "zposition", "xrotation", "yrotation", "zrotation"];
 const BVH_MOST_JOINTS = 1000;
 
+/**
+ * @param {string} text
+ * @param {string} where the file's name, for errors
+ */
 export function readBvh(text, where) {
-  return new BvhReader(text, where).source();
+  return new BvhReader(text, where).read();
 }
 
 class BvhReader {
   constructor(text, where) {
-    Object.assign(this, { lines: text.split(/\r\n|\r|\n/), where, line: 0, words: [], names: [], parents: [], offsets: [], channels: [] });
+    this.where = where;
+    this.lines = text.split(/\r\n|\r|\n/);
+    // Number of lines read, and the words of the last one that are still to come.
+    this.line = 0;
+    this.words = [];
+    // Of each joint: name, index of the parent, offset from it, and indices into BVH_CHANNELS.
+    this.names = [];
+    this.parents = [];
+    this.offsets = [];
+    this.channels = [];
   }
 
   bad(why) {
@@ -38,7 +51,8 @@ class BvhReader {
     return value;
   }
 
-  source() {
+  // Reads the whole file.
+  read() {
     this.word("HIERARCHY");
     this.word("ROOT");
     this.joint(-1, 0);
@@ -50,10 +64,10 @@ class BvhReader {
     this.word("Time:");
     const seconds = this.number();
     if (!(seconds >= 1e-4 && seconds <= 10)) throw this.bad(`a frame time of ${seconds} s; 0.0001 to 10 is expected`);
-    return this.posed(this.table(frames), 1 / seconds);
+    return this.toSource(this.table(frames), 1 / seconds);
   }
 
-  // A joint after its keyword, with all below it.
+  // Reads a joint after its keyword, with all below it.
   joint(parent, depth) {
     const at = this.names.length, name = [];
     if (at >= BVH_MOST_JOINTS || depth > 200) throw this.bad(`more than ${BVH_MOST_JOINTS} joints or 200 generations`);
@@ -90,7 +104,7 @@ class BvhReader {
     });
   }
 
-  // One array of numbers a frame; one line each.
+  // Reads the motion: a line of numbers for each frame.
   table(frames) {
     const width = this.channels.reduce((sum, c) => sum + c.length, 0), out = [];
     while (this.line < this.lines.length) {
@@ -106,7 +120,8 @@ class BvhReader {
     return out;
   }
 
-  posed(table, fps) {
+  // World places and turns of all joints, from the channels' values in each frame.
+  toSource(table, fps) {
     const { names, parents, offsets, channels } = this, rest = [];
     parents.forEach((p, j) => rest.push(p < 0 ? offsets[j] : Vec.add(rest[p], offsets[j])));
     const source = new MotionSource(fps, table.length, names, parents, names.map(() => [0, 0, 0, 1]), rest);

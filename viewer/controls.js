@@ -1,15 +1,18 @@
-// The page's buttons, sliders and drop place: they change the viewer, and show what it does.
+// The page's buttons, sliders and dropped files: they change the viewer and show its state.
 
 import { MotionError } from "./motion.js";
 import { addMotions, listenForDrops } from "./motion_files.js";
-import { faceSliders, jointSliders } from "./sliders.js";
+import { addFaceSliders, addJointSliders } from "./sliders.js";
 
+// A note on the page stays this long.
 const NOTE_MS = 9000;
 const WAYS = { webgpu: "WebGPU", webgl: "WebGL", software: "no graphics card" };
 
+/** @returns {any} the page's element, a button or an input among others */
 const find = (id) => document.getElementById(id);
 
 export class Controls {
+  /** @param {import("./viewer.js").Viewer} viewer */
   constructor(viewer) {
     this.viewer = viewer;
     for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
@@ -24,11 +27,11 @@ export class Controls {
     });
     this.onClick("open", () => find("file").click());
     this.onClick("picture", () => this.savePicture());
-    find("background").addEventListener("input", (e) => { viewer.background = e.target.value; });
-    find("time").addEventListener("input", (e) => viewer.seek(Number(e.target.value) * viewer.length));
-    find("file").addEventListener("change", async (e) => {
-      await this.open([...e.target.files]);
-      e.target.value = "";
+    find("background").addEventListener("input", () => { viewer.background = find("background").value; });
+    find("time").addEventListener("input", () => viewer.seek(Number(find("time").value) * viewer.length));
+    find("file").addEventListener("change", async () => {
+      await this.open([...find("file").files]);
+      find("file").value = "";
     });
     listenForDrops(find("drop"), (files) => this.open(files));
     viewer.camera.listen(viewer.stage, () => {
@@ -37,7 +40,8 @@ export class Controls {
     });
     viewer.onRate = (rate) => this.showRate(rate);
     viewer.onChange = (text) => this.note(text);
-    this.drawers = { joints: jointSliders(viewer, find("joint-rows")), faces: faceSliders(viewer, find("face-rows")) };
+    // Drawer -> what makes it show the viewer's state.
+    this.drawers = { joints: addJointSliders(viewer, find("joint-rows")), faces: addFaceSliders(viewer, find("face-rows")) };
     for (const name of Object.keys(this.drawers)) {
       this.onClick(`show-${name}`, () => this.openDrawer(find(name).hidden ? name : null));
       this.onClick(`zero-${name}`, () => {
@@ -55,6 +59,7 @@ export class Controls {
     });
   }
 
+  // A button that plays a clip or a pose.
   addButton(text, what) {
     const element = document.createElement("button");
     element.textContent = text;
@@ -66,6 +71,7 @@ export class Controls {
     find("poses").append(element);
   }
 
+  // Opens one drawer and closes the other; null closes both.
   openDrawer(name) {
     for (const other of Object.keys(this.drawers)) {
       find(other).hidden = other !== name;
@@ -73,7 +79,7 @@ export class Controls {
     }
   }
 
-  // Motion files from the user; what is wrong with one is said on the page.
+  // Takes motion files from the user; an error is shown on the page.
   async open(files) {
     try {
       const added = await addMotions(this.viewer.avatar, files);
@@ -87,6 +93,7 @@ export class Controls {
     this.show();
   }
 
+  // Offers the canvas as a PNG file.
   savePicture() {
     const { viewer } = this, link = document.createElement("a");
     viewer.draw();
@@ -98,6 +105,7 @@ export class Controls {
     }, "image/png");
   }
 
+  // Shows a sentence for a while.
   note(text) {
     find("note").textContent = text;
     find("note").hidden = false;
@@ -107,17 +115,18 @@ export class Controls {
 
   showRate({ fps, p95 }) {
     const { viewer } = this, count = viewer.binding.count.toLocaleString("en");
-    find("fps").textContent = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms · ${count} gaussians · ${WAYS[viewer.renderer?.kind] ?? "…"}`;
+    const rate = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms`;
+    find("fps").textContent = `${rate} · ${count} gaussians · ${WAYS[viewer.renderer?.kind] ?? "…"}`;
     if (viewer.length) {
       if (document.activeElement !== find("time") || !viewer.paused) find("time").value = viewer.clock / viewer.length;
       find("clock").textContent = `${viewer.clock.toFixed(1)} / ${viewer.length.toFixed(1)} s`;
     }
   }
 
-  // The controls as the viewer's state has them.
+  // Makes all controls show the viewer's state.
   show() {
     const { viewer } = this, { playing } = viewer;
-    for (const button of document.querySelectorAll("#poses button")) {
+    for (const button of find("poses").querySelectorAll("button")) {
       button.setAttribute("aria-pressed", String(button.dataset.pose === playing.pose && button.dataset.clip === playing.clip));
     }
     find("turntable").setAttribute("aria-pressed", String(viewer.turntable));

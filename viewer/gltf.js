@@ -1,28 +1,41 @@
-// Reader of the animations of a glTF 2.0 file: .glb, or .gltf with its buffers inside or beside it. Rest: the skin's bind
-// pose where there is one, else the nodes as they stand. A fault names the file and the part.
+// Reads the animations of a glTF 2.0 file: .glb, or .gltf with its buffers inside or beside it. The rest pose is the skin's bind
+// pose where there is one, else that of the nodes. An error names the file and the part.
 
 import { isTable } from "./json.js";
 import { MotionError, MotionSource } from "./motion.js";
 import { Quat, Vec } from "./quat.js";
 
 const GLTF_MAGIC = 0x46546c67;
+// Animations are sampled at this rate, frames a second.
 const GLTF_RATE = 30;
-const GLTF_TYPES = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
+const GLTF_TYPES = {
+  5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array,
+};
 const GLTF_WIDTHS = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
 
-// bytes: Uint8Array; beside: file name -> Uint8Array. Returns [{name, source: MotionSource}].
+/** @typedef {{translation: number[], rotation: number[], scale: number}} NodePlace from a node's parent, or from the world */
+
+/**
+ * @param {Uint8Array} bytes
+ * @param {string} where the file's name, for errors
+ * @param {Object<string, Uint8Array>} beside file name -> bytes of the files that came with it
+ * @returns {{name: string, source: MotionSource}[]} one for each animation
+ */
 export function readGltf(bytes, where, beside = {}) {
   return new GltfReader(bytes, where, beside).motions();
 }
 
 class GltfReader {
   constructor(bytes, where, beside) {
-    Object.assign(this, { where, beside, chunk: null });
+    this.where = where;
+    this.beside = beside;
+    // The binary part of a .glb.
+    this.chunk = null;
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     let text = bytes;
     if (bytes.length >= 20 && view.getUint32(0, true) === GLTF_MAGIC) {
-      if (view.getUint32(8, true) > bytes.length) throw this.bad(`it says ${view.getUint32(8, true)} bytes and has ${bytes.length}`);
-      const size = view.getUint32(12, true), rest = 20 + size;
+      const said = view.getUint32(8, true), size = view.getUint32(12, true), rest = 20 + size;
+      if (said > bytes.length) throw this.bad(`it says ${said} bytes and has ${bytes.length}`);
       if (rest > bytes.length) throw this.bad("its JSON ends after the file");
       text = bytes.subarray(20, rest);
       if (rest + 8 <= bytes.length) this.chunk = bytes.subarray(rest + 8, rest + 8 + view.getUint32(rest, true));
@@ -48,11 +61,11 @@ class GltfReader {
   }
 
   buffer(i) {
-    if (!this.buffers.has(i)) this.buffers.set(i, this.loaded(i));
+    if (!this.buffers.has(i)) this.buffers.set(i, this.loadBuffer(i));
     return this.buffers.get(i);
   }
 
-  loaded(i) {
+  loadBuffer(i) {
     const { uri } = this.entry("buffers", i);
     if (uri === undefined && this.chunk) return this.chunk;
     if (typeof uri !== "string") throw this.bad(`buffers[${i}] has no content`);
@@ -69,9 +82,10 @@ class GltfReader {
     return this.beside[name];
   }
 
-  // Rows of numbers of an accessor; integers that are `normalized` become -1..1.
+  // Rows of numbers of an accessor; `normalized` integers become -1..1.
   numbers(i, width) {
-    const accessor = this.entry("accessors", i), { count, componentType, type, bufferView, byteOffset = 0, normalized } = accessor;
+    const accessor = this.entry("accessors", i);
+    const { count, componentType, type, bufferView, byteOffset = 0, normalized } = accessor;
     const Type = GLTF_TYPES[componentType];
     if (!Type || GLTF_WIDTHS[type] !== width || !(Number.isInteger(count) && count > 0) || accessor.sparse) {
       throw this.bad(`accessors[${i}] is of a kind that an animation does not have`);
@@ -96,7 +110,7 @@ class GltfReader {
     const skeleton = this.skeleton();
     return animations.map((animation, i) => {
       const name = typeof animation.name === "string" && animation.name ? animation.name : `animation ${i + 1}`;
-      return { name, source: this.sampled(animation, `animations[${i}]`, skeleton) };
+      return { name, source: this.sampleAnimation(animation, `animations[${i}]`, skeleton) };
     });
   }
 
@@ -122,11 +136,16 @@ class GltfReader {
       names: order.map((i) => String(nodes[i].name ?? `node ${i}`)) };
   }
 
-  // Translation, rotation and mean scale of a node.
+  /**
+   * A node's place from its parent, with the mean of its scales.
+   * @returns {NodePlace}
+   */
   local(node, i) {
     const given = (name, fallback) => {
       const value = node[name] ?? fallback;
-      if (!Array.isArray(value) || value.length !== fallback.length || !value.every(Number.isFinite)) throw this.bad(`nodes[${i}].${name} is odd`);
+      if (!Array.isArray(value) || value.length !== fallback.length || !value.every(Number.isFinite)) {
+        throw this.bad(`nodes[${i}].${name} is odd`);
+      }
       return value;
     };
     if (node.matrix) return splitMatrix(given("matrix", new Array(16).fill(0)));
@@ -135,7 +154,8 @@ class GltfReader {
       scale: (scale[0] + scale[1] + scale[2]) / 3 };
   }
 
-  sampled(animation, where, { order, skin, local, parents, names }) {
+  // Turns and places of all joints, GLTF_RATE times a second.
+  sampleAnimation(animation, where, { order, skin, local, parents, names }) {
     const tracks = [];
     let end = 0;
     for (const channel of Array.isArray(animation.channels) ? animation.channels : []) {
@@ -143,7 +163,8 @@ class GltfReader {
       if (at < 0 || !["translation", "rotation"].includes(path)) continue;
       const sampler = (animation.samplers || [])[channel.sampler];
       if (!isTable(sampler)) throw this.bad(`${where} has a channel without its sampler`);
-      const times = this.numbers(sampler.input, 1).map(([t]) => t), values = this.numbers(sampler.output, path === "rotation" ? 4 : 3);
+      const times = this.numbers(sampler.input, 1).map(([t]) => t);
+      const values = this.numbers(sampler.output, path === "rotation" ? 4 : 3);
       const cubic = sampler.interpolation === "CUBICSPLINE";
       if (values.length !== times.length * (cubic ? 3 : 1) || times.some((t, k) => k && t < times[k - 1])) {
         throw this.bad(`${where} has a sampler whose times and values do not fit`);
@@ -157,14 +178,14 @@ class GltfReader {
     const source = new MotionSource(GLTF_RATE, frames, names, parents, restTurns, restPlaces);
     for (let t = 0; t < frames; t++) {
       for (const track of tracks) pose[track.at][track.path] = sampleTrack(track, t / GLTF_RATE);
-      placed(pose, parents).forEach(({ turn, place }, j) => source.set(t, j, turn, place));
+      placeNodes(pose, parents).forEach(({ turn, place }, j) => source.set(t, j, turn, place));
     }
     return source;
   }
 
-  // Turns and places of the bind pose, as large as the nodes' own.
+  // World turns and places of the rest pose; a bind pose is scaled to the size of the nodes.
   rest(order, skin, local, parents) {
-    const standing = placed(local, parents), turns = standing.map((s) => s.turn), places = standing.map((s) => s.place);
+    const standing = placeNodes(local, parents), turns = standing.map((s) => s.turn), places = standing.map((s) => s.place);
     if (!skin || skin.inverseBindMatrices === undefined) return [turns, places];
     const bind = this.numbers(skin.inverseBindMatrices, 16).map((m) => splitMatrix(m));
     const joints = skin.joints.map((i) => order.indexOf(i));
@@ -188,8 +209,8 @@ class GltfReader {
   }
 }
 
-// World turn and place of each node; pose: [{translation, rotation, scale}], parents first.
-function placed(pose, parents) {
+// World turn, scale and place of each node from its parent's; parents first.
+function placeNodes(pose, parents) {
   const out = [];
   pose.forEach(({ translation, rotation, scale }, j) => {
     const above = out[parents[j]];
@@ -200,14 +221,18 @@ function placed(pose, parents) {
   return out;
 }
 
-// Translation, rotation and mean scale of a column-major 4x4 matrix.
+/**
+ * Of a column-major 4x4 matrix, with the mean of its scales.
+ * @returns {NodePlace}
+ */
 function splitMatrix(m) {
   const columns = [0, 4, 8].map((o) => m.slice(o, o + 3)), lengths = columns.map(Vec.length);
   const x = Vec.unit(columns[0]), z = Vec.unit(Vec.cross(x, columns[1])), y = Vec.cross(z, x);
-  return { translation: m.slice(12, 15), rotation: Quat.fromColumns(x, y, z), scale: (lengths[0] + lengths[1] + lengths[2]) / 3 || 1 };
+  const scale = (lengths[0] + lengths[1] + lengths[2]) / 3 || 1;
+  return { translation: m.slice(12, 15), rotation: Quat.fromColumns(x, y, z), scale };
 }
 
-// Value of a track at a time, s.
+// The value of a track at a time, s: a step, linear, or a cubic spline as glTF 2.0 has it.
 function sampleTrack({ path, times, values, how }, seconds) {
   const cubic = how === "CUBICSPLINE", value = (k) => values[cubic ? 3 * k + 1 : k], last = times.length - 1;
   const finish = (v) => (path === "rotation" ? Quat.unit(v) : v);
@@ -221,7 +246,8 @@ function sampleTrack({ path, times, values, how }, seconds) {
   }
   if (how === "STEP") return finish(value(low));
   const length = times[high] - times[low], t = (seconds - times[low]) / length;
-  if (!cubic) return path === "rotation" ? Quat.mix(value(low), value(high), t) : value(low).map((v, i) => v + t * (value(high)[i] - v));
+  if (!cubic && path === "rotation") return Quat.mix(value(low), value(high), t);
+  if (!cubic) return value(low).map((v, i) => v + t * (value(high)[i] - v));
   const t2 = t * t, t3 = t2 * t, leaving = values[3 * low + 2], arriving = values[3 * high];
   return finish(value(low).map((v, i) => (2 * t3 - 3 * t2 + 1) * v + (t3 - 2 * t2 + t) * length * leaving[i]
     + (3 * t2 - 2 * t3) * value(high)[i] + (t3 - t2) * length * arriving[i]));

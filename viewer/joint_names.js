@@ -1,10 +1,11 @@
 // Written by `python -m gsac.viewer.joint_names` from avatar/motion/names.py. Do not edit.
 
-// Words of a name that tell nothing: prefixes of tools.
+// Words of a name without meaning: prefixes of tools.
 export const NOISE = ["mixamorig", "bip", "j", "c", "b", "f", "def", "org", "jnt", "bone", "bn"];
-// Word -> side, as our names begin.
+// Word -> the beginning of our joints' names.
 export const SIDES = {"left": "left_", "l": "left_", "right": "right_", "r": "right_"};
-// [our joint, side, spellings], in the order in which joints are taken.
+// Our joint, its side, and spellings, in the order in which joints are taken.
+/** @type {[string, string, string[]][]} */
 export const RULES = [
   ["neck", "", ["neck", "neck1"]],
   ["head", "", ["head"]],

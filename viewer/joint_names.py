@@ -19,9 +19,10 @@ def script() -> str:
     rules = ",\n".join(f"  {json.dumps(rule)}" for rule in names.RULES)
     return "\n".join([
         "// Written by `python -m gsac.viewer.joint_names` from avatar/motion/names.py. Do not edit.", "",
-        "// Words of a name that tell nothing: prefixes of tools.", f"export const NOISE = {json.dumps(names.NOISE)};",
-        "// Word -> side, as our names begin.", f"export const SIDES = {json.dumps(names.SIDES)};",
-        "// [our joint, side, spellings], in the order in which joints are taken.", f"export const RULES = [\n{rules},\n];", ""])
+        "// Words of a name without meaning: prefixes of tools.", f"export const NOISE = {json.dumps(names.NOISE)};",
+        "// Word -> the beginning of our joints' names.", f"export const SIDES = {json.dumps(names.SIDES)};",
+        "// Our joint, its side, and spellings, in the order in which joints are taken.",
+        "/** @type {[string, string, string[]][]} */", f"export const RULES = [\n{rules},\n];", ""])
 
 
 def main() -> int:

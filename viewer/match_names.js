@@ -1,4 +1,4 @@
-// Which joint of a strange skeleton is which of ours, by name. As avatar/motion/names.py, whose table joint_names.js holds.
+// Finds our joints in another skeleton by name, as avatar/motion/names.py does, whose table joint_names.js holds.
 
 import { NOISE, RULES, SIDES } from "./joint_names.js";
 
@@ -18,9 +18,14 @@ function plainName(name) {
   return [side, out];
 }
 
-// Joint of ours -> index into names, for those that are found.
+/**
+ * @param {string[]} names of the other skeleton's joints
+ * @returns {Object<string, number>} our joint -> index into names, for those that are found
+ */
 export function matchNames(names) {
-  const known = new Map(), found = {}, taken = new Set();
+  const known = new Map(), taken = new Set();
+  /** @type {Object<string, number>} */
+  const found = {};
   names.forEach((name, i) => {
     const key = plainName(name).join();
     if (!known.has(key)) known.set(key, i);

@@ -1,4 +1,4 @@
-// Motion files that are dropped on the page or chosen: each becomes a clip of the avatar, and the first plays.
+// Motion files that the user drops on the page or chooses: their motions become clips of the avatar.
 
 import { readBvh } from "./bvh.js";
 import { readGltf } from "./gltf.js";
@@ -6,19 +6,26 @@ import { MotionError } from "./motion.js";
 import { retarget } from "./retarget.js";
 
 const MOST_BYTES = 128 * 2 ** 20;
-const READERS = { bvh: bvhMotions, glb: readGltf, gltf: readGltf, vrma: readGltf };
+const READERS = { bvh: readBvhMotions, glb: readGltf, gltf: readGltf, vrma: readGltf };
 
-function bvhMotions(bytes, where) {
+function readBvhMotions(bytes, where) {
   return [{ name: where.replace(/\.[^.]*$/, ""), source: readBvh(new TextDecoder().decode(bytes), where) }];
 }
 
-// files: File[]. Adds clips to the avatar and returns their names; throws MotionError.
+/**
+ * Adds clips to the avatar; throws MotionError.
+ * @param {import("./reader.js").Avatar} avatar
+ * @param {File[]} files motions, and buffers that belong to a .gltf
+ * @returns {Promise<string[]>} the clips' names
+ */
 export async function addMotions(avatar, files) {
-  const kind = (file) => file.name.split(".").at(-1).toLowerCase(), motions = files.filter((file) => Object.hasOwn(READERS, kind(file)));
+  const kind = (file) => file.name.split(".").at(-1).toLowerCase();
+  const motions = files.filter((file) => Object.hasOwn(READERS, kind(file)));
   if (!motions.length) {
     const names = files.map((file) => file.name).join(", ") || "nothing";
     throw new MotionError(`${names}: a motion is read from .bvh, .glb and .gltf`);
   }
+  /** @type {Object<string, Uint8Array>} */
   const bytes = {};
   for (const file of files) {
     if (file.size > MOST_BYTES) throw new MotionError(`${file.name}: it has ${file.size} bytes; at most ${MOST_BYTES} are read`);
@@ -37,13 +44,18 @@ export async function addMotions(avatar, files) {
   return added;
 }
 
+// The name, with a number after it where a clip has it already.
 function freeName(clips, name) {
   let label = name;
   for (let k = 2; Object.hasOwn(clips, label); k++) label = `${name} ${k}`;
   return label;
 }
 
-// Listens for files that are dragged over the page; onFiles is called with those dropped.
+/**
+ * Listens for files that are dropped on the page.
+ * @param {HTMLElement} sign shown while files are dragged over the page
+ * @param {(files: File[]) => void} onFiles
+ */
 export function listenForDrops(sign, onFiles) {
   const carriesFiles = (e) => [...(e.dataTransfer?.types ?? [])].includes("Files");
   document.addEventListener("dragover", (e) => {

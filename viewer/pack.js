@@ -1,9 +1,14 @@
-// The arrays that Gsac.compute reads, from an avatar; Unity's GsacPacking.cs makes the same.
+// Packs an avatar into the arrays that Gsac.compute reads; Unity's GsacPacking.cs makes the same.
 
-// Returns buffer name -> typed array.
-export function packForGpu({ vertices, expressions, start, moved, delta, skinIndex, skinWeight, faces, face, mu, quat, logScale, rgb, opacity }) {
+/**
+ * @param {import("./reader.js").Avatar} avatar
+ * @returns {Object<string, Float32Array | Uint32Array>} by the buffer's name in the shader
+ */
+export function packForGpu(avatar) {
+  const { vertices, expressions, start, moved, delta, skinIndex, skinWeight } = avatar;
+  const { faces, face, mu, quat, logScale, rgb, opacity } = avatar;
   const V = vertices.length / 3, N = face.length;
-  // Moves of an expression, by vertex: a counting sort.
+  // The expressions' moves sorted by vertex: a counting sort.
   const first = new Uint32Array(V + 1), moves = new Float32Array(Math.max(moved.length, 1) * 4);
   for (const v of moved) first[v + 1]++;
   for (let v = 0; v < V; v++) first[v + 1] += first[v];
@@ -14,7 +19,8 @@ export function packForGpu({ vertices, expressions, start, moved, delta, skinInd
   const rest = new Float32Array(V * 4).fill(1), skin = new Uint32Array((V + 1) * 4);
   for (let v = 0; v < V; v++) {
     rest.set(vertices.subarray(v * 3, v * 3 + 3), v * 4);
-    const j = skinIndex.subarray(v * 4, v * 4 + 4), w = Array.from(skinWeight.subarray(v * 4, v * 4 + 4), (x) => Math.round(x * 65535));
+    const j = skinIndex.subarray(v * 4, v * 4 + 4);
+    const w = Array.from(skinWeight.subarray(v * 4, v * 4 + 4), (x) => Math.round(x * 65535));
     skin.set([j[0] | j[1] << 8 | j[2] << 16 | j[3] << 24, w[0] | w[1] << 16, w[2] | w[3] << 16], v * 4);
   }
   for (let v = 0; v <= V; v++) skin[v * 4 + 3] = first[v];

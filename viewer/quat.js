@@ -1,22 +1,37 @@
-// Quaternions [x, y, z, w] and vectors [x, y, z] as small arrays of doubles: what reading and retargeting a motion needs.
+// Quaternions [x, y, z, w] and vectors [x, y, z] as small arrays, for reading and retargeting motions. For the loops that run in
+// every frame there is flat_quat.js.
+
+/** @typedef {number[]} Quaternion x, y, z, w; of length 1 where it turns something */
+/** @typedef {number[]} Vector x, y, z */
 
 export const Quat = {
-  // First b, then a.
+  /**
+   * The turn that does b first, then a.
+   * @param {Quaternion} a
+   * @param {Quaternion} b
+   * @returns {Quaternion}
+   */
   multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
     return [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
       aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz];
   },
 
+  /** @param {Quaternion} q */
   inverse([x, y, z, w]) {
     return [-x, -y, -z, w];
   },
 
+  /**
+   * @param {Quaternion} q
+   * @param {Vector} v
+   * @returns {Vector}
+   */
   rotate([x, y, z, w], v) {
     const t = Vec.cross([x, y, z], v).map((c) => 2 * c), u = Vec.cross([x, y, z], t);
     return v.map((c, i) => c + w * t[i] + u[i]);
   },
 
-  // The smallest turn of direction a to direction b, of any length; opposite: about a normal of a.
+  // The smallest turn from direction a to direction b, of any length; where they are opposite, about some normal of a.
   between(a, b) {
     a = Vec.unit(a);
     b = Vec.unit(b);
@@ -26,6 +41,7 @@ export const Quat = {
     return [...Vec.unit(Vec.cross(a, [0, 1, 2].map((i) => Number(i === least)))), 0];
   },
 
+  // The turn about a unit axis by an angle, rad.
   about(axis, angle) {
     return [...axis.map((c) => c * Math.sin(angle / 2)), Math.cos(angle / 2)];
   },
@@ -35,7 +51,7 @@ export const Quat = {
     return q.map((c) => c / n);
   },
 
-  // a turned towards b by t along the shorter arc.
+  // From a, at t = 0, to b, at t = 1, along the shorter arc.
   mix(a, b, t) {
     const u = a.reduce((sum, c, i) => sum + c * b[i], 0) < 0 ? -t : t;
     return Quat.unit(a.map((c, i) => (1 - t) * c + u * b[i]));
@@ -50,6 +66,7 @@ export const Quat = {
     return Quat.unit([z[0] + x[2], y[2] + z[1], 1 + z[2] - x[0] - y[1], x[1] - y[0]]);
   },
 
+  /** @param {Quaternion} q */
   toAxisAngle(q) {
     const [x, y, z, w] = q[3] < 0 ? q.map((c) => -c) : q, s = Math.hypot(x, y, z);
     const factor = s > 1e-12 ? 2 * Math.atan2(s, w) / s : 2;
@@ -65,6 +82,6 @@ export const Vec = {
   times: (a, s) => [a[0] * s, a[1] * s, a[2] * s],
   length: (a) => Math.hypot(a[0], a[1], a[2]),
   unit: (a) => Vec.times(a, 1 / Math.max(Vec.length(a), 1e-12)),
-  // What is left of a across the unit axis.
+  // The part of a at right angles to the unit axis.
   across: (a, axis) => Vec.minus(a, Vec.times(axis, Vec.dot(a, axis))),
 };

@@ -1,12 +1,17 @@
-// How smoothly the page draws: frames a second over the last second, and the frame time that 95 of 100 frames stay below.
+// How smoothly the page draws: frames a second over the last second, and the 95th percentile of the time between frames.
 
 export class FrameRate {
+  // Frames that the percentile is taken over.
+  static KEPT = 300;
+
   constructor() {
+    // When the last frames were drawn and the rate was last given, ms.
+    /** @type {number[]} */
     this.times = [];
     this.told = 0;
   }
 
-  // now: ms. Returns {fps, p95}, ms, a few times a second, else null.
+  // Counts a frame; now: ms. Returns {fps, p95}, p95 in ms, every quarter of a second, else null.
   frame(now) {
     const { times } = this;
     times.push(now);
@@ -23,4 +28,3 @@ export class FrameRate {
     this.times.length = 0;
   }
 }
-FrameRate.KEPT = 300;

@@ -104,8 +104,8 @@ function readMesh(arrays, jointCount) {
   return { vertices, faces, skinIndex: arrays.index("skin.index", jointCount, V, 4), skinWeight };
 }
 
-// Returns expressions [E], start (E + 1,), moved (M,), delta (M, 3): expression e moves vertex moved[i] by row i of delta, for each i
-// from start[e] to below start[e + 1].
+// Returns expressions [E], start (E + 1,), moved (M,), delta (M, 3): expression e moves vertex moved[i] by row i of delta, for each
+// i from start[e] to below start[e + 1].
 function readExpressions(head, arrays, vertexCount) {
   const expressions = checkNames(head.expressions, "expressions"), E = expressions.length;
   arrays.real("expression.jaw", E, 3);

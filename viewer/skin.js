@@ -1,23 +1,28 @@
-// Pose of the skeleton over time, and linear blend skinning of the mesh.
+// The skeleton's pose, and linear blend skinning (LBS) of the mesh by it.
 
 import { quatFromAxisAngle, quatMix, quatToMatrix } from "./flat_quat.js";
 
 export class Pose {
+  /** @param {import("./reader.js").Avatar} avatar */
   constructor(avatar) {
     this.avatar = avatar;
+    // (J, 4) xyzw, each joint's turn from its parent; and where the root goes, m.
     this.quats = new Float32Array(avatar.names.length * 4);
     this.transl = new Float32Array(3);
+    // Scratch quaternions.
     this.a = new Float32Array(4);
     this.b = new Float32Array(4);
     this.reset();
   }
 
+  // To the T-pose.
   reset() {
     this.quats.fill(0);
     for (let j = 3; j < this.quats.length; j += 4) this.quats[j] = 1;
     this.transl.fill(0);
   }
 
+  // Sets a pose of the file.
   still(name) {
     this.reset();
     for (const [joint, r] of Object.entries(this.avatar.poses[name] || {})) {
@@ -25,6 +30,7 @@ export class Pose {
     }
   }
 
+  // Sets a place in a clip, s, between its two nearest keys.
   clip(name, seconds) {
     this.reset();
     const clip = this.avatar.clips[name], at = seconds * clip.fps;
@@ -40,7 +46,7 @@ export class Pose {
     for (let i = 0; i < 3; i++) this.transl[i] = clip.transl[k0 * 3 + i] * (1 - t) + clip.transl[k1 * 3 + i] * t;
   }
 
-  // A rotation on top of a joint's own; x, y, z: axis-angle, rad.
+  // Turns a joint further, in its own frame; x, y, z: axis-angle, rad.
   turn(joint, x, y, z) {
     const q = this.quats, o = joint * 4, ax = q[o], ay = q[o + 1], az = q[o + 2], aw = q[o + 3];
     quatFromAxisAngle(this.b, 0, x, y, z);
@@ -49,7 +55,7 @@ export class Pose {
     q[o + 2] = aw * bz + ax * by - ay * bx + az * bw; q[o + 3] = aw * bw - ax * bx - ay * by - az * bz;
   }
 
-  // From another pose towards this one.
+  // Mixes another pose (t = 0) with this one (t = 1).
   fadeFrom(other, t) {
     for (let q = 0; q < this.quats.length; q += 4) quatMix(this.quats, q, other.quats, q, this.quats, q, t);
     for (let i = 0; i < 3; i++) this.transl[i] = other.transl[i] * (1 - t) + this.transl[i] * t;
@@ -62,15 +68,22 @@ export class Pose {
 }
 
 export class Skin {
+  /** @param {import("./reader.js").Avatar} avatar */
   constructor(avatar) {
     this.avatar = avatar;
+    // (J, 3, 4) [R | t], from the rest place to the posed one.
     this.bones = new Float32Array(avatar.names.length * 12);
     this.local = new Float32Array(9);
+    // (V, 3), m: at rest with the expression, and posed.
     this.rest = new Float32Array(avatar.vertices.length);
     this.vertices = new Float32Array(avatar.vertices.length);
   }
 
-  // pose: Pose; expression: weights by name. Fills this.vertices, m.
+  /**
+   * Fills this.bones and this.vertices.
+   * @param {Pose} pose
+   * @param {Object<string, number>} expression weights by name
+   */
   update(pose, expression) {
     this.moveBones(pose);
     this.rest.set(this.avatar.vertices);
@@ -86,7 +99,7 @@ export class Skin {
     this.blend();
   }
 
-  // bones[j] = [R | t], row by row: rest place -> posed place.
+  // Fills this.bones.
   moveBones(pose) {
     const { parents, joints } = this.avatar, B = this.bones, L = this.local;
     for (let j = 0; j < parents.length; j++) {
@@ -107,6 +120,7 @@ export class Skin {
     }
   }
 
+  // Fills this.vertices from this.rest and this.bones.
   blend() {
     const { skinIndex, skinWeight } = this.avatar, B = this.bones, rest = this.rest, out = this.vertices;
     for (let v = 0, n = out.length / 3; v < n; v++) {

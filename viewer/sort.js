@@ -1,15 +1,20 @@
-// Order of the gaussians from the farthest to the nearest: a counting sort on 16 bits of depth, stable.
+// Sorts the gaussians from the farthest to the nearest: a stable counting sort on 16 bits of depth.
 
 export class DepthSort {
+  // The order's rows are this long, as WebGL has it in a texture.
+  static PER_ROW = 1024;
+
+  // count: of gaussians.
   constructor(count) {
-    this.count = count;
+    // Indices of gaussians, the farthest first.
     this.order = new Uint32Array(Math.max(1, Math.ceil(count / DepthSort.PER_ROW)) * DepthSort.PER_ROW);
+    this.count = count;
     this.depth = new Float32Array(count);
     this.key = new Uint16Array(count);
     this.bins = new Uint32Array(65537);
   }
 
-  // data: means in rows of 12; view: 3x4 row by row, its third row gives the depth. Fills this.order.
+  // Fills this.order; data: Binding's, view: Eye's, whose third row gives the depth.
   update(data, view) {
     const { count, depth, key, bins, order } = this;
     let low = Infinity, high = -Infinity;
@@ -29,4 +34,3 @@ export class DepthSort {
     for (let i = 0; i < count; i++) order[bins[key[i]]++] = i;
   }
 }
-DepthSort.PER_ROW = 1024;

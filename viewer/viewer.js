@@ -15,7 +15,7 @@ const BACKGROUND = "#2b303b";
 const MAX_PIXEL_RATIO = 2;
 const TURNTABLE_DEGREES_PER_S = 30;
 // A longer time between two frames counts as this.
-const MAX_STEP_S = 0.25;
+export const MAX_STEP_S = 0.25;
 // Keys of a clip that are looked at for the framing that holds them all.
 const FRAMING_KEYS = 16;
 // What a browser takes to start its graphics process again.

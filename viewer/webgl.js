@@ -180,8 +180,9 @@ export class WebglRenderer {
   }
 
   clear(background) {
-    this.gl.clearColor(...background);
-    this.gl.clear(this.gl.COLOR_BUFFER_BIT);
+    const { gl } = this, [red, green, blue, alpha] = background;
+    gl.clearColor(red, green, blue, alpha);
+    gl.clear(gl.COLOR_BUFFER_BIT);
   }
 
   /**

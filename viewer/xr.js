@@ -1,12 +1,21 @@
-// A headset or a phone's AR, where the device offers one: the avatar stands 1.6 m in front, each eye its own picture,
-// one sort for both from the middle of the head.
+// Shows the avatar in a headset or a phone's AR, where the device offers one, at XR_DISTANCE before the user. Each eye gets its own
+// picture; the gaussians are sorted once for both, from the middle of the head.
 
+import { MAX_STEP_S } from "./viewer.js";
 import { WebglRenderer } from "./webgl.js";
 
+/** @type {[XRSessionMode, string][]} */
 const XR_MODES = [["immersive-vr", "VR"], ["immersive-ar", "AR"]];
+// In metres. EYE_HEIGHT: where the device knows no floor, which then lies this far below the head.
 const XR_DISTANCE = 1.6;
+const EYE_HEIGHT = 1.5;
 
-// Adds a button for each mode that the device has.
+/**
+ * Adds a button for each mode that the device has.
+ * @param {import("./viewer.js").Viewer} viewer
+ * @param {HTMLElement} place
+ * @param {(text: string) => void} tell what went wrong
+ */
 export async function offerHeadset(viewer, place, tell) {
   if (!navigator.xr) return;
   for (const [mode, label] of XR_MODES) {
@@ -21,6 +30,7 @@ export async function offerHeadset(viewer, place, tell) {
   }
 }
 
+// Begins a session and draws it until it ends.
 async function enter(viewer, mode, button) {
   const session = await navigator.xr.requestSession(mode, { optionalFeatures: ["local-floor"] });
   const renderer = headsetRenderer(viewer), { gl } = renderer;
@@ -33,10 +43,9 @@ async function enter(viewer, mode, button) {
     await gl.makeXRCompatible();
     const layer = new XRWebGLLayer(session, gl, { antialias: false, depth: false, alpha: true });
     await session.updateRenderState({ baseLayer: layer });
-    // Without a floor the origin is the head, and the eyes are taken to be this high above it.
     let height = 0;
     const space = await session.requestReferenceSpace("local-floor").catch(() => {
-      height = 1.5;
+      height = EYE_HEIGHT;
       return session.requestReferenceSpace("local");
     });
     viewer.session = session;
@@ -46,7 +55,7 @@ async function enter(viewer, mode, button) {
     let last = null;
     const frame = (now, xrFrame) => {
       session.requestAnimationFrame(frame);
-      viewer.step(last === null ? 0 : Math.min((now - last) / 1000, 0.25));
+      viewer.step(last === null ? 0 : Math.min((now - last) / 1000, MAX_STEP_S));
       viewer.tick(now);
       last = now;
       const seen = xrFrame.getViewerPose(space);
@@ -63,13 +72,13 @@ async function enter(viewer, mode, button) {
   }
 }
 
-// A headset is drawn by WebGL2; where the page is not, by a renderer of its own.
+// A headset is drawn by WebGL2: by the page's renderer, or by one of its own where the page draws in another way.
 function headsetRenderer(viewer) {
-  if (viewer.renderer.gl) return viewer.renderer;
+  if (viewer.renderer instanceof WebglRenderer) return viewer.renderer;
   return viewer.headset ??= new WebglRenderer(document.createElement("canvas"), viewer.avatar, viewer.binding, viewer.sort);
 }
 
-// 3x4 row by row, OpenCV axes, of a column-major OpenGL view matrix; stand: the avatar's place in the room, m.
+// Eye's view from a column-major OpenGL view matrix; stand: the avatar's place in the room, m.
 function viewRows(m, stand) {
   const rows = new Float32Array(12);
   [1, -1, -1].forEach((sign, r) => {
@@ -79,6 +88,7 @@ function viewRows(m, stand) {
   return rows;
 }
 
+/** @returns {import("./camera.js").Eye} */
 function eyeOf({ projectionMatrix: p, transform }, { x, y, width, height }, stand) {
   return { view: viewRows(transform.inverse.matrix, stand), focal: [p[0] * width / 2, p[5] * height / 2],
     centre: [-p[8] * width / 2, p[9] * height / 2], box: [x, y, width, height] };

@@ -1,14 +1,20 @@
 """The viewer's ES modules: each imports what it uses, exports what is used, and stands behind what it imports."""
 
+import json
 import re
+import subprocess
 
 import pytest
 
 from gsac.viewer import joint_names
 from gsac.viewer.page import HERE, MODULES, join_modules
+from support.page_modules import copy_modules
 
 IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+\.js)";$', re.MULTILINE)
 DECLARED = re.compile(r"^(export )?(?:async )?(?:function|class|const|let) (\w+)", re.MULTILINE)
+TYPES = "typescript@5.9.3 @webgpu/types@0.1.74 @types/webxr@0.5.24"
+OPTIONS = {"lib": ["es2023", "dom", "dom.iterable"], "types": ["@webgpu/types", "webxr"], "module": "es2022", "target": "es2022",
+           "moduleResolution": "bundler", "allowJs": True, "checkJs": True, "noEmit": True, "strict": False, "noImplicitAny": False}
 
 
 def code_of(text):
@@ -87,3 +93,12 @@ def test_in_the_page_no_import_or_export_is_left():
 
 def test_joint_names_are_those_of_the_motion_package():
     assert joint_names.WRITTEN.read_text() == joint_names.script(), "run `python -m gsac.viewer.joint_names`"
+
+
+@pytest.mark.slow
+def test_typescript_finds_no_fault(node_package, tmp_path):
+    modules = node_package(TYPES) / "node_modules"
+    (copy_modules(tmp_path) / "node_modules").symlink_to(modules)
+    (tmp_path / "tsconfig.json").write_text(json.dumps({"compilerOptions": OPTIONS, "files": list(MODULES)}))
+    done = subprocess.run(["node", modules / "typescript" / "bin" / "tsc", "-p", tmp_path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
