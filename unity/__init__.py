@@ -1,1 +1,1 @@
-"""The Unity package: its C# and shaders, and what packs them together with an avatar."""
+"""The Unity package: its C# and shaders, and the code that packs them together with an avatar."""

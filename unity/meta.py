@@ -1,4 +1,4 @@
-"""Unity's `.meta` files: every file and folder of a package has one, with a GUID that never changes."""
+"""Unity's `.meta` files: each file and folder of a package needs one, with a GUID that never changes."""
 
 from __future__ import annotations
 
@@ -23,14 +23,16 @@ _PACKAGE_JSON = "PackageManifestImporter:\n" + _TAIL
 
 
 def guid(path: str) -> str:
-    """32 hex digits for a path inside the package; "" is the package's own folder."""
+    """The GUID of a path inside the package, 32 hex digits; "" is the package's own folder."""
     return hashlib.sha256(f"{PACKAGE}/{path}".encode()).hexdigest()[:32]
 
 
 def file_meta(path: str) -> str:
+    """The `.meta` text of a file; path: inside the package."""
     importer = _PACKAGE_JSON if path == "package.json" else _IMPORTERS[PurePosixPath(path).suffix]
     return f"fileFormatVersion: 2\nguid: {guid(path)}\n{importer}"
 
 
 def folder_meta(path: str) -> str:
+    """The `.meta` text of a folder; path: inside the package."""
     return f"fileFormatVersion: 2\nguid: {guid(path)}\nfolderAsset: yes\nDefaultImporter:\n{_TAIL}"

@@ -1,6 +1,6 @@
-"""`unity/`: the Unity package with the person in it, as a folder and a tarball for the Package Manager and as `.unitypackage`.
+"""Packs `unity/`, the Unity package with an avatar in it: a folder and a tarball for the Package Manager, and a `.unitypackage`.
 
-The same input gives the same bytes. A scene names another file of the package by `{guid:PATH}`, which is filled in here.
+The same input gives the same bytes. Scenes refer to files of the package by `{guid:PATH}`, which is replaced by the GUID here.
 """
 
 from __future__ import annotations
@@ -59,18 +59,21 @@ SOURCES = (
     "Runtime/Resources/Gsac/GsacPass.hlsl",
     "Runtime/Resources/Gsac/GsacSplats.shader",
 )
-"""What every package holds. Whole names, so that the cache sees these files."""
+"""Files of every package. Whole names, so that the cache sees these files."""
 
 AVATAR = "Demo/Avatar.bytes"
 SAMPLES = "Samples~"
-"""Unity's name for a folder that the Package Manager copies into a project at the user's wish."""
+"""Unity's name for a folder that the Package Manager copies into a project when the user asks for it."""
 INSTALLED = "Assets/Gsac"
-"""Where the .unitypackage puts itself."""
+"""The folder of a project into which the .unitypackage is unpacked."""
 
 
 def write_unity(folder: Path, container: bytes, version: str) -> None:
-    """Writes the three forms and the README into an empty folder; container: the bytes of avatar.gsac."""
-    files = package_files(container)
+    """Writes the three forms and the README into an empty folder.
+
+    container: the bytes of avatar.gsac; version: of the package, e.g. `0.1.0`.
+    """
+    files = collect_files(container)
     upm = {_in_upm(path): content for path, content in files.items()}
     upm["package.json"] = _manifest(version)
     upm |= {f"{path}.meta": file_meta(_guid_path(path)).encode() for path in list(upm)}
@@ -84,8 +87,8 @@ def write_unity(folder: Path, container: bytes, version: str) -> None:
     (folder / "README.md").write_bytes(files["README.md"])
 
 
-def package_files(container: bytes) -> dict[str, bytes]:
-    """Path in the package -> content, GUIDs filled in."""
+def collect_files(container: bytes) -> dict[str, bytes]:
+    """Path in the package -> content, with GUIDs filled in. container: the bytes of avatar.gsac."""
     files = {AVATAR: container}
     for path in SOURCES:
         content = (HERE / path).read_bytes()
@@ -100,7 +103,7 @@ def _in_upm(path: str) -> str:
 
 
 def _guid_path(path: str) -> str:
-    """The demo keeps its GUIDs wherever it lies."""
+    """The path from which a GUID is made: the demo's files keep theirs among the samples."""
     return path.removeprefix(f"{SAMPLES}/")
 
 
@@ -120,7 +123,7 @@ def _manifest(version: str) -> bytes:
 
 
 def _unitypackage(files: dict[str, bytes]) -> dict[str, bytes]:
-    """Entries of Unity's own archive: GUID/asset, GUID/asset.meta, GUID/pathname."""
+    """Entries of Unity's own archive for each path: GUID/asset, GUID/asset.meta, GUID/pathname."""
     entries = {}
     for path in ["", *_folders(files)]:
         entries[f"{guid(path)}/asset.meta"] = folder_meta(path).encode()
@@ -133,7 +136,7 @@ def _unitypackage(files: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def _tar(files: dict[str, bytes]) -> bytes:
-    """A .tar.gz without times and owners."""
+    """The bytes of a .tar.gz without times and owners."""
     raw = io.BytesIO()
     with tarfile.open(fileobj=raw, mode="w", format=tarfile.USTAR_FORMAT) as tar:
         for path, content in sorted(files.items()):

@@ -1,1 +1,1 @@
-"""The web page that shows an avatar: its scripts, its shaders, and what makes one file of them."""
+"""The web page that shows an avatar: its ES modules, its shaders, and the maker of one file from them."""

@@ -14,8 +14,8 @@ from gsac.avatar.motion import names
 WRITTEN = Path(__file__).with_name("joint_names.js")
 
 
-def script() -> str:
-    """joint_names.js."""
+def format_script() -> str:
+    """The text of joint_names.js."""
     rules = ",\n".join(f"  {json.dumps(rule)}" for rule in names.RULES)
     return "\n".join([
         "// Written by `python -m gsac.viewer.joint_names` from avatar/motion/names.py. Do not edit.", "",
@@ -26,7 +26,8 @@ def script() -> str:
 
 
 def main() -> int:
-    WRITTEN.write_text(script())
+    """Writes joint_names.js."""
+    WRITTEN.write_text(format_script())
     print(f"wrote {WRITTEN}", file=sys.stderr)
     return 0
 

@@ -21,7 +21,7 @@ _EXPORT = re.compile(r"^export (?=(async )?function |class |const )", re.MULTILI
 
 
 def page_bytes(container: bytes) -> bytes:
-    """container: the bytes of avatar.gsac. The same bytes give the same page."""
+    """viewer.html for an avatar. container: the bytes of avatar.gsac; the same bytes give the same page."""
     page = (HERE / PAGE).read_text()
     for mark, text in (("STYLE", (HERE / STYLE).read_text()), ("SCRIPT", join_modules(MODULES)),
                        ("AVATAR", base64.b64encode(zlib.compress(container, 9)).decode())):
@@ -33,8 +33,8 @@ def page_bytes(container: bytes) -> bytes:
 
 
 def join_modules(modules: Iterable[str]) -> str:
-    """One module's text in place of several, in an order in which each comes after those that it imports.
+    """The text of one module made of several, given in an order in which each comes after those that it imports.
 
-    Their top-level names share one scope, so that what they import is there already: imports and the word `export` go.
+    All share one scope, in which their top-level names are unique: `import` lines and the word `export` are left out.
     """
     return "\n".join(f"// {name}\n{_EXPORT.sub('', _IMPORT.sub('', (HERE / name).read_text()))}" for name in modules)

@@ -1,6 +1,6 @@
-"""The Unity package's HLSL as WGSL for viewer.html: `python -m gsac.viewer.wgsl` writes viewer/shaders.js anew.
+"""Translates the Unity package's HLSL to WGSL for viewer.html: `python -m gsac.viewer.wgsl` writes viewer/shaders.js.
 
-HLSL -> SPIR-V by glslang -> WGSL by naga (npm's naga-wasm). Both are needed here only: what is written is kept with the sources.
+glslang makes SPIR-V of the HLSL, naga (npm's naga-wasm) WGSL of that. Only this module needs the two: shaders.js is committed.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ WRITTEN = HERE / "shaders.js"
 NAGA = "naga-wasm@30.1.0"
 ENTRIES = {"Skin": "comp", "Bind": "comp", "SortBlocks": "comp", "SortAcross": "comp", "SortMerge": "comp",
            "SplatVertex": "vert", "SplatFragment": "frag", "FloorVertex": "vert", "FloorFragment": "frag"}
-SIZES = {"u32": 4, "f32": 4, "vec2<f32>": 8, "vec4<f32>": 16}
-"""Bytes of a member of a uniform block; WGSL aligns it to as many."""
-TRANSLATE = """
+"""Entry point -> kind of shader, as glslangValidator names it."""
+_SIZES = {"u32": 4, "f32": 4, "vec2<f32>": 8, "vec4<f32>": 16}
+"""Size of a member of a uniform block, bytes, which is its alignment too."""
+_TRANSLATE = """
 import { parseSpirv, validate, writeWgsl } from "naga-wasm";
 import { readFileSync } from "node:fs";
 const texts = {};
@@ -38,43 +39,46 @@ console.log(JSON.stringify(texts));
 
 
 class ShaderError(Exception):
-    """A tool that writes the shaders is missing, or refuses them; says which and why."""
+    """A tool that translates the shaders is missing or fails; the message names it and gives its words."""
 
 
-def digest() -> str:
-    """Of the HLSL that the shaders come from."""
+def hash_sources() -> str:
+    """SHA-256 of the HLSL from which shaders.js is made, in hex."""
     return hashlib.sha256(b"\0".join(source.read_bytes() for source in SOURCES)).hexdigest()
 
 
 def glslang_version() -> str:
-    """The front end's version, as shaders.js names it; ShaderError where it is not installed."""
+    """The version of glslang, as shaders.js names it; ShaderError where it is not installed."""
     if not shutil.which("glslangValidator"):
         raise ShaderError("writing the viewer's shaders needs glslangValidator (Debian package glslang-tools)")
     words = subprocess.run(["glslangValidator", "--version"], capture_output=True, text=True).stdout
     return re.search(r"Glslang Version: \S*?([\d.]+)", words)[1]
 
 
-def spirv(source: Path, entry: str, stage: str, out: Path, *options: str) -> Path:
-    """Compiles one entry point of HLSL for Vulkan 1.0; ShaderError with the compiler's words. options: more of glslang's."""
+def compile_spirv(source: Path, entry: str, stage: str, out: Path, *options: str) -> Path:
+    """Compiles one entry point of an HLSL file for Vulkan 1.0. Returns `out`; ShaderError with the compiler's words.
+
+    stage: `vert`, `frag` or `comp`; options: further ones of glslangValidator.
+    """
     _run(["glslangValidator", "-D", "-V", "-S", stage, "-e", entry, "--source-entrypoint", entry, "--auto-map-bindings",
           "--auto-map-locations", *options, f"-I{source.parent}", str(source), "-o", str(out)])
     return out
 
 
-def wgsl(node_modules: Path) -> dict[str, str]:
-    """Entry point -> WGSL without indents. node_modules: where naga-wasm is installed."""
+def translate(node_modules: Path) -> dict[str, str]:
+    """Entry point -> WGSL without indentation. node_modules: the folder in which npm has installed naga-wasm."""
     with tempfile.TemporaryDirectory(dir=node_modules.parent) as folder:
-        files = {entry: spirv(SOURCES[1] if stage == "comp" else SOURCES[3], entry, stage, Path(folder) / f"{entry}.spv",
+        files = {entry: compile_spirv(SOURCES[1] if stage == "comp" else SOURCES[3], entry, stage, Path(folder) / f"{entry}.spv",
                               "--shift-ssbo-binding", "1")
                  for entry, stage in ENTRIES.items()}
         script = Path(folder) / "translate.mjs"
-        script.write_text(TRANSLATE)
+        script.write_text(_TRANSLATE)
         texts = json.loads(_run(["node", str(script), *map(str, files.values())]))
         return {entry: re.sub(r"(?m)^ +| +$", "", texts[str(file)].replace("u0040_", "")) for entry, file in files.items()}
 
 
-def places(text: str) -> tuple[dict[str, int], dict[str, int]]:
-    """Buffer -> binding, parameter -> byte in the uniform block (whose buffer is called `parameters`)."""
+def parse_places(text: str) -> tuple[dict[str, int], dict[str, int]]:
+    """From WGSL: buffer -> binding, and parameter -> byte in the uniform block, whose buffer is called `parameters`."""
     bindings, parameters = {}, {}
     for number, kind, name, block in re.findall(r"@binding\((\d+)\)\s*var<(\w+)[^>]*> (\w+): (\w+);", text):
         if kind == "storage":
@@ -82,19 +86,19 @@ def places(text: str) -> tuple[dict[str, int], dict[str, int]]:
             continue
         bindings["parameters"], at = int(number), 0
         for member, type_ in re.findall(r"(\w+): ([^,]+),", re.search(rf"struct {block} {{(.*?)}}", text, re.S)[1]):
-            size = SIZES[type_]
+            size = _SIZES[type_]
             at = -(-at // size) * size
             parameters[member.rstrip("_")] = at
             at += size
     return bindings, parameters
 
 
-def script(texts: dict[str, str]) -> str:
-    """shaders.js."""
+def format_script(texts: dict[str, str]) -> str:
+    """The text of shaders.js. texts: entry point -> WGSL."""
     lines = ["// Written by `python -m gsac.viewer.wgsl` from the HLSL of the Unity package and page.hlsl. Do not edit.",
-             f"// glslang {glslang_version()}, {NAGA}, HLSL {digest()}", "", "export const SHADERS = {"]
+             f"// glslang {glslang_version()}, {NAGA}, HLSL {hash_sources()}", "", "export const SHADERS = {"]
     for entry, text in texts.items():
-        bindings, parameters = places(text)
+        bindings, parameters = parse_places(text)
         lines.append(f"  {entry}: {{ bindings: {json.dumps(bindings)}, parameters: {json.dumps(parameters)}, code: `\n{text}` }},")
     return "\n".join([*lines, "};", ""])
 
@@ -107,11 +111,12 @@ def _run(command: list[str]) -> str:
 
 
 def main() -> int:
+    """Writes shaders.js."""
     if not shutil.which("npm"):
         raise ShaderError("writing the viewer's shaders needs npm (Debian package npm)")
     with tempfile.TemporaryDirectory() as folder:
         _run(["npm", "install", "--silent", "--no-audit", "--no-fund", "--prefix", folder, NAGA])
-        WRITTEN.write_text(script(wgsl(Path(folder) / "node_modules")))
+        WRITTEN.write_text(format_script(translate(Path(folder) / "node_modules")))
     print(f"wrote {WRITTEN}", file=sys.stderr)
     return 0
 

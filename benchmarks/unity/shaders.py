@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 from gsac.benchmarks.unity.spirv import Program
-from gsac.viewer.wgsl import CORE, spirv
+from gsac.viewer.wgsl import CORE, compile_spirv
 
 PROGRAMS = {"glslangValidator": "glslang-tools", "spirv-val": "spirv-tools"}
 STEREO = Path(__file__).parent / "stereo"
@@ -24,7 +24,7 @@ def missing_packages() -> list[str]:
 
 def compile_hlsl(source: Path, entry: str, stage: str, folder: Path, include=(CORE,)) -> Program:
     """Validated for Vulkan 1.0, left in `folder` as ENTRY.spv. StageError or AssertionError with the tools' words."""
-    out = spirv(Path(source), entry, stage, Path(folder) / f"{entry}.spv", *(f"-I{i}" for i in include))
+    out = compile_spirv(Path(source), entry, stage, Path(folder) / f"{entry}.spv", *(f"-I{i}" for i in include))
     done = subprocess.run(["spirv-val", "--target-env", "vulkan1.0", str(out)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return Program(out.read_bytes())

@@ -22,7 +22,7 @@ CARD = """(() => {
 
 
 def test_the_shaders_are_of_the_present_hlsl():
-    assert wgsl.digest() in wgsl.WRITTEN.read_text(), "run `make shaders`"
+    assert wgsl.hash_sources() in wgsl.WRITTEN.read_text(), "run `make shaders`"
 
 
 @pytest.mark.slow
@@ -32,7 +32,7 @@ def test_the_hlsl_gives_these_very_shaders(node_package):
     written = wgsl.WRITTEN.read_text()
     if f"glslang {wgsl.glslang_version()}," not in written:
         pytest.skip("shaders.js was written with another version of glslang")
-    assert wgsl.script(wgsl.wgsl(node_package(wgsl.NAGA) / "node_modules")) == written
+    assert wgsl.format_script(wgsl.translate(node_package(wgsl.NAGA) / "node_modules")) == written
 
 
 @pytest.mark.slow
@@ -54,7 +54,7 @@ def test_the_other_browsers_compiler_takes_them_too():
 def test_parameters_stand_where_wgsl_lays_them():
     text = "struct P {\n a: u32,\n b: vec2<f32>,\n c1_: vec4<f32>,\n}\n@group(0) @binding(3) \nvar<uniform> unnamed: P;\n" \
            "@group(0) @binding(1) \nvar<storage, read_write> Keys_1: Keys;"
-    assert wgsl.places(text) == ({"parameters": 3, "Keys": 1}, {"a": 0, "b": 8, "c1": 16})
+    assert wgsl.parse_places(text) == ({"parameters": 3, "Keys": 1}, {"a": 0, "b": 8, "c1": 16})
 
 
 @pytest.fixture(scope="module")

@@ -92,7 +92,7 @@ def test_in_the_page_no_import_or_export_is_left():
 
 
 def test_joint_names_are_those_of_the_motion_package():
-    assert joint_names.WRITTEN.read_text() == joint_names.script(), "run `python -m gsac.viewer.joint_names`"
+    assert joint_names.WRITTEN.read_text() == joint_names.format_script(), "run `python -m gsac.viewer.joint_names`"
 
 
 @pytest.mark.slow
