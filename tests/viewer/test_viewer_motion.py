@@ -19,8 +19,7 @@ from gsac.viewer.page import page_bytes
 from support import dances
 from support.page_modules import expose
 
-TESTS = Path(__file__).parents[2]
-FOOTAGE = TESTS.parents[1] / "shared" / "footage" / "motion"
+FOOTAGE = Path(__file__).parents[3] / "shared" / "footage" / "motion"
 
 
 pytestmark = [pytest.mark.slow,
