@@ -2,9 +2,11 @@
 
 // Time constant of the glide to another framing.
 const GLIDE_S = 0.25;
-// Height of the framed figure that the picture's half height has to hold, with room at its top and bottom; likewise the width.
-const ROOM_TALL = 0.57;
-const ROOM_WIDE = 0.58;
+// A framed figure is seen from a little above, degrees.
+const PITCH = 4;
+// Shares of the figure's height and width that half of the picture holds: more than a half leaves a margin.
+const MARGIN_TALL = 0.57;
+const MARGIN_WIDE = 0.58;
 
 /**
  * What a renderer draws from. view: 3x4, row by row, world to camera; focal: px; centre: px from the middle of the box to the
@@ -22,9 +24,9 @@ export class OrbitCamera {
     // How far the figure has walked from where it was framed, m; the camera follows.
     this.walked = [0, 0, 0];
     this.view = new Float32Array(12);
-    // Around the target (m), degrees; distance from it, m.
+    // Angles around the target, degrees; the target and the distance from it, m.
     this.yaw = 0;
-    this.pitch = 4;
+    this.pitch = PITCH;
     this.target = [0, 0, 0];
     this.distance = 3;
     // Offset from the framing that a glide still has to lose: target (m), pitch (degrees), distance (m).
@@ -35,11 +37,11 @@ export class OrbitCamera {
 
   // Frames a box, m; aspect: the picture's width over its height.
   frame(low, high, aspect) {
-    this.pitch = 4;
+    this.pitch = PITCH;
     this.moved = false;
     this.behind = [0, 0, 0, 0, 0];
     this.target = low.map((l, i) => (l + high[i]) / 2);
-    const tall = (high[1] - low[1]) * ROOM_TALL / (1 - this.covered), wide = (high[0] - low[0]) * ROOM_WIDE / aspect;
+    const tall = (high[1] - low[1]) * MARGIN_TALL / (1 - this.covered), wide = (high[0] - low[0]) * MARGIN_WIDE / aspect;
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
   }
 

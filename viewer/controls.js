@@ -6,7 +6,8 @@ import { addFaceSliders, addJointSliders } from "./sliders.js";
 
 // A note on the page stays this long.
 const NOTE_MS = 9000;
-const WAYS = { webgpu: "WebGPU", webgl: "WebGL", software: "no graphics card" };
+// Renderer's kind -> its name on the page.
+const RENDERERS = { webgpu: "WebGPU", webgl: "WebGL", software: "no graphics card" };
 
 /** @returns {any} the page's element, a button or an input among others */
 const find = (id) => document.getElementById(id);
@@ -116,7 +117,7 @@ export class Controls {
   showRate({ fps, p95 }) {
     const { viewer } = this, count = viewer.binding.count.toLocaleString("en");
     const rate = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms`;
-    find("fps").textContent = `${rate} · ${count} gaussians · ${WAYS[viewer.renderer?.kind] ?? "…"}`;
+    find("fps").textContent = `${rate} · ${count} gaussians · ${RENDERERS[viewer.renderer?.kind] ?? "…"}`;
     if (viewer.length) {
       if (document.activeElement !== find("time") || !viewer.paused) find("time").value = viewer.clock / viewer.length;
       find("clock").textContent = `${viewer.clock.toFixed(1)} / ${viewer.length.toFixed(1)} s`;

@@ -34,8 +34,8 @@ class GltfReader {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     let text = bytes;
     if (bytes.length >= 20 && view.getUint32(0, true) === GLTF_MAGIC) {
-      const said = view.getUint32(8, true), size = view.getUint32(12, true), rest = 20 + size;
-      if (said > bytes.length) throw this.bad(`it says ${said} bytes and has ${bytes.length}`);
+      const total = view.getUint32(8, true), rest = 20 + view.getUint32(12, true);
+      if (total > bytes.length) throw this.bad(`it says ${total} bytes and has ${bytes.length}`);
       if (rest > bytes.length) throw this.bad("its JSON ends after the file");
       text = bytes.subarray(20, rest);
       if (rest + 8 <= bytes.length) this.chunk = bytes.subarray(rest + 8, rest + 8 + view.getUint32(rest, true));

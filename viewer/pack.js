@@ -1,6 +1,7 @@
-// Packs an avatar into the arrays that Gsac.compute reads; Unity's GsacPacking.cs makes the same.
+// Packs an avatar into the arrays that the graphics card reads.
 
 /**
+ * For Gsac.compute; Unity's GsacPacking.cs makes the same.
  * @param {import("./reader.js").Avatar} avatar
  * @returns {Object<string, Float32Array | Uint32Array>} by the buffer's name in the shader
  */
@@ -35,4 +36,14 @@ export function packForGpu(avatar) {
     colours[i * 4 + 3] = opacity[i];
   }
   return { GsacRest: rest, GsacSkin: skin, GsacMoves: moves, GsacCorners: corners, GsacLocal: local, GsacColours: colours };
+}
+
+/**
+ * The two triangles between the four corners of each gaussian.
+ * @param {number} count of gaussians
+ */
+export function indexQuads(count) {
+  const indices = new Uint32Array(count * 6);
+  for (let i = 0; i < count; i++) indices.set([0, 1, 2, 2, 1, 3].map((c) => i * 4 + c), i * 6);
+  return indices;
 }

@@ -2,6 +2,7 @@
 // The trainer's rule: covariance + lowPass, alpha = min(alphaMax, opacity exp(-s)), nothing below alphaMin.
 
 import { Binding } from "./binding.js";
+import { indexQuads } from "./pack.js";
 import { NEAR, WIDE } from "./projection.js";
 import { DepthSort } from "./sort.js";
 
@@ -126,11 +127,9 @@ export class WebglRenderer {
       colours[i * 4 + 3] = avatar.opacity[i];
     }
     this.fill(this.colours, Binding.PER_ROW, binding.rows, gl.RGBA, gl.FLOAT, colours);
-    const corners = new Uint32Array(binding.count * 6);
-    for (let i = 0; i < binding.count; i++) corners.set([0, 1, 2, 2, 1, 3].map((c) => i * 4 + c), i * 6);
     gl.bindVertexArray(gl.createVertexArray());
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indexQuads(binding.count), gl.STATIC_DRAW);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
@@ -156,6 +155,7 @@ export class WebglRenderer {
     return { program, places };
   }
 
+  // An empty texture, read texel by texel.
   texture(format, width, height) {
     const gl = this.gl, texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -165,6 +165,7 @@ export class WebglRenderer {
     return texture;
   }
 
+  // Fills a texture from its first row.
   fill(texture, width, height, format, type, data) {
     const gl = this.gl;
     gl.bindTexture(gl.TEXTURE_2D, texture);

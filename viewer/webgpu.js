@@ -3,7 +3,7 @@
 
 import { EVEN_LIGHT } from "./binding.js";
 import { reachDevice } from "./device.js";
-import { packForGpu } from "./pack.js";
+import { indexQuads, packForGpu } from "./pack.js";
 import { SHADERS } from "./shaders.js";
 
 // As in Gsac.compute: a group sorts 2^SORT_BLOCK_BITS keys at once, a thread of SortAcross SORT_HAND.
@@ -67,9 +67,7 @@ export class WebgpuRenderer {
     const arrays = { ...packForGpu(avatar), GsacWeights: this.weights, GsacBones: size(names.length * 48),
       GsacPosed: size(vertices.length / 3 * 16), GsacSplats: size(binding.count * 48), GsacKeys: size(this.sort.keys * 4) };
     this.buffers = Object.fromEntries(Object.entries(arrays).map(([name, data]) => [name, this.buffer(data)]));
-    const corners = new Uint32Array(binding.count * 6);
-    for (let i = 0; i < binding.count; i++) corners.set([0, 1, 2, 2, 1, 3].map((c) => i * 4 + c), i * 6);
-    this.corners = this.buffer(corners, GPUBufferUsage.INDEX);
+    this.corners = this.buffer(indexQuads(binding.count), GPUBufferUsage.INDEX);
     /** @type {Dispatch[]} */
     this.dispatches = [{ entry: "Skin", groups: Math.ceil(vertices.length / 3 / SKIN_THREADS) },
       { entry: "Bind", groups: Math.ceil(binding.count / SKIN_THREADS) }, ...this.sort.steps];
