@@ -84,16 +84,21 @@ class Parsed(BaseException):
 
 
 def parse(argv: list[str], monkeypatch) -> argparse.Namespace:
-    """The arguments as the real command reads them; SystemExit where it refuses them."""
+    """The arguments as the real command reads them; fails where it refuses them."""
     whole = argparse.ArgumentParser.parse_args
 
     def parse_args(self, *arguments):
         raise Parsed(whole(self, *arguments))
 
-    with monkeypatch.context() as patch, pytest.raises(Parsed) as seen:
+    with monkeypatch.context() as patch:
         patch.setattr(argparse.ArgumentParser, "parse_args", parse_args)
-        execute(argv)
-    return seen.value.args[0]
+        try:
+            ended = execute(argv)
+        except Parsed as seen:
+            return seen.args[0]
+        except SystemExit as refused:
+            ended = refused.code
+    pytest.fail(f"gsac {' '.join(argv)}: ended with {ended} before it began")
 
 
 def commands(page: Path) -> Iterator[list[str]]:
