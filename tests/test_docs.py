@@ -17,7 +17,9 @@ from gsac.pipeline.project import Project
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/**/*.md"), ROOT / "unity" / "README.md"})
-GUIDES = [page for page in PAGES if page.parent in (ROOT, ROOT / "docs", ROOT / "docs" / "lab")]
+REFERENCE = ROOT / "docs" / "cli.md"
+"""Written from the commands themselves; `[...]` in it is no command line."""
+GUIDES = [page for page in PAGES if page.parent in (ROOT, ROOT / "docs", ROOT / "docs" / "lab") and page != REFERENCE]
 """Those whose commands are checked; the others tell of runs of their time."""
 HISTORY = ROOT / "CHANGELOG.md"
 """Names paths that are gone."""
