@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     source = tmp_path_factory.mktemp("source")
-    for name in (*TOPS, "src", "pyproject.toml", "README.md", "dvc.yaml"):
+    for name in (*TOPS, "src", "pyproject.toml", "README.md", "LICENSE", "NOTICE", "dvc.yaml"):
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, source / name, symlinks=True, ignore=shutil.ignore_patterns(*NOT_SHIPPED))
         else:
