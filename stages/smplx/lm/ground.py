@@ -14,9 +14,8 @@ from scipy.ndimage import uniform_filter1d
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx.jacobians import Chain, Pairs, Skeleton, pairs_of, positions, pulled_back
-from gsac.stages.smplx.lm.solver import System
+from gsac.stages.smplx.lm.solver import System, robust
 from gsac.stages.smplx.lm.stance import upright
-from gsac.stages.smplx.robust import robust
 
 FEET = tuple((f"{side}_ankle", f"{side}_foot") for side in ("left", "right"))
 SEEN = tuple((INDEX[f"{side}_heel"], INDEX[f"{side}_big_toe"]) for side in ("left", "right"))

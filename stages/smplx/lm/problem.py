@@ -18,9 +18,8 @@ from gsac.stages.smplx import prior
 from gsac.stages.smplx.jacobians import Chain, Pairs, Skeleton, positions, pulled_back
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.person_offsets import Personal
-from gsac.stages.smplx.lm.solver import System
+from gsac.stages.smplx.lm.solver import System, robust
 from gsac.stages.smplx.lm.stance import Held
-from gsac.stages.smplx.robust import robust
 from gsac.stages.smplx.silhouette import INSET, Outline
 
 ROBUST = 3.0

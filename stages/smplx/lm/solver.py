@@ -111,6 +111,17 @@ class Trace:
     steps: int = 0
 
 
+def robust(residual: np.ndarray, limit: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Geman and McClure's robust loss (1987), by iterated reweighting.
+
+    residual: (...) in spreads; limit: scalar or (...), the residual in spreads beyond which the loss flattens. Returns the cost
+    (...) and the square root of the weight (...).
+    """
+    square = residual**2
+    shrink = 1 / (1 + square / limit**2)
+    return square * shrink, shrink
+
+
 def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callable, frozen: np.ndarray,
                         frozen_shared: np.ndarray, iterations: int, tolerance: float = 1e-3) -> tuple[object, Trace]:
     """Minimises `cost(state)`; `linearise(state)` gives a System, `move(state, step, shared)` a new state.
