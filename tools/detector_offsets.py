@@ -26,7 +26,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.wholebody import BODY_NAMES, FACE, FEET_NAMES, INDEX, LEFT_HAND, RIGHT_HAND
 from gsac.avatar.yaw import yaw
 from gsac.stages.smplx.detector import HARMONICS, PERSONAL, UNKNOWN, Detector, harmonics
-from gsac.stages.smplx.fit import Sightings
+from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.symmetry import mirrored
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")

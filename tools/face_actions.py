@@ -28,7 +28,7 @@ from gsac.benchmarks.face_people import looks_of, mirror_of
 from gsac.stages.face.actions import TABLE, spread_of, turns, view_terms
 from gsac.stages.face.head import AXES, similarity
 from gsac.stages.face.landmarks import align
-from gsac.stages.smplx.head import closest, head_vertices, incident
+from gsac.stages.smplx.paper.head import closest, head_vertices, incident
 
 SEEDS = [*range(1000, 1036), *range(2000, 2024)]
 """People of the turntable, of no truth clip that anything else is chosen or judged on, and drawn ones."""

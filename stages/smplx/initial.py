@@ -6,8 +6,11 @@ import cv2
 import numpy as np
 
 from gsac.avatar import rotation
+from gsac.avatar.body import Body
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.smplx.prior import MEAN
+from gsac.stages.smplx.prior import BODY_JOINTS, MEAN
+from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.state import State
 
 TRUNK = [INDEX[n] for n in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
 TURNING = TRUNK + [INDEX[n] for n in ("nose", "left_ear", "right_ear")]
@@ -64,3 +67,25 @@ def fill_gaps(turns: list[np.ndarray | None]) -> np.ndarray:
         return np.tile(turns[known[0]], (len(turns), 1, 1))
     slerp = Slerp(known, Rotation.from_matrix([turns[i] for i in known]))
     return slerp(np.clip(np.arange(len(turns)), known[0], known[-1])).as_matrix()
+
+
+def starting_state(body: Body, sightings: Sightings, focal: float, center: np.ndarray) -> State:
+    frames = len(sightings.xy)
+    rest = body.keypoints(body.v_template)
+    pelvis = body.J_regressor[0] @ body.v_template
+    turns = [trunk_turn(rest, sightings.world[t], sightings.xy[t], sightings.seen[t], focal, center) for t in range(frames)]
+    turns = fill_gaps(turns)
+    local = start_rotations(frames, 55, body.joint_names)
+    local[:, 0] = turns
+    transl = np.full((frames, 3), np.nan)
+    for t in range(frames):
+        use = [i for i in TRUNK if sightings.seen[t, i]]
+        if len(use) >= 2:
+            turned = (rest[use] - pelvis) @ turns[t].T + pelvis
+            transl[t] = place(turned, sightings.xy[t, use], focal, center)
+    known = np.isfinite(transl).all(1) & (np.nan_to_num(transl[:, 2]) > 0.3)
+    if not known.any():
+        transl[:], known[:] = [0, 0, focal * 1.7 / sightings.person_height], True
+    for c in range(3):
+        transl[:, c] = np.interp(np.arange(frames), np.nonzero(known)[0], transl[known, c])
+    return State(local, transl, np.zeros(body.num_betas), float(np.log(focal)), np.zeros(3 * len(BODY_JOINTS) + 2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.stages.frame_names import name_frames
-from gsac.stages.smplx.fit import Fit
+from gsac.stages.smplx.state import Fit
 
 POOR_IOU = 0.7
 FALL = 0.12

@@ -6,6 +6,7 @@ each point is drawn along the signed distance field of the alpha until it lies o
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,8 +14,9 @@ import cv2
 import numpy as np
 
 from gsac.avatar.artifacts import read_alpha
-from gsac.avatar.body import Body
+from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
+from gsac.avatar.threads import available
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.smplx.jacobians import Pairs, surface_pairs
 
@@ -24,6 +26,11 @@ POINTS = 160
 """Outline points a frame, at most."""
 INSET = 0.5
 """Field pixels that an outline point, the middle of a covered pixel, lies within the outline it stands for."""
+
+THREADS = min(available(), 8)
+"""The rasteriser releases Python's lock; more threads mostly wait for code that holds it."""
+POSED_AT_ONCE = 64
+"""Frames whose vertices are held in memory together."""
 
 
 @dataclass
@@ -60,6 +67,31 @@ def read_outline(path: Path) -> Outline:
     field = (cv2.GaussianBlur(outside - inside, (0, 0), 1.0) * scale).astype(np.float32)
     slope = np.stack([cv2.Sobel(field, cv2.CV_32F, 1, 0, ksize=3), cv2.Sobel(field, cv2.CV_32F, 0, 1, ksize=3)], -1) / (8 * scale)
     return Outline(field, slope, scale, float(mask.mean()), mask)
+
+
+def read_outlines(paths: list[Path]) -> list[Outline]:
+    """The outlines of a clip's alpha EXRs."""
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(read_outline, paths))
+
+
+def sample_outlines(body: Body, params: BodyParams, width: int, height: int,
+                    outlines: list[Outline]) -> tuple[list[Pairs | None], np.ndarray]:
+    """Each frame's outline points, None where there are none, and the IoU (T,) of body and alpha, NaN without alpha."""
+    camera = params.camera(width, height)
+    pairs: list[Pairs | None] = [None] * params.frames
+    iou = np.full(params.frames, np.nan)
+
+    def sample(t: int, vertices: np.ndarray) -> None:
+        if outlines[t].area > 0:
+            points, iou[t] = outline_points(body, vertices, camera, outlines[t], t)
+            pairs[t] = points if points.count else None
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        for first in range(0, len(outlines), POSED_AT_ONCE):
+            frames = range(first, min(first + POSED_AT_ONCE, len(outlines)))
+            list(pool.map(sample, frames, body.posed(params, list(frames))[0]))
+    return pairs, iou
 
 
 def outline_points(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int) -> tuple[Pairs, float]:

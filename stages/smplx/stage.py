@@ -1,8 +1,6 @@
-"""Reads the artifacts, fits the body, says where the fit is not to be trusted."""
+"""Reads the artifacts, fits the body, warns where the fit is not to be trusted."""
 
 from __future__ import annotations
-
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -12,9 +10,11 @@ from gsac.avatar.body import LOST
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.smplx.expression import mimic
-from gsac.stages.smplx.fit import THREADS, Sightings, fit_clip, to_params
+from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.lost_frames import lost_frames, sentences
-from gsac.stages.smplx.silhouette import read_outline
+from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.silhouette import read_outlines
+from gsac.stages.smplx.state import to_params
 from gsac.stages.smplx.warmup import rehearse
 
 
@@ -40,8 +40,7 @@ def run(job: Job) -> None:
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
-    with ThreadPoolExecutor(THREADS) as pool:
-        outlines = list(pool.map(read_outline, frame_paths(job.inputs["segment/alpha"])))
+    outlines = read_outlines(frame_paths(job.inputs["segment/alpha"]))
     if len(outlines) != len(sightings.xy):
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
@@ -49,10 +48,8 @@ def run(job: Job) -> None:
     expression, jaw, silent = mimic(body, face)
     if silent:
         job.warn(silent)
-    params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression)
+    params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression, fit.joint_offset)
     params.jaw_pose = jaw
-    if fit.joint_offset is not None:
-        params.joint_offset = fit.joint_offset.astype(np.float32)
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = lost_frames(fit, seen, sightings.person_height)

@@ -13,7 +13,7 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.contract import Job
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.fit import HIPS
+from gsac.stages.smplx.sightings import HIPS
 
 FRAMES, FPS = 6, 10.0
 WIDTH, HEIGHT, FOCAL, DISTANCE = 54, 96, 100.0, 2.4

@@ -8,7 +8,6 @@ ones: focal length, betas, what is the person's own, what is held, the ground.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,10 +16,12 @@ from gsac.avatar.body import Body
 from gsac.stages.smplx import prior
 from gsac.stages.smplx.jacobians import Chain, Pairs, Skeleton, positions, pulled_back
 from gsac.stages.smplx.lm.ground import Ground
+from gsac.stages.smplx.lm.observations import Observations
 from gsac.stages.smplx.lm.person_offsets import Personal
-from gsac.stages.smplx.lm.solver import System, robust
+from gsac.stages.smplx.lm.solver import System, levenberg_marquardt, robust
 from gsac.stages.smplx.lm.stance import Held
-from gsac.stages.smplx.silhouette import INSET, Outline
+from gsac.stages.smplx.silhouette import INSET
+from gsac.stages.smplx.state import State
 
 ROBUST = 3.0
 """Residuals beyond so many spreads count less and less; `Problem.limit` may be wider while the body is still far off."""
@@ -31,57 +32,11 @@ OUTLINE_SIGHTINGS = 60
 """How many independent sightings one frame's outline is worth."""
 
 
-@dataclass
-class State:
-    """The unknowns."""
-
-    local: np.ndarray  # (T, J, 3, 3) joint rotations
-    transl: np.ndarray  # (T, 3) m
-    betas: np.ndarray  # (B,)
-    log_focal: float
-    held: np.ndarray
-    """(H,) what the clip keeps to, as in held.py; empty where that is not sought."""
-    own: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    """(K,) the person's own, as in personal.py; empty where that is not sought."""
-    level: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    """(G,) m, 0 or 1: the ground along the upright, as in ground.py; empty where nothing stands on it."""
-
-    @property
-    def shape(self) -> np.ndarray:
-        """(B + K,) what does not move with the pose."""
-        return np.concatenate([self.betas, self.own])
-
-    @property
-    def shared(self) -> int:
-        """How many unknowns all frames share."""
-        return 1 + len(self.shape) + len(self.held) + len(self.level)
-
-
-@dataclass
-class Observations:
-    """What was seen, frame by frame."""
-
-    xy: np.ndarray  # (T, P, 2) px
-    spread: np.ndarray  # (T, P) px; infinite where a point was not seen
-    depth: np.ndarray  # (T, P) m, depth of the point against the hips; NaN where unknown
-    depth_spread: float  # m
-    center: np.ndarray  # (2,) px
-    seconds: np.ndarray | None  # (T,) time; None for photos
-    focal_prior: tuple[float, float]
-    """Focal length px and its relative spread."""
-    height: tuple[float, float]
-    """Metres and spread."""
-    repeats: float
-    """Frames for each different view of the person; what they get wrong they get wrong together."""
-    outlines: list[Outline]
-    outline_spread: float  # px
-
-
 class Problem:
     """One clip's fit over chosen joints."""
 
     def __init__(self, body: Body, pairs: Pairs, hips: tuple[int, int], seen: Observations, active: np.ndarray,
-                 smoothness: float, outline_weight: float, personal: Personal | None = None):
+                 smoothness: float, personal: Personal | None = None):
         self.body, self.pairs, self.hips, self.seen = body, pairs, hips, seen
         self.skeleton, self.personal = Skeleton(body, active, personal.joints if personal else None), personal
         self.own_spread = personal.spread if personal else np.zeros(0)
@@ -89,8 +44,7 @@ class Problem:
         self.mean, self.spread = prior.pose_prior(active)
         speed, acceleration = prior.turning_spread(active)
         self.speed_spread, self.acceleration_spread = speed, acceleration
-        self.smoothness, self.outline_weight = smoothness, outline_weight
-        self.limit = ROBUST
+        self.smoothness, self.outline_weight, self.limit = smoothness, 0.0, ROBUST
         self.held = Held(active)
         self.ground: Ground | None = None
         self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
@@ -101,6 +55,16 @@ class Problem:
         self.height_dirs[body.num_figure:] = 0
         self.shape_mean, self.shape_spread = prior.shape_prior(body.num_figure, body.clothes)
         self.clothes = 0.0 if body.clothes else CLOTHES
+
+    def minimise(self, state: State, iterations: int, frozen: np.ndarray | None = None,
+                 frozen_shared: np.ndarray | None = None) -> tuple[State, int]:
+        """Solves from a state. frozen: (n,) bool and frozen_shared: (s,) bool, unknowns that stay; none by default.
+
+        Returns state and number of steps.
+        """
+        frozen = np.zeros(self.size, bool) if frozen is None else frozen
+        frozen_shared = np.zeros(state.shared, bool) if frozen_shared is None else frozen_shared
+        return levenberg_marquardt(state, self.linearise, self.cost, self.move, frozen, frozen_shared, iterations)
 
     def move(self, state: State, step: np.ndarray, shared: np.ndarray) -> State:
         """step: (T, n); shared: (s,)."""
@@ -328,3 +292,23 @@ class Problem:
         residual = np.append(away / spreads, (tall - metres) / spread)
         count = np.sqrt(self.seen.repeats)
         return residual * count, np.pad(rows * count, ((0, 0), (0, len(state.level))))
+
+
+def joint_spread(problem: Problem, state: State) -> np.ndarray:
+    """(T, 55) m: how far each joint may be off by what its frame shows alone, each unknown by itself."""
+    chain = problem.skeleton.pose(state.local, state.shape)
+    system = problem.of_each_frame(state, chain)
+    n = problem.size
+    information = system.band[:, np.arange(n), np.arange(n)]
+    angle = 1 / np.sqrt(np.maximum(information[:, :-3].reshape(len(state.local), -1, 3).min(-1), 1e-6))
+    place = np.sqrt(1 / np.maximum(information[:, -3:-1].min(-1), 1e-6))
+    out = np.zeros(chain.place.shape[:2])
+    index = {int(j): i for i, j in enumerate(problem.active)}
+    for j, p in enumerate(problem.skeleton.parents):
+        if p < 0:
+            out[:, j] = place
+            continue
+        bone = np.linalg.norm(chain.place[:, j] - chain.place[:, p], axis=-1)
+        turn = angle[:, index[p]] if p in index else 0.2
+        out[:, j] = np.hypot(out[:, p], bone * turn)
+    return out

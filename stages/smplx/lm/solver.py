@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
+
+Unknowns = TypeVar("Unknowns")
 
 
 @dataclass
@@ -66,6 +69,7 @@ FROZEN = 1e12
 DAMPING = 1e-5
 """At the first step, a share of each unknown's own curvature. Shape and the hips' place lie in valleys a thousandth as steep as
 what surrounds them: more damping than that, and the fit stops on the way."""
+TOLERANCE = 1e-3
 
 
 def solve_band(band: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -103,14 +107,6 @@ def solve_band(band: np.ndarray, right: np.ndarray) -> np.ndarray:
     return solved.reshape(-1, n, right.shape[2])[:t]
 
 
-@dataclass
-class Trace:
-    """How a solve went."""
-
-    costs: list[float]
-    steps: int = 0
-
-
 def robust(residual: np.ndarray, limit: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Geman and McClure's robust loss (1987), by iterated reweighting.
 
@@ -122,13 +118,15 @@ def robust(residual: np.ndarray, limit: float | np.ndarray) -> tuple[np.ndarray,
     return square * shrink, shrink
 
 
-def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callable, frozen: np.ndarray,
-                        frozen_shared: np.ndarray, iterations: int, tolerance: float = 1e-3) -> tuple[object, Trace]:
-    """Minimises `cost(state)`; `linearise(state)` gives a System, `move(state, step, shared)` a new state.
+def levenberg_marquardt(state: Unknowns, linearise: Callable[[Unknowns], System], cost: Callable[[Unknowns], float],
+                        move: Callable[[Unknowns, np.ndarray, np.ndarray], Unknowns], frozen: np.ndarray,
+                        frozen_shared: np.ndarray, iterations: int) -> tuple[Unknowns, int]:
+    """Minimises `cost(state)`; `move(state, step, shared)` gives the state after a step. Returns state and number of steps.
 
-    Stops after `iterations` accepted or refused steps, or when a step lowers the cost by less than `tolerance` of it.
+    frozen: (n,) bool and frozen_shared: (s,) bool mark unknowns that stay. Stops after `iterations` accepted or refused steps, or
+    when a step lowers the cost by less than `TOLERANCE` of it.
     """
-    damping, trace, system = DAMPING, Trace([cost(state)]), None
+    damping, lowest, steps, system = DAMPING, cost(state), 0, None
     for _ in range(iterations):
         system = system or linearise(state)
         try:
@@ -138,16 +136,15 @@ def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callab
             continue
         trial = move(state, step, shared)
         value = cost(trial)
-        trace.steps += 1
-        if np.isfinite(value) and value < trace.costs[-1]:
-            gain = 1 - value / trace.costs[-1]
-            state, damping = trial, max(damping / 5, 1e-7)
-            trace.costs.append(value)
-            if gain < tolerance:
+        steps += 1
+        if np.isfinite(value) and value < lowest:
+            gain = 1 - value / lowest
+            state, damping, lowest = trial, max(damping / 5, 1e-7), value
+            if gain < TOLERANCE:
                 break
             system = None
         else:
             damping *= 8
             if damping > 1e6:
                 break
-    return state, trace
+    return state, steps

@@ -18,23 +18,16 @@ import torch
 from gsac.avatar.body import Body
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.fit import (
-    BODY_POINTS,
-    HIPS,
-    Fit,
-    Sightings,
-    focal_prior,
-    joint_spread,
-    observations,
-    starting_state,
-    to_params,
-)
+from gsac.stages.smplx.initial import starting_state
 from gsac.stages.smplx.jacobians import pairs_of
-from gsac.stages.smplx.lm.problem import Problem, State
+from gsac.stages.smplx.lm.observations import observations
+from gsac.stages.smplx.lm.problem import Problem, joint_spread
 from gsac.stages.smplx.paper.loss import Objective, Unknowns
 from gsac.stages.smplx.paper.smooth import smooth_linear, smooth_rotations
 from gsac.stages.smplx.prior import BODY_JOINTS
-from gsac.stages.smplx.silhouette import Outline, outline_points
+from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
+from gsac.stages.smplx.silhouette import Outline, sample_outlines
+from gsac.stages.smplx.state import Fit, State, to_params
 
 BATCH = 64
 HAND_OFFSET, HAND_OFFSET_STEPS = 10.0, 250
@@ -89,7 +82,8 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     notes = ("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's regression",)
     if objective.head is None:
         notes += ("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) are off",)
-    iou = overlap(body, state, joint_offset, outlines, center, sightings)
+    params = to_params(body, state, center, joint_offset=joint_offset)
+    iou = sample_outlines(body, params, sightings.width, sightings.height, outlines)[1]
     return Fit(state, spread_of(body, sightings, state, config, center), iou,
                pixels_off(objective, sightings, state, joint_offset), total, joint_offset, notes)
 
@@ -113,20 +107,7 @@ def spread_of(body: Body, sightings: Sightings, state: State, config: SmplxConfi
     detector = Detector.measured(sightings.detector, body)
     pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
     seen = observations(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
-    return joint_spread(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0), state)
-
-
-def overlap(body: Body, state: State, joint_offset: np.ndarray, outlines: list[Outline], center: np.ndarray,
-            sightings: Sightings) -> np.ndarray:
-    """(T,) IoU of body and alpha; NaN without alpha."""
-    params = to_params(body, state, center)
-    params.joint_offset = joint_offset.astype(np.float32)
-    camera = params.camera(sightings.width, sightings.height)
-    out = np.full(len(sightings.xy), np.nan)
-    for t, outline in enumerate(outlines):
-        if outline.area > 0:
-            out[t] = outline_points(body, body.posed(params, [t])[0][0], camera, outline, t)[1]
-    return out
+    return joint_spread(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness), state)
 
 
 def pixels_off(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:

@@ -10,11 +10,11 @@ import torch
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.fit import Sightings
-from gsac.stages.smplx.head import Head, HeadTerms, visible
-from gsac.stages.smplx.lm.problem import State
+from gsac.stages.smplx.paper.head import Head, HeadTerms, visible
 from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
 from gsac.stages.smplx.prior import BODY_JOINTS
+from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.state import State
 
 SPACE = 8.0
 """Side of the square that the person's box is projected to: pixel weights do not depend on the resolution."""

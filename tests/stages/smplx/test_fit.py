@@ -16,14 +16,17 @@ from gsac.stages.contract import BadInput, make_config
 from gsac.stages.smplx import STAGE
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.fit import BODY_POINTS, HIPS, Sightings, fit_clip, observations, to_params
 from gsac.stages.smplx.jacobians import pairs_of, positions
+from gsac.stages.smplx.lm.fit import fit_clip
+from gsac.stages.smplx.lm.observations import observations
 from gsac.stages.smplx.lm.person_offsets import Personal
-from gsac.stages.smplx.lm.problem import Problem, State
+from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.lm.solver import System
 from gsac.stages.smplx.lm.stance import Held
 from gsac.stages.smplx.prior import BODY_JOINTS
+from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings
 from gsac.stages.smplx.silhouette import Outline, outline_points, read_outline
+from gsac.stages.smplx.state import State, to_params
 from gsac.turntable.shell import draped
 
 WIDTH, HEIGHT, FOCAL = 360, 640, 700.0
@@ -197,7 +200,7 @@ def test_derivatives_agree_with_finite_differences(body, tmp_path):
     state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
                   truth.transl.astype(float) + 0.02, np.append(rng.normal(0, 0.3, body.num_figure), np.zeros(len(body.clothes))),
                   float(np.log(FOCAL)), np.zeros(0), np.zeros(len(personal.spread)))
-    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, 0.0, personal)
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, personal)
     camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
     chain = problem.skeleton.pose(state.local, state.shape)
     surface = pairs_of(body, body.keypoint_matrix[BODY_POINTS])

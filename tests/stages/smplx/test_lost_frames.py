@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import LOST, Body, BodyParams
-from gsac.stages.smplx.fit import Fit
 from gsac.stages.smplx.lost_frames import lost_frames, sentences
+from gsac.stages.smplx.state import Fit
 
 HEIGHT = 1000.0
 

@@ -12,8 +12,10 @@ from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx import detector
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
+from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.lm.person_offsets import JOINTS
+from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.state import to_params
 from gsac.stages.smplx.symmetry import mirrored
 
 WIDTH, HEIGHT, FOCAL, FRAMES = 360, 640, 700.0, 10

@@ -9,12 +9,13 @@ import torch
 from gsac.avatar import rotation
 from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.fit import HIPS, Sightings, starting_state
-from gsac.stages.smplx.head import Head, HeadTerms, visible
+from gsac.stages.smplx.initial import starting_state
 from gsac.stages.smplx.paper.fit import BATCH, PASSES, Pass, fit_clip
+from gsac.stages.smplx.paper.head import Head, HeadTerms, visible
 from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
 from gsac.stages.smplx.paper.loss import Objective, Unknowns, boxes
 from gsac.stages.smplx.paper.smooth import smooth_linear, smooth_rotations
+from gsac.stages.smplx.sightings import HIPS, Sightings
 
 pytestmark = pytest.mark.slow
 

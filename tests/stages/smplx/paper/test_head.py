@@ -7,7 +7,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.flame_file import read_flame
 from gsac.stages.contract import StageError
 from gsac.stages.smplx.expression import mimic
-from gsac.stages.smplx.head import Head, HeadTerms, head_vertices
+from gsac.stages.smplx.paper.head import Head, HeadTerms, head_vertices
 
 
 @pytest.fixture(scope="module")
