@@ -27,7 +27,7 @@ from gsac.avatar.wholebody import BODY_NAMES, FACE, FEET_NAMES, INDEX, LEFT_HAND
 from gsac.avatar.yaw import yaw
 from gsac.stages.smplx.detector import HARMONICS, PERSONAL, UNKNOWN, Detector, harmonics
 from gsac.stages.smplx.sightings import Sightings
-from gsac.stages.smplx.symmetry import mirrored
+from gsac.stages.smplx.symmetry import mirror_directions
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")
 RIDGE = 2000.0
@@ -48,7 +48,7 @@ FEW = 20
 
 
 @dataclass
-class Sight:
+class SeenClip:
     """One clip: what the detector saw, and what was there."""
 
     xy: np.ndarray  # (T, 133, 2) px
@@ -61,13 +61,13 @@ class Sight:
     figure: np.ndarray  # (F,) betas of the person's figure
 
     @classmethod
-    def read(cls, body: Body, run: Path, truth: Path) -> Sight:
+    def read(cls, body: Body, run: Path, truth: Path) -> SeenClip:
         seen, z = read_arrays(run / "keypoints" / "keypoints.npz"), read_arrays(truth)
         pose = np.concatenate([z[name] for name in POSE], 1).reshape(-1, 55, 3)
         score = seen["score"]
         height = Sightings(seen["xy"], score, score, seen["world"], None, 0, 0, None).person_height
         return cls(seen["xy"].astype(np.float64), score > 0.5, height, body.keypoints(z["vertices"].astype(np.float32)),
-                   world_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"], figure(body, z))
+                   chain_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"], fit_figure(body, z))
 
     def slope(self, points: np.ndarray) -> np.ndarray:
         """points: (n, 3). (n, 2, 3) px by metres."""
@@ -80,20 +80,20 @@ class Sight:
         return self.focal * points[..., :2] / points[..., 2:] + self.center
 
 
-def figure(body: Body, truth: dict[str, np.ndarray]) -> np.ndarray:
+def fit_figure(body: Body, truth: dict[str, np.ndarray]) -> np.ndarray:
     """(F,) betas that come nearest to the truth's bare body, which the basis does not span."""
     basis = body.shapedirs[:, :, : body.num_figure].reshape(-1, body.num_figure).astype(np.float64)
     beyond = (truth["shift"] - truth["joint_offset"][0]).ravel()  # about the pelvis, as the basis is
     return truth["betas"] + np.linalg.solve(basis.T @ basis + FIGURE_RIDGE * np.eye(body.num_figure), basis.T @ beyond)
 
 
-def carrier(body: Body) -> np.ndarray:
+def find_carriers(body: Body) -> np.ndarray:
     """(133,) joint that carries each key point most; -1 for points that the body does not have."""
     carried = np.abs(body.keypoint_matrix) @ body.weights
     return np.where(body.known_keypoints, np.asarray(carried).argmax(1), -1)
 
 
-def mirror() -> np.ndarray:
+def find_counterparts() -> np.ndarray:
     """(133,) index of each body, foot and hand point's counterpart; face points stay."""
     out = np.arange(133)
     for name in (*BODY_NAMES, *FEET_NAMES):
@@ -104,7 +104,7 @@ def mirror() -> np.ndarray:
     return out
 
 
-def world_rotations(body: Body, pose: np.ndarray) -> np.ndarray:
+def chain_rotations(body: Body, pose: np.ndarray) -> np.ndarray:
     """pose: (T, 55, 3). Returns the joints' rotations to the camera frame (T, 55, 3, 3)."""
     world = rotation.exp(np.asarray(pose, np.float64))
     for j, p in enumerate(body.parents[1:], 1):
@@ -112,9 +112,9 @@ def world_rotations(body: Body, pose: np.ndarray) -> np.ndarray:
     return world
 
 
-def measure_offsets(body: Body, clips: list[Sight]) -> tuple[np.ndarray, np.ndarray]:
+def measure_offsets(body: Body, clips: list[SeenClip]) -> tuple[np.ndarray, np.ndarray]:
     """Offsets (133, 3) m in the carrying joint's T-pose axes, and the median px distance before and after (133, 2)."""
-    joint, other = carrier(body), mirror()
+    joint, other = find_carriers(body), find_counterparts()
     rows: list[list] = [[] for _ in range(133)]
     for clip in clips:
         for p in np.nonzero(joint >= 0)[0]:
@@ -128,12 +128,12 @@ def measure_offsets(body: Body, clips: list[Sight]) -> tuple[np.ndarray, np.ndar
         if len(both) < FEW:
             continue
         jacobian, away = np.stack([j for j, _ in both]), np.stack([a for _, a in both])
-        offsets[p] = nearest(jacobian, away, RIDGE)
+        offsets[p] = fit_offset(jacobian, away, RIDGE)
         quality[p] = np.median(np.linalg.norm(away, axis=1)), np.median(np.linalg.norm(away - jacobian @ offsets[p], axis=1))
     return offsets, quality
 
 
-def nearest(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
+def fit_offset(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
     """(3,) m, the offset that explains px (R, 2) by slopes (R, 2, 3) best, outliers let go."""
     offset = np.zeros(3)
     for _ in range(8):
@@ -144,9 +144,9 @@ def nearest(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
     return offset
 
 
-def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def measure_habits(body: Body, clips: list[SeenClip], offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Habit (133, 2 H + 1, 2) and spread (133,) of what the offsets (133, 3) leave; none of the face, not fitted by them."""
-    joint, other = carrier(body), mirror()
+    joint, other = find_carriers(body), find_counterparts()
     habit, spread = np.zeros((133, 2 * HARMONICS + 1, 2)), np.full(133, UNKNOWN)
     pull = HABIT_RIDGE * np.diag([1e-9, *([1.0] * (HARMONICS - 1) + [2.0]) * 2])
     left = []
@@ -171,9 +171,9 @@ def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple
     return habit, spread
 
 
-def own_offsets(body: Body, clip: Sight, offsets: np.ndarray, habit: np.ndarray) -> np.ndarray:
+def measure_own_offsets(body: Body, clip: SeenClip, offsets: np.ndarray, habit: np.ndarray) -> np.ndarray:
     """(len(PERSONAL), 3) m, what one person's points lie off the offsets (133, 3) and habit, in the left side's axes."""
-    joint, flip = carrier(body), np.array([-1.0, 1, 1])
+    joint, flip = find_carriers(body), np.array([-1.0, 1, 1])
     usual = Detector(offsets, None, None, habit, None).error(yaw(clip.turn[:, 0])) * clip.height
     moved = clip.points + np.einsum("tpab,pb->tpa", clip.turn[:, joint], offsets)
     out = np.zeros((len(PERSONAL), 3))
@@ -185,7 +185,7 @@ def own_offsets(body: Body, clip: Sight, offsets: np.ndarray, habit: np.ndarray)
             aways.append(clip.xy[t, point] - clip.project(moved[t, point]) - usual[t, point])
         slope, away = np.concatenate(slopes), np.concatenate(aways)
         if len(away) >= FEW:
-            out[n] = nearest(slope, away, OWN_RIDGE)
+            out[n] = fit_offset(slope, away, OWN_RIDGE)
     return out
 
 
@@ -201,7 +201,7 @@ def measure_people(figures: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np
     left = values - wide @ by
     variance, directions = np.linalg.eigh(np.cov(left.T))
     kept = variance > LEAST_OWN**2
-    axes = mirrored(dict.fromkeys(PERSONAL, (1, 1, 1)), INDEX, 133)[0]
+    axes = mirror_directions(dict.fromkeys(PERSONAL, (1, 1, 1)), INDEX, 133)[0]
     return axes @ by[0], axes @ by[1:].T, axes @ (directions * np.sqrt(np.maximum(variance, 0)))[:, kept][:, ::-1]
 
 
@@ -211,10 +211,10 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     body = Body.load()
-    clips = [Sight.read(body, *pair) for pair in zip(options.paths[::2], options.paths[1::2], strict=True)]
+    clips = [SeenClip.read(body, *pair) for pair in zip(options.paths[::2], options.paths[1::2], strict=True)]
     offsets, quality = measure_offsets(body, clips)
     habit, spread = measure_habits(body, clips, offsets)
-    own = np.stack([own_offsets(body, clip, offsets, habit) for clip in clips])
+    own = np.stack([measure_own_offsets(body, clip, offsets, habit) for clip in clips])
     common, by_betas, directions = measure_people(np.stack([clip.figure for clip in clips]), own)
     kept = Detector(offsets + common, by_betas, directions, habit, spread)
     arrays = {f.name: getattr(kept, f.name).astype(np.float32) for f in fields(kept)}

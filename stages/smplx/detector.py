@@ -14,7 +14,7 @@ import numpy as np
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.smplx.symmetry import mirrored
+from gsac.stages.smplx.symmetry import mirror_directions
 
 FILES = {"mediapipe": Path(__file__).parent / "offsets" / "mediapipe.npz"}
 """`tools/detector_offsets.py` measures them on truth clips."""
@@ -38,13 +38,13 @@ class Detector:
     spread: np.ndarray  # (133,) of what is left, the same shares
 
     @classmethod
-    def measured(cls, name: str, body: Body) -> Detector:
+    def load(cls, name: str, body: Body) -> Detector:
         """The detector of this name; one without habits where it or this body was not measured."""
         arrays = read_arrays(FILES[name]) if name in FILES else None
         if arrays is None or str(arrays["model"]) != body.digest:
             spread = np.full(133, UNKNOWN)
             spread[:5] = UNKNOWN_FACE
-            own, metres = mirrored(PERSONAL, INDEX, 133)
+            own, metres = mirror_directions(PERSONAL, INDEX, 133)
             return cls(np.zeros((133, 3)), np.zeros((133, 3, 0)), own * metres, np.zeros((133, 2 * HARMONICS + 1, 2)), spread)
         return cls(*(arrays[f.name].astype(np.float64) for f in fields(cls)))
 

@@ -8,7 +8,7 @@ JAW_OPEN, JAW_ANGLE = 24, 0.38
 """Place of jawOpen among face.npz's 52 actions, and the turn, rad, of a jaw that is fully open."""
 
 
-def mimic(body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
+def translate_expression(body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
     """body: avatar.body.Body; face: arrays of face.npz. Returns expression (T, E), jaw_pose (T, 3) rad and what was lost, if any.
 
     The open body acts the 52 actions as they are. An official file's expressions are FLAME's, which no action names: with a FLAME

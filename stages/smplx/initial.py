@@ -18,7 +18,7 @@ UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """Canonical axes to the camera's for a person who stands and looks at it."""
 
 
-def start_rotations(frames: int, joints: int, joint_names: tuple[str, ...]) -> np.ndarray:
+def hang_arms(frames: int, joints: int, joint_names: tuple[str, ...]) -> np.ndarray:
     """(T, J, 3, 3) arms hanging, everything else at rest."""
     local = np.tile(np.eye(3), (frames, joints, 1, 1))
     for name, degrees in MEAN.items():
@@ -26,7 +26,7 @@ def start_rotations(frames: int, joints: int, joint_names: tuple[str, ...]) -> n
     return local
 
 
-def trunk_turn(rest: np.ndarray, world: np.ndarray, xy: np.ndarray, known: np.ndarray, focal: float,
+def align_trunk(rest: np.ndarray, world: np.ndarray, xy: np.ndarray, known: np.ndarray, focal: float,
                center: np.ndarray) -> np.ndarray | None:
     """Rotation (3, 3) of the body in one frame, or None where too little was seen.
 
@@ -44,7 +44,7 @@ def trunk_turn(rest: np.ndarray, world: np.ndarray, xy: np.ndarray, known: np.nd
     return cv2.Rodrigues(turn)[0] if ok else None
 
 
-def place(points: np.ndarray, xy: np.ndarray, focal: float, center: np.ndarray) -> np.ndarray:
+def solve_transl(points: np.ndarray, xy: np.ndarray, focal: float, center: np.ndarray) -> np.ndarray:
     """Translation (3,) that brings turned points (P, 3) onto pixels (P, 2), by linear least squares."""
     rows, want = [], []
     for p, u in zip(points, (xy - center) / focal, strict=True):
@@ -69,20 +69,20 @@ def fill_gaps(turns: list[np.ndarray | None]) -> np.ndarray:
     return slerp(np.clip(np.arange(len(turns)), known[0], known[-1])).as_matrix()
 
 
-def starting_state(body: Body, sightings: Sightings, focal: float, center: np.ndarray) -> State:
+def estimate_start(body: Body, sightings: Sightings, focal: float, center: np.ndarray) -> State:
     frames = len(sightings.xy)
     rest = body.keypoints(body.v_template)
     pelvis = body.J_regressor[0] @ body.v_template
-    turns = [trunk_turn(rest, sightings.world[t], sightings.xy[t], sightings.seen[t], focal, center) for t in range(frames)]
+    turns = [align_trunk(rest, sightings.world[t], sightings.xy[t], sightings.seen[t], focal, center) for t in range(frames)]
     turns = fill_gaps(turns)
-    local = start_rotations(frames, 55, body.joint_names)
+    local = hang_arms(frames, 55, body.joint_names)
     local[:, 0] = turns
     transl = np.full((frames, 3), np.nan)
     for t in range(frames):
         use = [i for i in TRUNK if sightings.seen[t, i]]
         if len(use) >= 2:
             turned = (rest[use] - pelvis) @ turns[t].T + pelvis
-            transl[t] = place(turned, sightings.xy[t, use], focal, center)
+            transl[t] = solve_transl(turned, sightings.xy[t, use], focal, center)
     known = np.isfinite(transl).all(1) & (np.nan_to_num(transl[:, 2]) > 0.3)
     if not known.any():
         transl[:], known[:] = [0, 0, focal * 1.7 / sightings.person_height], True

@@ -37,7 +37,7 @@ class Pairs:
         return self.moment + self.moment_dirs @ shape[: self.moment_dirs.shape[2]]
 
 
-def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, moves: np.ndarray | None = None) -> Pairs:
+def make_pairs(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, moves: np.ndarray | None = None) -> Pairs:
     """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m added in the axes of the heaviest joint;
     moves: (P, 3, B + K) how these offsets move by the shape unknowns.
 
@@ -64,7 +64,7 @@ def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None =
     return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), added)
 
 
-def surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:
+def make_surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:
     """Points on the surface: face (P,), bary (P, 3). Twelve pairs a point, some of no weight."""
     vertices = body.faces[face]  # (P, 3)
     w = bary[:, :, None] * body.skin_weight[vertices]  # (P, 3, 4)
@@ -120,12 +120,12 @@ class Chain:
         return Chain(self.world[t: t + 1], self.place[t: t + 1], self.shift[t: t + 1], self.shift_dirs[t: t + 1])
 
 
-def positions(chain: Chain, pairs: Pairs, shape: np.ndarray) -> np.ndarray:
+def place_points(chain: Chain, pairs: Pairs, shape: np.ndarray) -> np.ndarray:
     """(T, P, 3) the same points in every frame, without transl."""
-    return _positions(pairs.start, pairs.joint, pairs.mass, pairs.moments(shape), chain.world, chain.shift)
+    return _place_points(pairs.start, pairs.joint, pairs.mass, pairs.moments(shape), chain.world, chain.shift)
 
 
-def pulled_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray, covectors: np.ndarray) -> np.ndarray:
+def pull_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray, covectors: np.ndarray) -> np.ndarray:
     """Rows of the Jacobian: how g . x moves with the unknowns of its frame, for R covectors g of every point.
 
     covectors: (T, P, R, 3). Returns (T, P, R, 3 A + 3 + S): joint steps, transl, shape as far as it moves them.
@@ -134,13 +134,13 @@ def pulled_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarra
     size = max(pairs.moment_dirs.shape[2], chain.shift_dirs.shape[3])
     rows = np.zeros((*covectors.shape[:3], 3 * len(skeleton.active) + 3 + size))
     for t, g in enumerate(covectors):
-        _pulled_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
+        _pull_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
                      chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries, g, rows[t])
     return rows
 
 
 @njit(cache=True, nogil=True)
-def _positions(start, joint, mass, moment, world, shift):
+def _place_points(start, joint, mass, moment, world, shift):
     x = np.zeros((len(world), len(start) - 1, 3))
     for t in range(len(world)):
         for p in range(x.shape[1]):
@@ -153,7 +153,7 @@ def _positions(start, joint, mass, moment, world, shift):
 
 
 @njit(cache=True, nogil=True)
-def _pulled_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors, rows):
+def _pull_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors, rows):
     points, joints, size = len(start) - 1, len(active), rows.shape[2] - 3 * len(active) - 3
     own, shaped = moment_dirs.shape[2], shift_dirs.shape[2]
     arm = np.zeros((joints, 3))

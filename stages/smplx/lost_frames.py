@@ -14,7 +14,7 @@ FAR = 0.05
 """Median distance of fitted from seen body points, as a share of the person's height: a good fit has a tenth of it."""
 
 
-def lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarray]:
+def find_lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarray]:
     """seen: (T,) bool, whether somebody was; height: px, of the person. Returns reason -> (T,) bool; a frame has one reason."""
     iou, off = np.nan_to_num(fit.iou, nan=1.0), np.nan_to_num(fit.reprojection, nan=0.0)
     usual = np.median(iou[seen]) if seen.any() else 1.0
@@ -24,7 +24,7 @@ def lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarr
             f"the body lies more than {FAR:.0%} of its height off the seen points": away}
 
 
-def sentences(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[str]:
+def describe_lost_frames(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[str]:
     """What the user reads: lost frames by their reason, and a body that covers the silhouette badly all along."""
     out = [f"Not fitted, and not learned from: {name_frames(mask)}; {reason}." for reason, mask in lost.items() if mask.any()]
     poor = (np.nan_to_num(iou, nan=1.0) < POOR_IOU) & ~np.any(list(lost.values()), axis=0)

@@ -51,7 +51,7 @@ def finger_prior(side: str, part: str) -> tuple[np.ndarray, np.ndarray]:
     return np.array([0, 0, down * CURL]), np.radians([3, 8 if part.endswith("1") else 2, 25])
 
 
-def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def motion_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Spread of angular speed (A,) rad/s (infinite for the pelvis, which turns) and of acceleration (A,) rad/s^2."""
     speed, acceleration = np.full(len(joints), 0.4), np.full(len(joints), 1.0)
     arms, legs, ankles = np.isin(joints, (16, 17, 18, 19, 20, 21)), np.isin(joints, (1, 2, 4, 5)), np.isin(joints, (7, 8))

@@ -18,7 +18,7 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.threads import available
 from gsac.avatar.zbuffer import rasterise
-from gsac.stages.smplx.jacobians import Pairs, surface_pairs
+from gsac.stages.smplx.jacobians import Pairs, make_surface_pairs
 
 FIELD_HEIGHT = 320
 """Alpha is looked at this high: finer edges than this do not move a joint."""
@@ -84,7 +84,7 @@ def sample_outlines(body: Body, params: BodyParams, width: int, height: int,
 
     def sample(t: int, vertices: np.ndarray) -> None:
         if outlines[t].area > 0:
-            points, iou[t] = outline_points(body, vertices, camera, outlines[t], t)
+            points, iou[t] = sample_outline(body, vertices, camera, outlines[t], t)
             pairs[t] = points if points.count else None
 
     with ThreadPoolExecutor(THREADS) as pool:
@@ -94,7 +94,7 @@ def sample_outlines(body: Body, params: BodyParams, width: int, height: int,
     return pairs, iou
 
 
-def outline_points(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int) -> tuple[Pairs, float]:
+def sample_outline(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int) -> tuple[Pairs, float]:
     """Surface points under the posed body's outline (V, 3), and the IoU of body and alpha."""
     h, w = outline.field.shape
     face, bary, _ = rasterise(vertices, body.faces, camera.scaled(w, h))
@@ -107,4 +107,4 @@ def outline_points(body: Body, vertices: np.ndarray, camera: Camera, outline: Ou
     if len(y) > POINTS:
         pick = ((np.arange(POINTS) + np.random.default_rng(seed).random(POINTS)) * len(y) / POINTS).astype(int)  # evenly by height
         y, x = y[pick], x[pick]
-    return surface_pairs(body, face[y, x], bary[y, x].astype(np.float64)), float(overlap)
+    return make_surface_pairs(body, face[y, x], bary[y, x].astype(np.float64)), float(overlap)

@@ -9,23 +9,23 @@ from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
 from gsac.avatar.body import LOST
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
-from gsac.stages.smplx.expression import mimic
+from gsac.stages.smplx.expression import translate_expression
 from gsac.stages.smplx.lm.fit import fit_clip
-from gsac.stages.smplx.lost_frames import lost_frames, sentences
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import read_outlines
 from gsac.stages.smplx.state import to_params
 from gsac.stages.smplx.warmup import rehearse
 
 
-def published(*clip):
+def fit_as_published(*clip):
     """The paper's fit; torch takes seconds to load, so only who asks for it does."""
     from gsac.stages.smplx.paper.fit import fit_clip as fit_as_published
 
     return fit_as_published(*clip)
 
 
-METHODS = {"lm": fit_clip, "paper": published}
+METHODS = {"lm": fit_clip, "paper": fit_as_published}
 """smplx.method -> (body, sightings, outlines, config, progress) -> Fit."""
 
 
@@ -45,18 +45,18 @@ def run(job: Job) -> None:
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
-    expression, jaw, silent = mimic(body, face)
+    expression, jaw, silent = translate_expression(body, face)
     if silent:
         job.warn(silent)
     params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression, fit.joint_offset)
     params.jaw_pose = jaw
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
-    lost = lost_frames(fit, seen, sightings.person_height)
+    lost = find_lost_frames(fit, seen, sightings.person_height)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
-    for sentence in (*fit.notes, *sentences(lost, fit.iou)):
+    for sentence in (*fit.notes, *describe_lost_frames(lost, fit.iou)):
         job.warn(sentence)
-    warn(job, params, clip)
+    warn_of_guesses(job, params, clip)
     params.write(job.out / "body.npz")
 
 
@@ -65,7 +65,7 @@ def warm(device: str) -> None:
     rehearse(run)
 
 
-def warn(job: Job, params, clip: Clip) -> None:
+def warn_of_guesses(job: Job, params, clip: Clip) -> None:
     """Says what one camera left open."""
     if not clip.focal_px and not job.config.focal_px:
         job.warn(f"The clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it).")

@@ -18,7 +18,7 @@ class State:
     transl: np.ndarray  # (T, 3) m
     betas: np.ndarray  # (B,)
     log_focal: float
-    held: np.ndarray
+    stance: np.ndarray
     """(H,) the clip's upright and mean pose, as in lm/stance.py; empty where they are not unknowns."""
     own: np.ndarray = field(default_factory=lambda: np.zeros(0))
     """(K,) the person's own offsets, as in lm/person_offsets.py; empty where they are not unknowns."""
@@ -33,7 +33,7 @@ class State:
     @property
     def shared(self) -> int:
         """Number of unknowns that all frames share."""
-        return 1 + len(self.shape) + len(self.held) + len(self.level)
+        return 1 + len(self.shape) + len(self.stance) + len(self.level)
 
 
 @dataclass

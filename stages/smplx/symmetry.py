@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def mirrored(spreads: dict[str, tuple], index: dict[str, int], rows: int) -> tuple[np.ndarray, np.ndarray]:
+def mirror_directions(spreads: dict[str, tuple], index: dict[str, int], rows: int) -> tuple[np.ndarray, np.ndarray]:
     """spreads: name without its side -> mm along x, y, z; 0 leaves an axis out, and so does the middle of the body for x.
 
     Returns (rows, 3, K) metres a unit of each unknown, and their spreads (K,) m.

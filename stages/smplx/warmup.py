@@ -27,13 +27,13 @@ SIGMA = 0.5
 def rehearse(run: Callable[[Job], None]) -> None:
     """run: the stage's. Takes what the compiler takes at the very first; a second and a half once its cache holds everything."""
     with TemporaryDirectory() as folder:
-        inputs = written(Body.load(), Path(folder))
+        inputs = write_inputs(Body.load(), Path(folder))
         out = Path(folder) / "out"
         out.mkdir()
         run(Job(inputs, out, SmplxConfig(rounds=1, iterations=1)))
 
 
-def written(body: Body, folder: Path) -> dict[str, Path]:
+def write_inputs(body: Body, folder: Path) -> dict[str, Path]:
     """Artifacts of a body that turns, by port."""
     pose = np.zeros((FRAMES, len(body.parents), 3))
     for t in range(FRAMES):

@@ -19,12 +19,12 @@ from gsac.avatar.wholebody import LEFT_HAND, RIGHT_HAND
 from gsac.avatar.yaw import yaw
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.initial import starting_state
-from gsac.stages.smplx.jacobians import pairs_of, positions
+from gsac.stages.smplx.initial import estimate_start
+from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.ground import Ground
-from gsac.stages.smplx.lm.observations import observations, take_off_habits
-from gsac.stages.smplx.lm.person_offsets import Personal
-from gsac.stages.smplx.lm.problem import ROBUST, Problem, joint_spread
+from gsac.stages.smplx.lm.observations import observe, subtract_habit
+from gsac.stages.smplx.lm.person_offsets import PersonOffsets
+from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -46,37 +46,37 @@ VIEW = np.radians(30)
 def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
              progress: Callable[[int, int, str], None]) -> Fit:
     """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps."""
-    detector = Detector.measured(sightings.detector, body)
+    detector = Detector.load(sightings.detector, body)
     problem, state = set_up(body, sightings, outlines, detector, config)
     state, steps = fit_points(problem, state, sightings, detector, 3 * config.iterations)
     iou = np.full(len(sightings.xy), np.nan)
     problem.outline_weight, problem.limit, problem.seen.depth_spread = config.silhouette, ROBUST, ROUNDS_DEPTH_SPREAD
     for r in range(config.rounds):
         progress(r, config.rounds + 1, "rounds")
-        take_off_habits(problem.seen, sightings, detector, BODY_POINTS, state)
+        subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
         if config.silhouette > 0:
             iou = renew_outlines(problem, state, sightings)
-        state.held = problem.held.learn(state.local[:, problem.active], state.held)
+        state.stance = problem.stance.learn(state.local[:, problem.active], state.stance)
         if problem.ground is None and config.contact > 0:
             stand_on_ground(problem, state, sightings, config.contact)
         state, more = problem.minimise(state, config.iterations)
         steps += more
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
-    return Fit(state, joint_spread(problem, state), iou, measure_reprojection(problem, state), steps + more,
-               problem.personal.joint_offset(state.own))
+    return Fit(state, estimate_joint_sigma(problem, state), iou, measure_reprojection(problem, state), steps + more,
+               problem.person_offsets.joint_offset(state.own))
 
 
 def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
            config: SmplxConfig) -> tuple[Problem, State]:
     """The problem of the body's joints, and the state from which it is solved."""
     center, focal = np.array([sightings.width / 2, sightings.height / 2]), focal_prior(sightings, config)
-    personal = Personal.of(body, detector.own, config.joint_offsets)
-    moves = np.concatenate([detector.slopes(body), personal.points], 2)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS], moves[BODY_POINTS])
-    seen = observations(sightings, detector, BODY_POINTS, center, focal, config, outlines)
-    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, personal)
-    state = replace(starting_state(body, sightings, focal[0], center), own=np.zeros(len(personal.spread)))
+    person_offsets = PersonOffsets.of(body, detector.own, config.joint_offsets)
+    moves = np.concatenate([detector.slopes(body), person_offsets.points], 2)
+    pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS], moves[BODY_POINTS])
+    seen = observe(sightings, detector, BODY_POINTS, center, focal, config, outlines)
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, person_offsets)
+    state = replace(estimate_start(body, sightings, focal[0], center), own=np.zeros(len(person_offsets.spread)))
     seen.depth *= measure_world_scale(problem, state, sightings)
     seen.repeats = count_repeats(state.local[:, 0])
     return problem, state
@@ -87,9 +87,9 @@ def fit_points(problem: Problem, state: State, sightings: Sightings, detector: D
     problem.limit = FAR_OFF * ROBUST
     bends = np.zeros(problem.size, bool)
     bends[3:-3] = True
-    take_off_habits(problem.seen, sightings, detector, BODY_POINTS, state)
+    subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
     state, first = problem.minimise(state, TRUNK_STEPS, bends, np.ones(state.shared, bool))
-    take_off_habits(problem.seen, sightings, detector, BODY_POINTS, state)
+    subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
     state, more = problem.minimise(state, iterations)
     return state, first + more
 
@@ -97,9 +97,9 @@ def fit_points(problem: Problem, state: State, sightings: Sightings, detector: D
 def stand_on_ground(problem: Problem, state: State, sightings: Sightings, weight: float) -> None:
     """Adds the ground's terms to the problem, and the ground's height to the state."""
     problem.ground = Ground(problem.body, weight)
-    problem.ground.watch(sightings.xy, sightings.seen, sightings.seconds, sightings.person_height)
+    problem.ground.find_resting_feet(sightings.xy, sightings.seen, sightings.seconds, sightings.person_height)
     chain = problem.skeleton.pose(state.local, state.shape)
-    state.level = problem.ground.level(chain, state.shape, state.transl, state.held)
+    state.level = problem.ground.estimate_level(chain, state.shape, state.transl, state.stance)
 
 
 def count_repeats(turns: np.ndarray) -> float:
@@ -110,7 +110,7 @@ def count_repeats(turns: np.ndarray) -> float:
 def measure_world_scale(problem: Problem, state: State, sightings: Sightings) -> float:
     """Ratio of the body's bones to those of the detector's metric points, its median over `SCALE_BONES`."""
     chain = problem.skeleton.pose(state.local[:1], state.shape)
-    x = positions(chain, problem.pairs, state.shape)[0]
+    x = place_points(chain, problem.pairs, state.shape)[0]
     ratios = []
     for a, b in SCALE_BONES:
         length = np.linalg.norm(sightings.world[:, a] - sightings.world[:, b], axis=-1)
@@ -121,7 +121,7 @@ def measure_world_scale(problem: Problem, state: State, sightings: Sightings) ->
 
 def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
     """Gives the problem new outline points, from the posed body. Returns the IoU (T,) of body and alpha, NaN without alpha."""
-    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.personal.joint_offset(state.own))
+    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
     problem.outline_pairs, iou = sample_outlines(problem.body, params, sightings.width, sightings.height, problem.seen.outlines)
     return iou
 
@@ -129,10 +129,10 @@ def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.n
 def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, state: State, config: SmplxConfig) -> tuple[State, int]:
     """Bends the fingers on the fitted wrists; nothing else moves. Returns state and number of steps."""
     body = problem.body
-    pairs = pairs_of(body, body.keypoint_matrix[FINGER_POINTS], detector.offsets[FINGER_POINTS])
-    seen = observations(sightings, detector, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, [])
-    fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, problem.personal)
-    state = replace(state, local=state.local.copy(), held=np.zeros(0), level=np.zeros(0))
+    pairs = make_pairs(body, body.keypoint_matrix[FINGER_POINTS], detector.offsets[FINGER_POINTS])
+    seen = observe(sightings, detector, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, [])
+    fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, problem.person_offsets)
+    state = replace(state, local=state.local.copy(), stance=np.zeros(0), level=np.zeros(0))
     state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)
     place = np.zeros(fingers.size, bool)
     place[-3:] = True
@@ -142,7 +142,7 @@ def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, stat
 def measure_reprojection(problem: Problem, state: State) -> np.ndarray:
     """(T,) median distance, px, of seen and fitted body points; NaN where nothing was seen."""
     out = np.full(len(state.local), np.nan)
-    for t, x in enumerate(problem.points(problem.skeleton.pose(state.local, state.shape), state)):
+    for t, x in enumerate(problem.locate_points(problem.skeleton.pose(state.local, state.shape), state)):
         off = np.linalg.norm(problem.project(state, x) - problem.seen.xy[t], axis=-1)[np.isfinite(problem.seen.spread[t])]
         out[t] = np.median(off) if len(off) else np.nan
     return out

@@ -49,7 +49,7 @@ class Observations:
     outline_spread: float  # px
 
 
-def observations(sightings: Sightings, detector: Detector, points: np.ndarray, center: np.ndarray, focal: tuple[float, float],
+def observe(sightings: Sightings, detector: Detector, points: np.ndarray, center: np.ndarray, focal: tuple[float, float],
                  config: SmplxConfig, outlines: list[Outline]) -> Observations:
     """Observations of the chosen key points; their spread is the detector's, wider where it or `handgap` is unsure.
 
@@ -60,13 +60,13 @@ def observations(sightings: Sightings, detector: Detector, points: np.ndarray, c
     unsure = np.sqrt(np.maximum(sightings.sigma**2 - sightings.sigma.min(0) ** 2, 0))
     spread = np.hypot(usual, unsure) / np.sqrt(np.clip(sightings.score, 0.2, 1))
     spread = np.where(sightings.seen, spread, np.inf)[:, points]
-    return Observations(sightings.xy[:, points].astype(np.float64), spread.astype(np.float64), depths(sightings)[:, points],
+    return Observations(sightings.xy[:, points].astype(np.float64), spread.astype(np.float64), _depths(sightings)[:, points],
                         DEPTH_SPREAD, center, sightings.seconds, focal,
                         (config.height_m, GIVEN_HEIGHT_SPREAD) if config.height_m else ADULT_HEIGHT, 1.0, outlines,
                         OUTLINE_SPREAD * height)
 
 
-def depths(sightings: Sightings) -> np.ndarray:
+def _depths(sightings: Sightings) -> np.ndarray:
     """(T, 133) m against the middle of the hips, in the detector's scale; NaN where unknown, and for hands and face."""
     depth = np.where(sightings.seen, sightings.world[..., 2], np.nan).astype(np.float64)
     depth -= sightings.world[:, HIPS, 2].mean(1)[:, None]
@@ -74,7 +74,7 @@ def depths(sightings: Sightings) -> np.ndarray:
     return depth
 
 
-def take_off_habits(seen: Observations, sightings: Sightings, detector: Detector, points: np.ndarray, state: State) -> None:
+def subtract_habit(seen: Observations, sightings: Sightings, detector: Detector, points: np.ndarray, state: State) -> None:
     """Subtracts the detector's systematic error at the body's current yaw from the observed points (P,)."""
     error = detector.error(yaw(state.local[:, 0]))[:, points]
     seen.xy = sightings.xy[:, points] - error * sightings.person_height

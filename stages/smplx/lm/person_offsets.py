@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsac.avatar.body import Body
-from gsac.stages.smplx.symmetry import mirrored
+from gsac.stages.smplx.symmetry import mirror_directions
 
 JOINTS = ("hip", "spine1", "knee", "spine2", "ankle", "spine3", "neck", "collar", "head", "shoulder", "elbow", "wrist")
 """Joints that may lie off what the betas say."""
 
 
 @dataclass
-class Personal:
+class PersonOffsets:
     """How key points and joints move by the K unknowns: those of the joints first."""
 
     joints: np.ndarray  # (55, 3, Kj)
@@ -27,11 +27,11 @@ class Personal:
     spread: np.ndarray  # (K,) of each unknown
 
     @classmethod
-    def of(cls, body: Body, points: np.ndarray, joint_spread: float) -> Personal:
+    def of(cls, body: Body, points: np.ndarray, joint_spread: float) -> PersonOffsets:
         """points: (133, 3, Kp) m, how people differ, a standard deviation each direction; joint_spread: m, of each joint's
         offset; 0 leaves joints where the betas have them."""
         places = {name: i for i, name in enumerate(body.joint_names)}
-        joints, of_joints = mirrored(dict.fromkeys(JOINTS, (1e3 * joint_spread,) * 3), places, 55)
+        joints, of_joints = mirror_directions(dict.fromkeys(JOINTS, (1e3 * joint_spread,) * 3), places, 55)
         points = np.concatenate([np.zeros((len(points), 3, len(of_joints))), points], 2)
         return cls(joints, points, np.append(of_joints, np.ones(points.shape[2] - len(of_joints))))
 

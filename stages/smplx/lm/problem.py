@@ -2,7 +2,7 @@
 
 Residuals are in units of their own spread, so that weights are probabilities and not taste. Data terms are robust
 (Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = 1 + B + K + H + G shared
-ones: focal length, betas, what is the person's own, what is held, the ground.
+ones: focal length, betas, what is the person's own, the stance, the ground.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.smplx import prior
-from gsac.stages.smplx.jacobians import Chain, Pairs, Skeleton, positions, pulled_back
+from gsac.stages.smplx.jacobians import Chain, Pairs, Skeleton, place_points, pull_back
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.observations import Observations
-from gsac.stages.smplx.lm.person_offsets import Personal
+from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.solver import System, levenberg_marquardt, robust
-from gsac.stages.smplx.lm.stance import Held
+from gsac.stages.smplx.lm.stance import Stance
 from gsac.stages.smplx.silhouette import INSET
 from gsac.stages.smplx.state import State
 
@@ -36,16 +36,17 @@ class Problem:
     """One clip's fit over chosen joints."""
 
     def __init__(self, body: Body, pairs: Pairs, hips: tuple[int, int], seen: Observations, active: np.ndarray,
-                 smoothness: float, personal: Personal | None = None):
+                 smoothness: float, person_offsets: PersonOffsets | None = None):
         self.body, self.pairs, self.hips, self.seen = body, pairs, hips, seen
-        self.skeleton, self.personal = Skeleton(body, active, personal.joints if personal else None), personal
-        self.own_spread = personal.spread if personal else np.zeros(0)
+        self.person_offsets = person_offsets
+        self.skeleton = Skeleton(body, active, person_offsets.joints if person_offsets else None)
+        self.own_spread = person_offsets.spread if person_offsets else np.zeros(0)
         self.active = active
         self.mean, self.spread = prior.pose_prior(active)
-        speed, acceleration = prior.turning_spread(active)
+        speed, acceleration = prior.motion_prior(active)
         self.speed_spread, self.acceleration_spread = speed, acceleration
         self.smoothness, self.outline_weight, self.limit = smoothness, 0.0, ROBUST
-        self.held = Held(active)
+        self.stance = Stance(active)
         self.ground: Ground | None = None
         self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
         self.size = 3 * len(active) + 3
@@ -71,9 +72,9 @@ class Problem:
         local = state.local.copy()
         local[:, self.active] = local[:, self.active] @ rotation.exp(step[:, :-3].reshape(len(step), -1, 3))
         b, s = 1 + len(state.betas), 1 + len(state.shape)
-        h = s + len(state.held)
+        h = s + len(state.stance)
         return State(local, state.transl + step[:, -3:], state.betas + shared[1:b], state.log_focal + float(shared[0]),
-                     state.held + shared[s:h], state.own + shared[b:s], state.level + shared[h:])
+                     state.stance + shared[s:h], state.own + shared[b:s], state.level + shared[h:])
 
     def project(self, state: State, x: np.ndarray) -> np.ndarray:
         return np.exp(state.log_focal) * x[..., :2] / np.maximum(x[..., 2:], 0.05) + self.seen.center
@@ -81,58 +82,58 @@ class Problem:
     def cost(self, state: State) -> float:
         chain = self.skeleton.pose(state.local, state.shape)
         total = 0.0
-        x = self.points(chain, state)
+        x = self.locate_points(chain, state)
         total += robust(self._point_residual(self.project(state, x)), self.limit)[0].sum()
         total += robust(self._depth_residual(x), self.limit)[0].sum()
-        for t, x in self.outline_points(chain, state):
+        for t, x in self.locate_outlines(chain, state):
             distance, _, inside = self.seen.outlines[t].at(self.project(state, x))
             scaled = np.where(inside, (distance + self._stand_off(t, state, x)[0]) / self.seen.outline_spread, 0)
             total += self._outline_share(len(x)) * robust(scaled, OUTLINE_ROBUST)[0].sum()
         vector = rotation.log(state.local[:, self.active])
         total += (self._prior_residual(vector) ** 2).sum() + (self._limit_residual(vector)[0] ** 2).sum()
-        if len(state.held):
-            total += (self.held.residual(state.local[:, self.active], vector, state.held) ** 2).sum()
+        if len(state.stance):
+            total += (self.stance.residual(state.local[:, self.active], vector, state.stance) ** 2).sum()
         if len(state.level):
-            total += self.ground.cost(chain, state.shape, state.transl, state.held, state.level)
+            total += self.ground.cost(chain, state.shape, state.transl, state.stance, state.level)
         total += sum((r**2).sum() for r in self._temporal_residuals(state, self._turns(state)[0]))
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
     def linearise(self, state: State) -> System:
         chain = self.skeleton.pose(state.local, state.shape)
-        system = self.of_each_frame(state, chain)
+        system = self.linearise_frames(state, chain)
         self._add_temporal(system, state)
-        if len(state.held):
+        if len(state.stance):
             local = state.local[:, self.active]
-            self.held.add(system, local, rotation.log(local), state.held, len(state.shape) + 1)
+            self.stance.add(system, local, rotation.log(local), state.stance, len(state.shape) + 1)
         if len(state.level):
-            self.ground.add(system, self.skeleton, chain, state.shape, state.transl, state.held, state.level)
+            self.ground.add(system, self.skeleton, chain, state.shape, state.transl, state.stance, state.level)
         residual, jacobian = self._shared_residual(state)
         system.add_shared(jacobian, residual)
         return system
 
-    def of_each_frame(self, state: State, chain: Chain) -> System:
+    def linearise_frames(self, state: State, chain: Chain) -> System:
         """Normal equations of what each frame shows by itself, and of the pose prior."""
         system = System.zeros(len(state.local), self.size, state.shared)
         self._add_points(system, state, chain)
-        for t, x in self.outline_points(chain, state):
+        for t, x in self.locate_outlines(chain, state):
             self._add_outline(system, state, chain, t, x)
         self._add_prior(system, state)
         return system
 
-    def points(self, chain: Chain, state: State) -> np.ndarray:
+    def locate_points(self, chain: Chain, state: State) -> np.ndarray:
         """(T, P, 3) key points, camera frame."""
-        return positions(chain, self.pairs, state.shape) + state.transl[:, None]
+        return place_points(chain, self.pairs, state.shape) + state.transl[:, None]
 
-    def outline_points(self, chain: Chain, state: State) -> Iterator[tuple[int, np.ndarray]]:
+    def locate_outlines(self, chain: Chain, state: State) -> Iterator[tuple[int, np.ndarray]]:
         """Frame and its outline points (P, 3), of the frames that have any."""
         if self.outline_weight > 0:
             for t, pairs in enumerate(self.outline_pairs):
                 if pairs is not None:
-                    yield t, positions(chain.frame(t), pairs, state.shape)[0] + state.transl[t]
+                    yield t, place_points(chain.frame(t), pairs, state.shape)[0] + state.transl[t]
 
     def _add_points(self, system: System, state: State, chain: Chain) -> None:
         """Key points and their depths: two rows and one row a point."""
-        x = self.points(chain, state)
+        x = self.locate_points(chain, state)
         uv = self.project(state, x)
         residual = self._point_residual(uv)
         shrink = robust(residual, self.limit)[1]
@@ -142,7 +143,7 @@ class Problem:
         covectors = np.zeros((*x.shape[:2], 3, 3))
         covectors[..., :2, :], covectors[..., 2, 2] = self._projection_slope(state, x), 1
         scale = np.concatenate([weight, (depth_shrink / self.seen.depth_spread)[..., None]], 2)
-        rows = pulled_back(self.skeleton, chain, self.pairs, state.shape, covectors)
+        rows = pull_back(self.skeleton, chain, self.pairs, state.shape, covectors)
         rows[:, :, 2] -= rows[:, list(self.hips), 2].mean(1, keepdims=True)
         jacobian, n = np.zeros((*rows.shape[:3], rows.shape[3] + 1)), self.size
         jacobian[..., :n], jacobian[..., :2, n], jacobian[..., n + 1:] = rows[..., :n], uv - self.seen.center, rows[..., n:]
@@ -187,7 +188,7 @@ class Problem:
         along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x))  # (P, 3)
         along[:, 2] -= clothes / np.maximum(x[:, 2], 0.05)
         along *= weight[:, None]
-        rows = pulled_back(self.skeleton, chain.frame(t), self.outline_pairs[t], state.shape, along[None, :, None])[0, :, 0]
+        rows = pull_back(self.skeleton, chain.frame(t), self.outline_pairs[t], state.shape, along[None, :, None])[0, :, 0]
         focal = (((uv - self.seen.center) * direction).sum(1) + clothes) * weight
         system.add(slice(t, t + 1), np.insert(rows, self.size, focal, 1)[None], (residual * shrink)[None])
 
@@ -277,27 +278,27 @@ class Problem:
                 system.band[frames, block, columns] += left.transpose(0, 2, 1) @ right
 
     def _shared_residual(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Focal, shape and height priors, those of what is the person's own and of what is held: residuals (R,) and rows (R, s).
+        """Focal, shape and height priors, those of what is the person's own and of the stance: residuals (R,) and rows (R, s).
 
         Frames of one view share their errors (clothes, the detector's habits), so that the priors count once for each repeat.
         """
         b, (focal, focal_spread), (metres, spread) = 1 + len(state.betas), self.seen.focal_prior, self.seen.height
         spreads = np.concatenate([[focal_spread], self.shape_spread, self.own_spread[:len(state.own)],
-                                  self.held.mean_spread[:len(state.held)]])
+                                  self.stance.mean_spread[:len(state.stance)]])
         rows = np.concatenate([np.diag(1 / spreads), np.zeros((1, len(spreads)))])
         rows[-1, 1:b] = self.height_dirs / spread
         tall = self.height + self.height_dirs @ state.betas
         away = np.concatenate([[state.log_focal - np.log(focal)], state.betas - self.shape_mean, state.own,
-                               state.held - self.held.mean[:len(state.held)]])
+                               state.stance - self.stance.mean[:len(state.stance)]])
         residual = np.append(away / spreads, (tall - metres) / spread)
         count = np.sqrt(self.seen.repeats)
         return residual * count, np.pad(rows * count, ((0, 0), (0, len(state.level))))
 
 
-def joint_spread(problem: Problem, state: State) -> np.ndarray:
+def estimate_joint_sigma(problem: Problem, state: State) -> np.ndarray:
     """(T, 55) m: how far each joint may be off by what its frame shows alone, each unknown by itself."""
     chain = problem.skeleton.pose(state.local, state.shape)
-    system = problem.of_each_frame(state, chain)
+    system = problem.linearise_frames(state, chain)
     n = problem.size
     information = system.band[:, np.arange(n), np.arange(n)]
     angle = 1 / np.sqrt(np.maximum(information[:, :-3].reshape(len(state.local), -1, 3).min(-1), 1e-6))

@@ -32,7 +32,7 @@ FREE = 0.5
 """Spread of the mean turn of a joint, rad, at least: frames know it better."""
 
 
-class Held:
+class Stance:
     """The term of one clip; without a say until `learn` was called."""
 
     def __init__(self, active: np.ndarray):
@@ -44,17 +44,17 @@ class Held:
         self.mean = np.concatenate([mean.ravel(), [0, 0]])  # (H,)
         self.mean_spread = np.concatenate([spread.ravel(), [ROLL, PITCH]])  # (H,)
 
-    def residual(self, local: np.ndarray, vector: np.ndarray, held: np.ndarray) -> np.ndarray:
-        """local: (T, A, 3, 3); vector: (T, A, 3) its logarithm; held: (H,). Returns (T, A, 3), in spreads."""
-        return self._away(local, vector, held) / self.spread
+    def residual(self, local: np.ndarray, vector: np.ndarray, stance: np.ndarray) -> np.ndarray:
+        """local: (T, A, 3, 3); vector: (T, A, 3) its logarithm; stance: (H,). Returns (T, A, 3), in spreads."""
+        return self._away(local, vector, stance) / self.spread
 
-    def add(self, system: System, local: np.ndarray, vector: np.ndarray, held: np.ndarray, first: int) -> None:
-        """Adds the term to the normal equations; `first` is the place of `held` among the shared unknowns."""
+    def add(self, system: System, local: np.ndarray, vector: np.ndarray, stance: np.ndarray, first: int) -> None:
+        """Adds the term to the normal equations; `first` is the place of `stance` among the shared unknowns."""
         if not np.isfinite(self.spread).any():
             return
-        residual = self.residual(local, vector, held)
+        residual = self.residual(local, vector, stance)
         slope = rotation.log_derivative(vector)  # (T, A, 3, 3)
-        slope[:, 0] = _cross(local[:, 0].swapaxes(1, 2) @ upright(held)[0])
+        slope[:, 0] = _cross(local[:, 0].swapaxes(1, 2) @ upright(stance)[0])
         slope /= self.spread[:, :, None]
         for i in range(len(self.active)):
             rows, weight = slope[:, i], 1 / self.spread[i]
@@ -64,14 +64,14 @@ class Held:
             system.arrow[:, block, shared] -= rows.swapaxes(1, 2) * weight
             system.shared[shared, shared] += len(vector) * np.diag(weight**2)
             system.shared_gradient[shared] -= (residual[:, i] * weight).sum(0)
-        self._add_upright(system, local, held, residual[:, 0], slope[:, 0], first)
+        self._add_upright(system, local, stance, residual[:, 0], slope[:, 0], first)
 
-    def _add_upright(self, system: System, local: np.ndarray, held: np.ndarray, residual: np.ndarray, rows: np.ndarray,
+    def _add_upright(self, system: System, local: np.ndarray, stance: np.ndarray, residual: np.ndarray, rows: np.ndarray,
                      first: int) -> None:
         """How the lean (T, 3) moves with the upright. rows: (T, 3, 3) by the pelvis' turn."""
         weight = 1 / self.spread[0]
-        by_up = local[:, 0].swapaxes(1, 2) @ upright(held)[1] * weight[:, None]  # (T, 3, 2)
-        lean, up = slice(first, first + 3), slice(first + len(held) - 2, first + len(held))
+        by_up = local[:, 0].swapaxes(1, 2) @ upright(stance)[1] * weight[:, None]  # (T, 3, 2)
+        lean, up = slice(first, first + 3), slice(first + len(stance) - 2, first + len(stance))
         across = -(by_up * weight[:, None]).sum(0)  # (3, 2)
         system.arrow[:, :3, up] += rows.swapaxes(1, 2) @ by_up
         system.shared[lean, up] += across
@@ -79,39 +79,39 @@ class Held:
         system.shared[up, up] += np.einsum("tab,tac->bc", by_up, by_up)
         system.shared_gradient[up] += np.einsum("tab,ta->b", by_up, residual)
 
-    def learn(self, local: np.ndarray, held: np.ndarray) -> np.ndarray:
-        """Sets the spreads by what the frames show. Returns held (H,): the frames' means where there was none yet."""
+    def learn(self, local: np.ndarray, stance: np.ndarray) -> np.ndarray:
+        """Sets the spreads by what the frames show. Returns stance (H,): the frames' means where there was none yet."""
         vector = rotation.log(local)
         if not np.isfinite(self.spread).any():
             up = local[:, 0, :, 1].mean(0)
-            held = np.concatenate([vector.mean(0).ravel(), -up[[0, 2]] / min(up[1], -0.3)])
-            held[:3] = 0
+            stance = np.concatenate([vector.mean(0).ravel(), -up[[0, 2]] / min(up[1], -0.3)])
+            stance[:3] = 0
         unrest = np.sqrt(((vector - vector.mean(0)) ** 2).mean(0)).max(1)  # (A,)
-        spread = np.sqrt((USUAL_WEIGHT * USUAL**2 + (self._away(local, vector, held) ** 2).mean(0)) / (USUAL_WEIGHT + 1))
+        spread = np.sqrt((USUAL_WEIGHT * USUAL**2 + (self._away(local, vector, stance) ** 2).mean(0)) / (USUAL_WEIGHT + 1))
         spread[0] = np.sqrt(spread[0] ** 2 + USUAL_WEIGHT * (USUAL_LEAN**2 - USUAL**2) / (USUAL_WEIGHT + 1))
         spread[0, 1] = np.inf
         trunk = self._calm(unrest, TRUNK)
         for joints, calm in ((TRUNK, trunk), *((arm, trunk * self._calm(unrest, arm)) for arm in ARMS)):
             spread[np.isin(self.active, joints)] *= 1 / np.sqrt(calm) if calm > 0.01 else np.inf
         self.spread = spread
-        return held
+        return stance
 
     def _calm(self, unrest: np.ndarray, joints: tuple[int, ...]) -> float:
         """1 where the movers among the joints rest, 0 where they move. unrest: (A,) rad."""
         worst = unrest[np.isin(self.active, np.intersect1d(joints, MOVERS))].max(initial=0)
         return 1 / (1 + (worst / UNREST) ** 8)
 
-    def _away(self, local: np.ndarray, vector: np.ndarray, held: np.ndarray) -> np.ndarray:
+    def _away(self, local: np.ndarray, vector: np.ndarray, stance: np.ndarray) -> np.ndarray:
         """(T, A, 3) rad."""
-        away = vector - held[:-2].reshape(-1, 3)
-        away[:, 0] = local[:, 0].swapaxes(1, 2) @ upright(held)[0] - held[:3]
+        away = vector - stance[:-2].reshape(-1, 3)
+        away[:, 0] = local[:, 0].swapaxes(1, 2) @ upright(stance)[0] - stance[:3]
         away[:, 0, 1] = 0
         return away
 
 
-def upright(held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def upright(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The unit vector (3,) that points up in the camera frame, and how it moves with its slopes (3, 2)."""
-    v = np.array([held[-2], -1, held[-1]])
+    v = np.array([stance[-2], -1, stance[-1]])
     length = np.linalg.norm(v)
     u = v / length
     return u, (np.eye(3) - np.outer(u, u))[:, [0, 2]] / length

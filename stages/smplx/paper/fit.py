@@ -18,10 +18,10 @@ import torch
 from gsac.avatar.body import Body
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.initial import starting_state
-from gsac.stages.smplx.jacobians import pairs_of
-from gsac.stages.smplx.lm.observations import observations
-from gsac.stages.smplx.lm.problem import Problem, joint_spread
+from gsac.stages.smplx.initial import estimate_start
+from gsac.stages.smplx.jacobians import make_pairs
+from gsac.stages.smplx.lm.observations import observe
+from gsac.stages.smplx.lm.problem import Problem, estimate_joint_sigma
 from gsac.stages.smplx.paper.loss import Objective, Unknowns
 from gsac.stages.smplx.paper.smooth import smooth_linear, smooth_rotations
 from gsac.stages.smplx.prior import BODY_JOINTS
@@ -65,7 +65,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
 def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress: Callable,
          passes: tuple[Pass, ...]) -> Fit:
     center = np.array([sightings.width / 2, sightings.height / 2])
-    start = starting_state(body, sightings, focal_prior(sightings, config)[0], center)
+    start = estimate_start(body, sightings, focal_prior(sightings, config)[0], center)
     objective = Objective(body, sightings, start, center)
     unknowns = Unknowns(objective.start, torch.tensor(start.transl, dtype=torch.float32), body.num_betas)
     frames = len(sightings.xy)
@@ -75,7 +75,7 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
         for batch in batches:
             descend(objective, unknowns, batch, sweep, first == 0, lambda n, before=done: progress(before + n, total, "steps"))
             done += sweep.steps
-    local, transl, betas, joint_offset = unknowns.found()
+    local, transl, betas, joint_offset = unknowns.read()
     if sightings.seconds is not None:
         local, transl = smooth_rotations(local), smooth_linear(transl)
     state = State(local, transl, betas, start.log_focal, np.zeros(0))
@@ -84,8 +84,8 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
         notes += ("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) are off",)
     params = to_params(body, state, center, joint_offset=joint_offset)
     iou = sample_outlines(body, params, sightings.width, sightings.height, outlines)[1]
-    return Fit(state, spread_of(body, sightings, state, config, center), iou,
-               pixels_off(objective, sightings, state, joint_offset), total, joint_offset, notes)
+    return Fit(state, estimate_sigma(body, sightings, state, config, center), iou,
+               measure_reprojection(objective, sightings, state, joint_offset), total, joint_offset, notes)
 
 
 def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass, hold_hands: bool, tell: Callable) -> None:
@@ -93,7 +93,7 @@ def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass,
     optimiser = None
     for step in range(sweep.steps):
         if optimiser is None or step == sweep.warm_up:
-            optimiser = torch.optim.Adam(list(unknowns.leaves(batch, step < sweep.warm_up, sweep.shared)))
+            optimiser = torch.optim.Adam(list(unknowns.open_batch(batch, step < sweep.warm_up, sweep.shared)))
         optimiser.param_groups[0]["lr"] = sweep.rate * 0.1 ** sum(step >= d for d in sweep.decays)
         optimiser.zero_grad()
         hold = HAND_OFFSET if hold_hands and step < HAND_OFFSET_STEPS else 1.0
@@ -102,15 +102,15 @@ def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass,
         tell(step + 1)
 
 
-def spread_of(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
+def estimate_sigma(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
     """(T, 55) m, read off the same normal equations as `lm`'s at this state."""
-    detector = Detector.measured(sightings.detector, body)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
-    seen = observations(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
-    return joint_spread(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness), state)
+    detector = Detector.load(sightings.detector, body)
+    pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
+    seen = observe(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
+    return estimate_joint_sigma(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness), state)
 
 
-def pixels_off(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:
+def measure_reprojection(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:
     """(T,) median px of the body points; NaN where nothing was seen."""
     uv = objective.pixels(state.local, state.transl, state.betas, joint_offset)
     use = np.isin(objective.known, BODY_POINTS)

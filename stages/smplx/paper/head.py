@@ -25,7 +25,7 @@ VISIBLE = float(np.cos(np.radians(135)))
 EYES = [INDEX["left_eye"], INDEX["right_eye"]]
 EARS = [INDEX["left_ear"], INDEX["right_ear"]]
 HEAD_JOINTS, EYE_JOINTS = [15, 22], [23, 24]
-LAYINGS = 24
+ICP_STEPS = 24
 """Rounds in which the head mesh is laid on the body's head."""
 NEAR, LEAST_SHARE = 0.015, 0.3
 """m within which a vertex lies on the head mesh, and how many of the head's must."""
@@ -51,9 +51,9 @@ class Head:
         faces = arrays["head_faces"].astype(int)
         if faces.ndim != 2 or faces.shape[1] != 3 or faces.max(initial=0) >= len(own) or template.shape != own.shape:
             raise StageError(f"face.npz: head_faces must be (F, 3) over the {len(own)} head vertices, and head_template like them")
-        index, corners, share, turn = laid_on(template, faces, eyes, body)
-        if len(index) < LEAST_SHARE * head_vertices(body).sum():
-            raise StageError(f"face.npz: only {len(index)} of the body's {head_vertices(body).sum()} head vertices lie on its head "
+        index, corners, share, turn = lay_on_body(template, faces, eyes, body)
+        if len(index) < LEAST_SHARE * select_head(body).sum():
+            raise StageError(f"face.npz: only {len(index)} of the body's {select_head(body).sum()} head vertices lie on its head "
                              "mesh; expected a head in metres, y up, z out of the face, with head_eyes its left and right eye")
         places = np.einsum("nk,nkc->nc", share, own[corners]) @ turn.T
         place = np.full(len(body.v_template), -1)
@@ -62,21 +62,21 @@ class Head:
         return cls(places, index, kept[(kept >= 0).all(1)])
 
 
-def head_vertices(body: Body) -> np.ndarray:
+def select_head(body: Body) -> np.ndarray:
     """(V,) bool: those that go with head and jaw; the eyes are left out."""
     return body.weights[:, HEAD_JOINTS].sum(1) > 0.5
 
 
-def laid_on(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Body) -> tuple[np.ndarray, ...]:
+def lay_on_body(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Body) -> tuple[np.ndarray, ...]:
     """Index (n,) of the body's head vertices that lie on the head mesh, corners (n, 3) of the face where and their shares (n, 3),
     and the turn (3, 3) from the mesh to the body."""
-    index = np.flatnonzero(head_vertices(body))
-    skin, around = body.v_template[index].astype(float), incident(faces, len(vertices))
+    index = np.flatnonzero(select_head(body))
+    skin, around = body.v_template[index].astype(float), find_incident_faces(faces, len(vertices))
     own = (body.J_regressor[EYE_JOINTS] @ body.v_template).astype(float)
     size = np.linalg.norm(own[0] - own[1]) / max(np.linalg.norm(eyes[0] - eyes[1]), 1e-6)
     turn, shift = np.eye(3), own.mean(0) - size * eyes.mean(0)
-    for _ in range(LAYINGS):
-        found, corners, share = closest(skin, size * vertices @ turn.T + shift, faces, around)
+    for _ in range(ICP_STEPS):
+        found, corners, share = find_closest(skin, size * vertices @ turn.T + shift, faces, around)
         far = np.linalg.norm(found - skin, axis=1)
         near = far < max(NEAR, np.median(far))
         source = np.einsum("nk,nkc->nc", share, vertices[corners])[near]
@@ -88,7 +88,7 @@ def laid_on(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Bod
     return index[near], corners[near], share[near], turn
 
 
-def incident(faces: np.ndarray, count: int) -> np.ndarray:
+def find_incident_faces(faces: np.ndarray, count: int) -> np.ndarray:
     """(count, K) faces about each vertex, padded with repeats."""
     vertex, face = faces.T.ravel(), np.tile(np.arange(len(faces)), 3)
     order = np.argsort(vertex, kind="stable")
@@ -99,7 +99,7 @@ def incident(faces: np.ndarray, count: int) -> np.ndarray:
     return face[np.minimum(at, len(face) - 1)]
 
 
-def closest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, ...]:
+def find_closest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, ...]:
     """points: (n, 3). Nearest places (n, 3) on the faces about the nearest vertex, corners (n, 3) and their shares (n, 3)."""
     tried = faces[around[cKDTree(vertices).query(points)[1]]]  # (n, K, 3)
     a, b, c = (vertices[tried[..., k]] for k in range(3))
@@ -148,7 +148,7 @@ class HeadTerms:
         return (x[self.pairs[:, 0]] - x[self.pairs[:, 1]]).norm(dim=1)
 
 
-def visible(points: np.ndarray) -> np.ndarray:
+def faces_camera(points: np.ndarray) -> np.ndarray:
     """points: (T, 133, 3) m, camera frame, NaN where the body carries no such point. (T,) bool: the face looks towards the camera.
 
     In the camera's xz plane the way from the face's centre to the eyes must lie against the line of sight by more than 135 degrees.

@@ -13,7 +13,7 @@ from scipy import sparse
 from gsac.avatar.body import Body
 
 
-def matrices(six: torch.Tensor) -> torch.Tensor:
+def to_matrices(six: torch.Tensor) -> torch.Tensor:
     """six: (..., 6), the first two columns of a rotation, not normalised. Returns (..., 3, 3) (Zhou et al. 2019)."""
     a, b = six[..., :3], six[..., 3:]
     x = torch.nn.functional.normalize(a, dim=-1)
@@ -21,12 +21,12 @@ def matrices(six: torch.Tensor) -> torch.Tensor:
     return torch.stack([x, y, torch.linalg.cross(x, y)], -1)
 
 
-def six_of(rotation: torch.Tensor) -> torch.Tensor:
+def to_six(rotation: torch.Tensor) -> torch.Tensor:
     """rotation: (..., 3, 3). Returns (..., 6)."""
     return torch.cat([rotation[..., 0], rotation[..., 1]], -1)
 
 
-def rotation_vectors(rotation: torch.Tensor) -> torch.Tensor:
+def to_vectors(rotation: torch.Tensor) -> torch.Tensor:
     """rotation: (..., 3, 3) by less than pi. Returns (..., 3) rad."""
     r = rotation
     axis = torch.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], -1) / 2

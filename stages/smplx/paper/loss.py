@@ -10,8 +10,8 @@ import torch
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.paper.head import Head, HeadTerms, visible
-from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
+from gsac.stages.smplx.paper.head import Head, HeadTerms, faces_camera
+from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from gsac.stages.smplx.prior import BODY_JOINTS
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.state import State
@@ -33,7 +33,7 @@ class Unknowns:
     """What Adam moves: 6D rotations and translation of each frame, betas and joint offsets of the clip."""
 
     def __init__(self, local: torch.Tensor, transl: torch.Tensor, betas: int):
-        six = six_of(local)
+        six = to_six(local)
         self.root, self.transl = six[:, :1].clone(), transl.clone()
         self.body, self.hands = six[:, 1:BODY].clone(), six[:, HANDS_FROM:].clone()
         self.face = local[:, BODY:HANDS_FROM]
@@ -41,7 +41,7 @@ class Unknowns:
         self.movable = torch.ones(local.shape[1], 1)
         self.movable[FIXED_OFFSETS] = 0
 
-    def leaves(self, frames: slice, root_only: bool, shared: bool) -> Iterator[torch.Tensor]:
+    def open_batch(self, frames: slice, root_only: bool, shared: bool) -> Iterator[torch.Tensor]:
         """Opens the batch's leaves and closes all others; the frames' leaves are views that Adam writes through."""
         for tensor in (self.betas, self.joint_offset):
             tensor.requires_grad_(shared and not root_only)
@@ -56,15 +56,15 @@ class Unknowns:
     def local(self, frames: slice) -> torch.Tensor:
         """(n, J, 3, 3) of the batch that is open."""
         root, body, hands, _ = self.batch
-        return torch.cat([matrices(root), matrices(body), self.face[frames], matrices(hands)], 1)
+        return torch.cat([to_matrices(root), to_matrices(body), self.face[frames], to_matrices(hands)], 1)
 
     def offsets(self) -> torch.Tensor:
         """(J, 3) m."""
         return self.joint_offset * self.movable
 
-    def found(self) -> tuple[np.ndarray, ...]:
+    def read(self) -> tuple[np.ndarray, ...]:
         """Rotations (T, J, 3, 3), transl (T, 3), betas (B,), joint offsets (J, 3)."""
-        parts = (matrices(self.root), matrices(self.body), self.face, matrices(self.hands))
+        parts = (to_matrices(self.root), to_matrices(self.body), self.face, to_matrices(self.hands))
         return tuple(t.detach().numpy().astype(np.float64) for t in (torch.cat(parts, 1), self.transl, self.betas, self.offsets()))
 
 
@@ -73,12 +73,12 @@ class Objective:
 
     def __init__(self, body: Body, sightings: Sightings, start: State, center: np.ndarray):
         self.kinematics = Kinematics(body)
-        offsets = Detector.measured(sightings.detector, body).offsets
+        offsets = Detector.load(sightings.detector, body).offsets
         self.known = np.flatnonzero(body.known_keypoints)
         self.points = Points(body, body.keypoint_matrix[self.known], offsets[self.known])
         self.mesh = Mesh(body)
         self.focal, self.center = float(np.exp(start.log_focal)), torch.tensor(center, dtype=torch.float32)
-        corner, side = boxes(sightings)
+        corner, side = box_person(sightings)
         seen = sightings.seen[:, self.known]
         xy = np.where(seen[..., None], sightings.xy[:, self.known], 0)
         self.corner, self.side = torch.tensor(corner)[:, None], torch.tensor(side)[:, None, None]
@@ -105,18 +105,18 @@ class Objective:
         world, place = self.kinematics.pose(local, rest)
         x = self.points.at(world, place, rest, betas) + unknowns.batch[3][:, None]
         uv = self.project(x, frames)
-        seen = self.weight[frames] * self._countable(x, uv, frames)
+        seen = self.weight[frames] * self._weigh_points(x, uv, frames)
         total = ((uv - self.target[frames]).abs() * seen[..., None]).mean()
         mesh = self._relative(self.mesh.at(world, place, rest, betas), place)
         total = total + INIT * (mesh - self.start_mesh[frames]).abs().mean() + INIT * (local - self.start[frames]).abs().mean()
-        total = total + SHAPE * (betas**2).mean() + UPRIGHT * (rotation_vectors(local[:, SPINE])[..., 0] ** 2).mean()
+        total = total + SHAPE * (betas**2).mean() + UPRIGHT * (to_vectors(local[:, SPINE])[..., 0] ** 2).mean()
         hold = torch.ones(len(offset), 1)
         hold[HANDS_FROM:] = hand_hold
         total = total + JOINT_OFFSET * (hold * offset**2).mean()
         mirrored = offset[self.right] * torch.tensor([-1.0, 1, 1])
         total = total + SYMMETRY * (offset[self.left] - mirrored).abs().mean()
         if self.head is not None:
-            total = total + float(self.face_seen(x, frames).mean()) * self.head.loss(betas)
+            total = total + float(self.sees_face(x, frames).mean()) * self.head.loss(betas)
         return total
 
     def project(self, x: torch.Tensor, frames: slice) -> torch.Tensor:
@@ -131,11 +131,11 @@ class Objective:
         x = self.points.at(*self.kinematics.pose(as_float[0], rest), rest, as_float[2]) + as_float[1][:, None]
         return (self.focal * x[..., :2] / x[..., 2:] + self.center).numpy()
 
-    def face_seen(self, x: torch.Tensor, frames: slice) -> np.ndarray:
+    def sees_face(self, x: torch.Tensor, frames: slice) -> np.ndarray:
         """(n,) bool: the face looks at the camera and the face method saw it."""
         points = np.full((len(x), 133, 3), np.nan)
         points[:, self.known] = x.detach().numpy()
-        return visible(points) & self.face_valid[frames]
+        return faces_camera(points) & self.face_valid[frames]
 
     def _mesh(self, local: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
         world, place = self.kinematics.pose(local, rest)
@@ -145,12 +145,12 @@ class Objective:
     def _relative(mesh: torch.Tensor, place: torch.Tensor) -> torch.Tensor:
         return mesh - place[:, 0, :, None]
 
-    def _countable(self, x: torch.Tensor, uv: torch.Tensor, frames: slice) -> torch.Tensor:
+    def _weigh_points(self, x: torch.Tensor, uv: torch.Tensor, frames: slice) -> torch.Tensor:
         """(n, K) 0 for the face that is turned away, and for the farther of two hands (with its wrist) that lie on each other."""
         with torch.no_grad():
             out = torch.ones(uv.shape[:2])
             if self.inner_face:
-                seen = torch.tensor(self.face_seen(x, frames), dtype=torch.float32)
+                seen = torch.tensor(self.sees_face(x, frames), dtype=torch.float32)
                 out[:, self.inner_face] = seen[:, None]
             if all(self.hands):
                 low, high = zip(*[(uv[:, h].amin(1), uv[:, h].amax(1)) for h in self.hands], strict=True)
@@ -164,7 +164,7 @@ class Objective:
         return out
 
 
-def boxes(sightings: Sightings) -> tuple[np.ndarray, np.ndarray]:
+def box_person(sightings: Sightings) -> tuple[np.ndarray, np.ndarray]:
     """Corner (T, 2) and side (T,) px of the square around each frame's person: its points' box x 1.2, squared, x 1.25."""
     corner = np.zeros((len(sightings.xy), 2), np.float32)
     side = np.full(len(corner), max(sightings.width, sightings.height), np.float32)

@@ -16,16 +16,16 @@ from gsac.stages.contract import BadInput, make_config
 from gsac.stages.smplx import STAGE
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.jacobians import pairs_of, positions
+from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.fit import fit_clip
-from gsac.stages.smplx.lm.observations import observations
-from gsac.stages.smplx.lm.person_offsets import Personal
+from gsac.stages.smplx.lm.observations import observe
+from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.lm.solver import System
-from gsac.stages.smplx.lm.stance import Held
+from gsac.stages.smplx.lm.stance import Stance
 from gsac.stages.smplx.prior import BODY_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings
-from gsac.stages.smplx.silhouette import Outline, outline_points, read_outline
+from gsac.stages.smplx.silhouette import Outline, read_outline, sample_outline
 from gsac.stages.smplx.state import State, to_params
 from gsac.turntable.shell import draped
 
@@ -190,30 +190,30 @@ def test_arms_that_reach_forward_are_not_left_hanging(body):
 def test_derivatives_agree_with_finite_differences(body, tmp_path):
     truth = turning_person(body, 3)
     outlines = outlines_of(body, truth, tmp_path)
-    seen = observations(sightings_of(body, truth, 2.0), Detector.measured("", body), BODY_POINTS,
+    seen = observe(sightings_of(body, truth, 2.0), Detector.load("", body), BODY_POINTS,
                         np.array([WIDTH / 2, HEIGHT / 2]), (FOCAL, 0.1), SmplxConfig(height_m=1.8), outlines)
-    detector = Detector.measured("mediapipe", body)
-    personal = Personal.of(body, detector.own, 0.01)
-    moves = np.concatenate([detector.slopes(body), personal.points], 2)[BODY_POINTS]
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], None, moves)
+    detector = Detector.load("mediapipe", body)
+    person_offsets = PersonOffsets.of(body, detector.own, 0.01)
+    moves = np.concatenate([detector.slopes(body), person_offsets.points], 2)[BODY_POINTS]
+    pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], None, moves)
     rng = np.random.default_rng(0)
     state = State(rotation.exp(truth.pose.astype(float) + rng.normal(0, 0.05, truth.pose.shape)),
                   truth.transl.astype(float) + 0.02, np.append(rng.normal(0, 0.3, body.num_figure), np.zeros(len(body.clothes))),
-                  float(np.log(FOCAL)), np.zeros(0), np.zeros(len(personal.spread)))
-    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, personal)
+                  float(np.log(FOCAL)), np.zeros(0), np.zeros(len(person_offsets.spread)))
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, 1.0, person_offsets)
     camera = Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
     chain = problem.skeleton.pose(state.local, state.shape)
-    surface = pairs_of(body, body.keypoint_matrix[BODY_POINTS])
-    x = positions(chain, surface, state.shape)[0] + state.transl[0]
+    surface = make_pairs(body, body.keypoint_matrix[BODY_POINTS])
+    x = place_points(chain, surface, state.shape)[0] + state.transl[0]
     vertices, _ = body.posed(to_params(body, state, problem.seen.center), [0])
     assert np.allclose(x, body.keypoints(vertices)[0][BODY_POINTS], atol=2e-3)
     state.betas[body.num_figure:] = rng.normal(0, 1, len(body.clothes))
-    assert np.allclose(positions(problem.skeleton.pose(state.local, state.shape), surface, state.shape)[0] + state.transl[0], x,
+    assert np.allclose(place_points(problem.skeleton.pose(state.local, state.shape), surface, state.shape)[0] + state.transl[0], x,
                        atol=1e-3)
-    state.own[:] = rng.normal(0, 1, len(state.own)) * personal.spread
+    state.own[:] = rng.normal(0, 1, len(state.own)) * person_offsets.spread
     for t, outline in enumerate(outlines):
         vertices, _ = body.posed(to_params(body, state, problem.seen.center), [t])
-        problem.outline_pairs[t] = outline_points(body, vertices[0], camera, outline, t)[0]
+        problem.outline_pairs[t] = sample_outline(body, vertices[0], camera, outline, t)[0]
     check_gradient(problem, state, rng, 1e-5, 2e-3)
     problem.outline_weight = 1.0
     # the distance field is sampled to 1/32 pixel, so its slope shows only over longer steps
@@ -230,7 +230,7 @@ def check_gradient(problem: Problem, state: State, rng, h: float, tolerance: flo
         system = problem.linearise(state)
         for _ in range(4):
             step = rng.normal(0, 1, (len(state.local), problem.size))
-            shared = rng.normal(0, 1, 1 + len(state.shape) + len(state.held) + len(state.level)) * 0.3
+            shared = rng.normal(0, 1, 1 + len(state.shape) + len(state.stance) + len(state.level)) * 0.3
             shared[1 + len(state.betas): 1 + len(state.shape)] *= 0.03  # mostly metres
             slope = (problem.cost(problem.move(state, h * step, h * shared))
                      - problem.cost(problem.move(state, -h * step, -h * shared))) / (2 * h)
@@ -244,14 +244,14 @@ def test_derivatives_of_what_is_held_agree_with_finite_differences(body):
     """Gradient and, as these residuals have no outliers and hardly bend, the normal equations too."""
     truth = turning_person(body, 4)
     local = rotation.exp(truth.pose[:, :22].astype(float) + np.random.default_rng(2).normal(0, 0.05, (4, 22, 3)))
-    held = Held(BODY_JOINTS)
-    value = held.learn(local, np.zeros(68)) + np.random.default_rng(3).normal(0, 0.05, 68)
+    stance = Stance(BODY_JOINTS)
+    value = stance.learn(local, np.zeros(68)) + np.random.default_rng(3).normal(0, 0.05, 68)
     system = System.zeros(4, 69, 17 + 68)
-    held.add(system, local, rotation.log(local), value, 17)
+    stance.add(system, local, rotation.log(local), value, 17)
 
     def residual(step: np.ndarray, shared: np.ndarray) -> np.ndarray:
         moved = local @ rotation.exp(step)
-        return held.residual(moved, rotation.log(moved), value + shared).ravel()
+        return stance.residual(moved, rotation.log(moved), value + shared).ravel()
 
     steps = np.concatenate([np.eye(4 * 66).reshape(-1, 4, 22, 3), np.zeros((68, 4, 22, 3))])
     shared = np.concatenate([np.zeros((4 * 66, 68)), np.eye(68)])
@@ -274,11 +274,11 @@ def test_who_turns_is_held_and_who_moves_is_let_go(body):
                              * np.linspace(0, 1.6, 20)[:, None, None])
     waving = turning.copy()
     waving[:, 16] = rotation.exp(np.linspace(-1, 1, 20)[:, None] * [0.0, 0, 1])
-    held = Held(BODY_JOINTS)
+    stance = Stance(BODY_JOINTS)
     finite = {}
     for name, local in (("turning", turning), ("squatting", squatting), ("waving", waving)):
-        held.learn(local, np.zeros(68))
-        finite[name] = np.isfinite(held.spread).any(1)
+        stance.learn(local, np.zeros(68))
+        finite[name] = np.isfinite(stance.spread).any(1)
     assert finite["turning"].all() and not finite["squatting"].any()
     assert not finite["waving"][[13, 16, 18, 20]].any() and finite["waving"][[1, 4, 14, 17]].all()
 

@@ -6,8 +6,8 @@ import pytest
 from gsac.avatar.body import Body
 from gsac.avatar.flame_file import read_flame
 from gsac.stages.contract import StageError
-from gsac.stages.smplx.expression import mimic
-from gsac.stages.smplx.paper.head import Head, HeadTerms, head_vertices
+from gsac.stages.smplx.expression import translate_expression
+from gsac.stages.smplx.paper.head import Head, HeadTerms, select_head
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def brought(flame_file, betas) -> dict[str, np.ndarray]:
 def test_a_flame_head_is_carried_over_to_the_bodys_vertices(body, flame_file):
     betas = np.random.default_rng(0).normal(0, 1, body.num_betas)
     head = Head.from_arrays(brought(flame_file, betas), body)
-    assert len(head.index) > 0.9 * head_vertices(body).sum()
+    assert len(head.index) > 0.9 * select_head(body).sum()
     assert np.array_equal(head.index[head.faces].shape[1:], (3,)) and head.faces.max() < len(head.index)
     true = body.rest(betas)[0][head.index]
     off = np.linalg.norm(head.vertices - head.vertices.mean(0) - true + true.mean(0), axis=1)
@@ -60,9 +60,9 @@ def test_a_body_of_flames_expressions_takes_them_from_the_flame_head(body):
 
     face = {"expression": np.zeros((2, 52), np.float32), "jaw": np.zeros((2, 3), np.float32)}
     face["expression"][1, 24] = 1
-    expression, jaw, silent = mimic(Official, face)
+    expression, jaw, silent = translate_expression(Official, face)
     assert not expression.any() and jaw[1, 0] > 0.3 and "only the jaw" in silent
     face |= {"flame_expression": np.arange(100, dtype=np.float32).reshape(2, 50), "flame_jaw": np.full((2, 3), 0.1, np.float32)}
-    expression, jaw, silent = mimic(Official, face)
+    expression, jaw, silent = translate_expression(Official, face)
     assert np.array_equal(expression, face["flame_expression"][:, :10]) and np.array_equal(jaw, face["flame_jaw"]) and not silent
-    assert np.array_equal(mimic(body, face)[0], face["expression"])  # the open body acts the actions themselves
+    assert np.array_equal(translate_expression(body, face)[0], face["expression"])  # the open body acts the actions themselves

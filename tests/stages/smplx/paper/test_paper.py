@@ -9,11 +9,11 @@ import torch
 from gsac.avatar import rotation
 from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.initial import starting_state
+from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.paper.fit import BATCH, PASSES, Pass, fit_clip
-from gsac.stages.smplx.paper.head import Head, HeadTerms, visible
-from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
-from gsac.stages.smplx.paper.loss import Objective, Unknowns, boxes
+from gsac.stages.smplx.paper.head import Head, HeadTerms, faces_camera
+from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
+from gsac.stages.smplx.paper.loss import Objective, Unknowns, box_person
 from gsac.stages.smplx.paper.smooth import smooth_linear, smooth_rotations
 from gsac.stages.smplx.sightings import HIPS, Sightings
 
@@ -71,8 +71,8 @@ def test_every_method_that_can_be_chosen_is_there():
 def test_six_numbers_and_rotations_say_the_same():
     turns = rotation.exp(np.random.default_rng(1).normal(0, 0.7, (20, 3)))
     tensor = torch.tensor(turns)
-    torch.testing.assert_close(matrices(3 * six_of(tensor)), tensor)
-    np.testing.assert_allclose(rotation_vectors(tensor).numpy(), rotation.log(turns), atol=1e-5)
+    torch.testing.assert_close(to_matrices(3 * to_six(tensor)), tensor)
+    np.testing.assert_allclose(to_vectors(tensor).numpy(), rotation.log(turns), atol=1e-5)
 
 
 def test_points_lie_where_the_posed_body_has_them(body):
@@ -103,7 +103,7 @@ def test_every_vertex_lies_where_the_posed_body_has_it(body):
 
 def test_a_short_descent_lowers_the_reprojection(body, fitted):
     sightings, fit, told = fitted
-    start = starting_state(body, sightings, FOCAL, np.array([WIDTH / 2, HEIGHT / 2]))
+    start = estimate_start(body, sightings, FOCAL, np.array([WIDTH / 2, HEIGHT / 2]))
     objective = Objective(body, sightings, start, np.array([WIDTH / 2, HEIGHT / 2]))
     before = objective.pixels(start.local, start.transl, start.betas, np.zeros((55, 3))) - sightings.xy[:, objective.known]
     assert np.median(fit.reprojection) < 0.5 * np.median(np.linalg.norm(before, axis=-1))
@@ -120,12 +120,12 @@ def test_pelvis_and_hips_never_move_and_all_other_joints_may(fitted):
 def test_joint_offsets_of_both_sides_are_drawn_together(body):
     sightings = sightings_of(body, person(body))
     center = np.array([WIDTH / 2, HEIGHT / 2])
-    objective = Objective(body, sightings, starting_state(body, sightings, FOCAL, center), center)
+    objective = Objective(body, sightings, estimate_start(body, sightings, FOCAL, center), center)
     unknowns = Unknowns(objective.start, torch.tensor([[0, 0, 2.4]] * 4), body.num_betas)
     losses = []
     for right in (torch.tensor([-0.01, 0.02, 0.0]), torch.tensor([0.01, 0.02, 0.0])):
         unknowns.joint_offset[18], unknowns.joint_offset[19] = torch.tensor([0.01, 0.02, 0.0]), right
-        list(unknowns.leaves(slice(0, 4), True, False))
+        list(unknowns.open_batch(slice(0, 4), True, False))
         objective.target = objective.project(moved(objective, unknowns), slice(0, 4)).detach()
         losses.append(float(objective.loss(unknowns, slice(0, 4), 1.0).detach()))
     assert losses[0] + 0.02 / 24 / 3 == pytest.approx(losses[1], abs=2e-6)
@@ -142,22 +142,22 @@ def moved(objective, unknowns):
 def test_the_farther_of_two_hands_that_lie_on_each_other_does_not_count(body):
     sightings = sightings_of(body, person(body))
     center = np.array([WIDTH / 2, HEIGHT / 2])
-    objective = Objective(body, sightings, starting_state(body, sightings, FOCAL, center), center)
+    objective = Objective(body, sightings, estimate_start(body, sightings, FOCAL, center), center)
     n = len(objective.known)
     x, uv = torch.zeros(1, n, 3), torch.rand(1, n, 2)
     left, right = objective.hands
     uv[0, right] = uv[0, left]
     x[0, left, 2], x[0, right, 2] = 2.0, 2.3
-    count = objective._countable(x, uv, slice(0, 1))[0]
+    count = objective._weigh_points(x, uv, slice(0, 1))[0]
     assert not count[right].any() and count[objective.wrists[1]] == 0
     assert count.sum() == n - len(right) - 1
     uv[0, right] += 5
-    assert objective._countable(x, uv, slice(0, 1)).all()
+    assert objective._weigh_points(x, uv, slice(0, 1)).all()
 
 
 def test_the_square_holds_the_person_at_any_resolution(body):
     sightings = sightings_of(body, person(body))
-    corner, side = boxes(sightings)
+    corner, side = box_person(sightings)
     xy = sightings.xy[0][sightings.seen[0]]
     at = (xy - corner[0]) / side[0]
     assert at.min() == pytest.approx((1 - 1 / 1.5) / 2, abs=1e-5) and at.max() == pytest.approx(1 - (1 - 1 / 1.5) / 2, abs=1e-5)
@@ -200,7 +200,7 @@ def test_the_face_counts_only_when_it_looks_at_the_camera(body):
     pose[:, 0] = rotation.log(rotation.exp(np.array([np.pi, 0, 0])) @ rotation.exp(np.stack([0 * yaw, yaw, 0 * yaw], 1)))
     transl = np.tile([0, 0, 3.0], (len(yaw), 1))
     params = BodyParams.from_pose(pose, transl, np.zeros(20), np.zeros((len(yaw), 52)), FOCAL, (180, 320))
-    seen = visible(body.keypoints(body.posed(params)[0]))
+    seen = faces_camera(body.keypoints(body.posed(params)[0]))
     assert seen.tolist() == [True, True, False, False, False, False, True]
 
 
