@@ -1,4 +1,4 @@
-"""Where the fit begins: trunk turned onto the detector's 3D points, then placed so that its 2D points agree."""
+"""Initial state of the fit: the trunk aligned with the detector's 3-D points, then placed by its 2-D points."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from gsac.stages.smplx.state import State
 TRUNK = [INDEX[n] for n in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
 TURNING = TRUNK + [INDEX[n] for n in ("nose", "left_ear", "right_ear")]
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
-"""Canonical axes to the camera's for a person who stands and looks at it."""
+"""Canonical to camera axes of a person who stands upright and faces the camera."""
 
 
 def hang_arms(frames: int, joints: int, joint_names: tuple[str, ...]) -> np.ndarray:
-    """(T, J, 3, 3) arms hanging, everything else at rest."""
+    """Joint rotations (T, J, 3, 3) of hanging arms, all other joints at rest."""
     local = np.tile(np.eye(3), (frames, joints, 1, 1))
     for name, degrees in MEAN.items():
         local[:, joint_names.index(name)] = rotation.exp(np.radians(np.array(degrees, float)))
@@ -30,7 +30,8 @@ def align_trunk(rest: np.ndarray, world: np.ndarray, xy: np.ndarray, known: np.n
                center: np.ndarray) -> np.ndarray | None:
     """Rotation (3, 3) of the body in one frame, or None where too little was seen.
 
-    rest: (133, 3) keypoints of the shaped body at the start pose; world: (133, 3) detector points, m, NaN where absent.
+    rest: (133, 3) m, key points of the resting body; world: (133, 3) m, detector points, NaN where absent; xy: (133, 2) px;
+    known: (133,) bool; focal: px; center: (2,) px.
     """
     use = [i for i in TURNING if known[i] and np.isfinite(world[i]).all()]
     if sum(i in TRUNK for i in use) >= 3:
@@ -45,7 +46,7 @@ def align_trunk(rest: np.ndarray, world: np.ndarray, xy: np.ndarray, known: np.n
 
 
 def solve_transl(points: np.ndarray, xy: np.ndarray, focal: float, center: np.ndarray) -> np.ndarray:
-    """Translation (3,) that brings turned points (P, 3) onto pixels (P, 2), by linear least squares."""
+    """Translation (3,) m that projects points (P, 3) m onto xy (P, 2) px, by linear least squares. focal: px; center: (2,) px."""
     rows, want = [], []
     for p, u in zip(points, (xy - center) / focal, strict=True):
         for c in (0, 1):
@@ -57,7 +58,7 @@ def solve_transl(points: np.ndarray, xy: np.ndarray, focal: float, center: np.nd
 
 
 def fill_gaps(turns: list[np.ndarray | None]) -> np.ndarray:
-    """(T, 3, 3): frames without a rotation take the one between their neighbours' (shortest way)."""
+    """Rotations (T, 3, 3), interpolated by slerp in frames without one. turns: T of (3, 3) or None."""
     from scipy.spatial.transform import Rotation, Slerp
 
     known = [i for i, r in enumerate(turns) if r is not None]
@@ -70,6 +71,7 @@ def fill_gaps(turns: list[np.ndarray | None]) -> np.ndarray:
 
 
 def estimate_start(body: Body, sightings: Sightings, focal: float, center: np.ndarray) -> State:
+    """The trunk of each frame aligned and placed, arms hanging, betas zero. focal: px; center: (2,) px."""
     frames = len(sightings.xy)
     rest = body.keypoints(body.v_template)
     pelvis = body.J_regressor[0] @ body.v_template

@@ -1,4 +1,4 @@
-"""What the detector saw of one clip: the input of a fit by either method."""
+"""The detections of one clip: input of a fit by either method."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FOCAL_SPREAD, GIVEN_FOCAL_SPREAD = 0.15, 0.002
 
 @dataclass
 class Sightings:
-    """Detections of one clip, as `handgap` gives them."""
+    """Detections of one clip, from `handgap`, and face.npz."""
 
     xy: np.ndarray  # (T, 133, 2) px
     score: np.ndarray  # (T, 133)

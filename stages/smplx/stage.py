@@ -2,34 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
-from gsac.avatar.body import LOST
+from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
+from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.expression import translate_expression
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
-from gsac.stages.smplx.silhouette import read_outlines
-from gsac.stages.smplx.state import to_params
+from gsac.stages.smplx.silhouette import Outline, read_outlines
+from gsac.stages.smplx.state import Fit, to_params
 from gsac.stages.smplx.warmup import rehearse
 
 
-def fit_as_published(*clip):
-    """The paper's fit; torch takes seconds to load, so only who asks for it does."""
-    from gsac.stages.smplx.paper.fit import fit_clip as fit_as_published
+def fit_as_published(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
+                     progress: Callable[[int, int, str], None]) -> Fit:
+    """The paper's fit, imported only when chosen: torch takes seconds to load."""
+    from gsac.stages.smplx.paper import fit
 
-    return fit_as_published(*clip)
+    return fit.fit_clip(body, sightings, outlines, config, progress)
 
 
 METHODS = {"lm": fit_clip, "paper": fit_as_published}
-"""smplx.method -> (body, sightings, outlines, config, progress) -> Fit."""
+"""smplx.method -> fit; config.METHODS are the same names."""
 
 
 def run(job: Job) -> None:
+    """Writes body.npz."""
     clip = Clip.read(job.inputs["split/clip.json"])
     points = read_arrays(job.inputs["handgap/keypoints.npz"])
     face = read_arrays(job.inputs["face/face.npz"])
@@ -61,12 +66,12 @@ def run(job: Job) -> None:
 
 
 def warm(device: str) -> None:
-    """Called while a stage before is at work."""
+    """Compiles and imports what a run needs, while an earlier stage is at work."""
     rehearse(run)
 
 
-def warn_of_guesses(job: Job, params, clip: Clip) -> None:
-    """Says what one camera left open."""
+def warn_of_guesses(job: Job, params: BodyParams, clip: Clip) -> None:
+    """Tells the user which of focal length and scale were guessed."""
     if not clip.focal_px and not job.config.focal_px:
         job.warn(f"The clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it).")
     if job.config.height_m is None:

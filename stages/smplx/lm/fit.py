@@ -2,7 +2,7 @@
 
 1. Start in closed form (initial.py); only root and place move.
 2. All joints, by the key points alone.
-3. Rounds that renew the outlines' correspondences, learn how still the person stands, and put the feet on a ground.
+3. Rounds that renew the outline points, learn the spreads of the stance, and put the feet on a ground.
 4. Fingers, on the fitted wrists.
 """
 

@@ -1,8 +1,8 @@
-"""The fit as one least-squares problem: state, residuals, cost and normal equations.
+"""The fit as one least-squares problem: residuals, cost and normal equations.
 
-Residuals are in units of their own spread, so that weights are probabilities and not taste. Data terms are robust
-(Geman-McClure), by iterated reweighting. T frames, A active joints, n = 3 A + 3 unknowns a frame, s = 1 + B + K + H + G shared
-ones: focal length, betas, what is the person's own, the stance, the ground.
+Residuals are in units of their own spread (standard deviation), so that weights are probabilities and not taste. Data terms are
+robust (Geman-McClure), by iterated reweighting. T frames, P points, A active joints, n = 3 A + 3 unknowns a frame,
+s = 1 + B + K + H + G shared ones: focal length, betas, the person's own offsets, the stance, the ground's level.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from gsac.stages.smplx.lm.stance import Stance
 from gsac.stages.smplx.silhouette import INSET
 from gsac.stages.smplx.state import State
 
-ROBUST = 3.0
-"""Residuals beyond so many spreads count less and less; `Problem.limit` may be wider while the body is still far off."""
-OUTLINE_ROBUST = 3.0
+ROBUST, OUTLINE_ROBUST = 3.0, 3.0
+"""Robust limits of points and of outlines, in spreads; `Problem.limit` is wider while the body is far off."""
 CLOTHES = 0.003
-"""Metres that the silhouette is believed to stand off a body that has no clothes of its own (an official SMPL-X file)."""
+"""Distance, m, of the silhouette from a body model without clothes (an official SMPL-X file)."""
 OUTLINE_SIGHTINGS = 60
-"""How many independent sightings one frame's outline is worth."""
+"""Weight of one frame's outline, in independent points."""
 
 
 class Problem:
-    """One clip's fit over chosen joints."""
+    """The least-squares problem of one clip over its active joints."""
 
     def __init__(self, body: Body, pairs: Pairs, hips: tuple[int, int], seen: Observations, active: np.ndarray,
                  smoothness: float, person_offsets: PersonOffsets | None = None):
+        """pairs: of the observed points; hips: the two of them against which depths are measured; active: (A,) joints that turn."""
         self.body, self.pairs, self.hips, self.seen = body, pairs, hips, seen
         self.person_offsets = person_offsets
         self.skeleton = Skeleton(body, active, person_offsets.joints if person_offsets else None)
@@ -59,16 +59,16 @@ class Problem:
 
     def minimise(self, state: State, iterations: int, frozen: np.ndarray | None = None,
                  frozen_shared: np.ndarray | None = None) -> tuple[State, int]:
-        """Solves from a state. frozen: (n,) bool and frozen_shared: (s,) bool, unknowns that stay; none by default.
+        """Minimises the cost from a state. Returns state and number of steps.
 
-        Returns state and number of steps.
+        frozen: (n,) bool and frozen_shared: (s,) bool, unknowns that stay; none by default.
         """
         frozen = np.zeros(self.size, bool) if frozen is None else frozen
         frozen_shared = np.zeros(state.shared, bool) if frozen_shared is None else frozen_shared
         return levenberg_marquardt(state, self.linearise, self.cost, self.move, frozen, frozen_shared, iterations)
 
     def move(self, state: State, step: np.ndarray, shared: np.ndarray) -> State:
-        """step: (T, n); shared: (s,)."""
+        """The state after a step (T, n) and a shared step (s,)."""
         local = state.local.copy()
         local[:, self.active] = local[:, self.active] @ rotation.exp(step[:, :-3].reshape(len(step), -1, 3))
         b, s = 1 + len(state.betas), 1 + len(state.shape)
@@ -77,9 +77,11 @@ class Problem:
                      state.stance + shared[s:h], state.own + shared[b:s], state.level + shared[h:])
 
     def project(self, state: State, x: np.ndarray) -> np.ndarray:
+        """Pixels (..., 2) of points x (..., 3) m, camera frame."""
         return np.exp(state.log_focal) * x[..., :2] / np.maximum(x[..., 2:], 0.05) + self.seen.center
 
     def cost(self, state: State) -> float:
+        """Sum of all terms."""
         chain = self.skeleton.pose(state.local, state.shape)
         total = 0.0
         x = self.locate_points(chain, state)
@@ -99,6 +101,7 @@ class Problem:
         return float(total + (self._shared_residual(state)[0] ** 2).sum())
 
     def linearise(self, state: State) -> System:
+        """Normal equations of all terms."""
         chain = self.skeleton.pose(state.local, state.shape)
         system = self.linearise_frames(state, chain)
         self._add_temporal(system, state)
@@ -112,7 +115,7 @@ class Problem:
         return system
 
     def linearise_frames(self, state: State, chain: Chain) -> System:
-        """Normal equations of what each frame shows by itself, and of the pose prior."""
+        """Normal equations of the terms that look at one frame alone: points, outlines, pose prior."""
         system = System.zeros(len(state.local), self.size, state.shared)
         self._add_points(system, state, chain)
         for t, x in self.locate_outlines(chain, state):
@@ -121,18 +124,18 @@ class Problem:
         return system
 
     def locate_points(self, chain: Chain, state: State) -> np.ndarray:
-        """(T, P, 3) key points, camera frame."""
+        """(T, P, 3) m, the observed points, camera frame."""
         return place_points(chain, self.pairs, state.shape) + state.transl[:, None]
 
     def locate_outlines(self, chain: Chain, state: State) -> Iterator[tuple[int, np.ndarray]]:
-        """Frame and its outline points (P, 3), of the frames that have any."""
+        """Frame index and outline points (P, 3) m of each frame that has any."""
         if self.outline_weight > 0:
             for t, pairs in enumerate(self.outline_pairs):
                 if pairs is not None:
                     yield t, place_points(chain.frame(t), pairs, state.shape)[0] + state.transl[t]
 
     def _add_points(self, system: System, state: State, chain: Chain) -> None:
-        """Key points and their depths: two rows and one row a point."""
+        """Adds points and their depths: two rows and one row a point."""
         x = self.locate_points(chain, state)
         uv = self.project(state, x)
         residual = self._point_residual(uv)
@@ -152,7 +155,7 @@ class Problem:
         system.add(slice(None), jacobian.reshape(len(x), -1, jacobian.shape[-1]), values.reshape(len(x), -1))
 
     def _projection_slope(self, state: State, x: np.ndarray) -> np.ndarray:
-        """(..., 2, 3) pixels by camera-frame metres."""
+        """Derivative (..., 2, 3) of the pixels by x (..., 3) m."""
         f, z = np.exp(state.log_focal), np.maximum(x[..., 2], 0.05)
         out = np.zeros((*x.shape[:-1], 2, 3))
         out[..., 0, 0] = out[..., 1, 1] = f / z
@@ -160,12 +163,12 @@ class Problem:
         return out
 
     def _point_residual(self, uv: np.ndarray) -> np.ndarray:
-        """(T, P, 2) in spreads; 0 where a point was not seen."""
+        """(T, P, 2) in spreads; 0 where a point was not seen. uv: (T, P, 2) px."""
         known = np.isfinite(self.seen.spread)[..., None]
         return np.where(known, (uv - np.nan_to_num(self.seen.xy)) / self.seen.spread[..., None], 0)
 
     def _depth_residual(self, x: np.ndarray) -> np.ndarray:
-        """(T, P) depth against the middle of the hips, in spreads; 0 where unknown."""
+        """(T, P) of the depths against the middle of the hips, in spreads; 0 where unknown. x: (T, P, 3) m."""
         model = x[..., 2] - x[:, list(self.hips), 2].mean(1, keepdims=True)
         return np.nan_to_num((model - self.seen.depth) / self.seen.depth_spread)
 
@@ -174,11 +177,12 @@ class Problem:
         return self.outline_weight * OUTLINE_SIGHTINGS / max(count, 1)
 
     def _stand_off(self, t: int, state: State, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(P,) px that the silhouette stands off outline points (P, 3); and the part of it that shrinks with their distance."""
+        """Distance (P,) px of the silhouette from outline points x (P, 3) m, and the part of it that scales with 1 / depth."""
         clothes = self.clothes * np.exp(state.log_focal) / np.maximum(x[:, 2], 0.05)
         return clothes + INSET * self.seen.outlines[t].scale, clothes
 
     def _add_outline(self, system: System, state: State, chain: Chain, t: int, x: np.ndarray) -> None:
+        """Adds one frame's outline points x (P, 3) m: one row a point."""
         uv = self.project(state, x)
         distance, direction, inside = self.seen.outlines[t].at(uv)
         off, clothes = self._stand_off(t, state, x)
@@ -193,11 +197,11 @@ class Problem:
         system.add(slice(t, t + 1), np.insert(rows, self.size, focal, 1)[None], (residual * shrink)[None])
 
     def _prior_residual(self, vector: np.ndarray) -> np.ndarray:
-        """vector: (T, A, 3) rotation vectors of the active joints. Returns (T, A, 3)."""
+        """(T, A, 3) in spreads. vector: (T, A, 3) rotation vectors of the active joints."""
         return (vector - self.mean) / self.spread
 
     def _limit_residual(self, vector: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
-        """(T, L) how far hinges bend back, in spreads, and the limits that concern active joints."""
+        """Backward bend (T, L) of hinges, in spreads, and the limits that concern active joints. vector: (T, A, 3)."""
         where = {int(j): i for i, j in enumerate(self.active)}
         limits = [(where[j], axis, sign) for j, axis, sign in prior.LIMITS if j in where]
         if not limits:
@@ -205,6 +209,7 @@ class Problem:
         return np.stack([np.minimum(0, sign * vector[:, i, axis]) / prior.LIMIT_SPREAD for i, axis, sign in limits], 1), limits
 
     def _add_prior(self, system: System, state: State) -> None:
+        """Adds pose prior and hinge limits."""
         vector = rotation.log(state.local[:, self.active])
         slope = rotation.log_derivative(vector) / self.spread[:, :, None]  # (T, A, 3, 3)
         residual = self._prior_residual(vector)
@@ -221,15 +226,15 @@ class Problem:
             system.gradient[:, block] += row * over[:, k, None]
 
     def _turns(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Rotation vectors (T - 1, A, 3) and matrices from each frame's joint to the next frame's."""
+        """Rotation vectors (T - 1, A, 3) and matrices (T - 1, A, 3, 3) of the joints from each frame to the next."""
         local = state.local[:, self.active]
         relative = local[:-1].swapaxes(-1, -2) @ local[1:]
         return rotation.log(relative), relative
 
     def _temporal_residuals(self, state: State, vector: np.ndarray) -> list[np.ndarray]:
-        """Speed of the joints, their acceleration and that of the body, in spreads; empty for photos.
+        """Speed and acceleration of the joints, and acceleration of transl, in spreads; empty for photos.
 
-        vector: (T - 1, A, 3) turn of each joint from frame to frame.
+        vector: (T - 1, A, 3) rotation of each joint from frame to frame.
         """
         if self.seen.seconds is None or len(state.local) < 3 or self.smoothness == 0:
             return []
@@ -243,6 +248,7 @@ class Problem:
                 scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / prior.TRANSL_ACCELERATION]
 
     def _add_temporal(self, system: System, state: State) -> None:
+        """Adds speeds and accelerations."""
         vector, relative = self._turns(state)
         residuals = self._temporal_residuals(state, vector)
         if not residuals:
@@ -268,7 +274,7 @@ class Problem:
 
     @staticmethod
     def _couple(system: System, block: slice, n: int, parts: list[np.ndarray], residual: np.ndarray) -> None:
-        """Adds rows that tie the same unknowns of two or three frames in a row; parts: (R, 3, 3) by frame."""
+        """Adds rows that couple the same unknowns of two or three adjacent frames. parts: (R, 3, 3) by frame; residual: (R, 3)."""
         rows = len(residual)
         for i, left in enumerate(parts):
             frames = slice(i, i + rows)
@@ -278,9 +284,9 @@ class Problem:
                 system.band[frames, block, columns] += left.transpose(0, 2, 1) @ right
 
     def _shared_residual(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Focal, shape and height priors, those of what is the person's own and of the stance: residuals (R,) and rows (R, s).
+        """Priors of focal length, betas, own offsets, stance and height: residuals (R,) and rows (R, s).
 
-        Frames of one view share their errors (clothes, the detector's habits), so that the priors count once for each repeat.
+        Frames of one view share their errors (clothes, the detector's), so that the priors count once for each repeat.
         """
         b, (focal, focal_spread), (metres, spread) = 1 + len(state.betas), self.seen.focal_prior, self.seen.height
         spreads = np.concatenate([[focal_spread], self.shape_spread, self.own_spread[:len(state.own)],
@@ -296,7 +302,7 @@ class Problem:
 
 
 def estimate_joint_sigma(problem: Problem, state: State) -> np.ndarray:
-    """(T, 55) m: how far each joint may be off by what its frame shows alone, each unknown by itself."""
+    """Standard deviation (T, 55) m of each joint by its frame alone; unknowns are taken as independent."""
     chain = problem.skeleton.pose(state.local, state.shape)
     system = problem.linearise_frames(state, chain)
     n = problem.size

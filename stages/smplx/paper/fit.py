@@ -1,10 +1,12 @@
 """The published co-registration (GSAC eq. 5-8, after ExAvatar's fitting): key points, initial values, face and regularisers,
-all means, by Adam in three passes over batches of frames. The baseline that `lm` is measured against.
+all means, by Adam in three passes over batches of frames. It is the baseline of `lm`.
 
-Read differently from the publication, because what it takes is not there: the start is `lm`'s closed form (the paper regresses it
-by Hand4Whole); the head of the face terms is the one in face.npz, FLAME's or the open body's own (`head.py`); the body has no
-face offsets, so they move its shape only, and the second key point term, which differs from the first by the face offsets alone,
-is left out. Every step poses all vertices, as the published one does for the term that holds the mesh to the start.
+It deviates from the publication where an input of that is missing: the start is the closed form of initial.py (the paper regresses
+it by Hand4Whole); the head of the face terms is that of face.npz, FLAME's or the open body's own (head.py); the body has no face
+offsets, so that the face terms move its shape only, and the second key point term, which differs from the first by the face
+offsets alone, is left out. Every step poses all vertices, for the published term that keeps the mesh near the start.
+
+The published method knows no sigma of its joints: sigma_joints comes from `lm`'s normal equations, the one import of lm/.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ from gsac.stages.smplx.state import Fit, State, to_params
 
 BATCH = 64
 HAND_OFFSET, HAND_OFFSET_STEPS = 10.0, 250
-"""The hands' joint offsets are held so many times stronger, for so many steps of the first pass."""
+"""Factor on the weight of the hands' joint offsets, and the steps of the first pass that it lasts."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Pass:
     decays: tuple[int, ...]
     """Steps at which the rate falls to a tenth."""
     warm_up: int
-    """First steps, in which only the root moves."""
+    """Steps at first in which only the root moves."""
     shared: bool
     """Whether betas and joint offsets move."""
 
@@ -53,7 +55,7 @@ PASSES = (Pass(500, 0.1, (100, 250, 400), 100, True), Pass(250, 0.01, (100, 200)
 
 def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress: Callable,
              passes: tuple[Pass, ...] = PASSES) -> Fit:
-    """Fits the clip by the published method; arguments and result as `fit.fit_clip`. The focal length stays as given or guessed."""
+    """Fits the clip by the published method; the focal length stays as given or guessed."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # matrices of 3 x 3: threads cost more than they give
     try:
@@ -89,7 +91,7 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
 
 
 def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass, hold_hands: bool, tell: Callable) -> None:
-    """One batch through one pass. Adam begins anew after the warm-up and at each pass, as published."""
+    """Takes one batch through one pass. Adam starts anew after the warm-up and at each pass, as published."""
     optimiser = None
     for step in range(sweep.steps):
         if optimiser is None or step == sweep.warm_up:
@@ -103,7 +105,7 @@ def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass,
 
 
 def estimate_sigma(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
-    """(T, 55) m, read off the same normal equations as `lm`'s at this state."""
+    """sigma_joints (T, 55) m by the normal equations of `lm` at this state. center: (2,) px."""
     detector = Detector.load(sightings.detector, body)
     pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
     seen = observe(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
@@ -111,7 +113,7 @@ def estimate_sigma(body: Body, sightings: Sightings, state: State, config: Smplx
 
 
 def measure_reprojection(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:
-    """(T,) median px of the body points; NaN where nothing was seen."""
+    """(T,) median distance, px, of seen and fitted body points; NaN where nothing was seen. joint_offset: (55, 3) m."""
     uv = objective.pixels(state.local, state.transl, state.betas, joint_offset)
     use = np.isin(objective.known, BODY_POINTS)
     known = objective.known[use]

@@ -1,9 +1,9 @@
-"""The face terms of the published method: the body's resting head against a head mesh that a face network found.
+"""The face terms of the published method: the body's resting head against the head mesh that `face` found.
 
-The network's head (the open body's own, or FLAME's) comes in face.npz in its own mesh: `head_template` and `head_vertices`,
-everybody's and the person's own at rest, m, y up and z out of the face, `head_faces` over both, and the template's `head_eyes`
-(2, 3), left and right. The template is laid on the body's by the eyes, then as it fits best; so each of the body's vertices,
-whichever body that is, has its place on the mesh.
+face.npz holds that head (the open body's own, or FLAME's) as a mesh of its own, N vertices, at rest, m, y up, z out of the face:
+`head_template` (N, 3) of the mean person, `head_vertices` (N, 3) of this person, `head_faces` (F, 3), and `head_eyes` (2, 3) of the
+template, left and right. The template is aligned with the body's head by the eyes, then by ICP; so each head vertex of any body
+has its place on the mesh.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ EYES = [INDEX["left_eye"], INDEX["right_eye"]]
 EARS = [INDEX["left_ear"], INDEX["right_ear"]]
 HEAD_JOINTS, EYE_JOINTS = [15, 22], [23, 24]
 ICP_STEPS = 24
-"""Rounds in which the head mesh is laid on the body's head."""
+"""Rounds of iterative closest points."""
 NEAR, LEAST_SHARE = 0.015, 0.3
-"""m within which a vertex lies on the head mesh, and how many of the head's must."""
+"""Distance, m, within which a vertex lies on the head mesh, and the share of the head's vertices that must."""
 
 
 @dataclass
 class Head:
-    """A head at rest, N vertices."""
+    """A person's head at rest, over N vertices of the body."""
 
-    vertices: np.ndarray  # (N, 3) m, in any place
-    index: np.ndarray  # (N,) the body's vertices that they stand for
+    vertices: np.ndarray  # (N, 3) m, at any place
+    index: np.ndarray  # (N,) indices of the body's vertices
     faces: np.ndarray  # (F, 3)
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray], body: Body) -> Head | None:
-        """The head of face.npz's arrays; None where no face was seen. Raises StageError."""
+        """The head of face.npz's arrays, `head_template` (N, 3), ... as above; None where no face was seen. Raises StageError."""
         if "head_vertices" not in arrays:
             return None
         for name in ("head_template", "head_faces", "head_eyes"):
@@ -63,13 +63,16 @@ class Head:
 
 
 def select_head(body: Body) -> np.ndarray:
-    """(V,) bool: those that go with head and jaw; the eyes are left out."""
+    """Vertices (V,) bool that head and jaw carry; the eyes are left out."""
     return body.weights[:, HEAD_JOINTS].sum(1) > 0.5
 
 
 def lay_on_body(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Body) -> tuple[np.ndarray, ...]:
-    """Index (n,) of the body's head vertices that lie on the head mesh, corners (n, 3) of the face where and their shares (n, 3),
-    and the turn (3, 3) from the mesh to the body."""
+    """Aligns a head mesh with the body's head by a similarity.
+
+    vertices: (N, 3) m; faces: (F, 3); eyes: (2, 3) m. Returns the index (n,) of the body's vertices that lie on the mesh, corners
+    (n, 3) of the face below each and their shares (n, 3), and the rotation (3, 3) from the mesh to the body.
+    """
     index = np.flatnonzero(select_head(body))
     skin, around = body.v_template[index].astype(float), find_incident_faces(faces, len(vertices))
     own = (body.J_regressor[EYE_JOINTS] @ body.v_template).astype(float)
@@ -89,7 +92,7 @@ def lay_on_body(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body:
 
 
 def find_incident_faces(faces: np.ndarray, count: int) -> np.ndarray:
-    """(count, K) faces about each vertex, padded with repeats."""
+    """Indices (count, K) of the faces (F, 3) about each vertex, padded with repeats."""
     vertex, face = faces.T.ravel(), np.tile(np.arange(len(faces)), 3)
     order = np.argsort(vertex, kind="stable")
     vertex, face = vertex[order], face[order]
@@ -100,7 +103,10 @@ def find_incident_faces(faces: np.ndarray, count: int) -> np.ndarray:
 
 
 def find_closest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, ...]:
-    """points: (n, 3). Nearest places (n, 3) on the faces about the nearest vertex, corners (n, 3) and their shares (n, 3)."""
+    """Nearest places (n, 3) on the faces about the nearest vertex, corners (n, 3) of the face and their shares (n, 3).
+
+    points: (n, 3); vertices: (N, 3); faces: (F, 3); around: (N, K) as by `find_incident_faces`.
+    """
     tried = faces[around[cKDTree(vertices).query(points)[1]]]  # (n, K, 3)
     a, b, c = (vertices[tried[..., k]] for k in range(3))
     ab, ac, ap = b - a, c - a, points[:, None] - a
@@ -132,7 +138,7 @@ class HeadTerms:
         self.share = torch.tensor(1 / np.maximum(degree, 1), dtype=torch.float32)[:, None]
 
     def loss(self, betas: torch.Tensor) -> torch.Tensor:
-        """Weighted sum of vertex L1, Laplacian L2 and edge length L1, each a mean; places are compared with their means removed."""
+        """Weighted sum, a scalar, of vertex L1, Laplacian L2 and edge length L1, each a mean; vertices are centred. betas: (B,)."""
         x = self.rest + self.dirs @ betas
         x = x - x.mean(0)
         vertex = (x - self.target).abs().mean()
@@ -149,9 +155,9 @@ class HeadTerms:
 
 
 def faces_camera(points: np.ndarray) -> np.ndarray:
-    """points: (T, 133, 3) m, camera frame, NaN where the body carries no such point. (T,) bool: the face looks towards the camera.
+    """Whether the face looks towards the camera, (T,) bool. points: (T, 133, 3) m, camera frame, NaN where the body carries none.
 
-    In the camera's xz plane the way from the face's centre to the eyes must lie against the line of sight by more than 135 degrees.
+    In the camera's xz plane the direction from the face's centre to the eyes must be more than 135 degrees off the line of sight.
     """
     face = points[:, FACE]
     carried = np.isfinite(face).all((0, 2))
