@@ -1,15 +1,15 @@
-"""Where a detector's key points lie on the body, and how that changes with the turn: measured on truth clips, kept with the fit.
+"""Measures a detector's systematic errors on truth clips: offsets of its key points, and their change with the body's yaw.
 
     python -m gsac.turntable CLIPS/201 --seed 201 --frames 30 --fps 5; gsac run CLIPS/201/clip.mp4 --until keypoints ...
     python tools/detector_offsets.py RUN TRUTH [RUN TRUTH ...] --out stages/smplx/offsets/mediapipe.npz
 
 The kept file was measured on 120 people, seeds 201 to 320, those that end in 1 or 2 with `--feet planted`.
 
-RUN is a run's folder (keypoints/keypoints.npz), TRUTH the clip's truth.npz. A detector's hip is not the body's hip: for every point
-one constant offset (3,) m in the frame of the joint that carries it most is found by robust least squares over all frames and
-clips. What is left is laid out over the body's yaw: harmonics for each point, x and y as a share of the person's height, and the
-spread of the rest. Each person's own offsets from these are laid out over the betas of their figure (a hip is taken to be higher in
-a long trunk), and the directions in which people still differ are kept. Left and right share everything, mirrored.
+RUN is a run's folder (keypoints/keypoints.npz), TRUTH the clip's truth.npz. A detector's hip is not the body's hip: robust least
+squares over all frames and clips finds one constant offset (3,) m of each point, in the axes of the joint that carries it most. The
+residuals are fitted by harmonics of the body's yaw, x and y as a share of the person's height (the point's habit); the standard
+deviation of the rest is its spread. Each person's own offsets are regressed on the betas of their figure (in a long trunk a hip is
+detected higher); the directions in which people still differ are kept. Left and right share everything, mirrored.
 """
 
 from __future__ import annotations
@@ -31,30 +31,31 @@ from gsac.stages.smplx.symmetry import mirror_directions
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")
 RIDGE = 2000.0
-"""Pull of an offset that all share to zero: one of 1 m is as bad as so many square px."""
+"""Ridge, px^2 / m^2, on the offset that all people share."""
 HABIT_RIDGE = 2.0
-"""Pull of a habit's harmonics to zero, in sightings; the highest twice."""
+"""Ridge on a habit's harmonics, in sightings; doubled for the highest."""
 FIGURE_RIDGE = 1e-4
-"""Pull of the betas that lie beyond the truth's to zero, in square metres of all vertices."""
+"""Ridge on the betas beyond the truth's, m^2 summed over the vertices."""
 LEAST_SPREAD = 0.002
+"""Smallest spread of a point, as a share of the person's height."""
 OWN_RIDGE = (8.0 / 0.02) ** 2
-"""The same for one person's own: px that a sighting is off over metres that people differ by."""
+"""Ridge on one person's own offset: (px of a sighting's error / m of the difference between people)^2."""
 PEOPLE_RIDGE = 10.0
-"""Pull of an offset's slopes by the betas to zero, in people."""
+"""Ridge on the slopes of an offset by the betas, in people."""
 LEAST_OWN = 0.002
-"""m, of a direction in which people differ."""
+"""Smallest standard deviation, m, of a direction in which people differ."""
 FEW = 20
-"""Sightings below which nothing is said of a point."""
+"""Sightings below which a point is not measured."""
 
 
 @dataclass
 class SeenClip:
-    """One clip: what the detector saw, and what was there."""
+    """One clip: detections and truth."""
 
     xy: np.ndarray  # (T, 133, 2) px
     seen: np.ndarray  # (T, 133) bool
     height: float  # px, of the person as the fit measures it
-    points: np.ndarray  # (T, 133, 3) m, the body's own points, camera frame
+    points: np.ndarray  # (T, 133, 3) m, the body's true points, camera frame
     turn: np.ndarray  # (T, 55, 3, 3) of the joints to the camera frame
     focal: float
     center: np.ndarray  # (2,) px
@@ -62,6 +63,7 @@ class SeenClip:
 
     @classmethod
     def read(cls, body: Body, run: Path, truth: Path) -> SeenClip:
+        """Reads a run's folder and its clip's truth.npz."""
         seen, z = read_arrays(run / "keypoints" / "keypoints.npz"), read_arrays(truth)
         pose = np.concatenate([z[name] for name in POSE], 1).reshape(-1, 55, 3)
         score = seen["score"]
@@ -70,31 +72,34 @@ class SeenClip:
                    chain_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"], fit_figure(body, z))
 
     def slope(self, points: np.ndarray) -> np.ndarray:
-        """points: (n, 3). (n, 2, 3) px by metres."""
+        """Derivative (n, 2, 3) of the pixels by the points (n, 3) m, camera frame."""
         x, y, z = points.T
         none = np.zeros_like(z)
         return self.focal * np.stack([np.stack([1 / z, none, -x / z**2], -1), np.stack([none, 1 / z, -y / z**2], -1)], 1)
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """points: (..., 3). (..., 2) px."""
+        """Pixels (..., 2) of points (..., 3) m, camera frame."""
         return self.focal * points[..., :2] / points[..., 2:] + self.center
 
 
 def fit_figure(body: Body, truth: dict[str, np.ndarray]) -> np.ndarray:
-    """(F,) betas that come nearest to the truth's bare body, which the basis does not span."""
+    """Betas (F,) nearest to the true bare body, which the basis does not span.
+
+    truth: `betas` (F,), `shift` (V, 3) m of the vertices, `joint_offset` (55, 3) m.
+    """
     basis = body.shapedirs[:, :, : body.num_figure].reshape(-1, body.num_figure).astype(np.float64)
     beyond = (truth["shift"] - truth["joint_offset"][0]).ravel()  # about the pelvis, as the basis is
     return truth["betas"] + np.linalg.solve(basis.T @ basis + FIGURE_RIDGE * np.eye(body.num_figure), basis.T @ beyond)
 
 
 def find_carriers(body: Body) -> np.ndarray:
-    """(133,) joint that carries each key point most; -1 for points that the body does not have."""
+    """Joint (133,) that carries each key point most; -1 for points that the body does not have."""
     carried = np.abs(body.keypoint_matrix) @ body.weights
     return np.where(body.known_keypoints, np.asarray(carried).argmax(1), -1)
 
 
 def find_counterparts() -> np.ndarray:
-    """(133,) index of each body, foot and hand point's counterpart; face points stay."""
+    """Index (133,) of each body, foot and hand point's counterpart on the other side; of face points their own."""
     out = np.arange(133)
     for name in (*BODY_NAMES, *FEET_NAMES):
         side, _, rest = name.partition("_")
@@ -105,7 +110,7 @@ def find_counterparts() -> np.ndarray:
 
 
 def chain_rotations(body: Body, pose: np.ndarray) -> np.ndarray:
-    """pose: (T, 55, 3). Returns the joints' rotations to the camera frame (T, 55, 3, 3)."""
+    """Rotations (T, 55, 3, 3) of the joints to the camera frame. pose: (T, 55, 3) rotation vectors."""
     world = rotation.exp(np.asarray(pose, np.float64))
     for j, p in enumerate(body.parents[1:], 1):
         world[:, j] = world[:, p] @ world[:, j]
@@ -134,7 +139,7 @@ def measure_offsets(body: Body, clips: list[SeenClip]) -> tuple[np.ndarray, np.n
 
 
 def fit_offset(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
-    """(3,) m, the offset that explains px (R, 2) by slopes (R, 2, 3) best, outliers let go."""
+    """Offset (3,) m that explains residuals away (R, 2) px best, robustly. slope: (R, 2, 3) px / m; ridge: px^2 / m^2."""
     offset = np.zeros(3)
     for _ in range(8):
         left = np.linalg.norm(away - slope @ offset, axis=1)
@@ -145,7 +150,7 @@ def fit_offset(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
 
 
 def measure_habits(body: Body, clips: list[SeenClip], offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Habit (133, 2 H + 1, 2) and spread (133,) of what the offsets (133, 3) leave; none of the face, not fitted by them."""
+    """Habit (133, 2 H + 1, 2) and spread (133,) of the residuals that the offsets (133, 3) m leave; zero and wide for the face."""
     joint, other = find_carriers(body), find_counterparts()
     habit, spread = np.zeros((133, 2 * HARMONICS + 1, 2)), np.full(133, UNKNOWN)
     pull = HABIT_RIDGE * np.diag([1e-9, *([1.0] * (HARMONICS - 1) + [2.0]) * 2])
@@ -172,7 +177,7 @@ def measure_habits(body: Body, clips: list[SeenClip], offsets: np.ndarray) -> tu
 
 
 def measure_own_offsets(body: Body, clip: SeenClip, offsets: np.ndarray, habit: np.ndarray) -> np.ndarray:
-    """(len(PERSONAL), 3) m, what one person's points lie off the offsets (133, 3) and habit, in the left side's axes."""
+    """One person's offsets (len(PERSONAL), 3) m beyond offsets (133, 3) m and habit (133, 2 H + 1, 2), in the left side's axes."""
     joint, flip = find_carriers(body), np.array([-1.0, 1, 1])
     usual = Detector(offsets, None, None, habit, None).error(yaw(clip.turn[:, 0])) * clip.height
     moved = clip.points + np.einsum("tpab,pb->tpa", clip.turn[:, joint], offsets)
@@ -190,7 +195,7 @@ def measure_own_offsets(body: Body, clip: SeenClip, offsets: np.ndarray, habit: 
 
 
 def measure_people(figures: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What offsets have in common, by_betas (133, 3, F) and directions (133, 3, K) in which people differ still.
+    """Common offsets (133, 3) m, slopes by the betas (133, 3, F), and directions (133, 3, K) m in which people still differ.
 
     figures: (N, F) betas; own: (N, len(PERSONAL), 3) m.
     """
@@ -206,6 +211,7 @@ def measure_people(figures: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np
 
 
 def main() -> None:
+    """Writes the measured errors, and prints the body's points."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("paths", nargs="+", type=Path, help="RUN TRUTH pairs")
     parser.add_argument("--out", type=Path, required=True)
