@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
@@ -15,11 +14,6 @@ from support.scripts import script
 detector_offsets = script("detector_offsets")
 
 WRIST, OTHER = INDEX["left_wrist"], INDEX["right_wrist"]
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
 
 
 def turn(frames: int) -> tuple[np.ndarray, np.ndarray]:

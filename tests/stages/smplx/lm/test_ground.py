@@ -16,11 +16,6 @@ from gsac.stages.smplx.prior import BODY_JOINTS
 FRAMES, STANCE = 4, 68
 
 
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
-
-
 def standing(body: Body, seed: int = 0):
     """Rotations (T, 55, 3, 3), shape, transl (T, 3), stance and level of somebody who stands, a little off."""
     rng = np.random.default_rng(seed)

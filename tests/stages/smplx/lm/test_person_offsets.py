@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import rotation
@@ -20,11 +19,6 @@ from gsac.stages.smplx.symmetry import mirror_directions
 
 WIDTH, HEIGHT, FOCAL, FRAMES = 360, 640, 700.0, 10
 UP = 0.03
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
 
 
 def turn(body: Body) -> BodyParams:
