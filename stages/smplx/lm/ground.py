@@ -67,8 +67,8 @@ class Ground:
     def cost(self, chain: Chain, shape: np.ndarray, transl: np.ndarray, stance: np.ndarray, level: np.ndarray) -> float:
         """Robust cost of both terms. shape: (S,); transl: (T, 3) m; stance: (H,); level: (1,) m."""
         x = place_points(chain, self.pairs, shape) + transl[:, None]
-        off, slip = self._off(x, stance, level), self._slip(x)
-        return float(_off_ground(off)[0].sum() + robust(slip, SLIPPED)[0].sum())
+        off, slip = self._height_residual(x, stance, level), self._slip_residual(x)
+        return float(_robust_height(off)[0].sum() + robust(slip, SLIPPED)[0].sum())
 
     def add(self, system: System, skeleton: Skeleton, chain: Chain, shape: np.ndarray, transl: np.ndarray, stance: np.ndarray,
             level: np.ndarray) -> None:
@@ -79,8 +79,8 @@ class Ground:
         x = place_points(chain, self.pairs, shape) + transl[:, None]
         n, first = system.gradient.shape[1], 1 + len(shape)
         up, by_slope = upright(stance)
-        off = self._off(x, stance, level)
-        shrink = _off_ground(off)[1]
+        off = self._height_residual(x, stance, level)
+        shrink = _robust_height(off)[1]
         rows = pull_back(skeleton, chain, self.pairs, shape, np.broadcast_to(up, (*x.shape[:2], 1, 3)))[:, :, 0]
         jacobian = np.zeros((*x.shape[:2], n + first + len(stance) + 1))
         jacobian[..., :n], jacobian[..., n + 1: n + 1 + rows.shape[2] - n] = rows[..., :n], rows[..., n:]
@@ -92,7 +92,7 @@ class Ground:
 
     def _add_slip(self, system: System, rows: np.ndarray, x: np.ndarray) -> None:
         """Adds the slip term. rows: (T, P, 3, n + S') Jacobian of the points x (T, P, 3) m."""
-        slip = self._slip(x)
+        slip = self._slip_residual(x)
         shrink = robust(slip, SLIPPED)[1]
         weight = (shrink * self.rest[..., None] * self.scale)[..., None]
         n, residual = system.gradient.shape[1], (slip * shrink).reshape(len(slip), -1, 1)
@@ -113,16 +113,16 @@ class Ground:
         """(T, P) m along the upright."""
         return (place_points(chain, self.pairs, shape) + transl[:, None]) @ upright(stance)[0]
 
-    def _off(self, x: np.ndarray, stance: np.ndarray, level: np.ndarray) -> np.ndarray:
+    def _height_residual(self, x: np.ndarray, stance: np.ndarray, level: np.ndarray) -> np.ndarray:
         """Residuals (T, P): heights of the middles over the plane, of one edge over the other, in spreads."""
         return (x @ upright(stance)[0] - level[0]) @ self.flat.T
 
-    def _slip(self, x: np.ndarray) -> np.ndarray:
+    def _slip_residual(self, x: np.ndarray) -> np.ndarray:
         """Residuals (T - 1, P, 3) in spreads; empty before `find_resting_feet`."""
         return np.diff(x, axis=0) * (self.rest * self.scale)[..., None] if len(self.rest) else np.zeros((0, *x.shape[1:]))
 
 
-def _off_ground(off: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _robust_height(off: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Robust cost and square root of the weight of the residuals (T, P)."""
     limit = np.where(off > 0, LIFTED, SUNK)
     limit[..., off.shape[-1] // 2:] = LIFTED  # a sole tips one way as easily as the other

@@ -57,7 +57,7 @@ def test_derivatives_of_the_ground_agree_with_finite_differences(body, monkeypat
     def residual(x):
         chain, shape, transl, stance, level = moved(skeleton, *state, x[:count].reshape(FRAMES, 69), x[count:])
         place = place_points(chain, ground.pairs, shape) + transl[:, None]
-        return np.concatenate([ground._off(place, stance, level).ravel(), ground._slip(place).ravel()])
+        return np.concatenate([ground._height_residual(place, stance, level).ravel(), ground._slip_residual(place).ravel()])
 
     jacobian = np.stack([(residual(1e-5 * e) - residual(-1e-5 * e)) / 2e-5 for e in np.eye(count + size)], 1)
     normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual(np.zeros(count + size))
