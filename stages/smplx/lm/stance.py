@@ -28,7 +28,7 @@ USUAL_WEIGHT = 0.3
 """Weight of the prior spreads against those of the clip."""
 LEAN, PITCH, ROLL = np.radians((2, 4)), np.radians(10), np.radians(4)
 """Spreads over clips: of the mean lean to the side and to the front, of the camera's pitch, of its roll."""
-FREE = 0.5
+LEAST_MEAN_SPREAD = 0.5
 """Smallest spread of a joint's mean rotation over clips, rad: the frames know it better."""
 
 
@@ -41,13 +41,13 @@ class Stance:
         self.spread = np.full((len(active), 3), np.inf)  # rad
         mean, spread = pose_prior(active)
         mean[0], spread[0] = 0, (LEAN[0], 1, LEAN[1])
-        spread[1:] = np.maximum(spread[1:], FREE)
+        spread[1:] = np.maximum(spread[1:], LEAST_MEAN_SPREAD)
         self.mean = np.concatenate([mean.ravel(), [0, 0]])  # (H,)
         self.mean_spread = np.concatenate([spread.ravel(), [ROLL, PITCH]])  # (H,)
 
     def residual(self, local: np.ndarray, vector: np.ndarray, stance: np.ndarray) -> np.ndarray:
         """Residuals (T, A, 3) in spreads. local: (T, A, 3, 3) rotations; vector: (T, A, 3) their logarithms; stance: (H,)."""
-        return self._away(local, vector, stance) / self.spread
+        return self._deviation(local, vector, stance) / self.spread
 
     def add(self, system: System, local: np.ndarray, vector: np.ndarray, stance: np.ndarray, first: int) -> None:
         """Adds the term to the normal equations.
@@ -94,7 +94,7 @@ class Stance:
             stance = np.concatenate([vector.mean(0).ravel(), -up[[0, 2]] / min(up[1], -0.3)])
             stance[:3] = 0
         unrest = np.sqrt(((vector - vector.mean(0)) ** 2).mean(0)).max(1)  # (A,)
-        spread = np.sqrt((USUAL_WEIGHT * USUAL**2 + (self._away(local, vector, stance) ** 2).mean(0)) / (USUAL_WEIGHT + 1))
+        spread = np.sqrt((USUAL_WEIGHT * USUAL**2 + (self._deviation(local, vector, stance) ** 2).mean(0)) / (USUAL_WEIGHT + 1))
         spread[0] = np.sqrt(spread[0] ** 2 + USUAL_WEIGHT * (USUAL_LEAN**2 - USUAL**2) / (USUAL_WEIGHT + 1))
         spread[0, 1] = np.inf
         trunk = self._calm(unrest, TRUNK)
@@ -108,7 +108,7 @@ class Stance:
         worst = unrest[np.isin(self.active, np.intersect1d(joints, MOVERS))].max(initial=0)
         return 1 / (1 + (worst / UNREST) ** 8)
 
-    def _away(self, local: np.ndarray, vector: np.ndarray, stance: np.ndarray) -> np.ndarray:
+    def _deviation(self, local: np.ndarray, vector: np.ndarray, stance: np.ndarray) -> np.ndarray:
         """Deviations (T, A, 3) rad of the frames from the stance (H,)."""
         away = vector - stance[:-2].reshape(-1, 3)
         away[:, 0] = local[:, 0].swapaxes(1, 2) @ upright(stance)[0] - stance[:3]

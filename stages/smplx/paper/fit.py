@@ -53,8 +53,8 @@ class Pass:
 PASSES = (Pass(500, 0.1, (100, 250, 400), 100, True), Pass(250, 0.01, (100, 200), 0, True), Pass(250, 0.01, (100, 200), 0, False))
 
 
-def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress: Callable,
-             passes: tuple[Pass, ...] = PASSES) -> Fit:
+def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
+             progress: Callable[[int, int, str], None], passes: tuple[Pass, ...] = PASSES) -> Fit:
     """Fits the clip by the published method; the focal length stays as given or guessed."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # matrices of 3 x 3: threads cost more than they give
@@ -64,8 +64,8 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         torch.set_num_threads(threads)
 
 
-def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress: Callable,
-         passes: tuple[Pass, ...]) -> Fit:
+def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
+         progress: Callable[[int, int, str], None], passes: tuple[Pass, ...]) -> Fit:
     center = np.array([sightings.width / 2, sightings.height / 2])
     start = estimate_start(body, sightings, focal_prior(sightings, config)[0], center)
     objective = Objective(body, sightings, start, center)
@@ -73,9 +73,9 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     frames = len(sightings.xy)
     batches = [slice(a, min(a + BATCH, frames)) for a in range(0, frames, BATCH)]
     total, done = sum(p.steps for p in passes) * len(batches), 0
-    for first, sweep in enumerate(passes):
+    for i, sweep in enumerate(passes):
         for batch in batches:
-            descend(objective, unknowns, batch, sweep, first == 0, lambda n, before=done: progress(before + n, total, "steps"))
+            descend(objective, unknowns, batch, sweep, i == 0, lambda n, before=done: progress(before + n, total, "steps"))
             done += sweep.steps
     local, transl, betas, joint_offset = unknowns.read()
     if sightings.seconds is not None:
@@ -90,8 +90,12 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
                measure_reprojection(objective, sightings, state, joint_offset), total, joint_offset, notes)
 
 
-def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass, hold_hands: bool, tell: Callable) -> None:
-    """Takes one batch through one pass. Adam starts anew after the warm-up and at each pass, as published."""
+def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass, hold_hands: bool,
+            tell: Callable[[int], None]) -> None:
+    """Takes one batch through one pass. Adam starts anew after the warm-up and at each pass, as published.
+
+    hold_hands: whether the hands' joint offsets weigh more at first; tell: called with the number of steps done.
+    """
     optimiser = None
     for step in range(sweep.steps):
         if optimiser is None or step == sweep.warm_up:

@@ -22,6 +22,7 @@ from gsac.stages.smplx.state import State
 SPACE = 8.0
 """Side of the square to which the person's box is scaled, so that the loss does not depend on the resolution."""
 INIT, SHAPE, JOINT_OFFSET, SYMMETRY, UPRIGHT = 0.1, 0.01, 100.0, 1.0, 1.0
+"""Weights of the start, of betas, of joint offsets, of their symmetry, and of the spine's bend to front or back."""
 OVERLAP = 0.5
 """IoU of the hands' boxes above which the farther hand gets no weight."""
 BODY = len(BODY_JOINTS)
