@@ -28,7 +28,7 @@ from gsac.benchmarks.face_people import looks_of, mirror_of
 from gsac.stages.face.actions import TABLE, spread_of, turns, view_terms
 from gsac.stages.face.head import AXES, similarity
 from gsac.stages.face.landmarks import align
-from gsac.stages.smplx.head import closest, head_vertices, incident
+from gsac.stages.smplx.paper.head import find_closest, find_incident_faces, select_head
 
 SEEDS = [*range(1000, 1036), *range(2000, 2024)]
 """People of the turntable, of no truth clip that anything else is chosen or judged on, and drawn ones."""
@@ -110,11 +110,12 @@ def where(people: list[dict], mirror: np.ndarray, body: Body) -> tuple[np.ndarra
     """Corners (468, 3) and shares (468, 3): where on the open body's skin the network's points lie, the median over people."""
     places = np.array([p["places"] for p in people])
     both = np.concatenate([places, places[:, mirror] * [-1, 1, 1]])
-    skin = head_vertices(body)
+    skin = select_head(body)
     faces = body.faces[skin[body.faces].all(1)]
     used = np.unique(faces)
     faces = np.searchsorted(used, faces)
-    _, corners, share = closest(np.nanmedian(both, axis=0), body.v_template[used].astype(float), faces, incident(faces, len(used)))
+    _, corners, share = find_closest(np.nanmedian(both, axis=0), body.v_template[used].astype(float), faces,
+                                     find_incident_faces(faces, len(used)))
     return used[corners], share
 
 

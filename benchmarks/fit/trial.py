@@ -55,8 +55,9 @@ def warm_up() -> None:
     """Loads and compiles what the methods need on a few frames of a body whose pose is known, so that no trial pays for it."""
     import numpy as np
 
-    from gsac.stages.smplx.fit import Sightings, fit_clip
+    from gsac.stages.smplx.lm.fit import fit_clip
     from gsac.stages.smplx.paper import fit as paper
+    from gsac.stages.smplx.sightings import Sightings
 
     body = Body.load()
     pose = np.zeros((3, 55, 3))

@@ -1,8 +1,10 @@
 """smplx: fits the body model to all frames of a clip at once.
 
 takes  split/clip.json, handgap/keypoints.npz, face/face.npz, segment/alpha
-gives  body.npz: betas, poses, translation, focal length, joints and how sure each joint is
-One camera cannot see scale: `smplx.height_m` fixes it, otherwise the shape prior does and the report says so.
+gives  body.npz: betas, poses, translation, focal length, joints and their sigma
+`smplx.height_m` fixes the scale, which one camera cannot see; otherwise the shape prior does, with a warning.
+
+stage.py runs the method: lm/ or paper/. Files beside them are terms and data that both use.
 """
 
 from gsac.avatar.artifacts import check_body

@@ -13,29 +13,29 @@ METHODS = ("lm", "paper")
 @dataclass
 class SmplxConfig:
     method: str = "lm"
-    """How the body is fitted: `lm` solves all frames at once by Levenberg-Marquardt; `paper` is the published co-registration by
-    Adam, slower and less exact."""
+    """Solver of the fit. `lm`: Levenberg-Marquardt over all frames at once; `paper`: the published co-registration by Adam, slower
+    and less exact."""
     body_model: str = OPEN
-    """Which body: `open`, or the name under which `gsac models add NAME SMPLX_NEUTRAL.npz` keeps your own; train and export
-    must be given the same."""
+    """Body model: `open`, or the name under which `gsac models add NAME SMPLX_NEUTRAL.npz` keeps your own; train and export must be
+    given the same."""
     height_m: float | None = None
-    """The person's height; fixes the scale that one camera cannot see. None leaves it to the shape prior."""
+    """Height of the person, m; fixes the scale, which one camera cannot see. null: the shape prior gives the scale."""
     focal_px: float | None = None
-    """Focal length when the clip does not carry it; None estimates it."""
+    """Focal length, px, of a clip that does not carry it. null: estimated."""
     rounds: int = 2
-    """How often the silhouette's correspondences are renewed, and what the clip keeps to."""
+    """`lm`: how often the correspondences of the silhouette and the spread of the person's pose are renewed."""
     iterations: int = 8
-    """Levenberg-Marquardt steps a round, at most."""
+    """`lm`: Levenberg-Marquardt steps a round, at most."""
     silhouette: float = 1.0
-    """Weight of the silhouette against the key points; 0 leaves it out."""
+    """`lm`: weight of the silhouette against the key points; 0 turns it off."""
     smoothness: float = 1.0
-    """Weight of the temporal terms."""
+    """`lm`: weight of the temporal terms; 0 turns them off."""
     contact: float = 1.0
-    """`lm`: weight of the ground: soles lie on one plane or above it, and feet that rest in the picture stay; 0 leaves it out.
+    """`lm`: weight of the ground; 0 turns it off. Soles lie on one plane or above it, and feet at rest in the image do not slide.
     On eight turns joints 17.1 -> 16.6 mm, acceleration's error .98 -> .79 of the truth's own; on two with planted feet soles at
     rest slide 5 mm a frame instead of 9, joints 23.0 -> 23.6 mm."""
     joint_offsets: float = 0.0
-    """`lm`: how far joints may lie off what the shape says, metres, the same left and right; 0 leaves them where it has them.
+    """`lm`: standard deviation, m, of the joints' offsets from where the betas put them, the same left and right; 0 turns them off.
     On turns 0.005 measured the same within 1 %: 13.8 mm of joints, 13.2 against 13.3 mm of vertices in unseen poses."""
 
     def models(self) -> tuple[str, ...]:
@@ -43,6 +43,7 @@ class SmplxConfig:
         return brought(self.body_model)
 
     def check(self) -> None:
+        """Raises BadInput where a value is out of range."""
         if self.method not in METHODS:
             raise BadInput(f"smplx.method is {self.method!r}; choose one of {', '.join(METHODS)}")
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:

@@ -1,18 +1,20 @@
-"""What `face` saw, in the words of the body at hand."""
+"""Translates the facial actions of face.npz into the body model's expression and jaw pose."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.body import Body
+
 JAW_OPEN, JAW_ANGLE = 24, 0.38
-"""Place of jawOpen among face.npz's 52 actions, and the turn, rad, of a jaw that is fully open."""
+"""Index of jawOpen in face.npz's 52 actions, and the angle, rad, of a fully open jaw."""
 
 
-def mimic(body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
-    """body: avatar.body.Body; face: arrays of face.npz. Returns expression (T, E), jaw_pose (T, 3) rad and what was lost, if any.
+def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
+    """Expression (T, E), jaw_pose (T, 3) rad and a sentence about what was lost, or "".
 
-    The open body acts the 52 actions as they are. An official file's expressions are FLAME's, which no action names: with a FLAME
-    head in face.npz they are there, without one only the jaw moves.
+    face: arrays of face.npz, `expression` (T, 52), `jaw` (T, 3), ... The open body's expressions are the 52 actions. An official
+    body's are FLAME's: taken from a FLAME head in face.npz; without one only the jaw moves.
     """
     actions, jaw = face["expression"], face["jaw"].astype(np.float32)
     if actions.shape[1] == len(body.expression_names) and body.jaw_actions.any():

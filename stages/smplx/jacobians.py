@@ -2,8 +2,8 @@
 
 A point is a weighted sum of skinned vertices. Grouped by joint k it is  x = sum_k G_k m_k + w_k t_k + transl,  where the
 moment m_k = sum_v a_v w_vk v is linear in the betas: a few 3-vectors a point instead of 13,718 vertices.
-T frames, J joints, A active joints, P points, M (point, joint) pairs, B betas. The shape unknowns are the betas and what
-`personal.py` adds to them, joints or points.
+T frames, J joints, A active joints, P points, M (point, joint) pairs, B betas. The S shape unknowns are the B betas and the K
+person's own offsets of lm/person_offsets.py.
 A step turns joint j by R_j <- R_j exp(delta_j); then dx/ddelta_j = (G_j delta_j) x (the part of x carried by j, about j).
 """
 
@@ -20,7 +20,7 @@ from gsac.avatar.body import Body
 
 @dataclass
 class Pairs:
-    """P points as M (point, joint) pairs; the pairs of point p are `start[p]:start[p + 1]`."""
+    """P points as M (point, joint) pairs; point p owns the pairs `start[p]:start[p + 1]`."""
 
     start: np.ndarray  # (P + 1,) int64
     joint: np.ndarray  # (M,) int64
@@ -33,15 +33,15 @@ class Pairs:
         return len(self.start) - 1
 
     def moments(self, shape: np.ndarray) -> np.ndarray:
-        """(M, 3) of a shape that may have more unknowns than move these points."""
+        """Moments (M, 3). shape: (S,); unknowns beyond those that move these points are ignored."""
         return self.moment + self.moment_dirs @ shape[: self.moment_dirs.shape[2]]
 
 
-def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, moves: np.ndarray | None = None) -> Pairs:
-    """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m added in the axes of the heaviest joint;
-    moves: (P, 3, B + K) how these offsets move by the shape unknowns.
+def make_pairs(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, moves: np.ndarray | None = None) -> Pairs:
+    """Pairs of points that are weighted sums of vertices; clothes do not move them.
 
-    The points are the person's own: clothes do not move them.
+    matrix: (P, V) weights; offsets: (P, 3) m added in the axes of the point's heaviest joint; moves: (P, 3, B + K) slopes of the
+    offsets by the shape unknowns.
     """
     matrix = matrix.tocsr()
     moves = np.zeros((matrix.shape[0], 3, body.num_betas)) if moves is None else moves
@@ -64,8 +64,8 @@ def pairs_of(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None =
     return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), added)
 
 
-def surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:
-    """Points on the surface: face (P,), bary (P, 3). Twelve pairs a point, some of no weight."""
+def make_surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:
+    """Pairs of points on the surface: face (P,), bary (P, 3). Twelve pairs a point, some of weight 0."""
     vertices = body.faces[face]  # (P, 3)
     w = bary[:, :, None] * body.skin_weight[vertices]  # (P, 3, 4)
     mass = w.reshape(-1).astype(np.float64)
@@ -75,12 +75,12 @@ def surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:
 
 
 class Skeleton:
-    """Joint chain of one body with the derivatives that the fit needs."""
+    """Joint chain of one body, with its derivatives."""
 
     def __init__(self, body: Body, active: np.ndarray, joint_moves: np.ndarray | None = None):
-        """joint_moves: (J, 3, K) how joints move by the shape unknowns after the betas."""
+        """active: (A,) joints that the fit turns; joint_moves: (J, 3, K) slopes of the joints by the unknowns after the betas."""
         self.parents = np.asarray(body.parents, np.int64)
-        self.active = np.asarray(active, np.int64)  # (A,) joints that the fit may turn
+        self.active = np.asarray(active, np.int64)  # (A,)
         self.rest = (body.J_regressor @ body.v_template).astype(np.float64)  # (J, 3)
         self.rest_dirs = np.einsum("jv,vcb->jcb", body.J_regressor, body.shapedirs).astype(np.float64)
         if joint_moves is not None:
@@ -89,10 +89,10 @@ class Skeleton:
         for j, p in enumerate(self.parents):
             if p >= 0:
                 carries[j] |= carries[p]
-        self.carries = carries[:, self.active]  # (J, A): whether turning the active joint moves what the joint carries
+        self.carries = carries[:, self.active]  # (J, A) bool: the active joint is the joint or above it
 
     def pose(self, local: np.ndarray, shape: np.ndarray) -> Chain:
-        """local: (T, J, 3, 3) joint rotations. Returns the posed chain of every frame."""
+        """Poses the chain in every frame. local: (T, J, 3, 3) joint rotations; shape: (S,)."""
         shape = shape[: self.rest_dirs.shape[2]]
         rest = self.rest + self.rest_dirs @ shape
         world, place, dirs = local.copy(), np.empty((*local.shape[:2], 3)), np.empty((*local.shape[:2], 3, len(shape)))
@@ -111,7 +111,7 @@ class Chain:
     """T posed skeletons."""
 
     world: np.ndarray  # (T, J, 3, 3) joint to camera, rotations
-    place: np.ndarray  # (T, J, 3) joints, without transl
+    place: np.ndarray  # (T, J, 3) m, joints without transl
     shift: np.ndarray  # (T, J, 3): skinned = world @ rest + shift
     shift_dirs: np.ndarray  # (T, J, 3, S) by the first S shape unknowns
 
@@ -120,27 +120,27 @@ class Chain:
         return Chain(self.world[t: t + 1], self.place[t: t + 1], self.shift[t: t + 1], self.shift_dirs[t: t + 1])
 
 
-def positions(chain: Chain, pairs: Pairs, shape: np.ndarray) -> np.ndarray:
-    """(T, P, 3) the same points in every frame, without transl."""
-    return _positions(pairs.start, pairs.joint, pairs.mass, pairs.moments(shape), chain.world, chain.shift)
+def place_points(chain: Chain, pairs: Pairs, shape: np.ndarray) -> np.ndarray:
+    """The pairs' points (T, P, 3) m in every frame, without transl. shape: (S,)."""
+    return _place_points(pairs.start, pairs.joint, pairs.mass, pairs.moments(shape), chain.world, chain.shift)
 
 
-def pulled_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray, covectors: np.ndarray) -> np.ndarray:
-    """Rows of the Jacobian: how g . x moves with the unknowns of its frame, for R covectors g of every point.
+def pull_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray, covectors: np.ndarray) -> np.ndarray:
+    """Rows of the Jacobian: derivatives of g . x for R covectors g of every point x.
 
-    covectors: (T, P, R, 3). Returns (T, P, R, 3 A + 3 + S): joint steps, transl, shape as far as it moves them.
+    shape: (S,); covectors: (T, P, R, 3). Returns (T, P, R, 3 A + 3 + S): by joint steps, transl and the shape unknowns that move x.
     """
     moment = pairs.moments(shape)
     size = max(pairs.moment_dirs.shape[2], chain.shift_dirs.shape[3])
     rows = np.zeros((*covectors.shape[:3], 3 * len(skeleton.active) + 3 + size))
     for t, g in enumerate(covectors):
-        _pulled_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
+        _pull_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
                      chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries, g, rows[t])
     return rows
 
 
 @njit(cache=True, nogil=True)
-def _positions(start, joint, mass, moment, world, shift):
+def _place_points(start, joint, mass, moment, world, shift):
     x = np.zeros((len(world), len(start) - 1, 3))
     for t in range(len(world)):
         for p in range(x.shape[1]):
@@ -153,7 +153,7 @@ def _positions(start, joint, mass, moment, world, shift):
 
 
 @njit(cache=True, nogil=True)
-def _pulled_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors, rows):
+def _pull_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors, rows):
     points, joints, size = len(start) - 1, len(active), rows.shape[2] - 3 * len(active) - 3
     own, shaped = moment_dirs.shape[2], shift_dirs.shape[2]
     arm = np.zeros((joints, 3))

@@ -1,21 +1,24 @@
-"""Which frames the fit got wrong, and why: nothing is learned from them."""
+"""Detects frames whose fit failed, and why; training skips them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gsac.stages.frame_names import name_frames
-from gsac.stages.smplx.fit import Fit
+from gsac.stages.smplx.state import Fit
 
 POOR_IOU = 0.7
 FALL = 0.12
-"""IoU below the clip's usual; a wide coat covers more than the body in every frame, a wrong pose in one."""
+"""A frame's IoU is lost this far below the clip's median: a wide coat lowers it in every frame, a wrong pose in one."""
 FAR = 0.05
-"""Median distance of fitted from seen body points, as a share of the person's height: a good fit has a tenth of it."""
+"""Median reprojection error of a lost frame, as a share of the person's height; a good fit has a tenth of it."""
 
 
-def lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarray]:
-    """seen: (T,) bool, whether somebody was; height: px, of the person. Returns reason -> (T,) bool; a frame has one reason."""
+def find_lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarray]:
+    """Reason -> frames (T,) bool; a frame has at most one reason.
+
+    seen: (T,) bool, frames with a person; height: px, of the person.
+    """
     iou, off = np.nan_to_num(fit.iou, nan=1.0), np.nan_to_num(fit.reprojection, nan=0.0)
     usual = np.median(iou[seen]) if seen.any() else 1.0
     uncovered = seen & (iou < min(POOR_IOU, usual - FALL))
@@ -24,8 +27,11 @@ def lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarr
             f"the body lies more than {FAR:.0%} of its height off the seen points": away}
 
 
-def sentences(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[str]:
-    """What the user reads: lost frames by their reason, and a body that covers the silhouette badly all along."""
+def describe_lost_frames(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[str]:
+    """Sentences for the user: lost frames by reason, and frames of low IoU that were kept.
+
+    lost: reason -> frames (T,) bool; iou: (T,), NaN without alpha.
+    """
     out = [f"Not fitted, and not learned from: {name_frames(mask)}; {reason}." for reason, mask in lost.items() if mask.any()]
     poor = (np.nan_to_num(iou, nan=1.0) < POOR_IOU) & ~np.any(list(lost.values()), axis=0)
     if poor.any():

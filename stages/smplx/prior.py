@@ -1,7 +1,7 @@
-"""What bodies do: mean and spread of each joint's rotation vector, limits of the hinges, and how fast joints turn.
+"""Priors of pose, motion and shape: mean and spread of each joint's rotation vector, limits of hinges, speeds, betas.
 
-Rotation vectors about the T-pose axes (x left, y up, z front), degrees in the tables. Spreads are wide: they decide only
-what the pictures leave open.
+Rotation vectors about the T-pose axes (x left, y up, z front), degrees in the tables. Spreads are standard deviations, and wide:
+they decide only what the images leave open.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ MEAN = {"left_collar": (0, 0, -3), "right_collar": (0, 0, 3), "left_shoulder": (
         "left_elbow": (0, -20, 0), "right_elbow": (0, 20, 0), "left_knee": (8, 0, 0), "right_knee": (8, 0, 0)}
 """Arms hang, and the collar bones with them: the template's lie as under arms held 45 degrees out."""
 LIMITS = ((4, 0, 1), (5, 0, 1), (18, 1, -1), (19, 1, 1))
-"""Hinges that do not bend back: joint, axis, sign of the allowed bend."""
+"""Hinges that do not bend backwards: joint, axis, sign of the allowed bend."""
 LIMIT_SPREAD = np.radians(3)
 CURL = np.radians(15)
-"""Fingers at rest bend a little, about z: towards the palm."""
+"""Bend of resting fingers about z, towards the palm."""
 
 
 def pose_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (A, 3) and spread (A, 3) of the joints' rotation vectors, rad."""
+    """Mean (A, 3) and spread (A, 3) of the joints' rotation vectors, rad. joints: (A,) indices."""
     mean, spread = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
     for i, j in enumerate(joints):
         name = SMPLX_JOINTS[j]
@@ -44,15 +44,15 @@ def pose_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def finger_prior(side: str, part: str) -> tuple[np.ndarray, np.ndarray]:
-    """Fingers are hinges about z; roots also spread about y; the thumb is freer."""
+    """Mean (3,) and spread (3,), rad. Fingers are hinges about z; roots also spread about y; the thumb is freer."""
     down = -1 if side == "left" else 1
     if part.startswith("thumb"):
         return np.zeros(3), np.radians([12, 15, 15])
     return np.array([0, 0, down * CURL]), np.radians([3, 8 if part.endswith("1") else 2, 25])
 
 
-def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Spread of angular speed (A,) rad/s (infinite for the pelvis, which turns) and of acceleration (A,) rad/s^2."""
+def motion_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Spread of angular speed (A,) rad/s (infinite for the pelvis, which turns) and of acceleration (A,) rad/s^2. joints: (A,)."""
     speed, acceleration = np.full(len(joints), 0.4), np.full(len(joints), 1.0)
     arms, legs, ankles = np.isin(joints, (16, 17, 18, 19, 20, 21)), np.isin(joints, (1, 2, 4, 5)), np.isin(joints, (7, 8))
     speed[arms], acceleration[arms] = 0.75, 2.0
@@ -69,14 +69,14 @@ def turning_spread(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 CLOTHES = {"chest": (4, 8), "belly": (4, 8), "waist": (10, 10), "upper arms": (3, 8), "sleeves": (1.5, 8), "forearms": (1.5, 6),
            "thighs": (4, 8), "shanks": (4, 12), "cuffs": (2.5, 10), "feet": (2.5, 8), "soles": (5, 10), "hair": (5, 15),
            "nape": (1.5, 15)}
-"""How far clothes and hair stand off the skin, mm: mean and spread, of people in clothes and without."""
+"""Distance of clothes and hair from the skin, mm: mean and spread over people in clothes and without."""
 
 
 def shape_prior(figure: int, clothes: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (B,) and spread (B,) of the betas: the figure's, then the clothes' (a centimetre a unit)."""
+    """Mean (B,) and spread (B,) of the betas: the figure's, then the clothes' (1 cm a unit). figure: number of the former."""
     worn = np.array([CLOTHES[name] for name in clothes]).reshape(-1, 2) / 10
     return np.append(np.zeros(figure), worn[:, 0]), np.append(np.ones(figure), worn[:, 1])
 
 
 TRANSL_ACCELERATION = 0.25
-"""Spread of the body's acceleration, m/s^2."""
+"""Spread of the acceleration of transl, m/s^2."""

@@ -1,11 +1,12 @@
-"""The outline term: where the body's own outline lies against the alpha's edge.
+"""Outlines: the signed distance field of an alpha's edge, and the points of the posed body that should lie on it.
 
-Each round the posed body is rasterised small, the visible surface under its outline pixels becomes a set of points, and
-each point is drawn along the signed distance field of the alpha until it lies on the edge.
+The posed body is rasterised small; the surface under its outline pixels becomes a set of points. `lm` renews them each round and
+minimises their distance in the field.
 """
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,33 +14,39 @@ import cv2
 import numpy as np
 
 from gsac.avatar.artifacts import read_alpha
-from gsac.avatar.body import Body
+from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
+from gsac.avatar.threads import available
 from gsac.avatar.zbuffer import rasterise
-from gsac.stages.smplx.jacobians import Pairs, surface_pairs
+from gsac.stages.smplx.jacobians import Pairs, make_surface_pairs
 
 FIELD_HEIGHT = 320
-"""Alpha is looked at this high: finer edges than this do not move a joint."""
+"""Height of the field, px: finer edges do not move a joint."""
 POINTS = 160
-"""Outline points a frame, at most."""
+"""Most outline points a frame."""
 INSET = 0.5
-"""Field pixels that an outline point, the middle of a covered pixel, lies within the outline it stands for."""
+"""Distance, field pixels, from an outline point (the middle of a covered pixel) out to the outline."""
+
+THREADS = min(available(), 8)
+"""The rasteriser releases Python's lock; more threads mostly wait for code that holds it."""
+POSED_AT_ONCE = 64
+"""Frames whose vertices are held in memory together."""
 
 
 @dataclass
 class Outline:
-    """One frame's alpha edge as a field, in full-size pixels."""
+    """Signed distance field of one frame's alpha edge, in full-size pixels."""
 
     field: np.ndarray  # (h, w) signed distance px, negative inside
     slope: np.ndarray  # (h, w, 2) its gradient
     scale: float
-    """Full-size pixels a field pixel."""
+    """Full-size pixels per field pixel."""
     area: float
-    """Share of the frame that the person covers; 0 where there is nobody."""
+    """Share of the frame that the person covers; 0 without a person."""
     mask: np.ndarray  # (h, w) bool
 
     def at(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """xy: (P, 2) px. Signed distance (P,) px, its gradient (P, 2), and whether the point lies in the picture (P,)."""
+        """Signed distance (P,) px, its gradient (P, 2), and whether the point lies in the image (P,) bool. xy: (P, 2) px."""
         h, w = self.field.shape
         at = (xy / self.scale - 0.5).astype(np.float32)
         inside = (at[:, 0] > 1) & (at[:, 0] < w - 2) & (at[:, 1] > 1) & (at[:, 1] < h - 2)
@@ -49,7 +56,7 @@ class Outline:
 
 
 def read_outline(path: Path) -> Outline:
-    """The outline of one alpha EXR."""
+    """Makes the field of one alpha EXR."""
     alpha = read_alpha(path)
     scale = max(alpha.shape[0] / FIELD_HEIGHT, 1.0)
     size = (max(2, round(alpha.shape[1] / scale)), max(2, round(alpha.shape[0] / scale)))
@@ -62,8 +69,33 @@ def read_outline(path: Path) -> Outline:
     return Outline(field, slope, scale, float(mask.mean()), mask)
 
 
-def outline_points(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int) -> tuple[Pairs, float]:
-    """Surface points under the posed body's outline (V, 3), and the IoU of body and alpha."""
+def read_outlines(paths: list[Path]) -> list[Outline]:
+    """Makes the fields of a clip's alpha EXRs."""
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(read_outline, paths))
+
+
+def sample_outlines(body: Body, params: BodyParams, width: int, height: int,
+                    outlines: list[Outline]) -> tuple[list[Pairs | None], np.ndarray]:
+    """Outline points of each posed frame, None where there are none, and the IoU (T,) of body and alpha, NaN without alpha."""
+    camera = params.camera(width, height)
+    pairs: list[Pairs | None] = [None] * params.frames
+    iou = np.full(params.frames, np.nan)
+
+    def sample(t: int, vertices: np.ndarray) -> None:
+        if outlines[t].area > 0:
+            points, iou[t] = sample_outline(body, vertices, camera, outlines[t], t)
+            pairs[t] = points if points.count else None
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        for first in range(0, len(outlines), POSED_AT_ONCE):
+            frames = range(first, min(first + POSED_AT_ONCE, len(outlines)))
+            list(pool.map(sample, frames, body.posed(params, list(frames))[0]))
+    return pairs, iou
+
+
+def sample_outline(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int) -> tuple[Pairs, float]:
+    """Outline points of one posed body, and the IoU of body and alpha. vertices: (V, 3) m, camera frame."""
     h, w = outline.field.shape
     face, bary, _ = rasterise(vertices, body.faces, camera.scaled(w, h))
     covered = face >= 0
@@ -75,4 +107,4 @@ def outline_points(body: Body, vertices: np.ndarray, camera: Camera, outline: Ou
     if len(y) > POINTS:
         pick = ((np.arange(POINTS) + np.random.default_rng(seed).random(POINTS)) * len(y) / POINTS).astype(int)  # evenly by height
         y, x = y[pick], x[pick]
-    return surface_pairs(body, face[y, x], bary[y, x].astype(np.float64)), float(overlap)
+    return make_surface_pairs(body, face[y, x], bary[y, x].astype(np.float64)), float(overlap)

@@ -1,14 +1,14 @@
-"""Directions that left and right share: x of the right side is minus x of the left, and the middle of the body stays in it."""
+"""Offsets that left and right share: x of the right side is minus x of the left; points of the body's middle have no x."""
 
 from __future__ import annotations
 
 import numpy as np
 
 
-def mirrored(spreads: dict[str, tuple], index: dict[str, int], rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """spreads: name without its side -> mm along x, y, z; 0 leaves an axis out, and so does the middle of the body for x.
+def mirror_directions(spreads: dict[str, tuple], index: dict[str, int], rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (rows, 3, K) m a unit of K unknowns that move left and right alike, and the unknowns' standard deviations (K,) m.
 
-    Returns (rows, 3, K) metres a unit of each unknown, and their spreads (K,) m.
+    spreads: name without its side -> mm along x, y, z; an axis of 0 is left out; index: name with its side -> row.
     """
     columns, metres = [], []
     for name, spread in spreads.items():

@@ -1,4 +1,4 @@
-"""A fit in miniature: it calls what a real one calls, so that kernels are compiled or loaded, and libraries imported, before."""
+"""A small fit ahead of the run: it calls everything that a run calls, so that all is compiled and imported before."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.contract import Job
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.fit import HIPS
+from gsac.stages.smplx.sightings import HIPS
 
 FRAMES, FPS = 6, 10.0
 WIDTH, HEIGHT, FOCAL, DISTANCE = 54, 96, 100.0, 2.4
-"""px and m of images that the body nearly fills."""
+"""px, px, px and m: the body nearly fills the image."""
 TURN = 1.0
-"""rad from frame to frame."""
+"""Yaw from frame to frame, rad."""
 SIGMA = 0.5
 """px"""
 
 
 def rehearse(run: Callable[[Job], None]) -> None:
-    """run: the stage's. Takes what the compiler takes at the very first; a second and a half once its cache holds everything."""
+    """Runs the stage once. Takes 1.5 s once the compiler's cache is filled, and the compile time before. run: the stage's."""
     with TemporaryDirectory() as folder:
-        inputs = written(Body.load(), Path(folder))
+        inputs = write_inputs(Body.load(), Path(folder))
         out = Path(folder) / "out"
         out.mkdir()
         run(Job(inputs, out, SmplxConfig(rounds=1, iterations=1)))
 
 
-def written(body: Body, folder: Path) -> dict[str, Path]:
-    """Artifacts of a body that turns, by port."""
+def write_inputs(body: Body, folder: Path) -> dict[str, Path]:
+    """Writes the artifacts of a turning body; returns port -> path."""
     pose = np.zeros((FRAMES, len(body.parents), 3))
     for t in range(FRAMES):
         pose[t, 0] = np.pi * np.array([np.cos(t * TURN / 2), 0, np.sin(t * TURN / 2)])

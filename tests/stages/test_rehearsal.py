@@ -11,7 +11,7 @@ import pytest
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
-from gsac.stages.smplx.warmup import written
+from gsac.stages.smplx.warmup import write_inputs
 
 CHILD = """
 import importlib, json, sys
@@ -47,7 +47,7 @@ def loaded_by(name: str, inputs: dict[str, Path], out: Path) -> list[str]:
 
 @pytest.mark.slow
 def test_after_the_rehearsal_a_fit_loads_nothing(tmp_path):
-    assert loaded_by("smplx", written(Body.load(), tmp_path), tmp_path / "out") == []
+    assert loaded_by("smplx", write_inputs(Body.load(), tmp_path), tmp_path / "out") == []
 
 
 @pytest.mark.slow

@@ -1,4 +1,5 @@
-"""Levenberg-Marquardt over all frames: a block band (frames and their temporal neighbours) with an arrow (shared unknowns).
+"""Levenberg-Marquardt over all frames. The normal equations are a block band (frames and their temporal neighbours) with an arrow
+(shared unknowns).
 
 T frames, n unknowns a frame, s shared unknowns. Temporal terms reach two frames ahead, so the band is 3 n wide.
 """
@@ -7,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
+AnyState = TypeVar("AnyState")
+
 
 @dataclass
 class System:
-    """Normal equations J'J x = -J'r."""
+    """Normal equations J'J x = -J'r of rows J and residuals r."""
 
     band: np.ndarray  # (T, n, 3 n): block row t against frames t, t + 1, t + 2
     arrow: np.ndarray  # (T, n, s)
@@ -24,11 +28,12 @@ class System:
 
     @classmethod
     def zeros(cls, frames: int, size: int, shared: int) -> System:
+        """No equations yet; size: n, shared: s."""
         return cls(np.zeros((frames, size, 3 * size)), np.zeros((frames, size, shared)), np.zeros((shared, shared)),
                    np.zeros((frames, size)), np.zeros(shared))
 
     def add(self, frames: slice, jacobian: np.ndarray, residual: np.ndarray) -> None:
-        """Rows (F, R, n + s') and residuals (F, R) of F frames, by the first s' shared unknowns."""
+        """Adds rows: jacobian (F, R, n + s'), residual (F, R) of F frames, by the first s' shared unknowns."""
         n, shared = self.gradient.shape[1], slice(jacobian.shape[2] - self.gradient.shape[1])
         across = jacobian.swapaxes(1, 2)
         square, slope = across @ jacobian, (across @ residual[..., None])[..., 0]
@@ -39,12 +44,12 @@ class System:
         self.shared_gradient[shared] += slope[:, n:].sum(0)
 
     def add_shared(self, jacobian: np.ndarray, residual: np.ndarray) -> None:
-        """Rows (R, s) on the shared unknowns alone."""
+        """Adds rows on the shared unknowns alone: jacobian (R, s), residual (R,)."""
         self.shared += jacobian.T @ jacobian
         self.shared_gradient += jacobian.T @ residual
 
     def solve(self, damping: float, frozen: np.ndarray, frozen_shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Step (T, n) and shared step (s,); frozen (n,) and frozen_shared (s,) mark unknowns that stay.
+        """Step (T, n) and shared step (s,). frozen: (n,) bool and frozen_shared: (s,) bool, unknowns that stay.
 
         Raises LinAlgError where the damped system is not positive definite.
         """
@@ -63,9 +68,12 @@ class System:
 
 
 FROZEN = 1e12
+"""Added to the diagonal at unknowns that stay."""
 DAMPING = 1e-5
-"""At the first step, a share of each unknown's own curvature. Shape and the hips' place lie in valleys a thousandth as steep as
-what surrounds them: more damping than that, and the fit stops on the way."""
+"""At the first step, as a share of each unknown's own curvature. Shape and the hips' place lie in valleys a thousandth as steep as
+their surroundings: with more damping the fit stops on the way."""
+TOLERANCE = 1e-3
+"""Relative decrease of the cost below which the solver stops."""
 
 
 def solve_band(band: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -103,21 +111,26 @@ def solve_band(band: np.ndarray, right: np.ndarray) -> np.ndarray:
     return solved.reshape(-1, n, right.shape[2])[:t]
 
 
-@dataclass
-class Trace:
-    """How a solve went."""
+def robust(residual: np.ndarray, limit: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Geman and McClure's robust loss (1987), by iterated reweighting.
 
-    costs: list[float]
-    steps: int = 0
-
-
-def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callable, frozen: np.ndarray,
-                        frozen_shared: np.ndarray, iterations: int, tolerance: float = 1e-3) -> tuple[object, Trace]:
-    """Minimises `cost(state)`; `linearise(state)` gives a System, `move(state, step, shared)` a new state.
-
-    Stops after `iterations` accepted or refused steps, or when a step lowers the cost by less than `tolerance` of it.
+    residual: (...) in spreads; limit: scalar or (...), the residual in spreads beyond which the loss flattens. Returns the cost
+    (...) and the square root of the weight (...).
     """
-    damping, trace, system = DAMPING, Trace([cost(state)]), None
+    square = residual**2
+    shrink = 1 / (1 + square / limit**2)
+    return square * shrink, shrink
+
+
+def levenberg_marquardt(state: AnyState, linearise: Callable[[AnyState], System], cost: Callable[[AnyState], float],
+                        move: Callable[[AnyState, np.ndarray, np.ndarray], AnyState], frozen: np.ndarray,
+                        frozen_shared: np.ndarray, iterations: int) -> tuple[AnyState, int]:
+    """Minimises `cost(state)`. Returns state and number of steps.
+
+    move: the state after a step (T, n) and a shared step (s,); frozen: (n,) bool and frozen_shared: (s,) bool, unknowns that stay.
+    Stops after `iterations` accepted or refused steps, or when a step lowers the cost by less than `TOLERANCE` of it.
+    """
+    damping, lowest, steps, system = DAMPING, cost(state), 0, None
     for _ in range(iterations):
         system = system or linearise(state)
         try:
@@ -127,16 +140,15 @@ def levenberg_marquardt(state, linearise: Callable, cost: Callable, move: Callab
             continue
         trial = move(state, step, shared)
         value = cost(trial)
-        trace.steps += 1
-        if np.isfinite(value) and value < trace.costs[-1]:
-            gain = 1 - value / trace.costs[-1]
-            state, damping = trial, max(damping / 5, 1e-7)
-            trace.costs.append(value)
-            if gain < tolerance:
+        steps += 1
+        if np.isfinite(value) and value < lowest:
+            gain = 1 - value / lowest
+            state, damping, lowest = trial, max(damping / 5, 1e-7), value
+            if gain < TOLERANCE:
                 break
             system = None
         else:
             damping *= 8
             if damping > 1e6:
                 break
-    return state, trace
+    return state, steps

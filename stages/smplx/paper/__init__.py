@@ -1,1 +1,1 @@
-"""`smplx.method paper`: the published co-registration by Adam."""
+"""`smplx.method paper`: the published co-registration by Adam, in torch."""

@@ -1,10 +1,12 @@
 """The published co-registration (GSAC eq. 5-8, after ExAvatar's fitting): key points, initial values, face and regularisers,
-all means, by Adam in three passes over batches of frames. The baseline that `lm` is measured against.
+all means, by Adam in three passes over batches of frames. It is the baseline of `lm`.
 
-Read differently from the publication, because what it takes is not there: the start is `lm`'s closed form (the paper regresses it
-by Hand4Whole); the head of the face terms is the one in face.npz, FLAME's or the open body's own (`head.py`); the body has no
-face offsets, so they move its shape only, and the second key point term, which differs from the first by the face offsets alone,
-is left out. Every step poses all vertices, as the published one does for the term that holds the mesh to the start.
+It deviates from the publication where an input of that is missing: the start is the closed form of initial.py (the paper regresses
+it by Hand4Whole); the head of the face terms is that of face.npz, FLAME's or the open body's own (head.py); the body has no face
+offsets, so that the face terms move its shape only, and the second key point term, which differs from the first by the face
+offsets alone, is left out. Every step poses all vertices, for the published term that keeps the mesh near the start.
+
+The published method knows no sigma of its joints: sigma_joints comes from `lm`'s normal equations, the one import of lm/.
 """
 
 from __future__ import annotations
@@ -18,27 +20,20 @@ import torch
 from gsac.avatar.body import Body
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.fit import (
-    BODY_POINTS,
-    HIPS,
-    Fit,
-    Sightings,
-    focal_prior,
-    joint_spread,
-    observations,
-    starting_state,
-    to_params,
-)
-from gsac.stages.smplx.jacobians import pairs_of
-from gsac.stages.smplx.lm.problem import Problem, State
+from gsac.stages.smplx.initial import estimate_start
+from gsac.stages.smplx.jacobians import make_pairs
+from gsac.stages.smplx.lm.observations import observe
+from gsac.stages.smplx.lm.problem import Problem, estimate_joint_sigma
 from gsac.stages.smplx.paper.loss import Objective, Unknowns
 from gsac.stages.smplx.paper.smooth import smooth_linear, smooth_rotations
 from gsac.stages.smplx.prior import BODY_JOINTS
-from gsac.stages.smplx.silhouette import Outline, outline_points
+from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
+from gsac.stages.smplx.silhouette import Outline, sample_outlines
+from gsac.stages.smplx.state import Fit, State, to_params
 
 BATCH = 64
 HAND_OFFSET, HAND_OFFSET_STEPS = 10.0, 250
-"""The hands' joint offsets are held so many times stronger, for so many steps of the first pass."""
+"""Factor on the weight of the hands' joint offsets, and the steps of the first pass that it lasts."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class Pass:
     decays: tuple[int, ...]
     """Steps at which the rate falls to a tenth."""
     warm_up: int
-    """First steps, in which only the root moves."""
+    """Steps at first in which only the root moves."""
     shared: bool
     """Whether betas and joint offsets move."""
 
@@ -58,9 +53,9 @@ class Pass:
 PASSES = (Pass(500, 0.1, (100, 250, 400), 100, True), Pass(250, 0.01, (100, 200), 0, True), Pass(250, 0.01, (100, 200), 0, False))
 
 
-def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress: Callable,
-             passes: tuple[Pass, ...] = PASSES) -> Fit:
-    """Fits the clip by the published method; arguments and result as `fit.fit_clip`. The focal length stays as given or guessed."""
+def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
+             progress: Callable[[int, int, str], None], passes: tuple[Pass, ...] = PASSES) -> Fit:
+    """Fits the clip by the published method; the focal length stays as given or guessed."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # matrices of 3 x 3: threads cost more than they give
     try:
@@ -69,37 +64,42 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         torch.set_num_threads(threads)
 
 
-def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig, progress: Callable,
-         passes: tuple[Pass, ...]) -> Fit:
+def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
+         progress: Callable[[int, int, str], None], passes: tuple[Pass, ...]) -> Fit:
     center = np.array([sightings.width / 2, sightings.height / 2])
-    start = starting_state(body, sightings, focal_prior(sightings, config)[0], center)
+    start = estimate_start(body, sightings, focal_prior(sightings, config)[0], center)
     objective = Objective(body, sightings, start, center)
     unknowns = Unknowns(objective.start, torch.tensor(start.transl, dtype=torch.float32), body.num_betas)
     frames = len(sightings.xy)
     batches = [slice(a, min(a + BATCH, frames)) for a in range(0, frames, BATCH)]
     total, done = sum(p.steps for p in passes) * len(batches), 0
-    for first, sweep in enumerate(passes):
+    for i, sweep in enumerate(passes):
         for batch in batches:
-            descend(objective, unknowns, batch, sweep, first == 0, lambda n, before=done: progress(before + n, total, "steps"))
+            descend(objective, unknowns, batch, sweep, i == 0, lambda n, before=done: progress(before + n, total, "steps"))
             done += sweep.steps
-    local, transl, betas, joint_offset = unknowns.found()
+    local, transl, betas, joint_offset = unknowns.read()
     if sightings.seconds is not None:
         local, transl = smooth_rotations(local), smooth_linear(transl)
     state = State(local, transl, betas, start.log_focal, np.zeros(0))
     notes = ("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's regression",)
     if objective.head is None:
         notes += ("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) are off",)
-    iou = overlap(body, state, joint_offset, outlines, center, sightings)
-    return Fit(state, spread_of(body, sightings, state, config, center), iou,
-               pixels_off(objective, sightings, state, joint_offset), total, joint_offset, notes)
+    params = to_params(body, state, center, joint_offset=joint_offset)
+    iou = sample_outlines(body, params, sightings.width, sightings.height, outlines)[1]
+    return Fit(state, estimate_sigma(body, sightings, state, config, center), iou,
+               measure_reprojection(objective, sightings, state, joint_offset), total, joint_offset, notes)
 
 
-def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass, hold_hands: bool, tell: Callable) -> None:
-    """One batch through one pass. Adam begins anew after the warm-up and at each pass, as published."""
+def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass, hold_hands: bool,
+            tell: Callable[[int], None]) -> None:
+    """Takes one batch through one pass. Adam starts anew after the warm-up and at each pass, as published.
+
+    hold_hands: whether the hands' joint offsets weigh more at first; tell: called with the number of steps done.
+    """
     optimiser = None
     for step in range(sweep.steps):
         if optimiser is None or step == sweep.warm_up:
-            optimiser = torch.optim.Adam(list(unknowns.leaves(batch, step < sweep.warm_up, sweep.shared)))
+            optimiser = torch.optim.Adam(list(unknowns.open_batch(batch, step < sweep.warm_up, sweep.shared)))
         optimiser.param_groups[0]["lr"] = sweep.rate * 0.1 ** sum(step >= d for d in sweep.decays)
         optimiser.zero_grad()
         hold = HAND_OFFSET if hold_hands and step < HAND_OFFSET_STEPS else 1.0
@@ -108,29 +108,16 @@ def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass,
         tell(step + 1)
 
 
-def spread_of(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
-    """(T, 55) m, read off the same normal equations as `lm`'s at this state."""
-    detector = Detector.measured(sightings.detector, body)
-    pairs = pairs_of(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
-    seen = observations(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
-    return joint_spread(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, 0.0), state)
+def estimate_sigma(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
+    """sigma_joints (T, 55) m by the normal equations of `lm` at this state. center: (2,) px."""
+    detector = Detector.load(sightings.detector, body)
+    pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
+    seen = observe(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
+    return estimate_joint_sigma(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness), state)
 
 
-def overlap(body: Body, state: State, joint_offset: np.ndarray, outlines: list[Outline], center: np.ndarray,
-            sightings: Sightings) -> np.ndarray:
-    """(T,) IoU of body and alpha; NaN without alpha."""
-    params = to_params(body, state, center)
-    params.joint_offset = joint_offset.astype(np.float32)
-    camera = params.camera(sightings.width, sightings.height)
-    out = np.full(len(sightings.xy), np.nan)
-    for t, outline in enumerate(outlines):
-        if outline.area > 0:
-            out[t] = outline_points(body, body.posed(params, [t])[0][0], camera, outline, t)[1]
-    return out
-
-
-def pixels_off(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:
-    """(T,) median px of the body points; NaN where nothing was seen."""
+def measure_reprojection(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:
+    """(T,) median distance, px, of seen and fitted body points; NaN where nothing was seen. joint_offset: (55, 3) m."""
     uv = objective.pixels(state.local, state.transl, state.betas, joint_offset)
     use = np.isin(objective.known, BODY_POINTS)
     known = objective.known[use]

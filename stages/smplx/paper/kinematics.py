@@ -1,7 +1,9 @@
-"""The posed skeleton and points on the body as torch functions of the unknowns, for methods that descend a gradient.
+"""Skeleton, points and vertices of the body as torch functions of the unknowns.
 
-T frames, J joints, P points, B betas. As in `points.py` a point is  x = sum_k G_k m_k + w_k t_k  with its moment m_k and mass
-w_k on joint k; here all joints are written out, so that T frames of P points are one matrix product.
+T frames, J joints, P points, V vertices, B betas. As in jacobians.py a point is  x = sum_k G_k m_k + w_k t_k  with its moment m_k
+and mass w_k on joint k; here over all joints, so that T frames of P points are one matrix product.
+`local`: (T, J, 3, 3) rotations of the joints against their parents; `world`: (T, J, 3, 3) against the camera;
+`place`: (T, J, 3) m, posed joints without transl; `rest`: (J, 3) m, resting joints.
 """
 
 from __future__ import annotations
@@ -13,21 +15,21 @@ from scipy import sparse
 from gsac.avatar.body import Body
 
 
-def matrices(six: torch.Tensor) -> torch.Tensor:
-    """six: (..., 6), the first two columns of a rotation, not normalised. Returns (..., 3, 3) (Zhou et al. 2019)."""
+def to_matrices(six: torch.Tensor) -> torch.Tensor:
+    """Rotations (..., 3, 3) from six (..., 6), their first two columns, not normalised (Zhou et al. 2019)."""
     a, b = six[..., :3], six[..., 3:]
     x = torch.nn.functional.normalize(a, dim=-1)
     y = torch.nn.functional.normalize(b - (x * b).sum(-1, keepdim=True) * x, dim=-1)
     return torch.stack([x, y, torch.linalg.cross(x, y)], -1)
 
 
-def six_of(rotation: torch.Tensor) -> torch.Tensor:
-    """rotation: (..., 3, 3). Returns (..., 6)."""
+def to_six(rotation: torch.Tensor) -> torch.Tensor:
+    """The first two columns (..., 6) of a rotation (..., 3, 3)."""
     return torch.cat([rotation[..., 0], rotation[..., 1]], -1)
 
 
-def rotation_vectors(rotation: torch.Tensor) -> torch.Tensor:
-    """rotation: (..., 3, 3) by less than pi. Returns (..., 3) rad."""
+def to_vectors(rotation: torch.Tensor) -> torch.Tensor:
+    """Rotation vectors (..., 3) rad of a rotation (..., 3, 3) by less than pi."""
     r = rotation
     axis = torch.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], -1) / 2
     cos = ((r.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2).clamp(-0.999, 1 - 1e-6)
@@ -50,11 +52,11 @@ class Kinematics:
         self.order = torch.tensor(np.argsort(np.concatenate(self.levels)))
 
     def joints(self, betas: torch.Tensor, joint_offset: torch.Tensor) -> torch.Tensor:
-        """(J, 3) joints of the T-pose, moved by their offsets (J, 3)."""
+        """Resting joints (J, 3) m. betas: (B,); joint_offset: (J, 3) m."""
         return self.rest + self.rest_dirs @ betas + joint_offset
 
     def pose(self, local: torch.Tensor, rest: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """local: (T, J, 3, 3); rest: (J, 3). Returns rotations (T, J, 3, 3) and places (T, J, 3), without transl."""
+        """World rotations (T, J, 3, 3) and places (T, J, 3) m. local: (T, J, 3, 3); rest: (J, 3) m."""
         worlds, places = [local[:, :1]], [rest[None, :1].expand(len(local), 1, 3)]
         for before, level in zip(self.levels, self.levels[1:], strict=False):
             above = [before.index(self.parents[j]) for j in level]
@@ -70,7 +72,7 @@ class Points:
     """P points of the body as moments over all joints."""
 
     def __init__(self, body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None):
-        """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m, in the axes of the heaviest joint."""
+        """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m, in the axes of each point's heaviest joint."""
         matrix = matrix.tocsr()
         points, joints = matrix.shape[0], body.weights.shape[1]
         mass = np.asarray(matrix @ body.weights)
@@ -88,7 +90,7 @@ class Points:
         self.dirs = torch.tensor(dirs).flatten(1, 2)  # (P, 3 J, B)
 
     def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
-        """Rotations (T, J, 3, 3) and places (T, J, 3) of the joints, which rest at (J, 3). Returns (T, P, 3) without transl."""
+        """Points (T, P, 3) m without transl. world: (T, J, 3, 3); place: (T, J, 3) m; rest: (J, 3) m; betas: (B,)."""
         moment = self.moment + self.dirs @ betas
         shift = place - (world @ rest[None, :, :, None])[..., 0]
         turned = world.transpose(1, 2).flatten(2) @ moment.T  # (T, 3, P)
@@ -96,7 +98,7 @@ class Points:
 
 
 class Mesh:
-    """All vertices of the body: linear blend skinning, T frames as one matrix product over the joints."""
+    """All vertices of the body by linear blend skinning, T frames as one matrix product over the joints."""
 
     def __init__(self, body: Body):
         self.template = torch.tensor(body.v_template, dtype=torch.float32)  # (V, 3)
@@ -104,7 +106,7 @@ class Mesh:
         self.weights = torch.tensor(body.weights.T.copy(), dtype=torch.float32)  # (J, V)
 
     def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
-        """As `Points.at`; returns (T, 3, V)."""
+        """Vertices (T, 3, V) m without transl. world: (T, J, 3, 3); place: (T, J, 3) m; rest: (J, 3) m; betas: (B,)."""
         vertices = (self.template + self.dirs @ betas).T  # (3, V)
         moment = (self.weights[:, None] * vertices).flatten(0, 1)  # (3 J, V)
         shift = place - (world @ rest[None, :, :, None])[..., 0]

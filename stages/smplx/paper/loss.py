@@ -1,4 +1,7 @@
-"""The loss of the published co-registration: L_kpt + 0.1 L_init + L_face + L_reg, all of them means (GSAC eq. 5-8)."""
+"""The loss of the published co-registration: L_kpt + 0.1 L_init + L_face + L_reg, all of them means (GSAC eq. 5-8).
+
+T frames, n of them in a batch, J joints, K key points that the body carries, B betas.
+"""
 
 from __future__ import annotations
 
@@ -10,30 +13,32 @@ import torch
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.fit import Sightings
-from gsac.stages.smplx.head import Head, HeadTerms, visible
-from gsac.stages.smplx.lm.problem import State
-from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, matrices, rotation_vectors, six_of
+from gsac.stages.smplx.paper.head import Head, HeadTerms, faces_camera
+from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from gsac.stages.smplx.prior import BODY_JOINTS
+from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.state import State
 
 SPACE = 8.0
-"""Side of the square that the person's box is projected to: pixel weights do not depend on the resolution."""
+"""Side of the square to which the person's box is scaled, so that the loss does not depend on the resolution."""
 INIT, SHAPE, JOINT_OFFSET, SYMMETRY, UPRIGHT = 0.1, 0.01, 100.0, 1.0, 1.0
+"""Weights of the start, of betas, of joint offsets, of their symmetry, and of the spine's bend to front or back."""
 OVERLAP = 0.5
-"""Hand boxes that cover each other more than this: the farther hand does not count."""
+"""IoU of the hands' boxes above which the farther hand gets no weight."""
 BODY = len(BODY_JOINTS)
 HANDS_FROM = BODY + 3
-"""After jaw and eyes: nothing here sees them, they stay."""
+"""First joint of the hands, after jaw and eyes, which no term sees: they stay."""
 FIXED_OFFSETS = [0, 1, 2]
-"""Pelvis and hips stay where the shape puts them."""
+"""Pelvis and hips stay where the betas put them."""
 SPINE = [3, 6, 9, 12, 15]
 
 
 class Unknowns:
-    """What Adam moves: 6D rotations and translation of each frame, betas and joint offsets of the clip."""
+    """The unknowns of Adam: 6-D rotations and transl of each frame, betas and joint offsets of the clip."""
 
     def __init__(self, local: torch.Tensor, transl: torch.Tensor, betas: int):
-        six = six_of(local)
+        """The start: local (T, J, 3, 3), transl (T, 3) m; betas: their number, B."""
+        six = to_six(local)
         self.root, self.transl = six[:, :1].clone(), transl.clone()
         self.body, self.hands = six[:, 1:BODY].clone(), six[:, HANDS_FROM:].clone()
         self.face = local[:, BODY:HANDS_FROM]
@@ -41,8 +46,11 @@ class Unknowns:
         self.movable = torch.ones(local.shape[1], 1)
         self.movable[FIXED_OFFSETS] = 0
 
-    def leaves(self, frames: slice, root_only: bool, shared: bool) -> Iterator[torch.Tensor]:
-        """Opens the batch's leaves and closes all others; the frames' leaves are views that Adam writes through."""
+    def open_batch(self, frames: slice, root_only: bool, shared: bool) -> Iterator[torch.Tensor]:
+        """Makes leaves of the batch's tensors, (B,), (J, 3) and (n, ...), and of no others.
+
+        Those of the frames are views, through which Adam writes.
+        """
         for tensor in (self.betas, self.joint_offset):
             tensor.requires_grad_(shared and not root_only)
             if tensor.requires_grad:
@@ -54,17 +62,17 @@ class Unknowns:
                 yield tensor
 
     def local(self, frames: slice) -> torch.Tensor:
-        """(n, J, 3, 3) of the batch that is open."""
+        """Rotations (n, J, 3, 3) of the open batch."""
         root, body, hands, _ = self.batch
-        return torch.cat([matrices(root), matrices(body), self.face[frames], matrices(hands)], 1)
+        return torch.cat([to_matrices(root), to_matrices(body), self.face[frames], to_matrices(hands)], 1)
 
     def offsets(self) -> torch.Tensor:
-        """(J, 3) m."""
+        """Joint offsets (J, 3) m."""
         return self.joint_offset * self.movable
 
-    def found(self) -> tuple[np.ndarray, ...]:
-        """Rotations (T, J, 3, 3), transl (T, 3), betas (B,), joint offsets (J, 3)."""
-        parts = (matrices(self.root), matrices(self.body), self.face, matrices(self.hands))
+    def read(self) -> tuple[np.ndarray, ...]:
+        """Rotations (T, J, 3, 3), transl (T, 3) m, betas (B,), joint offsets (J, 3) m."""
+        parts = (to_matrices(self.root), to_matrices(self.body), self.face, to_matrices(self.hands))
         return tuple(t.detach().numpy().astype(np.float64) for t in (torch.cat(parts, 1), self.transl, self.betas, self.offsets()))
 
 
@@ -72,13 +80,14 @@ class Objective:
     """The loss of a batch of frames."""
 
     def __init__(self, body: Body, sightings: Sightings, start: State, center: np.ndarray):
+        """center: (2,) px."""
         self.kinematics = Kinematics(body)
-        offsets = Detector.measured(sightings.detector, body).offsets
+        offsets = Detector.load(sightings.detector, body).offsets
         self.known = np.flatnonzero(body.known_keypoints)
         self.points = Points(body, body.keypoint_matrix[self.known], offsets[self.known])
         self.mesh = Mesh(body)
         self.focal, self.center = float(np.exp(start.log_focal)), torch.tensor(center, dtype=torch.float32)
-        corner, side = boxes(sightings)
+        corner, side = box_person(sightings)
         seen = sightings.seen[:, self.known]
         xy = np.where(seen[..., None], sightings.xy[:, self.known], 0)
         self.corner, self.side = torch.tensor(corner)[:, None], torch.tensor(side)[:, None, None]
@@ -100,42 +109,43 @@ class Objective:
         self.start_mesh = self._mesh(self.start, rest, torch.zeros(body.num_betas))
 
     def loss(self, unknowns: Unknowns, frames: slice, hand_hold: float) -> torch.Tensor:
+        """The loss of a batch, a scalar. hand_hold: factor on the weight of the hands' joint offsets."""
         local, betas, offset = unknowns.local(frames), unknowns.betas, unknowns.offsets()
         rest = self.kinematics.joints(betas, offset)
         world, place = self.kinematics.pose(local, rest)
         x = self.points.at(world, place, rest, betas) + unknowns.batch[3][:, None]
         uv = self.project(x, frames)
-        seen = self.weight[frames] * self._countable(x, uv, frames)
+        seen = self.weight[frames] * self._weigh_points(x, uv, frames)
         total = ((uv - self.target[frames]).abs() * seen[..., None]).mean()
         mesh = self._relative(self.mesh.at(world, place, rest, betas), place)
         total = total + INIT * (mesh - self.start_mesh[frames]).abs().mean() + INIT * (local - self.start[frames]).abs().mean()
-        total = total + SHAPE * (betas**2).mean() + UPRIGHT * (rotation_vectors(local[:, SPINE])[..., 0] ** 2).mean()
+        total = total + SHAPE * (betas**2).mean() + UPRIGHT * (to_vectors(local[:, SPINE])[..., 0] ** 2).mean()
         hold = torch.ones(len(offset), 1)
         hold[HANDS_FROM:] = hand_hold
         total = total + JOINT_OFFSET * (hold * offset**2).mean()
         mirrored = offset[self.right] * torch.tensor([-1.0, 1, 1])
         total = total + SYMMETRY * (offset[self.left] - mirrored).abs().mean()
         if self.head is not None:
-            total = total + float(self.face_seen(x, frames).mean()) * self.head.loss(betas)
+            total = total + float(self.sees_face(x, frames).mean()) * self.head.loss(betas)
         return total
 
     def project(self, x: torch.Tensor, frames: slice) -> torch.Tensor:
-        """x: (n, P, 3) m. Returns (n, P, 2) in the person's square."""
+        """Points (n, K, 2) in the person's square. x: (n, K, 3) m, camera frame."""
         px = self.focal * x[..., :2] / x[..., 2:].clamp(min=0.05) + self.center
         return (px - self.corner[frames]) / self.side[frames] * SPACE
 
     def pixels(self, local: np.ndarray, transl: np.ndarray, betas: np.ndarray, joint_offset: np.ndarray) -> np.ndarray:
-        """(T, K, 2) px of the known key points."""
+        """Key points (T, K, 2) px. local: (T, J, 3, 3); transl: (T, 3) m; betas: (B,); joint_offset: (J, 3) m."""
         as_float = [torch.tensor(a, dtype=torch.float32) for a in (local, transl, betas, joint_offset)]
         rest = self.kinematics.joints(as_float[2], as_float[3])
         x = self.points.at(*self.kinematics.pose(as_float[0], rest), rest, as_float[2]) + as_float[1][:, None]
         return (self.focal * x[..., :2] / x[..., 2:] + self.center).numpy()
 
-    def face_seen(self, x: torch.Tensor, frames: slice) -> np.ndarray:
-        """(n,) bool: the face looks at the camera and the face method saw it."""
+    def sees_face(self, x: torch.Tensor, frames: slice) -> np.ndarray:
+        """(n,) bool: the face looks at the camera, and `face` found it. x: (n, K, 3) m, camera frame."""
         points = np.full((len(x), 133, 3), np.nan)
         points[:, self.known] = x.detach().numpy()
-        return visible(points) & self.face_valid[frames]
+        return faces_camera(points) & self.face_valid[frames]
 
     def _mesh(self, local: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
         world, place = self.kinematics.pose(local, rest)
@@ -145,12 +155,12 @@ class Objective:
     def _relative(mesh: torch.Tensor, place: torch.Tensor) -> torch.Tensor:
         return mesh - place[:, 0, :, None]
 
-    def _countable(self, x: torch.Tensor, uv: torch.Tensor, frames: slice) -> torch.Tensor:
-        """(n, K) 0 for the face that is turned away, and for the farther of two hands (with its wrist) that lie on each other."""
+    def _weigh_points(self, x: torch.Tensor, uv: torch.Tensor, frames: slice) -> torch.Tensor:
+        """Weights (n, K): 0 for a face turned away, and for the farther of two overlapping hands, with its wrist."""
         with torch.no_grad():
             out = torch.ones(uv.shape[:2])
             if self.inner_face:
-                seen = torch.tensor(self.face_seen(x, frames), dtype=torch.float32)
+                seen = torch.tensor(self.sees_face(x, frames), dtype=torch.float32)
                 out[:, self.inner_face] = seen[:, None]
             if all(self.hands):
                 low, high = zip(*[(uv[:, h].amin(1), uv[:, h].amax(1)) for h in self.hands], strict=True)
@@ -164,8 +174,8 @@ class Objective:
         return out
 
 
-def boxes(sightings: Sightings) -> tuple[np.ndarray, np.ndarray]:
-    """Corner (T, 2) and side (T,) px of the square around each frame's person: its points' box x 1.2, squared, x 1.25."""
+def box_person(sightings: Sightings) -> tuple[np.ndarray, np.ndarray]:
+    """Corner (T, 2) and side (T,), px, of the square about the person: the box of its points x 1.2, squared, x 1.25."""
     corner = np.zeros((len(sightings.xy), 2), np.float32)
     side = np.full(len(corner), max(sightings.width, sightings.height), np.float32)
     for t, seen in enumerate(sightings.seen):

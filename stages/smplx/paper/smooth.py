@@ -1,4 +1,4 @@
-"""Smoothing of a finished fit over time."""
+"""Smooths a finished fit over time."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 WINDOW, ORDER = 9, 2
-"""Savitzky-Golay filter of the published method."""
+"""Frames and degree of the published Savitzky-Golay filter."""
 
 
 def smooth_rotations(local: np.ndarray) -> np.ndarray:
-    """local: (T, J, 3, 3). Filters continuous quaternions; clips shorter than the window stay as they are."""
+    """Filters local (T, J, 3, 3) as continuous quaternions; clips shorter than the window stay as they are."""
     if len(local) < WINDOW:
         return local
     quats = Rotation.from_matrix(local.reshape(-1, 3, 3)).as_quat().reshape(*local.shape[:2], 4)
@@ -22,5 +22,5 @@ def smooth_rotations(local: np.ndarray) -> np.ndarray:
 
 
 def smooth_linear(values: np.ndarray) -> np.ndarray:
-    """values: (T, n)."""
+    """Filters values (T, n); clips shorter than the window stay as they are."""
     return savgol_filter(values, WINDOW, ORDER, axis=0) if len(values) >= WINDOW else values

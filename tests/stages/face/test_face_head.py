@@ -7,7 +7,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.stages.face.actions import Actions
 from gsac.stages.face.head import HeadModel, similarity
-from gsac.stages.smplx.head import Head
+from gsac.stages.smplx.paper.head import Head
 
 
 @pytest.fixture(scope="module")

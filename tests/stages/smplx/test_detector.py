@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
@@ -17,11 +16,6 @@ detector_offsets = script("detector_offsets")
 WRIST, OTHER = INDEX["left_wrist"], INDEX["right_wrist"]
 
 
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
-
-
 def turn(frames: int) -> tuple[np.ndarray, np.ndarray]:
     """Poses (T, 55, 3) of one turn, upright before the camera, and the yaw (T,)."""
     yaw = np.linspace(-np.pi, np.pi, frames, endpoint=False)
@@ -31,13 +25,13 @@ def turn(frames: int) -> tuple[np.ndarray, np.ndarray]:
     return pose, yaw
 
 
-def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> detector_offsets.Sight:
+def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> detector_offsets.SeenClip:
     """One turn as a detector with this offset (3,) m and habit (2 H + 1, 2) at the left wrist, mirrored at the right, sees it."""
     pose, _ = turn(48)
     still = np.zeros((48, 52))
     params = BodyParams.from_pose(pose, np.tile([0, 0, 3.0], (48, 1)), np.zeros(body.num_betas), still, 900.0, (360, 640))
     points = body.keypoints(body.posed(params)[0])
-    turns = detector_offsets.world_rotations(body, params.pose)
+    turns = detector_offsets.chain_rotations(body, params.pose)
     yaw = turn_yaw(turns[:, 0])
     moved = points.astype(float).copy()
     for point, joint, sign in ((WRIST, 20, 1), (OTHER, 21, -1)):
@@ -47,7 +41,7 @@ def sight(body: Body, offset: np.ndarray, habit: np.ndarray) -> detector_offsets
     xy[:, WRIST] += 500.0 * harmonics(yaw) @ habit
     xy[:, OTHER] += 500.0 * harmonics(-yaw) @ habit * [-1, 1]
     known = np.tile(body.known_keypoints, (48, 1))
-    return detector_offsets.Sight(xy, known, 500.0, points, turns, 900.0, np.array([360.0, 640.0]), np.zeros(body.num_figure))
+    return detector_offsets.SeenClip(xy, known, 500.0, points, turns, 900.0, np.array([360.0, 640.0]), np.zeros(body.num_figure))
 
 
 def test_a_planted_offset_is_found_and_other_points_keep_theirs(body):
@@ -76,7 +70,7 @@ def test_a_persons_own_offset_is_found_beside_what_all_share(body):
     offsets = np.zeros((133, 3))
     offsets[[WRIST, OTHER]] = shared, shared * [-1, 1, 1]
     habit = np.zeros((133, 2 * HARMONICS + 1, 2))
-    found = detector_offsets.own_offsets(body, sight(body, shared + own, habit[WRIST]), offsets, habit)
+    found = detector_offsets.measure_own_offsets(body, sight(body, shared + own, habit[WRIST]), offsets, habit)
     wrist = list(PERSONAL).index("wrist")
     assert np.allclose(found[wrist], own, atol=1e-3)
     assert np.abs(np.delete(found, wrist, 0)).max() < 1e-3
@@ -101,13 +95,13 @@ def test_the_figure_of_a_person_beyond_the_basis_is_the_nearest_one(body):
     betas = rng.normal(0, 1, body.num_figure)
     shift = (body.shapedirs[:, :, : body.num_figure] @ betas).astype(float) + rng.normal(0, 1e-4, body.v_template.shape)
     moved = np.array([[0.01, 0.02, 0.0]])
-    found = detector_offsets.figure(body, {"betas": betas, "shift": shift + moved, "joint_offset": moved})
+    found = detector_offsets.fit_figure(body, {"betas": betas, "shift": shift + moved, "joint_offset": moved})
     assert np.allclose(found, 2 * betas, atol=0.02)
 
 
 def test_what_is_kept_was_measured_on_the_embedded_body_and_is_mirror_symmetric(body):
-    kept = Detector.measured("mediapipe", body)
-    other = detector_offsets.mirror()
+    kept = Detector.load("mediapipe", body)
+    other = detector_offsets.find_counterparts()
     assert np.abs(kept.offsets).max() > 0.005
     paired = other != np.arange(133)
     assert np.allclose(kept.offsets[paired], kept.offsets[other][paired] * [-1, 1, 1], atol=1e-6)
@@ -119,6 +113,6 @@ def test_what_is_kept_was_measured_on_the_embedded_body_and_is_mirror_symmetric(
 
 
 def test_an_unknown_detector_has_no_habits(body):
-    unknown = Detector.measured("someone-else", body)
+    unknown = Detector.load("someone-else", body)
     assert not unknown.offsets.any() and not unknown.habit.any() and (unknown.spread > 0).all()
     assert not unknown.slopes(body).any() and unknown.own.any()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import LOST, Body, BodyParams
-from gsac.stages.smplx.fit import Fit
-from gsac.stages.smplx.lost_frames import lost_frames, sentences
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
+from gsac.stages.smplx.state import Fit
 
 HEIGHT = 1000.0
 
@@ -20,9 +20,9 @@ def good() -> Fit:
 
 
 def said(fit: Fit, seen: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
-    lost = lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT)
+    lost = find_lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT)
     assert np.sum(list(lost.values()), axis=0).max() <= 1  # one reason a frame
-    return np.any(list(lost.values()), axis=0), sentences(lost, fit.iou)
+    return np.any(list(lost.values()), axis=0), describe_lost_frames(lost, fit.iou)
 
 
 def test_a_good_fit_loses_nothing_and_says_nothing(good):

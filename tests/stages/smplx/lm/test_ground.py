@@ -7,29 +7,24 @@ import pytest
 
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
-from gsac.stages.smplx.jacobians import Skeleton, positions
+from gsac.stages.smplx.jacobians import Skeleton, place_points
 from gsac.stages.smplx.lm import ground as module
-from gsac.stages.smplx.lm.ground import Ground, resting
+from gsac.stages.smplx.lm.ground import Ground, rate_rest
 from gsac.stages.smplx.lm.solver import System
 from gsac.stages.smplx.prior import BODY_JOINTS
 
-FRAMES, HELD = 4, 68
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
+FRAMES, STANCE = 4, 68
 
 
 def standing(body: Body, seed: int = 0):
-    """Rotations (T, 55, 3, 3), shape, transl (T, 3), held and level of somebody who stands, a little off."""
+    """Rotations (T, 55, 3, 3), shape, transl (T, 3), stance and level of somebody who stands, a little off."""
     rng = np.random.default_rng(seed)
     local = np.tile(np.eye(3), (FRAMES, 55, 1, 1))
     local[:, 0] = np.diag([1.0, -1, -1])
     local[:, :22] = local[:, :22] @ rotation.exp(rng.normal(0, 0.02, (FRAMES, 22, 3)))
-    held = np.zeros(HELD)
-    held[-2:] = 0.02, -0.1
-    return local, rng.normal(0, 0.3, body.num_betas), np.array([0, 0, 2.5]) + rng.normal(0, 0.01, (FRAMES, 3)), held
+    stance = np.zeros(STANCE)
+    stance[-2:] = 0.02, -0.1
+    return local, rng.normal(0, 0.3, body.num_betas), np.array([0, 0, 2.5]) + rng.normal(0, 0.01, (FRAMES, 3)), stance
 
 
 def on_ground(body: Body, limits: float, monkeypatch):
@@ -37,32 +32,32 @@ def on_ground(body: Body, limits: float, monkeypatch):
     monkeypatch.setattr(module, "SUNK", 2 * limits)
     monkeypatch.setattr(module, "SLIPPED", limits)
     ground, skeleton = Ground(body, 0.7), Skeleton(body, BODY_JOINTS)
-    local, shape, transl, held = standing(body)
+    local, shape, transl, stance = standing(body)
     ground.rest = np.random.default_rng(1).uniform(0, 30, (FRAMES - 1, 8))
-    level = ground.level(skeleton.pose(local, shape), shape, transl, held) - 0.004
-    return ground, skeleton, local, shape, transl, held, level
+    level = ground.estimate_level(skeleton.pose(local, shape), shape, transl, stance) - 0.004
+    return ground, skeleton, local, shape, transl, stance, level
 
 
-def moved(skeleton, local, shape, transl, held, level, step, shared):
+def moved(skeleton, local, shape, transl, stance, level, step, shared):
     """The state after a step (T, 69) and a shared step (1 + B + 68 + 1,)."""
     turned = local.copy()
     turned[:, :22] = turned[:, :22] @ rotation.exp(step[:, :66].reshape(FRAMES, 22, 3))
     b = 1 + len(shape)
     shape = shape + shared[1:b]
-    return skeleton.pose(turned, shape), shape, transl + step[:, 66:], held + shared[b:-1], level + shared[-1:]
+    return skeleton.pose(turned, shape), shape, transl + step[:, 66:], stance + shared[b:-1], level + shared[-1:]
 
 
 def test_derivatives_of_the_ground_agree_with_finite_differences(body, monkeypatch):
     """Without outliers: gradient and normal equations."""
     ground, skeleton, *state = on_ground(body, np.inf, monkeypatch)
-    size, count = 1 + body.num_betas + HELD + 1, 69 * FRAMES
+    size, count = 1 + body.num_betas + STANCE + 1, 69 * FRAMES
     system = System.zeros(FRAMES, 69, size)
     ground.add(system, skeleton, skeleton.pose(state[0], state[1]), *state[1:])
 
     def residual(x):
-        chain, shape, transl, held, level = moved(skeleton, *state, x[:count].reshape(FRAMES, 69), x[count:])
-        place = positions(chain, ground.pairs, shape) + transl[:, None]
-        return np.concatenate([ground._off(place, held, level).ravel(), ground._slip(place).ravel()])
+        chain, shape, transl, stance, level = moved(skeleton, *state, x[:count].reshape(FRAMES, 69), x[count:])
+        place = place_points(chain, ground.pairs, shape) + transl[:, None]
+        return np.concatenate([ground._height_residual(place, stance, level).ravel(), ground._slip_residual(place).ravel()])
 
     jacobian = np.stack([(residual(1e-5 * e) - residual(-1e-5 * e)) / 2e-5 for e in np.eye(count + size)], 1)
     normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual(np.zeros(count + size))
@@ -79,7 +74,7 @@ def test_derivatives_of_the_ground_agree_with_finite_differences(body, monkeypat
 
 def test_the_slope_is_the_costs_where_feet_are_let_go(body, monkeypatch):
     ground, skeleton, *state = on_ground(body, 2.0, monkeypatch)
-    system = System.zeros(FRAMES, 69, 1 + body.num_betas + HELD + 1)
+    system = System.zeros(FRAMES, 69, 1 + body.num_betas + STANCE + 1)
     ground.add(system, skeleton, skeleton.pose(state[0], state[1]), *state[1:])
     rng = np.random.default_rng(2)
     for _ in range(4):
@@ -90,12 +85,12 @@ def test_the_slope_is_the_costs_where_feet_are_let_go(body, monkeypatch):
 
 def test_lifted_soles_are_let_go_sooner_than_sunk_ones(body):
     ground, skeleton = Ground(body), Skeleton(body, BODY_JOINTS)
-    local, shape, transl, held = standing(body)
+    local, shape, transl, stance = standing(body)
     chain = skeleton.pose(local, shape)
-    heights = (positions(chain, ground.pairs, shape) + transl[:, None]) @ module.upright(held)[0]
+    heights = (place_points(chain, ground.pairs, shape) + transl[:, None]) @ module.upright(stance)[0]
 
     def pull(level):
-        return ground.cost(chain, shape, transl, held, np.array([level]))
+        return ground.cost(chain, shape, transl, stance, np.array([level]))
 
     high, low = heights.max() + 0.3, heights.min() - 0.3
     assert pull(high) > 3 * pull(low)
@@ -105,8 +100,8 @@ def test_lifted_soles_are_let_go_sooner_than_sunk_ones(body):
 def test_soles_are_held_flat(body):
     """A foot that tips by four degrees about its own length, its middle staying on the ground, is turned back."""
     ground, skeleton, level = Ground(body), Skeleton(body, BODY_JOINTS), np.zeros(1)
-    local, _, _, held = standing(body)
-    held[:] = 0
+    local, _, _, stance = standing(body)
+    stance[:] = 0
     local[:] = np.eye(3)
     local[:, 0] = np.diag([1.0, -1, -1])
     ankle, shape = body.joint_names.index("left_ankle"), np.zeros(body.num_betas)
@@ -114,9 +109,9 @@ def test_soles_are_held_flat(body):
     for degrees in (-4, 0, 4):
         local[:, ankle] = rotation.exp(np.radians([0, 0, degrees]))
         chain = skeleton.pose(local, shape)
-        transl = -(positions(chain, ground.pairs, shape)[:, :4].mean(1) @ module.upright(held)[0])[:, None] * [0, -1, 0]
-        system = System.zeros(FRAMES, 69, 1 + len(shape) + HELD + 1)
-        ground.add(system, skeleton, chain, shape, transl, held, level)
+        transl = -(place_points(chain, ground.pairs, shape)[:, :4].mean(1) @ module.upright(stance)[0])[:, None] * [0, -1, 0]
+        system = System.zeros(FRAMES, 69, 1 + len(shape) + STANCE + 1)
+        ground.add(system, skeleton, chain, shape, transl, stance, level)
         slopes.append(system.gradient[:, 3 * ankle + 2])
     left, flat, right = np.array(slopes)
     assert (left < -10).all() and (right > 10).all()
@@ -130,7 +125,7 @@ def test_feet_that_stand_rest_and_feet_that_step_do_not():
     pivoting = still.copy()
     pivoting[:, 1, 0] += np.linspace(0, 0.4, 20)  # the heel stays, the toes go round
     seen = np.ones((20, 2), bool)
-    assert resting(still, seen, seconds).min() > 0.8
-    assert resting(stepping, seen, seconds).max() < 0.05
-    assert resting(pivoting, seen, seconds).max() < 0.05
-    assert resting(still, seen & False, seconds).max() == 0
+    assert rate_rest(still, seen, seconds).min() > 0.8
+    assert rate_rest(stepping, seen, seconds).max() < 0.05
+    assert rate_rest(pivoting, seen, seconds).max() < 0.05
+    assert rate_rest(still, seen & False, seconds).max() == 0

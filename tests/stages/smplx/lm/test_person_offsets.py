@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import rotation
@@ -12,17 +11,14 @@ from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx import detector
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector import Detector
-from gsac.stages.smplx.fit import Sightings, fit_clip, to_params
+from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.lm.person_offsets import JOINTS
-from gsac.stages.smplx.symmetry import mirrored
+from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.state import to_params
+from gsac.stages.smplx.symmetry import mirror_directions
 
 WIDTH, HEIGHT, FOCAL, FRAMES = 360, 640, 700.0, 10
 UP = 0.03
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
 
 
 def turn(body: Body) -> BodyParams:
@@ -58,7 +54,7 @@ def joint_error_mm(body: Body, fit, truth: BodyParams) -> float:
 def test_hips_seen_too_high_in_every_frame_are_told_apart_from_the_pose(body, monkeypatch):
     truth = turn(body)
     fit = fitted(body, truth, {}, UP)
-    moved = Detector.measured("", body).own @ fit.state.own
+    moved = Detector.load("", body).own @ fit.state.own
     assert moved[INDEX["left_hip"], 1] > UP / 4 and moved[INDEX["left_hip"], 1] == moved[INDEX["right_hip"], 1]
     assert not fit.joint_offset.any()
     monkeypatch.setattr(detector, "PERSONAL", {})
@@ -66,7 +62,7 @@ def test_hips_seen_too_high_in_every_frame_are_told_apart_from_the_pose(body, mo
 
 
 def test_offsets_are_mirrored_and_the_middle_stays_in_the_middle():
-    moves, spread = mirrored({"hip": (1, 0, 2), "neck": (5, 5, 5)}, {"left_hip": 0, "right_hip": 1, "neck": 2}, 3)
+    moves, spread = mirror_directions({"hip": (1, 0, 2), "neck": (5, 5, 5)}, {"left_hip": 0, "right_hip": 1, "neck": 2}, 3)
     assert np.allclose(spread, [0.001, 0.002, 0.005, 0.005])
     assert np.array_equal(moves @ [1, 2, 3, 4], [[1, 0, 2], [-1, 0, 2], [0, 3, 4]])
 

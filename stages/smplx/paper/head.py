@@ -1,9 +1,9 @@
-"""The face terms of the published method: the body's resting head against a head mesh that a face network found.
+"""The face terms of the published method: the body's resting head against the head mesh that `face` found.
 
-The network's head (the open body's own, or FLAME's) comes in face.npz in its own mesh: `head_template` and `head_vertices`,
-everybody's and the person's own at rest, m, y up and z out of the face, `head_faces` over both, and the template's `head_eyes`
-(2, 3), left and right. The template is laid on the body's by the eyes, then as it fits best; so each of the body's vertices,
-whichever body that is, has its place on the mesh.
+face.npz holds that head (the open body's own, or FLAME's) as a mesh of its own, N vertices, at rest, m, y up, z out of the face:
+`head_template` (N, 3) of the mean person, `head_vertices` (N, 3) of this person, `head_faces` (F, 3), and `head_eyes` (2, 3) of the
+template, left and right. The template is aligned with the body's head by the eyes, then by ICP; so each head vertex of any body
+has its place on the mesh.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ VISIBLE = float(np.cos(np.radians(135)))
 EYES = [INDEX["left_eye"], INDEX["right_eye"]]
 EARS = [INDEX["left_ear"], INDEX["right_ear"]]
 HEAD_JOINTS, EYE_JOINTS = [15, 22], [23, 24]
-LAYINGS = 24
-"""Rounds in which the head mesh is laid on the body's head."""
+ICP_STEPS = 24
+"""Rounds of iterative closest points."""
 NEAR, LEAST_SHARE = 0.015, 0.3
-"""m within which a vertex lies on the head mesh, and how many of the head's must."""
+"""Distance, m, within which a vertex lies on the head mesh, and the share of the head's vertices that must."""
 
 
 @dataclass
 class Head:
-    """A head at rest, N vertices."""
+    """A person's head at rest, over N vertices of the body."""
 
-    vertices: np.ndarray  # (N, 3) m, in any place
-    index: np.ndarray  # (N,) the body's vertices that they stand for
+    vertices: np.ndarray  # (N, 3) m, at any place
+    index: np.ndarray  # (N,) indices of the body's vertices
     faces: np.ndarray  # (F, 3)
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray], body: Body) -> Head | None:
-        """The head of face.npz's arrays; None where no face was seen. Raises StageError."""
+        """The head of face.npz's arrays, `head_template` (N, 3), ... as above; None where no face was seen. Raises StageError."""
         if "head_vertices" not in arrays:
             return None
         for name in ("head_template", "head_faces", "head_eyes"):
@@ -51,9 +51,9 @@ class Head:
         faces = arrays["head_faces"].astype(int)
         if faces.ndim != 2 or faces.shape[1] != 3 or faces.max(initial=0) >= len(own) or template.shape != own.shape:
             raise StageError(f"face.npz: head_faces must be (F, 3) over the {len(own)} head vertices, and head_template like them")
-        index, corners, share, turn = laid_on(template, faces, eyes, body)
-        if len(index) < LEAST_SHARE * head_vertices(body).sum():
-            raise StageError(f"face.npz: only {len(index)} of the body's {head_vertices(body).sum()} head vertices lie on its head "
+        index, corners, share, turn = lay_on_body(template, faces, eyes, body)
+        if len(index) < LEAST_SHARE * select_head(body).sum():
+            raise StageError(f"face.npz: only {len(index)} of the body's {select_head(body).sum()} head vertices lie on its head "
                              "mesh; expected a head in metres, y up, z out of the face, with head_eyes its left and right eye")
         places = np.einsum("nk,nkc->nc", share, own[corners]) @ turn.T
         place = np.full(len(body.v_template), -1)
@@ -62,21 +62,24 @@ class Head:
         return cls(places, index, kept[(kept >= 0).all(1)])
 
 
-def head_vertices(body: Body) -> np.ndarray:
-    """(V,) bool: those that go with head and jaw; the eyes are left out."""
+def select_head(body: Body) -> np.ndarray:
+    """Vertices (V,) bool that head and jaw carry; the eyes are left out."""
     return body.weights[:, HEAD_JOINTS].sum(1) > 0.5
 
 
-def laid_on(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Body) -> tuple[np.ndarray, ...]:
-    """Index (n,) of the body's head vertices that lie on the head mesh, corners (n, 3) of the face where and their shares (n, 3),
-    and the turn (3, 3) from the mesh to the body."""
-    index = np.flatnonzero(head_vertices(body))
-    skin, around = body.v_template[index].astype(float), incident(faces, len(vertices))
+def lay_on_body(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Body) -> tuple[np.ndarray, ...]:
+    """Aligns a head mesh with the body's head by a similarity.
+
+    vertices: (N, 3) m; faces: (F, 3); eyes: (2, 3) m. Returns the index (n,) of the body's vertices that lie on the mesh, corners
+    (n, 3) of the face below each and their shares (n, 3), and the rotation (3, 3) from the mesh to the body.
+    """
+    index = np.flatnonzero(select_head(body))
+    skin, around = body.v_template[index].astype(float), find_incident_faces(faces, len(vertices))
     own = (body.J_regressor[EYE_JOINTS] @ body.v_template).astype(float)
     size = np.linalg.norm(own[0] - own[1]) / max(np.linalg.norm(eyes[0] - eyes[1]), 1e-6)
     turn, shift = np.eye(3), own.mean(0) - size * eyes.mean(0)
-    for _ in range(LAYINGS):
-        found, corners, share = closest(skin, size * vertices @ turn.T + shift, faces, around)
+    for _ in range(ICP_STEPS):
+        found, corners, share = find_closest(skin, size * vertices @ turn.T + shift, faces, around)
         far = np.linalg.norm(found - skin, axis=1)
         near = far < max(NEAR, np.median(far))
         source = np.einsum("nk,nkc->nc", share, vertices[corners])[near]
@@ -88,8 +91,8 @@ def laid_on(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Bod
     return index[near], corners[near], share[near], turn
 
 
-def incident(faces: np.ndarray, count: int) -> np.ndarray:
-    """(count, K) faces about each vertex, padded with repeats."""
+def find_incident_faces(faces: np.ndarray, count: int) -> np.ndarray:
+    """Indices (count, K) of the faces (F, 3) about each vertex, padded with repeats."""
     vertex, face = faces.T.ravel(), np.tile(np.arange(len(faces)), 3)
     order = np.argsort(vertex, kind="stable")
     vertex, face = vertex[order], face[order]
@@ -99,8 +102,11 @@ def incident(faces: np.ndarray, count: int) -> np.ndarray:
     return face[np.minimum(at, len(face) - 1)]
 
 
-def closest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, ...]:
-    """points: (n, 3). Nearest places (n, 3) on the faces about the nearest vertex, corners (n, 3) and their shares (n, 3)."""
+def find_closest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Nearest places (n, 3) on the faces about the nearest vertex, corners (n, 3) of the face and their shares (n, 3).
+
+    points: (n, 3); vertices: (N, 3); faces: (F, 3); around: (N, K) as by `find_incident_faces`.
+    """
     tried = faces[around[cKDTree(vertices).query(points)[1]]]  # (n, K, 3)
     a, b, c = (vertices[tried[..., k]] for k in range(3))
     ab, ac, ap = b - a, c - a, points[:, None] - a
@@ -132,7 +138,7 @@ class HeadTerms:
         self.share = torch.tensor(1 / np.maximum(degree, 1), dtype=torch.float32)[:, None]
 
     def loss(self, betas: torch.Tensor) -> torch.Tensor:
-        """Weighted sum of vertex L1, Laplacian L2 and edge length L1, each a mean; places are compared with their means removed."""
+        """Weighted sum, a scalar, of vertex L1, Laplacian L2 and edge length L1, each a mean; vertices are centred. betas: (B,)."""
         x = self.rest + self.dirs @ betas
         x = x - x.mean(0)
         vertex = (x - self.target).abs().mean()
@@ -148,10 +154,10 @@ class HeadTerms:
         return (x[self.pairs[:, 0]] - x[self.pairs[:, 1]]).norm(dim=1)
 
 
-def visible(points: np.ndarray) -> np.ndarray:
-    """points: (T, 133, 3) m, camera frame, NaN where the body carries no such point. (T,) bool: the face looks towards the camera.
+def faces_camera(points: np.ndarray) -> np.ndarray:
+    """Whether the face looks towards the camera, (T,) bool. points: (T, 133, 3) m, camera frame, NaN where the body carries none.
 
-    In the camera's xz plane the way from the face's centre to the eyes must lie against the line of sight by more than 135 degrees.
+    In the camera's xz plane the direction from the face's centre to the eyes must be more than 135 degrees off the line of sight.
     """
     face = points[:, FACE]
     carried = np.isfinite(face).all((0, 2))

@@ -1,18 +1,17 @@
-"""A head mesh that `face` found, laid on whichever body is fitted, and FLAME's face in SMPL-X's words."""
+"""The head mesh that `face` found, aligned with the head of whichever body is fitted, and the face terms."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
-from gsac.avatar.body import Body
+from gsac.avatar import rotation
+from gsac.avatar.body import BodyParams
 from gsac.avatar.flame_file import read_flame
 from gsac.stages.contract import StageError
-from gsac.stages.smplx.expression import mimic
-from gsac.stages.smplx.head import Head, HeadTerms, head_vertices
-
-
-@pytest.fixture(scope="module")
-def body() -> Body:
-    return Body.load()
+from gsac.stages.smplx.paper.head import Head, HeadTerms, faces_camera, select_head
+from support.turning_person import FOCAL, head_of
 
 
 def brought(flame_file, betas) -> dict[str, np.ndarray]:
@@ -26,7 +25,7 @@ def brought(flame_file, betas) -> dict[str, np.ndarray]:
 def test_a_flame_head_is_carried_over_to_the_bodys_vertices(body, flame_file):
     betas = np.random.default_rng(0).normal(0, 1, body.num_betas)
     head = Head.from_arrays(brought(flame_file, betas), body)
-    assert len(head.index) > 0.9 * head_vertices(body).sum()
+    assert len(head.index) > 0.9 * select_head(body).sum()
     assert np.array_equal(head.index[head.faces].shape[1:], (3,)) and head.faces.max() < len(head.index)
     true = body.rest(betas)[0][head.index]
     off = np.linalg.norm(head.vertices - head.vertices.mean(0) - true + true.mean(0), axis=1)
@@ -34,7 +33,6 @@ def test_a_flame_head_is_carried_over_to_the_bodys_vertices(body, flame_file):
 
 
 def test_the_face_terms_tell_a_head_from_another(body, flame_file):
-    torch = pytest.importorskip("torch")
     betas = np.random.default_rng(1).normal(0, 1, body.num_betas).astype(np.float32)
     terms = HeadTerms(body, Head.from_arrays(brought(flame_file, betas), body))
     own, other = (float(terms.loss(torch.tensor(b))) for b in (betas, np.zeros_like(betas)))
@@ -53,16 +51,23 @@ def test_a_mesh_that_is_no_head_is_refused(body, flame_file):
     assert Head.from_arrays({}, body) is None
 
 
-def test_a_body_of_flames_expressions_takes_them_from_the_flame_head(body):
-    class Official:
-        expression_names = tuple(f"expression{i}" for i in range(10))
-        jaw_actions = np.zeros((10, 3))
+@pytest.mark.slow
+def test_face_terms_vanish_at_the_same_head_and_lead_towards_it(body):
+    betas = np.random.default_rng(3).normal(0, 1, body.num_betas).astype(np.float32)
+    terms = HeadTerms(body, Head.from_arrays(head_of(body, betas), body))
+    none, half = (torch.tensor(betas * share, requires_grad=True) for share in (0.0, 0.5))
+    terms.loss(half).backward()
+    here, midway, there = (float(terms.loss(b.detach())) for b in (torch.tensor(betas), half, none))
+    assert here < 0.1 * there and here < midway < there
+    assert float((half.grad * torch.tensor(betas)).sum()) < 0
 
-    face = {"expression": np.zeros((2, 52), np.float32), "jaw": np.zeros((2, 3), np.float32)}
-    face["expression"][1, 24] = 1
-    expression, jaw, silent = mimic(Official, face)
-    assert not expression.any() and jaw[1, 0] > 0.3 and "only the jaw" in silent
-    face |= {"flame_expression": np.arange(100, dtype=np.float32).reshape(2, 50), "flame_jaw": np.full((2, 3), 0.1, np.float32)}
-    expression, jaw, silent = mimic(Official, face)
-    assert np.array_equal(expression, face["flame_expression"][:, :10]) and np.array_equal(jaw, face["flame_jaw"]) and not silent
-    assert np.array_equal(mimic(body, face)[0], face["expression"])  # the open body acts the actions themselves
+
+@pytest.mark.slow
+def test_the_face_counts_only_when_it_looks_at_the_camera(body):
+    yaw = np.radians([0, 30, 60, 90, 180, 270, 330])
+    pose = np.zeros((len(yaw), 55, 3))
+    pose[:, 0] = rotation.log(rotation.exp(np.array([np.pi, 0, 0])) @ rotation.exp(np.stack([0 * yaw, yaw, 0 * yaw], 1)))
+    transl = np.tile([0, 0, 3.0], (len(yaw), 1))
+    params = BodyParams.from_pose(pose, transl, np.zeros(20), np.zeros((len(yaw), 52)), FOCAL, (180, 320))
+    seen = faces_camera(body.keypoints(body.posed(params)[0]))
+    assert seen.tolist() == [True, True, False, False, False, False, True]

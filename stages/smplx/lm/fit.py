@@ -1,0 +1,148 @@
+"""The Levenberg-Marquardt fit of one clip.
+
+1. Start in closed form (initial.py); only root and place move.
+2. All joints, by the key points alone.
+3. Rounds that renew the outline points, learn the spreads of the stance, and put the feet on a ground.
+4. Fingers, on the fitted wrists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.avatar.body import Body
+from gsac.avatar.wholebody import LEFT_HAND, RIGHT_HAND
+from gsac.avatar.yaw import yaw
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.initial import estimate_start
+from gsac.stages.smplx.jacobians import make_pairs, place_points
+from gsac.stages.smplx.lm.ground import Ground
+from gsac.stages.smplx.lm.observations import observe, subtract_habit
+from gsac.stages.smplx.lm.person_offsets import PersonOffsets
+from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
+from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
+from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
+from gsac.stages.smplx.silhouette import Outline, sample_outlines
+from gsac.stages.smplx.state import Fit, State, to_params
+
+FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(hand.start, hand.stop)])
+SCALE_BONES = ((5, 11), (6, 12), (11, 13), (12, 14), (5, 7), (6, 8))
+"""Pairs of key points: trunk, thighs and upper arms."""
+FAR_OFF = 5.0
+"""Factor on the robust limit before the outline counts: an arm that starts hanging has a long way to go."""
+ROUNDS_DEPTH_SPREAD = 0.8
+"""m, of the detector's depth in the rounds, once limbs point the right way: its depth leans with the camera, the images do not."""
+TRUNK_STEPS = 4
+"""Steps in which only the root and the place move."""
+VIEW = np.radians(30)
+"""Width of a bin of yaw; frames of one bin show one view of the person."""
+
+
+def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
+             progress: Callable[[int, int, str], None]) -> Fit:
+    """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps."""
+    detector = Detector.load(sightings.detector, body)
+    problem, state = set_up(body, sightings, outlines, detector, config)
+    state, steps = fit_points(problem, state, sightings, detector, 3 * config.iterations)
+    iou = np.full(len(sightings.xy), np.nan)
+    problem.outline_weight, problem.limit, problem.seen.depth_spread = config.silhouette, ROBUST, ROUNDS_DEPTH_SPREAD
+    for r in range(config.rounds):
+        progress(r, config.rounds + 1, "rounds")
+        subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
+        if config.silhouette > 0:
+            iou = renew_outlines(problem, state, sightings)
+        state.stance = problem.stance.learn(state.local[:, problem.active], state.stance)
+        if problem.ground is None and config.contact > 0:
+            stand_on_ground(problem, state, sightings, config.contact)
+        state, more = problem.minimise(state, config.iterations)
+        steps += more
+    state, more = fit_fingers(sightings, detector, problem, state, config)
+    progress(config.rounds + 1, config.rounds + 1, "rounds")
+    return Fit(state, estimate_joint_sigma(problem, state), iou, measure_reprojection(problem, state), steps + more,
+               problem.person_offsets.joint_offset(state.own))
+
+
+def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
+           config: SmplxConfig) -> tuple[Problem, State]:
+    """The problem of the body's joints, and the state from which it is solved."""
+    center, focal = np.array([sightings.width / 2, sightings.height / 2]), focal_prior(sightings, config)
+    person_offsets = PersonOffsets.of(body, detector.own, config.joint_offsets)
+    moves = np.concatenate([detector.slopes(body), person_offsets.points], 2)
+    pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS], moves[BODY_POINTS])
+    seen = observe(sightings, detector, BODY_POINTS, center, focal, config, outlines)
+    problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, person_offsets)
+    state = replace(estimate_start(body, sightings, focal[0], center), own=np.zeros(len(person_offsets.spread)))
+    seen.depth *= measure_world_scale(problem, state, sightings)
+    seen.repeats = count_repeats(state.local[:, 0])
+    return problem, state
+
+
+def fit_points(problem: Problem, state: State, sightings: Sightings, detector: Detector, iterations: int) -> tuple[State, int]:
+    """Fits the key points alone, first by root and place. Returns state and number of steps."""
+    problem.limit = FAR_OFF * ROBUST
+    bends = np.zeros(problem.size, bool)
+    bends[3:-3] = True
+    subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
+    state, first = problem.minimise(state, TRUNK_STEPS, bends, np.ones(state.shared, bool))
+    subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
+    state, more = problem.minimise(state, iterations)
+    return state, first + more
+
+
+def stand_on_ground(problem: Problem, state: State, sightings: Sightings, weight: float) -> None:
+    """Adds the ground's terms to the problem, and the ground's height to the state."""
+    problem.ground = Ground(problem.body, weight)
+    problem.ground.find_resting_feet(sightings.xy, sightings.seen, sightings.seconds, sightings.person_height)
+    chain = problem.skeleton.pose(state.local, state.shape)
+    state.level = problem.ground.estimate_level(chain, state.shape, state.transl, state.stance)
+
+
+def count_repeats(turns: np.ndarray) -> float:
+    """Mean number of frames that show one view. turns: (T, 3, 3) of the body to the camera frame."""
+    return len(turns) / len(np.unique(np.floor(yaw(turns) / VIEW)))
+
+
+def measure_world_scale(problem: Problem, state: State, sightings: Sightings) -> float:
+    """Ratio of the body's bones to those of the detector's metric points, its median over `SCALE_BONES`."""
+    chain = problem.skeleton.pose(state.local[:1], state.shape)
+    x = place_points(chain, problem.pairs, state.shape)[0]
+    ratios = []
+    for a, b in SCALE_BONES:
+        length = np.linalg.norm(sightings.world[:, a] - sightings.world[:, b], axis=-1)
+        if np.isfinite(length).any():
+            ratios.append(np.linalg.norm(x[a] - x[b]) / np.nanmedian(length))
+    return float(np.median(ratios)) if ratios else 1.0
+
+
+def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
+    """Gives the problem new outline points, from the posed body. Returns the IoU (T,) of body and alpha, NaN without alpha."""
+    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
+    problem.outline_pairs, iou = sample_outlines(problem.body, params, sightings.width, sightings.height, problem.seen.outlines)
+    return iou
+
+
+def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, state: State, config: SmplxConfig) -> tuple[State, int]:
+    """Bends the fingers on the fitted wrists; nothing else moves. Returns state and number of steps."""
+    body = problem.body
+    pairs = make_pairs(body, body.keypoint_matrix[FINGER_POINTS], detector.offsets[FINGER_POINTS])
+    seen = observe(sightings, detector, FINGER_POINTS, problem.seen.center, problem.seen.focal_prior, config, [])
+    fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, problem.person_offsets)
+    state = replace(state, local=state.local.copy(), stance=np.zeros(0), level=np.zeros(0))
+    state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)
+    place = np.zeros(fingers.size, bool)
+    place[-3:] = True
+    return fingers.minimise(state, config.iterations, place, np.ones(state.shared, bool))
+
+
+def measure_reprojection(problem: Problem, state: State) -> np.ndarray:
+    """(T,) median distance, px, of seen and fitted body points; NaN where nothing was seen."""
+    out = np.full(len(state.local), np.nan)
+    for t, x in enumerate(problem.locate_points(problem.skeleton.pose(state.local, state.shape), state)):
+        off = np.linalg.norm(problem.project(state, x) - problem.seen.xy[t], axis=-1)[np.isfinite(problem.seen.spread[t])]
+        out[t] = np.median(off) if len(off) else np.nan
+    return out

@@ -1,0 +1,55 @@
+"""The detections of one clip: input of a fit by either method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsac.avatar.wholebody import INDEX
+from gsac.stages.smplx.config import SmplxConfig
+
+HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
+"""Hand points that no finger joint moves: they turn the wrist."""
+BODY_POINTS = np.array([*range(23), *HAND_ROOTS])
+HIPS = (INDEX["left_hip"], INDEX["right_hip"])
+FOCAL_GUESS = 0.95
+"""Focal length when nothing is known, as a share of the image's longer side: between a phone's main lens and a tele."""
+FOCAL_SPREAD, GIVEN_FOCAL_SPREAD = 0.15, 0.002
+"""Relative sigma of a guessed and of a given focal length."""
+
+
+@dataclass
+class Sightings:
+    """Detections of one clip, from `handgap`, and face.npz."""
+
+    xy: np.ndarray  # (T, 133, 2) px
+    score: np.ndarray  # (T, 133)
+    sigma: np.ndarray  # (T, 133) px
+    world: np.ndarray  # (T, 133, 3) m
+    seconds: np.ndarray | None  # (T,) time; None for photos
+    width: int
+    height: int
+    focal_px: float | None
+    detector: str = ""
+    face: dict[str, np.ndarray] | None = None
+    """Arrays of face.npz: `valid` (T,), `expression` (T, E), `jaw` (T, 3) and, where a head was fitted, its mesh."""
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(T, 133) bool."""
+        return (self.score > 0.2) & np.isfinite(self.xy).all(-1)
+
+    @property
+    def person_height(self) -> float:
+        """Median height of the person, px, from the body points."""
+        extents = [np.ptp(self.xy[t, :23, 1][seen]) for t, seen in enumerate(self.seen[:, :23]) if seen.sum() > 1]
+        return float(np.median(extents)) * 1.08 if extents else self.height * 0.8
+
+
+def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
+    """Focal length, px, and its relative sigma."""
+    given = config.focal_px or sightings.focal_px
+    if given:
+        return given, GIVEN_FOCAL_SPREAD
+    return FOCAL_GUESS * max(sightings.width, sightings.height), FOCAL_SPREAD
