@@ -24,7 +24,7 @@ from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.benchmarks.face_drawing import SMALLEST, Head, Look
 from gsac.benchmarks.perception import video_frames
 from gsac.stages.face.landmarks import look
-from gsac.turntable.clip import Video, develop, make_studio, make_view, place, posed, studio_rng
+from gsac.turntable.clip import FEET, VideoWriter, develop, make_studio, make_view, place_person, pose_person, studio_rng
 from gsac.turntable.motion import make_motion
 from gsac.turntable.options import TurntableOptions
 from gsac.turntable.person import Person, make_person
@@ -140,8 +140,8 @@ class Scene:
         expression = np.array([any_expression(person.body.expression_names, rng) for _ in range(FRAMES)], np.float32)
         motion = dataclasses.replace(motion, pose=pose, yaw=yaw, expression=expression)
         view = make_view(person, options, studio_rng(options))
-        params = place(person, motion, view)
-        frames = [posed(person, params, t) for t in range(FRAMES)]
+        params = place_person(person, motion, view)
+        frames = [pose_person(person, params, t) for t in range(FRAMES)]
         eyes = np.array([view.camera.project(person.body.keypoints(bare))[EYES] for bare, _, _ in frames])
         apart = float(np.linalg.norm(eyes[:, 0] - eyes[:, 1], axis=-1).max())
         middle = eyes.mean(1)
@@ -155,9 +155,9 @@ class Scene:
     def film(self, clip: Path) -> None:
         studio = make_studio(self.person, self.options, self.window)
         options = dataclasses.replace(self.options, width=self.window.width, height=self.window.height)
-        video = Video(clip, options)
+        video = VideoWriter(clip, options)
         for t, (_, drawn, joints) in enumerate(self.frames):
-            picture = studio.picture(drawn, studio.view.to_world(joints[[7, 8, 10, 11]]))
+            picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
             video.add(develop(picture, options, t, noise=True))
         video.close()
 

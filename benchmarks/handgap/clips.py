@@ -10,11 +10,11 @@ import numpy as np
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.camera import Camera
 from gsac.avatar.wholebody import LEFT_HAND
-from gsac.turntable.clip import place, posed
+from gsac.turntable.clip import place_person, pose_person
 from gsac.turntable.motion import make_motion
 from gsac.turntable.options import TurntableOptions
 from gsac.turntable.person import make_person
-from gsac.turntable.render import View
+from gsac.turntable.viewpoint import Viewpoint
 
 BODY_NOISE, HAND_NOISE = 2.4, 1.0
 """px a frame, of a person 930 px tall, as measured on rendered clips; so are the next three."""
@@ -41,9 +41,9 @@ def turning_body(seed: int, frames: int = 80, habit: float = 1.0, noise: float =
     motion = make_motion(person.body, person.joints, options, np.random.default_rng([seed, 2]))
     width, height = options.size
     camera = Camera((options.focal_px,) * 2, (width / 2, height / 2), width, height)
-    view = View(camera, np.diag([1.0, -1.0, -1.0]), np.array([0, 1.25, options.focal_px * person.height_m / (0.73 * height)]))
-    params = place(person, motion, view)
-    points = np.stack([person.body.keypoints(posed(person, params, t)[0]) for t in range(frames)])
+    view = Viewpoint(camera, np.diag([1.0, -1.0, -1.0]), np.array([0, 1.25, options.focal_px * person.height_m / (0.73 * height)]))
+    params = place_person(person, motion, view)
+    points = np.stack([person.body.keypoints(pose_person(person, params, t)[0]) for t in range(frames)])
     truth = camera.project(points)
     rng = np.random.default_rng([seed, 6])
     sizes, habits = np.full(133, BODY_NOISE), np.full(133, BODY_HABIT)

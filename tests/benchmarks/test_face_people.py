@@ -19,7 +19,7 @@ from gsac.benchmarks.perception import ACTIONS
 from gsac.stages.face.actions import TABLE, Actions, pace, smooth, solve
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.landmarks import align, look
-from gsac.turntable.motion import expressions
+from gsac.turntable.motion import make_expressions
 from gsac.turntable.options import TurntableOptions
 from support.scripts import script
 
@@ -56,7 +56,7 @@ def drawn_clip(mesh: FaceMesh, mirror: np.ndarray, seed: int) -> dict[str, np.nd
     """A drawn head that turns past the camera, 50 to 110 px between the eyes' outer corners, with a truth clip's expressions."""
     body, rng = Body.load(), np.random.default_rng([seed, 78])
     head, share = Head(body, rng.normal(0, 1, body.num_figure), Look.of(rng)), rng.uniform(0.45, 1)
-    expression = expressions(body, TurntableOptions(seed=seed, frames=90), np.random.default_rng([seed, 2]))[:LENGTH]
+    expression = make_expressions(body, TurntableOptions(seed=seed, frames=90), np.random.default_rng([seed, 2]))[:LENGTH]
     nod = 0.1 * np.sin(np.arange(LENGTH) / 5 + seed) - 0.05
     turn = Rotation.from_euler("YX", np.stack([np.linspace(-0.95, 0.95, LENGTH), nod], 1)).as_matrix()
     landmarks = np.full((LENGTH, 468, 3), np.nan)

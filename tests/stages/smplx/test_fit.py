@@ -24,7 +24,7 @@ from gsac.stages.smplx.lm.solver import System
 from gsac.stages.smplx.lm.stance import Held
 from gsac.stages.smplx.prior import BODY_JOINTS
 from gsac.stages.smplx.silhouette import Outline, outline_points, read_outline
-from gsac.turntable.shell import draped
+from gsac.turntable.shell import drape
 
 WIDTH, HEIGHT, FOCAL = 360, 640, 700.0
 
@@ -123,7 +123,7 @@ def in_a_shirt(body: Body, bare: BodyParams) -> tuple[Body, BodyParams]:
     """Cloth that falls from the chest to the hips; joints stay where they are."""
     rest, joints = body.rest(bare.betas)
     trunk = (rest[:, 1] > 0.07) & (rest[:, 1] < 0.52) & (np.abs(rest[:, 0]) < 0.2)
-    shirt = replace(body, v_template=body.v_template + draped(rest, trunk * np.clip((0.52 - rest[:, 1]) / 0.08, 0, 1)) - rest)
+    shirt = replace(body, v_template=body.v_template + drape(rest, trunk * np.clip((0.52 - rest[:, 1]) / 0.08, 0, 1)) - rest)
     return shirt, replace(bare, joint_offset=joints - shirt.rest(bare.betas)[1])
 
 
