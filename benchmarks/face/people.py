@@ -43,7 +43,7 @@ EYES = [INDEX["left_eye"], INDEX["right_eye"]]
 
 
 def read_people(seeds: list[int], store: Path, folder: Path) -> list[dict[str, np.ndarray]]:
-    """The arrays of `Reader.read` of each seed; kept in `folder`, so that an interrupted run can go on."""
+    """The arrays of `Reader.read`, shapes (T, ...), for each seed; kept in `folder`, so that an interrupted run can go on."""
     reader, out = Reader(store), []
     folder.mkdir(parents=True, exist_ok=True)
     for seed in seeds:

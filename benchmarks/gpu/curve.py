@@ -50,7 +50,7 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     rows, found = [], []
     for folder in options.run:
-        case = training.of_run(folder)
+        case = training.read_run(folder)
         ends = {}
         for recipe, steps in [*(("fast", n) for n in options.budgets), ("paper", None)]:
             metrics = training.train(case, options.out / f"{case.name}_{recipe}{steps or ''}", recipe=recipe, device="cuda",

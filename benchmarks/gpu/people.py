@@ -36,7 +36,7 @@ def main() -> None:
         metrics = training.train(case, folder, cores, recipe=recipe, device="cuda", height=options.height, flip=True)
         return metrics | (judge_poses(folder, case.novel, options.height, folder / "novel") if case.novel else {})
 
-    cases = training.cases(options, PlainReporter(sys.stderr), options.novel)
+    cases = training.prepare_cases(options, PlainReporter(sys.stderr), options.novel)
     calls = [(case, recipe) for case in cases for recipe in RECIPES]
     ends = training.side_by_side(one, calls, options.jobs)
     pairs = {case.name: tuple(ends[2 * k: 2 * k + 2]) for k, case in enumerate(cases)}
