@@ -1,7 +1,7 @@
 """CPU time of the rasteriser against a vectorised torch implementation of the same tiles, in one run.
 
 `python -m gsac.benchmarks.raster [--scene figure|body] [--sizes 270 540 1080] [--repeats 20] [--threads 1] [--json FILE]`
-Times are the process' CPU time, the best of many repeats, which other load disturbs least.
+Times are CPU times of the process, the best of many repeats, which the machine's other load disturbs least.
 """
 
 from __future__ import annotations

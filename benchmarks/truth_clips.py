@@ -14,7 +14,7 @@ from gsac.pipeline.run import Chain, Options
 from gsac.pipeline.run_folder import RunFolder
 
 HEIGHT = 1280
-"""px."""
+"""Height of rendered clips, px."""
 
 
 def render_clip(folder: Path, say: PlainReporter, **options: Any) -> Path:

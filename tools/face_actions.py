@@ -38,7 +38,7 @@ CHANNELS = 64
 PULL_VIEW, PULL_PERSON, PULL_OWN_VIEW, PULL_FRONT, PULL_TURNED = 1e-3, 0.3, 3.0, 0.6, 2.0
 """Ridges on the unknowns, in frames."""
 OWN_WAVERING, LEAST_WAVERING = 0.05, 0.02
-"""Shrinkage of the noise covariance to its diagonal, and noise (mm) added to each coordinate: a few thousand frames are few."""
+"""Shrinkage of the noise covariance to its diagonal, and noise (mm) added to each coordinate: too few frames for all of it."""
 OWN_SHARE, LEAST_OWN = 0.3, 0.11
 """The same for the covariance of people's differences."""
 OWN_VIEW = 0.1

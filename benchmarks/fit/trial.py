@@ -63,7 +63,7 @@ def warm_up() -> None:
     pose = np.zeros((3, 55, 3))
     pose[:, 0, 0] = np.pi
     still = np.zeros((3, body.exprdirs.shape[2]))
-    params = BodyParams.from_pose(pose, [[0, 0, 3]] * 3, np.zeros(body.num_betas), still, 500.0, (180, 320))
+    params = BodyParams.from_pose(pose, np.tile([0, 0, 3], (3, 1)), np.zeros(body.num_betas), still, 500.0, (180, 320))
     points = body.keypoints(body.posed(params)[0])
     known = body.known_keypoints.astype(float)
     xy = np.nan_to_num(params.camera(360, 640).project(points))

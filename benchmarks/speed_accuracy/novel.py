@@ -33,7 +33,7 @@ def read_true_params(truth: Path, model: str) -> BodyParams:
     return BodyParams(**fields, sigma_joints=np.full((len(arrays["transl"]), J), 1e-3, np.float32), model=model)
 
 
-def judge_poses(trained: Path, clip: Path, height: int, folder: Path) -> dict[str, float]:
+def judge_poses(trained: Path, clip: Path, height: int, folder: Path) -> dict[str, float | None]:
     """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first aligned to its image.
 
     trained: output folder of `train`; clip: a turntable's folder of novel poses; folder: for truth, render and error images.
@@ -49,7 +49,7 @@ def judge_poses(trained: Path, clip: Path, height: int, folder: Path) -> dict[st
     return found | rename_metrics(summary(judge(gaussians, poses, frames, views, flip=True)), "novel_aligned")
 
 
-def rename_metrics(metrics: dict[str, float], ending: str) -> dict[str, float]:
+def rename_metrics(metrics: dict[str, float | None], ending: str) -> dict[str, float | None]:
     """PSNR, SSIM, FLIP and detail with the ending in their names."""
     return {f"{name.removesuffix('_fg')}_{ending}": metrics[name] for name in ("psnr_fg", "ssim", "flip", "detail")}
 

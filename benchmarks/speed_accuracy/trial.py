@@ -10,7 +10,7 @@ from gsac.stages.contract import BadInput
 WORST_S, WORST_DB = 3600.0, 20.0
 """Reference point of the hypervolume: seconds and dB."""
 NOVEL = ("flip", "psnr_novel", "psnr_novel_aligned", "flip_novel", "flip_novel_aligned", "stray_alpha", "needle_share")
-"""Metrics that older or shorter trainings lack."""
+"""Optional metrics of a training."""
 
 
 @dataclass

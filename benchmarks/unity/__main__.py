@@ -41,7 +41,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         if not options.shaders:
             compile_frame(Path(folder))
-        programs = read_frame(options.shaders or folder)
+        programs = read_frame(options.shaders or Path(folder))
     report(options, programs)
 
 

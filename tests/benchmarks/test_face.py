@@ -1,4 +1,4 @@
-"""The people that the face's table is measured on, and what the shipped table makes of one whom it never saw."""
+"""The made-up people on whom the face's table is measured, and the committed table on people whom it never saw."""
 
 import os
 from pathlib import Path

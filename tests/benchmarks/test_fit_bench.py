@@ -1,3 +1,5 @@
+"""The fit benchmark's table, chart and windows, on made-up trials."""
+
 import csv
 
 import numpy as np

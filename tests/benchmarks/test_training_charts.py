@@ -1,4 +1,4 @@
-"""What the training charts are made of, on made-up trainings."""
+"""Tables and charts of trainings, on made-up ones."""
 
 import csv
 from dataclasses import replace

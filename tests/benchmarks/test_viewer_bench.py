@@ -1,3 +1,5 @@
+"""The viewer benchmark: both pages show the same view, and ratios are of medians."""
+
 from gsac.benchmarks.viewer.avatar import make_avatar
 from gsac.benchmarks.viewer.bench import pages, text
 from gsac.benchmarks.viewer.race import FrameRate, cpu_seconds

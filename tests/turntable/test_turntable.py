@@ -1,3 +1,5 @@
+"""Truth clips: what the files promise, from the options to the last frame."""
+
 import dataclasses
 from typing import get_args
 
