@@ -1,17 +1,15 @@
-"""Measures a key point detector's systematic errors on truth clips; writes `stages/smplx/offsets/mediapipe.npz`.
+"""Where a detector's key points lie on the body, and how that changes with the turn: measured on truth clips, kept with the fit.
 
     python -m gsac.turntable CLIPS/201 --seed 201 --frames 30 --fps 5; gsac run CLIPS/201/clip.mp4 --until keypoints ...
     python tools/detector_offsets.py RUN TRUTH [RUN TRUTH ...] --out stages/smplx/offsets/mediapipe.npz
 
-The committed file was measured on 120 people, seeds 201 to 320; those whose seed ends in 1 or 2 with `--feet planted`.
+The kept file was measured on 120 people, seeds 201 to 320, those that end in 1 or 2 with `--feet planted`.
 
-RUN is a run's folder (keypoints/keypoints.npz), TRUTH the clip's truth.npz. A detector's hip is not the body's hip, so four things
-are fitted, left and right mirrored onto each other:
-1. offsets: for every point one constant offset (3,) m in the axes of the joint that carries it most, by robust least squares over
-   all frames and clips;
-2. habit: harmonics of the body's yaw for the residual in x and y, as a share of the person's height, and the spread of the rest;
-3. by_betas: linear change of a person's own offsets with the betas of their figure (a hip is seen higher on a long trunk);
-4. own: the principal directions in which people still differ.
+RUN is a run's folder (keypoints/keypoints.npz), TRUTH the clip's truth.npz. A detector's hip is not the body's hip: for every point
+one constant offset (3,) m in the frame of the joint that carries it most is found by robust least squares over all frames and
+clips. What is left is laid out over the body's yaw: harmonics for each point, x and y as a share of the person's height, and the
+spread of the rest. Each person's own offsets from these are laid out over the betas of their figure (a hip is taken to be higher in
+a long trunk), and the directions in which people still differ are kept. Left and right share everything, mirrored.
 """
 
 from __future__ import annotations
@@ -33,72 +31,70 @@ from gsac.stages.smplx.symmetry import mirrored
 
 POSE = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose")
 RIDGE = 2000.0
-"""Ridge on the shared offsets, px^2 / m^2."""
+"""Pull of an offset that all share to zero: one of 1 m is as bad as so many square px."""
 HABIT_RIDGE = 2.0
-"""Ridge on a habit's harmonics, in observations; doubled for the highest."""
+"""Pull of a habit's harmonics to zero, in sightings; the highest twice."""
 FIGURE_RIDGE = 1e-4
-"""Ridge on the correction of the truth's betas, m^2 summed over all vertices."""
+"""Pull of the betas that lie beyond the truth's to zero, in square metres of all vertices."""
 LEAST_SPREAD = 0.002
-"""Lower bound of a spread, share of the person's height."""
 OWN_RIDGE = (8.0 / 0.02) ** 2
-"""Ridge on one person's offsets: error of an observation (px) over the difference between people (m), squared."""
+"""The same for one person's own: px that a sighting is off over metres that people differ by."""
 PEOPLE_RIDGE = 10.0
-"""Ridge on the slopes by the betas, in people."""
+"""Pull of an offset's slopes by the betas to zero, in people."""
 LEAST_OWN = 0.002
-"""Least standard deviation, m, of a direction that is kept."""
+"""m, of a direction in which people differ."""
 FEW = 20
-"""Points with fewer observations are left at zero."""
+"""Sightings below which nothing is said of a point."""
 
 
 @dataclass
 class Sight:
-    """Detections and truth of one clip."""
+    """One clip: what the detector saw, and what was there."""
 
     xy: np.ndarray  # (T, 133, 2) px
-    seen: np.ndarray  # (T, 133) bool, score above .5
-    height: float  # px, of the person, as the fit estimates it
+    seen: np.ndarray  # (T, 133) bool
+    height: float  # px, of the person as the fit measures it
     points: np.ndarray  # (T, 133, 3) m, the body's own points, camera frame
     turn: np.ndarray  # (T, 55, 3, 3) of the joints to the camera frame
-    focal: float  # px
+    focal: float
     center: np.ndarray  # (2,) px
     figure: np.ndarray  # (F,) betas of the person's figure
 
     @classmethod
     def read(cls, body: Body, run: Path, truth: Path) -> Sight:
-        """Reads a run's folder and the clip's truth.npz."""
         seen, z = read_arrays(run / "keypoints" / "keypoints.npz"), read_arrays(truth)
         pose = np.concatenate([z[name] for name in POSE], 1).reshape(-1, 55, 3)
         score = seen["score"]
         height = Sightings(seen["xy"], score, score, seen["world"], None, 0, 0, None).person_height
         return cls(seen["xy"].astype(np.float64), score > 0.5, height, body.keypoints(z["vertices"].astype(np.float32)),
-                   world_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"], fit_figure(body, z))
+                   world_rotations(body, pose), float(np.ravel(z["focal"])[0]), z["center"], figure(body, z))
 
     def slope(self, points: np.ndarray) -> np.ndarray:
-        """Jacobian (n, 2, 3), px a metre, of `project` at points (n, 3) m."""
+        """points: (n, 3). (n, 2, 3) px by metres."""
         x, y, z = points.T
         none = np.zeros_like(z)
         return self.focal * np.stack([np.stack([1 / z, none, -x / z**2], -1), np.stack([none, 1 / z, -y / z**2], -1)], 1)
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """points: (..., 3) m, camera frame. Returns (..., 2) px."""
+        """points: (..., 3). (..., 2) px."""
         return self.focal * points[..., :2] / points[..., 2:] + self.center
 
 
-def fit_figure(body: Body, truth: dict[str, np.ndarray]) -> np.ndarray:
-    """Betas (F,) nearest to the truth's bare body, which the basis does not span. truth: betas, shift, joint_offset."""
+def figure(body: Body, truth: dict[str, np.ndarray]) -> np.ndarray:
+    """(F,) betas that come nearest to the truth's bare body, which the basis does not span."""
     basis = body.shapedirs[:, :, : body.num_figure].reshape(-1, body.num_figure).astype(np.float64)
-    beyond = (truth["shift"] - truth["joint_offset"][0]).ravel()  # the basis keeps the pelvis in place
+    beyond = (truth["shift"] - truth["joint_offset"][0]).ravel()  # about the pelvis, as the basis is
     return truth["betas"] + np.linalg.solve(basis.T @ basis + FIGURE_RIDGE * np.eye(body.num_figure), basis.T @ beyond)
 
 
-def find_carriers(body: Body) -> np.ndarray:
-    """Joint (133,) with the largest skinning weight at each key point; -1 for points that the body lacks."""
+def carrier(body: Body) -> np.ndarray:
+    """(133,) joint that carries each key point most; -1 for points that the body does not have."""
     carried = np.abs(body.keypoint_matrix) @ body.weights
     return np.where(body.known_keypoints, np.asarray(carried).argmax(1), -1)
 
 
-def mirror_points() -> np.ndarray:
-    """Index (133,) of each body, foot and hand point's mirror image; face points map to themselves."""
+def mirror() -> np.ndarray:
+    """(133,) index of each body, foot and hand point's counterpart; face points stay."""
     out = np.arange(133)
     for name in (*BODY_NAMES, *FEET_NAMES):
         side, _, rest = name.partition("_")
@@ -109,7 +105,7 @@ def mirror_points() -> np.ndarray:
 
 
 def world_rotations(body: Body, pose: np.ndarray) -> np.ndarray:
-    """pose: (T, 55, 3) axis-angle. Returns the joints' rotations to the camera frame (T, 55, 3, 3)."""
+    """pose: (T, 55, 3). Returns the joints' rotations to the camera frame (T, 55, 3, 3)."""
     world = rotation.exp(np.asarray(pose, np.float64))
     for j, p in enumerate(body.parents[1:], 1):
         world[:, j] = world[:, p] @ world[:, j]
@@ -117,8 +113,8 @@ def world_rotations(body: Body, pose: np.ndarray) -> np.ndarray:
 
 
 def measure_offsets(body: Body, clips: list[Sight]) -> tuple[np.ndarray, np.ndarray]:
-    """Offsets (133, 3) m in the carrying joint's T-pose axes, and the median error (133, 2) px before and after."""
-    joint, other = find_carriers(body), mirror_points()
+    """Offsets (133, 3) m in the carrying joint's T-pose axes, and the median px distance before and after (133, 2)."""
+    joint, other = carrier(body), mirror()
     rows: list[list] = [[] for _ in range(133)]
     for clip in clips:
         for p in np.nonzero(joint >= 0)[0]:
@@ -132,13 +128,13 @@ def measure_offsets(body: Body, clips: list[Sight]) -> tuple[np.ndarray, np.ndar
         if len(both) < FEW:
             continue
         jacobian, away = np.stack([j for j, _ in both]), np.stack([a for _, a in both])
-        offsets[p] = solve_offset(jacobian, away, RIDGE)
+        offsets[p] = nearest(jacobian, away, RIDGE)
         quality[p] = np.median(np.linalg.norm(away, axis=1)), np.median(np.linalg.norm(away - jacobian @ offsets[p], axis=1))
     return offsets, quality
 
 
-def solve_offset(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
-    """Offset (3,) m by robust ridge regression. slope: (R, 2, 3) px a metre; away: (R, 2) px, the errors to explain."""
+def nearest(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarray:
+    """(3,) m, the offset that explains px (R, 2) by slopes (R, 2, 3) best, outliers let go."""
     offset = np.zeros(3)
     for _ in range(8):
         left = np.linalg.norm(away - slope @ offset, axis=1)
@@ -149,11 +145,8 @@ def solve_offset(slope: np.ndarray, away: np.ndarray, ridge: float) -> np.ndarra
 
 
 def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Habit (133, 2 H + 1, 2) and spread (133,) of the residuals, shares of the person's height; face points have none.
-
-    offsets: (133, 3) m, which are subtracted first.
-    """
-    joint, other = find_carriers(body), mirror_points()
+    """Habit (133, 2 H + 1, 2) and spread (133,) of what the offsets (133, 3) leave; none of the face, not fitted by them."""
+    joint, other = carrier(body), mirror()
     habit, spread = np.zeros((133, 2 * HARMONICS + 1, 2)), np.full(133, UNKNOWN)
     pull = HABIT_RIDGE * np.diag([1e-9, *([1.0] * (HARMONICS - 1) + [2.0]) * 2])
     left = []
@@ -178,12 +171,9 @@ def measure_habits(body: Body, clips: list[Sight], offsets: np.ndarray) -> tuple
     return habit, spread
 
 
-def measure_own(body: Body, clip: Sight, offsets: np.ndarray, habit: np.ndarray) -> np.ndarray:
-    """One person's offsets (P, 3) m from the shared ones, P points of `PERSONAL`, in the left side's axes.
-
-    offsets: (133, 3) m; habit: (133, 2 H + 1, 2); both are subtracted first.
-    """
-    joint, flip = find_carriers(body), np.array([-1.0, 1, 1])
+def own_offsets(body: Body, clip: Sight, offsets: np.ndarray, habit: np.ndarray) -> np.ndarray:
+    """(len(PERSONAL), 3) m, what one person's points lie off the offsets (133, 3) and habit, in the left side's axes."""
+    joint, flip = carrier(body), np.array([-1.0, 1, 1])
     usual = Detector(offsets, None, None, habit, None).error(yaw(clip.turn[:, 0])) * clip.height
     moved = clip.points + np.einsum("tpab,pb->tpa", clip.turn[:, joint], offsets)
     out = np.zeros((len(PERSONAL), 3))
@@ -195,14 +185,14 @@ def measure_own(body: Body, clip: Sight, offsets: np.ndarray, habit: np.ndarray)
             aways.append(clip.xy[t, point] - clip.project(moved[t, point]) - usual[t, point])
         slope, away = np.concatenate(slopes), np.concatenate(aways)
         if len(away) >= FEW:
-            out[n] = solve_offset(slope, away, OWN_RIDGE)
+            out[n] = nearest(slope, away, OWN_RIDGE)
     return out
 
 
 def measure_people(figures: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Linear model of people's own offsets: common part (133, 3) m, slopes (133, 3, F), directions (133, 3, K).
+    """What offsets have in common, by_betas (133, 3, F) and directions (133, 3, K) in which people differ still.
 
-    The slopes are by the betas, the directions span what is left. figures: (N, F) betas; own: (N, P, 3) m of `measure_own`.
+    figures: (N, F) betas; own: (N, len(PERSONAL), 3) m.
     """
     values = own.reshape(len(own), -1)
     wide = np.column_stack([np.ones(len(own)), figures])
@@ -216,7 +206,7 @@ def measure_people(figures: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python tools/detector_offsets.py", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("paths", nargs="+", type=Path, help="RUN TRUTH pairs")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
@@ -224,7 +214,7 @@ def main() -> None:
     clips = [Sight.read(body, *pair) for pair in zip(options.paths[::2], options.paths[1::2], strict=True)]
     offsets, quality = measure_offsets(body, clips)
     habit, spread = measure_habits(body, clips, offsets)
-    own = np.stack([measure_own(body, clip, offsets, habit) for clip in clips])
+    own = np.stack([own_offsets(body, clip, offsets, habit) for clip in clips])
     common, by_betas, directions = measure_people(np.stack([clip.figure for clip in clips]), own)
     kept = Detector(offsets + common, by_betas, directions, habit, spread)
     arrays = {f.name: getattr(kept, f.name).astype(np.float32) for f in fields(kept)}

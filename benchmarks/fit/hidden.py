@@ -42,7 +42,7 @@ class Hidden:
         return len(self.errors_mm)
 
 
-def windows(frames: int) -> Iterator[tuple[str, int, int]]:
+def list_windows(frames: int) -> Iterator[tuple[str, int, int]]:
     """Side, first frame and frame after the last of each window, evenly spaced; windows without room are left out."""
     for side, gaps in GAPS.items():
         while sum(gaps) + MARGIN * (len(gaps) + 1) > frames:
@@ -59,7 +59,7 @@ def mask_windows(keypoints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     keypoints: arrays of keypoints.npz, (T, 133, ...) each. Returns them changed, shapes (T, 133, ...).
     """
     out = {name: array.copy() for name, array in keypoints.items()}
-    for side, first, last in windows(len(out["xy"])):
+    for side, first, last in list_windows(len(out["xy"])):
         gone = [*range(133)[HANDS[side]], *ARM[side][1:3]]
         out["xy"][first:last, gone], out["score"][first:last, gone], out["world"][first:last, gone] = 0, 0, np.nan
     return out
@@ -83,7 +83,7 @@ def measure(case: FitCase) -> list[Hidden]:
     off = joint_distances(Body.load(), params, case.truth)
     column = {SMPLX_JOINTS[j]: i for i, j in enumerate(case.truth.joint)}
     return [Hidden(case.name, side, first, off[first:last, column[f"{side}_wrist"]])
-            for side, first, last in windows(len(masked["xy"]))]
+            for side, first, last in list_windows(len(masked["xy"]))]
 
 
 def text(found: list[Hidden]) -> str:

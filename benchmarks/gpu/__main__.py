@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gsac.benchmarks.gpu.figure import Figure
 
 
-def make_recipe(count: int = 25000, **more: Any) -> Recipe:
+def make_bench_recipe(count: int = 25000, **more: Any) -> Recipe:
     """Recipe `fast` with the paper's Sobel term and without the displaced surface. more: fields of the recipe."""
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import recipe_of
@@ -48,7 +48,7 @@ def main() -> None:
 
     small = figure(3, 101, 67, 4000)
     done("small figure")
-    recipe = make_recipe(steps=5)
+    recipe = make_bench_recipe(steps=5)
     for count in (1, 17, 1000, 12000, 100000):
         report(f"101x67, {count}", errors(small, start(small.body, count), recipe, device, 1024 if count < 2000 else None), LIMIT)
     inside = figure(3, 101, 67, 100)
@@ -94,7 +94,7 @@ def compare(figure: Figure) -> None:
     from gsac.benchmarks.gpu.baseline import seconds_per_step
 
     for compiled in (False, True):
-        took = seconds_per_step(figure, start(figure.body, 25000), make_recipe(), compiled)
+        took = seconds_per_step(figure, start(figure.body, 25000), make_bench_recipe(), compiled)
         print(f"torch + gsplat, {'torch.compile' if compiled else 'eager'}: {took * 1e3:.2f} ms a step, "
               f"{took * 3000:.1f} s for 3000 steps of one frame", flush=True)
 
@@ -133,7 +133,7 @@ def measure_rounds(device: Device, figure: Figure) -> None:
     from gsac.stages.train.fast import prealign
     from gsac.stages.train.fast.trainer import OFFSET_RATE
 
-    recipe = make_recipe(prealign.COUNT, steps=600, sobel=0.0, pose_rate=0.0, offset_rate=OFFSET_RATE, offset_share=1.0)
+    recipe = make_bench_recipe(prealign.COUNT, steps=600, sobel=0.0, pose_rate=0.0, offset_rate=OFFSET_RATE, offset_share=1.0)
     trainer = CudaTrainer(figure.body, [figure.scaled(8)], figure.pose, figure.transl, start(figure.body, prealign.COUNT), recipe,
                           device)
     steps = step_milliseconds(trainer)
@@ -150,7 +150,7 @@ def measure_body(device: Device, figure: Figure, ceilings: tuple[float, float]) 
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import kernel_microseconds, least_bytes
 
-    recipe = make_recipe(steps=600, expression_rate=1e-3, joint_rate=1e-4)
+    recipe = make_bench_recipe(steps=600, expression_rate=1e-3, joint_rate=1e-4)
     body = figure.body._replace(expression=Body.load().exprdirs)
     trainer = CudaTrainer(body, [figure.shots], figure.pose, figure.transl, start(body, 25000), recipe, device)
     trainer.train(60)
@@ -170,7 +170,7 @@ def measure_tails(device: Device, figure: Figure) -> None:
     for count, batch, smaller in ((25000, 1, 1), (25000, 4, 1), (12000, 1, 2)):
         shots = figure.shots if smaller == 1 else figure.scaled(smaller)
         trainer = CudaTrainer(figure.body, [shots], figure.pose, figure.transl, start(figure.body, count),
-                              make_recipe(count, steps=900, batch=batch), device)
+                              make_bench_recipe(count, steps=900, batch=batch), device)
         trainer.train(300)
         tails.measure(trainer, device)
         trainer.close()
@@ -200,7 +200,7 @@ def measure(device: Device, figure: Figure, quick: bool, ceilings: tuple[float, 
     )
 
     for count, batch in ((25000, 1), (25000, 4), (25000, 8), (10000, 1), (100000, 1)):
-        recipe = make_recipe(count, steps=3000, batch=batch)
+        recipe = make_bench_recipe(count, steps=3000, batch=batch)
         trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, count), recipe,
                               device)
         steps = step_milliseconds(trainer)
@@ -213,7 +213,7 @@ def measure(device: Device, figure: Figure, quick: bool, ceilings: tuple[float, 
     if quick:
         return
     for batch, steps in ((1, 3000), (4, 750)):
-        recipe = make_recipe(steps=steps, batch=batch)
+        recipe = make_bench_recipe(steps=steps, batch=batch)
         results = []
         for _ in range(2):
             trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 25000), recipe,

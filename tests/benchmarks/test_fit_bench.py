@@ -82,12 +82,12 @@ def test_a_bare_clip_is_rendered_without_clothes(tmp_path, monkeypatch):
 
 def test_windows_of_one_hand_are_apart_and_as_long_as_they_say():
     for frames in (60, 40, 24):
-        found = list(hidden.windows(frames))
+        found = list(hidden.list_windows(frames))
         assert found and all(last <= frames - hidden.MARGIN for *_, last in found)
         for side in HANDS:
             ends = [0, *(t for s, *span in found if s == side for t in span)]
             assert np.diff(ends)[::2].min() >= hidden.MARGIN
-    lengths = sorted(last - first for side, first, last in hidden.windows(60) if side == "left")
+    lengths = sorted(last - first for side, first, last in hidden.list_windows(60) if side == "left")
     assert lengths == sorted(hidden.GAPS["left"])
 
 
@@ -95,7 +95,7 @@ def test_masking_hides_arm_and_hand_there_and_nothing_else():
     seen = {"xy": np.ones((60, 133, 2)), "score": np.ones((60, 133)), "world": np.ones((60, 133, 3))}
     masked = hidden.mask_windows(seen)
     hide = np.zeros((60, 133), bool)
-    for side, first, last in hidden.windows(60):
+    for side, first, last in hidden.list_windows(60):
         hide[first:last, [*range(133)[HANDS[side]], *ARM[side][1:3]]] = True
     assert np.array_equal(masked["score"] == 0, hide) and np.array_equal(np.isnan(masked["world"]).all(-1), hide)
     assert seen["score"].all()

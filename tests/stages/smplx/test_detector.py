@@ -76,7 +76,7 @@ def test_a_persons_own_offset_is_found_beside_what_all_share(body):
     offsets = np.zeros((133, 3))
     offsets[[WRIST, OTHER]] = shared, shared * [-1, 1, 1]
     habit = np.zeros((133, 2 * HARMONICS + 1, 2))
-    found = detector_offsets.measure_own(body, sight(body, shared + own, habit[WRIST]), offsets, habit)
+    found = detector_offsets.own_offsets(body, sight(body, shared + own, habit[WRIST]), offsets, habit)
     wrist = list(PERSONAL).index("wrist")
     assert np.allclose(found[wrist], own, atol=1e-3)
     assert np.abs(np.delete(found, wrist, 0)).max() < 1e-3
@@ -101,13 +101,13 @@ def test_the_figure_of_a_person_beyond_the_basis_is_the_nearest_one(body):
     betas = rng.normal(0, 1, body.num_figure)
     shift = (body.shapedirs[:, :, : body.num_figure] @ betas).astype(float) + rng.normal(0, 1e-4, body.v_template.shape)
     moved = np.array([[0.01, 0.02, 0.0]])
-    found = detector_offsets.fit_figure(body, {"betas": betas, "shift": shift + moved, "joint_offset": moved})
+    found = detector_offsets.figure(body, {"betas": betas, "shift": shift + moved, "joint_offset": moved})
     assert np.allclose(found, 2 * betas, atol=0.02)
 
 
 def test_what_is_kept_was_measured_on_the_embedded_body_and_is_mirror_symmetric(body):
     kept = Detector.measured("mediapipe", body)
-    other = detector_offsets.mirror_points()
+    other = detector_offsets.mirror()
     assert np.abs(kept.offsets).max() > 0.005
     paired = other != np.arange(133)
     assert np.allclose(kept.offsets[paired], kept.offsets[other][paired] * [-1, 1, 1], atol=1e-6)
