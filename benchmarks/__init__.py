@@ -1,1 +1,1 @@
-"""Makes the truth clips and the charts: speed-accuracy, stability, size."""
+"""Measurements against truth, as tables and charts: each package with a module `bench` is a `gsac bench NAME`."""

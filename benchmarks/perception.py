@@ -1,4 +1,4 @@
-"""How well keypoints and face see: figures against independent points and rendered truth.
+"""Accuracy of the stages `keypoints` and `face` against independent detections and rendered truth.
 
 `python -m gsac.benchmarks.perception FOOTAGE STORE [--draw DIR]`: FOOTAGE holds `squats`, `truth-a` and `turn-photos`,
 STORE is the cache folder that `gsac models pull` filled. Prints one JSON object a clip.
@@ -10,8 +10,9 @@ import argparse
 import json
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,17 +22,16 @@ from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import Job, Stage
 
 VISIBLE = 0.25
-"""A hand counts as visible where the camera sees at least this part of its vertices; 0.65 is the most it ever sees."""
+"""Least share of its vertices that the camera sees of a visible hand; the largest possible is 0.65."""
 BONES = [0] + [4 * finger + joint for finger in range(5) for joint in (1, 2, 3)]
-"""Hand points that have a bone's head in the rendered truth: the wrist and three joints a finger."""
-
+"""Hand points that are a bone's head in the rendered truth: the wrist and three joints a finger."""
 ACTIONS = {"jaw": ("jawOpen",), "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
            "smile": ("mouthSmileLeft", "mouthSmileRight"), "brow": ("browInnerUp",)}
-"""What the rendered clip moves."""
+"""Facial actions that the rendered clip moves, by group."""
 
 
 def video_frames(path: Path) -> Iterator[np.ndarray]:
-    """(H, W, 3) uint8 RGB frames."""
+    """Decodes the frames of a video, (H, W, 3) uint8 RGB each."""
     import imageio_ffmpeg
 
     reader = imageio_ffmpeg.read_frames(str(path))
@@ -41,7 +41,7 @@ def video_frames(path: Path) -> Iterator[np.ndarray]:
 
 
 def write_split(frames: Iterator[np.ndarray], folder: Path, name: str) -> dict[str, Path]:
-    """Frames and clip.json as `split` would write them. Returns the ports."""
+    """Writes frames and clip.json as `split` does. frames: (H, W, 3) uint8 RGB each. Returns port -> path."""
     (folder / "frames").mkdir(parents=True)
     n = 0
     for n, image in enumerate(frames, 1):
@@ -52,8 +52,9 @@ def write_split(frames: Iterator[np.ndarray], folder: Path, name: str) -> dict[s
     return {"split/frames": folder / "frames", "split/clip.json": folder / "clip.json"}
 
 
-def run_stage(stage: Stage, run, inputs: dict[str, Path], out: Path, store: Path, **parameters) -> dict:
-    """Runs one stage and checks its outputs. Returns its warnings and CPU seconds a frame."""
+def run_stage(stage: Stage, run: Callable[[Job], None], inputs: dict[str, Path], out: Path, store: Path,
+              **parameters: Any) -> dict:
+    """Runs one stage and checks its outputs. Returns its warnings, and CPU and wall milliseconds a frame."""
     config = stage.config(**parameters)
     warnings: list[str] = []
     out.mkdir()
@@ -69,7 +70,7 @@ def run_stage(stage: Stage, run, inputs: dict[str, Path], out: Path, store: Path
 
 
 def run_keypoints(frames: Iterator[np.ndarray], name: str, folder: Path, store: Path) -> tuple[dict, dict, dict]:
-    """Returns the arrays of keypoints.npz, the notes of `run_stage` and all ports so far."""
+    """Runs `keypoints` on frames (H, W, 3) uint8 RGB. Returns arrays of keypoints.npz, what `run_stage` gives, and all ports."""
     from gsac.stages.keypoints import STAGE
     from gsac.stages.keypoints.stage import run
 
@@ -79,8 +80,8 @@ def run_keypoints(frames: Iterator[np.ndarray], name: str, folder: Path, store: 
     return read_arrays(ports["keypoints/keypoints.npz"]), notes, ports
 
 
-def run_face(ports: dict[str, Path], folder: Path, store: Path, **parameters) -> tuple[dict, dict]:
-    """Returns the arrays of face.npz and the notes of `run_stage`."""
+def run_face(ports: dict[str, Path], folder: Path, store: Path, **parameters: Any) -> tuple[dict, dict]:
+    """Runs `face` on the ports of `run_keypoints`. Returns the arrays of face.npz and the dict of `run_stage`."""
     from gsac.stages.face import STAGE
     from gsac.stages.face.stage import run
 
@@ -89,7 +90,10 @@ def run_face(ports: dict[str, Path], folder: Path, store: Path, **parameters) ->
 
 
 def score_squats(arrays: dict, reference: np.ndarray) -> dict:
-    """reference: (T, 33, 3) px of an independent implementation of the same body network."""
+    """Share of frames with a person, and median distance from the reference in percent of the person's height.
+
+    reference: (T, 33, 3) px, by an independent implementation of the same body network.
+    """
     apart = np.linalg.norm(arrays["pose33"][..., :2] - reference[..., :2], axis=-1)
     height = np.ptp(reference[..., 1], axis=1)[:, None]
     return {"person": float(arrays["score"].any(axis=1).mean()),
@@ -97,7 +101,7 @@ def score_squats(arrays: dict, reference: np.ndarray) -> dict:
 
 
 def score_truth(arrays: dict, truth: dict) -> dict:
-    """truth: the arrays of truth.npz (see the footage's own note)."""
+    """Errors of body and hand points and detection rates. truth: arrays of the 104-bone rig's truth.npz."""
     apart = np.linalg.norm(arrays["xy"][:, :17] - truth["coco2d"][:, :17], axis=-1)
     joints = [str(name) for name in truth["joint_names"]]
     found, seen, px, false = [], [], [], 0
@@ -126,8 +130,10 @@ def score_truth(arrays: dict, truth: dict) -> dict:
 
 
 def score_expression(face: dict, truth: dict) -> dict:
-    """Correlation with the rendered actions over the frames in which the stage calls the face seen, and the slope of
-    what it says against what is true; None where nothing moves."""
+    """Correlation and slope of the estimated against the true actions, by group, over frames with a valid face.
+
+    None where nothing moves.
+    """
     names = [str(name) for name in truth["expr_names"]]
     out = {"face_valid": int(face["valid"].sum())}
     for what, members in ACTIONS.items():
@@ -143,7 +149,7 @@ def score_expression(face: dict, truth: dict) -> dict:
 
 
 def draw(arrays: dict, frames: list[Path], path: Path, columns: int = 6, rows: int = 3, height: int = 640) -> None:
-    """Contact sheet of frames and points: body green, feet yellow, face blue, left hand red, right hand violet."""
+    """Writes a contact sheet of frames and points: body green, feet yellow, face blue, left hand red, right hand violet."""
     import cv2
 
     colours = [(slice(0, 17), (0, 255, 0)), (slice(17, 23), (255, 255, 0)), (FACE, (80, 160, 255)),
@@ -165,10 +171,10 @@ def draw(arrays: dict, frames: list[Path], path: Path, columns: int = 6, rows: i
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("footage", type=Path)
-    parser.add_argument("store", type=Path)
-    parser.add_argument("--draw", type=Path, help="folder for contact sheets")
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.perception", description=__doc__.splitlines()[0])
+    parser.add_argument("footage", type=Path, metavar="FOOTAGE", help="folder with squats, truth-a and turn-photos")
+    parser.add_argument("store", type=Path, metavar="STORE", help="cache folder that `gsac models pull` filled")
+    parser.add_argument("--draw", type=Path, metavar="DIR", help="folder for contact sheets")
     arguments = parser.parse_args()
     truth = read_arrays(arguments.footage / "truth-a" / "truth.npz")
     reference = np.array(json.loads((arguments.footage / "squats" / "pose_squats.full.json").read_text()))

@@ -1,7 +1,7 @@
-"""Time of the CPU rasteriser against a vectorised torch implementation of the same tiles, in the same run.
+"""CPU time of the rasteriser against a vectorised torch implementation of the same tiles, in one run.
 
 `python -m gsac.benchmarks.raster [--scene figure|body] [--sizes 270 540 1080] [--repeats 20] [--threads 1] [--json FILE]`
-Figures are process CPU time, the best of many: a busy host disturbs them least.
+Times are CPU times of the process, the best of many repeats, which the machine's other load disturbs least.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import argparse
 import functools
 import json
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,21 +20,21 @@ from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 
 COUNT = 25_000
+"""Gaussians."""
 ELLIPSOIDS = (
-    # centre, half axes (m), y up: head, trunk, hips, arms, hands, legs
     ((0, 1.62, 0), (0.09, 0.13, 0.10)), ((0, 1.25, 0), (0.17, 0.26, 0.11)), ((0, 0.95, 0), (0.16, 0.14, 0.11)),
     ((0.33, 1.38, 0), (0.22, 0.05, 0.05)), ((-0.33, 1.38, 0), (0.22, 0.05, 0.05)),
     ((0.60, 1.38, 0), (0.09, 0.03, 0.04)), ((-0.60, 1.38, 0), (0.09, 0.03, 0.04)),
     ((0.09, 0.65, 0), (0.08, 0.28, 0.08)), ((-0.09, 0.65, 0), (0.08, 0.28, 0.08)),
     ((0.09, 0.22, 0), (0.06, 0.26, 0.06)), ((-0.09, 0.22, 0), (0.06, 0.26, 0.06)),
 )
-
+"""Centre and half axes (m), y up: head, trunk, hips, arms, hands, legs."""
 BROAD = 1.6
-"""Widens the figure until it covers a quarter of the frame."""
+"""Factor on the figure's width, with which it covers a quarter of the frame."""
 
 
-def figure() -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) m, camera frame, and faces (F, 3) of a person made of ellipsoids."""
+def make_figure() -> tuple[np.ndarray, np.ndarray]:
+    """A person of ellipsoids: vertices (V, 3) m, camera frame, and faces (F, 3)."""
     import trimesh
 
     parts = []
@@ -42,38 +43,41 @@ def figure() -> tuple[np.ndarray, np.ndarray]:
         ball.vertices = ball.vertices * (np.array(axes) * (BROAD, 1, BROAD)) + np.array(centre) * (BROAD, 1, 1)
         parts.append(ball)
     mesh = trimesh.util.concatenate(parts)
-    return in_front(np.asarray(mesh.vertices)), np.asarray(mesh.faces, np.int32)
+    return place_in_front(np.asarray(mesh.vertices)), np.asarray(mesh.faces, np.int32)
 
 
-def in_front(vertices: np.ndarray) -> np.ndarray:
-    """A canonical body (y up, facing +z) put upright before the camera, its middle on the optical axis at 3 m."""
+def place_in_front(vertices: np.ndarray) -> np.ndarray:
+    """Places a canonical body upright in front of the camera, its middle on the optical axis at 3 m.
+
+    vertices: (V, 3) m, y up, facing +z. Returns (V, 3) m, camera frame.
+    """
     middle = (vertices.max(0) + vertices.min(0)) / 2
     return ((vertices - middle) * (1, -1, -1) + (0, 0, 3)).astype(np.float32)
 
 
-def camera_for(vertices: np.ndarray, size: int) -> Camera:
-    """The body fills the height of a square frame up to a margin of 4 %."""
+def fit_camera(vertices: np.ndarray, size: int) -> Camera:
+    """A camera whose square image of `size` px the body fills in height, but for 4 %. vertices: (V, 3) m, camera frame."""
     high = np.abs(vertices[:, 1] / vertices[:, 2]).max()
     focal = 0.5 * size * 0.96 / high
     return Camera((focal, focal), (size / 2, size / 2), size, size)
 
 
-def scene(name: str) -> tuple[np.ndarray, np.ndarray, Gaussians]:
-    """`figure` (ellipsoids) or `body` (the open body, T-pose): vertices, faces, 25,000 gaussians of random colour."""
+def make_scene(name: str) -> tuple[np.ndarray, np.ndarray, Gaussians]:
+    """Vertices (V, 3) m, faces (F, 3) and `COUNT` gaussians of random colour; name: `figure` (ellipsoids) or `body` (T-pose)."""
     if name == "body":
         from gsac.avatar.body import Body
 
         body = Body.load()
-        vertices, faces = in_front(body.v_template), body.faces
+        vertices, faces = place_in_front(body.v_template), body.faces
     else:
-        vertices, faces = figure()
+        vertices, faces = make_figure()
     gaussians = Gaussians.area(vertices, faces, COUNT, seed=0)
     gaussians.rgb[:] = np.random.default_rng(0).random(gaussians.rgb.shape)
     return vertices, faces, gaussians
 
 
-def best(repeats: int, work) -> float:
-    """Least process CPU time of `work()`, ms."""
+def time_best(repeats: int, work: Callable[[], object]) -> float:
+    """Least CPU time of `work()`, ms."""
     least = np.inf
     for _ in range(repeats):
         start = time.process_time()
@@ -82,8 +86,8 @@ def best(repeats: int, work) -> float:
     return 1e3 * least
 
 
-def composited(state: raster.State) -> tuple[np.ndarray, np.ndarray]:
-    """Gaussian and pixel of every (gaussian, pixel) that the tiles composite, pixel by pixel, front to back."""
+def list_composited(state: raster.State) -> tuple[np.ndarray, np.ndarray]:
+    """Gaussian (n,) and pixel (n,) of every pair that the tiles composite, pixel by pixel, front to back."""
     size, column = raster.project.TILE, raster.project
     height, width = state.alpha.shape
     y, x = (g.reshape(-1) for g in np.mgrid[:size, :size])
@@ -104,18 +108,18 @@ def composited(state: raster.State) -> tuple[np.ndarray, np.ndarray]:
 
 
 def torch_step(state: raster.State, grad_rgb: np.ndarray, grad_alpha: np.ndarray, repeats: int) -> tuple[float, int]:
-    """CPU ms, best of a few, of compositing forward and backward in torch on one thread, and the number of (gaussian, pixel)s.
+    """CPU ms of compositing forward and backward in torch on one thread, best of a few, and the number of (gaussian, pixel) pairs.
 
-    Vectorised over what the same tiles composite (list made before the clock starts: no work on pairs that do not show), as
-    gsplat's torch formula does it: exponent, alpha, transmittance by a segmented sum of logarithms, weighted sums by index.
-    The image must agree with the kernels'.
+    grad_rgb: (H, W, 3); grad_alpha: (H, W). Vectorised over the pairs that the same tiles composite, which are listed before the
+    clock starts: exponent, alpha, transmittance by a segmented sum of logarithms, weighted sums by index. Raises RuntimeError if
+    the image differs from the kernels'.
     """
     import torch
 
     torch.set_num_threads(1)
     column = raster.project
     height, width = state.alpha.shape
-    gaussian, pixel = (torch.from_numpy(a) for a in composited(state))
+    gaussian, pixel = (torch.from_numpy(a) for a in list_composited(state))
     first = torch.cat([torch.ones(1, dtype=torch.bool), pixel[1:] != pixel[:-1]])
     begin = torch.cummax(torch.where(first, torch.arange(len(pixel)), 0), 0).values
     wanted = torch.from_numpy(np.concatenate([grad_rgb, grad_alpha[..., None]], 2).reshape(-1, 4))
@@ -141,15 +145,15 @@ def torch_step(state: raster.State, grad_rgb: np.ndarray, grad_alpha: np.ndarray
 
 
 def measure(name: str, size: int, repeats: int, workers: int, torch_repeats: int) -> dict:
-    """CPU ms of one image size. `raster_ms`: projection, depth sort, tiles, forward, backward to means, rotations and scales."""
-    vertices, faces, gaussians = scene(name)
-    camera = camera_for(vertices, size)
+    """CPU ms at one image size. `raster_ms`: projection, depth sort, tiles, forward, backward to means, rotations and scales."""
+    vertices, faces, gaussians = make_scene(name)
+    camera = fit_camera(vertices, size)
     workspace = raster.Workspace(workers)
     random = np.random.default_rng(1)
     grad_rgb = random.normal(size=(size, size, 3)).astype(np.float32)
     grad_alpha = random.normal(size=(size, size)).astype(np.float32)
 
-    def bound_step():
+    def bound_step() -> object:
         return raster.render_bound_backward(raster.render_bound(vertices, faces, gaussians, camera, workspace).state, grad_rgb,
                                             grad_alpha)
 
@@ -157,16 +161,16 @@ def measure(name: str, size: int, repeats: int, workers: int, torch_repeats: int
     state = raster.render_bound(vertices, faces, gaussians, camera, workspace).state
     result = {"scene": name, "size": size, "gaussians": len(gaussians), "threads": workers,
               "covered": float((state.alpha > 0.5).mean()), "tile_pairs": len(state.pair_slot),
-              "step_ms": best(repeats, bound_step)}
-    forward = best(repeats, lambda: raster.render(state.means, state.rotations, state.scales, gaussians.rgb, gaussians.opacity,
+              "step_ms": time_best(repeats, bound_step)}
+    forward = time_best(repeats, lambda: raster.render(state.means, state.rotations, state.scales, gaussians.rgb, gaussians.opacity,
                                                   camera, workspace))
-    backward = best(repeats, lambda: raster.render_backward(state, grad_rgb, grad_alpha))
+    backward = time_best(repeats, lambda: raster.render_backward(state, grad_rgb, grad_alpha))
     result |= {"forward_ms": forward, "backward_ms": backward, "raster_ms": forward + backward}
     target = random.random((size, size, 3), np.float32)
     image, gradient = state.rgb.copy(), np.zeros_like(target)
     for loss in (losses.l2, losses.ssim, losses.sobel):
         loss(image, target, gradient=gradient, workspace=workspace)
-        result[f"{loss.__name__}_ms"] = best(repeats, functools.partial(loss, image, target, gradient=gradient,
+        result[f"{loss.__name__}_ms"] = time_best(repeats, functools.partial(loss, image, target, gradient=gradient,
                                                                         workspace=workspace))
     if torch_repeats:
         slow, pixels = torch_step(state, grad_rgb, grad_alpha, torch_repeats)
@@ -175,7 +179,7 @@ def measure(name: str, size: int, repeats: int, workers: int, torch_repeats: int
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.raster", description=__doc__.splitlines()[0])
     parser.add_argument("--scene", choices=("figure", "body"), default="figure")
     parser.add_argument("--sizes", type=int, nargs="+", default=[270, 540, 1080])
     parser.add_argument("--repeats", type=int, default=20)

@@ -1,4 +1,7 @@
-"""The README's pictures, from the folder that `make demo` made."""
+"""Makes the README's pictures, `docs/demo-*.jpg`, from the folder of `make demo`.
+
+    python tools/demo_pictures.py
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,24 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from gsac.pipeline.report.pictures import Picture
 
 VIEWS = 4
-"""Frames in the strips of clip and body."""
+"""Frames in a strip."""
 HIGH = 420
 """Height of every picture, px."""
 QUALITY = 82
+"""JPEG quality."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python tools/demo_pictures.py", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python tools/demo_pictures.py", description=__doc__.splitlines()[0])
     parser.add_argument("--run", type=Path, default=Path("demo/avatar"), metavar="DIR", help="default: demo/avatar")
     parser.add_argument("--out", type=Path, default=Path("docs"), metavar="DIR", help="default: docs")
     options = parser.parse_args(argv)
@@ -29,16 +39,16 @@ def main(argv: list[str] | None = None) -> int:
 
     results = Results(options.run)
     footage = Footage(results)
-    save(options.out / "demo-clip.jpg", strip(contact_sheet(footage).pictures))
-    save(options.out / "demo-body.jpg", strip(body_sheet(footage).pictures))
+    save(options.out / "demo-clip.jpg", join_strip(contact_sheet(footage).pictures))
+    save(options.out / "demo-body.jpg", join_strip(body_sheet(footage).pictures))
     held = heldout_sheet(results).pictures
-    save(options.out / "demo-heldout.jpg", decoded(held[len(held) // 2].uri))
-    save(options.out / "demo-viewer.jpg", viewed(options.run / "export" / "viewer.html"))
+    save(options.out / "demo-heldout.jpg", decode(held[len(held) // 2].uri))
+    save(options.out / "demo-viewer.jpg", photograph(options.run / "export" / "viewer.html"))
     return 0
 
 
-def decoded(uri: str):
-    """(H, W, 3) uint8 BGR of a data URI, made `HIGH` px high."""
+def decode(uri: str) -> np.ndarray:
+    """Image (H, W, 3) uint8 BGR of a data URI, resized to H = `HIGH`."""
     import cv2
     import numpy as np
 
@@ -46,15 +56,15 @@ def decoded(uri: str):
     return cv2.resize(image, (round(image.shape[1] * HIGH / image.shape[0]), HIGH), interpolation=cv2.INTER_AREA)
 
 
-def strip(pictures: list):
-    """Evenly chosen pictures side by side."""
+def join_strip(pictures: list[Picture]) -> np.ndarray:
+    """`VIEWS` evenly spaced pictures side by side, (H, W, 3) uint8 BGR."""
     import numpy as np
 
-    return np.hstack([decoded(pictures[i * len(pictures) // VIEWS].uri) for i in range(VIEWS)])
+    return np.hstack([decode(pictures[i * len(pictures) // VIEWS].uri) for i in range(VIEWS)])
 
 
-def viewed(page: Path):
-    """A browser's screenshot of the viewer page, (H, W, 3) uint8 BGR."""
+def photograph(page: Path) -> np.ndarray:
+    """Screenshot (H, W, 3) uint8 BGR of the viewer page."""
     import cv2
 
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -70,7 +80,8 @@ def viewed(page: Path):
     return cv2.resize(image, (HIGH, HIGH), interpolation=cv2.INTER_AREA)
 
 
-def save(path: Path, image) -> None:
+def save(path: Path, image: np.ndarray) -> None:
+    """image: (H, W, 3) uint8 BGR."""
     import cv2
 
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,16 +1,16 @@
-"""Measures how the face network answers to facial actions; writes `stages/face/actions.npz`.
+"""Measures the face network's response to facial actions; writes `stages/face/actions.npz`.
 
     python tools/face_actions.py STORE FOLDER
 
-STORE is the cache folder that `gsac models pull` filled; the people that are drawn and looked at stay in FOLDER (10 s each).
+STORE is the cache folder that `gsac models pull` filled; the people's landmarks are kept in FOLDER (10 s each).
 
-What the network's points do differs from what the skin under them does: it slides along lips and lids, damps what it seldom saw,
-and answers differently from the side. One linear model says what it says: of every person, view and action, all at once,
+The network's points do not follow the skin exactly: they slide along lips and lids, damp rare actions, and respond differently from
+the side. One linear model of the points is fitted to all people, views and actions at once:
 
     points = neutral + view(direction) + person + sum_k action_k (response_k0 + yaw response_k1 + yaw^2 response_k2) + wavering
 
-and what is left is the wavering, coordinate by coordinate with all others. `channels` are the sums of coordinates that still
-tell the actions apart once the wavering is made white: in them it has spread one and the actions are found by least squares.
+The wavering is noise with a full covariance over all coordinates. `channels` are the linear combinations of coordinates that still
+tell the actions apart after whitening: in them the noise has a standard deviation of one, and actions follow by least squares.
 """
 
 from __future__ import annotations
@@ -24,31 +24,36 @@ from scipy.linalg import solve_triangular
 from gsac.avatar.artifacts import write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.facemesh import POINTS, Face
-from gsac.benchmarks.face_people import looks_of, mirror_of
+from gsac.benchmarks.face.people import find_mirror, read_people
 from gsac.stages.face.actions import TABLE, spread_of, turns, view_terms
 from gsac.stages.face.head import AXES, similarity
 from gsac.stages.face.landmarks import align
 from gsac.stages.smplx.paper.head import find_closest, find_incident_faces, select_head
 
 SEEDS = [*range(1000, 1036), *range(2000, 2024)]
-"""People of the turntable, of no truth clip that anything else is chosen or judged on, and drawn ones."""
+"""Turntable people that no other choice or judgement uses, and drawn heads."""
 ANGLE = np.radians(55)
-"""Heads turned farther away are no faces to the stage."""
+"""Largest yaw, rad, at which the stage reads a face."""
 CHANNELS = 64
 PULL_VIEW, PULL_PERSON, PULL_OWN_VIEW, PULL_FRONT, PULL_TURNED = 1e-3, 0.3, 3.0, 0.6, 2.0
-"""Pulls to zero of what is solved for, in frames."""
+"""Ridges on the unknowns, in frames."""
 OWN_WAVERING, LEAST_WAVERING = 0.05, 0.02
-"""Share of the wavering that is a coordinate's own, and mm of it that each has at least: what a few thousand looks cannot tell."""
+"""Shrinkage of the noise covariance to its diagonal, and noise (mm) added to each coordinate: too few frames for all of it."""
 OWN_SHARE, LEAST_OWN = 0.3, 0.11
-"""The same of the persons' differences."""
+"""The same for the covariance of people's differences."""
 OWN_VIEW = 0.1
-"""How much of the variance with which a person's rest changes with yaw is granted: all of it takes slow brows for it."""
+"""Factor on the variance of a person's change with yaw: with all of it, slow brows are taken for that change."""
 
 
 class Looks:
-    """All frames of all people and of their mirror images, N in all."""
+    """N frames: all frames of all people, and their mirror images.
 
-    def __init__(self, people: list[dict], neutral: np.ndarray, mirror: np.ndarray, names: tuple[str, ...]):
+    points: (N, 1404) mm from neutral, weighted by the axes; direction: (N, 3), in which the face looks; expression: (N, E);
+    person: (N,) index, a mirror image counts as another person.
+    """
+
+    def __init__(self, people: list[dict[str, np.ndarray]], neutral: np.ndarray, mirror: np.ndarray, names: tuple[str, ...]):
+        """people: of `read_people`; neutral: (468, 3) m; mirror: (468,) of `find_mirror`; names: of the E actions."""
         other = [names.index(n.replace("Left", "?").replace("Right", "Left").replace("?", "Right")) for n in names]
         points, direction, expression, person = [], [], [], []
         for k, one in enumerate(people):
@@ -65,9 +70,11 @@ class Looks:
         self.direction, self.expression, self.person = (np.concatenate(a) for a in (direction, expression, person))
 
 
-def fitted(looks: Looks, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """`rest` (1404,), `view` (10, 1404), `response` (3, E, 1404) mm, as `Actions` has them but for the axes' weights; `own`
-    (2K, 1404) of each person and `left` (N, 1404)."""
+def fit_model(looks: Looks, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Solves the linear model, mm weighted by the axes.
+
+    Returns `rest` (1404,), `view` (10, 1404), `response` (3, E, 1404), `own` (P, 1404) of P people, and residuals `left` (N, 1404).
+    """
     N, E, people = len(looks.points), len(names), looks.person.max() + 1
     acts = (turns(looks.direction)[:, :, None] * looks.expression[:, None]).reshape(N, -1)
     design = np.hstack([np.ones((N, 1)), view_terms(looks.direction), np.eye(people)[looks.person], acts])
@@ -78,10 +85,13 @@ def fitted(looks: Looks, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     return {"rest": rest[0], "view": view, "own": own, "response": response.reshape(3, E, -1), "left": left}
 
 
-def channels_of(fit: dict[str, np.ndarray], looks: Looks, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """`channels` (C, 1404), `persons` (3, C, C), and `own` and `wavering` (1404,) mm, for points weighted by the axes."""
+def find_channels(fit: dict[str, np.ndarray], looks: Looks, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """`channels` (C, 1404), their covariances `persons` (3, C, C), standard deviations `own` and `wavering` (1404,) mm.
+
+    fit: arrays of `fit_model`.
+    """
     people = looks.person.max() + 1
-    # each person's rest again, now that the actions are known, and how it changes with yaw: none of it counts as wavering
+    # refit each person's rest and its change with yaw, now that the actions are known: neither counts as wavering
     rest, terms = fit["left"] + fit["own"][looks.person], turns(looks.direction)
     own, left, spent = np.empty((people, 3, rest.shape[1])), np.empty_like(rest), 0.0
     for k in range(people):
@@ -106,8 +116,11 @@ def channels_of(fit: dict[str, np.ndarray], looks: Looks, names: tuple[str, ...]
     return {"channels": channels, "persons": persons, "own": own[:, 0].std(0), "wavering": np.sqrt(wavering)}
 
 
-def where(people: list[dict], mirror: np.ndarray, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (468, 3) and shares (468, 3): where on the open body's skin the network's points lie, the median over people."""
+def place_points(people: list[dict[str, np.ndarray]], mirror: np.ndarray, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Places the network's points on the body's skin, median over people: vertices (468, 3) and barycentric shares (468, 3).
+
+    people: of `read_people`; mirror: (468,).
+    """
     places = np.array([p["places"] for p in people])
     both = np.concatenate([places, places[:, mirror] * [-1, 1, 1]])
     skin = select_head(body)
@@ -119,9 +132,11 @@ def where(people: list[dict], mirror: np.ndarray, body: Body) -> tuple[np.ndarra
     return used[corners], share
 
 
-def first_frame(people: list[dict], places: np.ndarray, mirror: np.ndarray) -> np.ndarray:
-    """(468, 3) m, y up, z out of the face, about the root of the nose: the calmest frontal face of the first person, symmetric, as
-    large as places (468, 3) m."""
+def start_neutral(people: list[dict[str, np.ndarray]], places: np.ndarray, mirror: np.ndarray) -> np.ndarray:
+    """A first neutral face (468, 3) m, y up, z out of the face, root of the nose at the origin.
+
+    The calmest frontal face of the first person, made symmetric. places: (468, 3) m on the skin, for the size; mirror: (468,).
+    """
     person = people[0]
     seen = np.isfinite(person["landmarks"][:, 0, 0])
     faces, moved = person["landmarks"][seen].astype(float), person["expression"][seen].sum(1)
@@ -133,38 +148,39 @@ def first_frame(people: list[dict], places: np.ndarray, mirror: np.ndarray) -> n
     return points - points[168]
 
 
-def measure(people: list[dict]) -> dict[str, np.ndarray]:
-    """The arrays of `Actions`, in half precision where they are differences."""
+def measure(people: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The arrays of `Actions` by name, shapes (..., 468, 3) as there; differences in half precision. people: of `read_people`."""
     body = Body.load()
     names = tuple(body.expression_names)
     calm = people[0]["landmarks"][np.isfinite(people[0]["landmarks"][:, 0, 0])]
-    mirror = mirror_of(min((Face(p.astype(float), 1.0) for p in calm), key=lambda face: abs(face.yaw)).points)
-    corner, share = where(people, mirror, body)
-    neutral = first_frame(people, np.einsum("lk,lkc->lc", share, body.v_template[corner].astype(float)), mirror)
+    mirror = find_mirror(min((Face(p.astype(float), 1.0) for p in calm), key=lambda face: abs(face.yaw)).points)
+    corner, share = place_points(people, mirror, body)
+    neutral = start_neutral(people, np.einsum("lk,lkc->lc", share, body.v_template[corner].astype(float)), mirror)
     weight = np.tile(AXES, POINTS)
-    for _ in range(2):  # everybody's rest is found in the frame of one, then in its own
+    for _ in range(2):  # points are aligned with one person's neutral face, then with the mean one
         looks = Looks(people, neutral, mirror, names)
-        fit = fitted(looks, names)
+        fit = fit_model(looks, names)
         neutral = neutral + (fit["rest"] / weight).reshape(POINTS, 3) / 1e3
-    found = channels_of(fit, looks, names)
+    found = find_channels(fit, looks, names)
 
     channels = (found["channels"] * weight).reshape(-1, POINTS, 3)
 
-    def points(a: np.ndarray) -> np.ndarray:
+    def unweighted(a: np.ndarray) -> np.ndarray:
+        """a: (..., 1404). Returns (..., 468, 3) float16."""
         return (a / weight).reshape(*a.shape[:-1], POINTS, 3).astype(np.float16)
 
     return {"neutral": neutral.astype(np.float32), "mirror": mirror.astype(np.int16), "names": np.array(names),
-            "view": points(fit["view"]), "response": points(fit["response"]), "own": points(found["own"]),
-            "wavering": points(found["wavering"]), "channels": channels.astype(np.float16),
+            "view": unweighted(fit["view"]), "response": unweighted(fit["response"]), "own": unweighted(found["own"]),
+            "wavering": unweighted(found["wavering"]), "channels": channels.astype(np.float16),
             "persons": found["persons"].astype(np.float32), "corner": corner.astype(np.int16), "share": share.astype(np.float16)}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("store", type=Path)
-    parser.add_argument("folder", type=Path)
+    parser = argparse.ArgumentParser(prog="python tools/face_actions.py", description=__doc__.splitlines()[0])
+    parser.add_argument("store", type=Path, metavar="STORE", help="cache folder that `gsac models pull` filled")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="keeps the people's landmarks; 10 s each")
     asked = parser.parse_args()
-    write_arrays(TABLE, **measure(looks_of(SEEDS, asked.store, asked.folder)))
+    write_arrays(TABLE, **measure(read_people(SEEDS, asked.store, asked.folder)))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Truth clips: a clothed person turns before a still camera, with everything the real job has to find known exactly.
+"""Truth clips: a made-up, clothed person turns before a still camera; pose, shape and camera of every frame are known exactly.
 
-Body, clothes and hair are meshes drawn by a z-buffer: nothing here shares code with the gaussians judged on it.
+Body, clothes and hair are meshes drawn by a z-buffer: no code is shared with the gaussians that are judged on these clips.
 """

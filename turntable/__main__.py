@@ -1,4 +1,4 @@
-"""`python -m gsac.turntable OUT --seed 3 --frames 60 --height 1280 ...`: one flag for every option."""
+"""`python -m gsac.turntable OUT --seed 3 --frames 60 --height 1280 ...`: renders one truth clip; every option is a flag."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _optional(kind) -> bool:
+def _optional(kind: object) -> bool:
     return NoneType in get_args(kind) and (get_origin(kind) is Union or type(kind).__name__ == "UnionType")
 
 

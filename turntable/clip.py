@@ -1,4 +1,4 @@
-"""Makes one truth clip: `clip.mp4` (or `frames/` of novel poses), `mask/%06d.png` and `truth.npz`."""
+"""Makes a truth clip: `clip.mp4` (`frames/` for novel poses), `mask/%06d.png` and `truth.npz`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import imageio_ffmpeg
@@ -22,29 +23,32 @@ from gsac.turntable.appearance import make_appearance
 from gsac.turntable.motion import Motion, make_motion
 from gsac.turntable.options import TurntableOptions
 from gsac.turntable.person import Person, make_person
-from gsac.turntable.render import SHADOW, Picture, Studio, View
-from gsac.turntable.room import make_light, make_room
+from gsac.turntable.render import SHADOW, Picture, Studio
+from gsac.turntable.room import make_lighting, make_room
+from gsac.turntable.viewpoint import Viewpoint, look_at
 
+FEET = [7, 8, 10, 11]
+"""Joints of ankles and balls of the feet."""
 HIDDEN_SHARE = 0.10
-"""A hand counts as hidden when a smaller share of its vertices is seen."""
+"""A hand counts as hidden when a smaller share of its vertices is visible."""
 SLACK = np.full(133, 0.025)
-"""m that a keypoint may lie below the drawn surface and still be seen: inside a limb and under cloth."""
+"""(133,) m by which a key point may lie below the drawn surface and still count as visible: inside a limb, under cloth."""
 SLACK[wholebody.BODY] = 0.14
 SLACK[:5] = 0.03
 SLACK[wholebody.FEET] = 0.05
 
 
 def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
-              progress: Callable[[int, int, str], None] = lambda done, total, what: None, **changes) -> Path:
-    """Writes a clip into out_dir (made if needed) and returns `clip.mp4`, or `frames` for novel poses.
+              progress: Callable[[int, int, str], None] = lambda done, total, what: None, **changes: Any) -> Path:
+    """Writes a clip into out_dir, which is created if missing. Returns the path of `clip.mp4`, or of `frames` for novel poses.
 
-    Options come as a TurntableOptions or by keyword: `make_clip(out, seed=3, frames=40)`. A bad one raises ValueError.
+    Options are a TurntableOptions or keywords: `make_clip(out, seed=3, frames=40)`. A wrong one raises ValueError.
 
-    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m, camera frame; vertices (T, V, 3) m bare body (if asked
-    for); keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad; hidden (T, 2)
-    bool, left and right hand; height_m; rotation (3, 3) and eye (3,) world -> camera; shift (V, 3) m by which the bare
-    T-pose leaves the shape basis; and `BodyParams`' arrays, whose posed body is the truth up to that shift.
-    mask: share of each pixel that is person; above 127 is the silhouette.
+    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m, camera frame; vertices (T, V, 3) m, bare body (option
+    `vertices`); keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad; hidden (T, 2)
+    bool, left and right hand; height_m; rotation (3, 3) and eye (3,), world -> camera; shift (V, 3) m of the bare T-pose
+    from the shape basis; and the arrays of `BodyParams`, whose posed body is the truth up to that shift.
+    mask: coverage of each pixel by the person; above 127 is the silhouette.
     """
     options = options or TurntableOptions(**changes)
     options.check()
@@ -57,13 +61,13 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
     person = make_person(options, np.random.default_rng([options.seed, 1]))
     motion = make_motion(person.body, person.joints, options, np.random.default_rng([options.seed, 2]))
     studio = make_studio(person, options)
-    params = place(person, motion, studio.view)
-    truth = Truth(person, motion, params, studio.view)
-    video = Video(out / "clip.mp4", options) if turn else None
+    params = place_person(person, motion, studio.view)
+    truth = TruthRecorder(person, motion, params, studio.view)
+    video = VideoWriter(out / "clip.mp4", options) if turn else None
     try:
         for t in range(options.frames):
-            bare, drawn, joints = posed(person, params, t)
-            picture = studio.picture(drawn, studio.view.to_world(joints[[7, 8, 10, 11]]))
+            bare, drawn, joints = pose_person(person, params, t)
+            picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
             frame = develop(picture, options, t, noise=turn)
             cv2.imwrite(str(out / "mask" / f"{t:06d}.png"), picture.mask)
             if video:
@@ -79,43 +83,40 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
     return out / ("clip.mp4" if turn else "frames")
 
 
-def make_view(person: Person, options: TurntableOptions, rng: np.random.Generator) -> View:
-    """The camera stands so far off that arms stay in the picture."""
+def make_view(person: Person, options: TurntableOptions, rng: np.random.Generator) -> Viewpoint:
+    """Places the camera at a distance that keeps the arms in the picture."""
     width, height = options.size
     fill = 0.73 if options.poses == "turn" else 0.53
     camera = Camera((options.focal_px,) * 2, (width / 2, height / 2), width, height)
     distance = options.focal_px * person.height_m / (fill * min(height, width * 16 / 9))
     eye = np.array([rng.uniform(-0.05, 0.05), rng.uniform(1.1, 1.4), distance])
-    aim = np.array([0, 0.5 * person.height_m, 0]) - eye
-    forward = aim / np.linalg.norm(aim)
-    right = np.cross(forward, [0, 1, 0])
-    right /= np.linalg.norm(right)
-    return View(camera, np.stack([right, np.cross(forward, right), forward]), eye)
+    return Viewpoint(camera, look_at(eye, np.array([0, 0.5 * person.height_m, 0])), eye)
 
 
 def studio_rng(options: TurntableOptions) -> np.random.Generator:
+    """The random numbers of camera, light and room."""
     return np.random.default_rng([options.seed, 3])
 
 
 def make_studio(person: Person, options: TurntableOptions, window: Camera | None = None) -> Studio:
-    """window: a part of the view's own picture, where only that is to be drawn."""
+    """Camera, colours, light and room of a clip. window: a camera of part of the picture, to draw that part only."""
     rng = studio_rng(options)
     view = make_view(person, options, rng)
     if window is not None:
         view.camera = window
-    light = make_light(rng)
+    light = make_lighting(rng)
     room = make_room(view.camera, view.rotation.T, view.eye, light, SHADOW, rng)
     return Studio(view, make_appearance(person, np.random.default_rng([options.seed, 4])), light, room, options.supersample)
 
 
-def place(person: Person, motion: Motion, view: View) -> BodyParams:
-    """The motion as parameters in the camera frame; in every frame the lowest point stands on the floor."""
+def place_person(person: Person, motion: Motion, view: Viewpoint) -> BodyParams:
+    """Body parameters of the motion in the camera frame; the lowest point of each frame touches the floor."""
     pose = motion.pose.copy()
     pelvis = person.joints[0]
     transl = np.empty((len(pose), 3))
     for t in range(len(pose)):
         transforms = joint_transforms(motion.pose[t][None], person.joints, person.body.parents)[0]
-        _, drawn = person.posed(transforms, motion.expression[t])
+        _, drawn = person.pose(transforms, motion.expression[t])
         world = np.array([motion.place[t, 0], -drawn[:, 1].min(), motion.place[t, 1]])
         transl[t] = view.to_camera(pelvis * [0, 1, 0] + world) - pelvis
         pose[t, 0] = (Rotation.from_matrix(view.rotation) * Rotation.from_rotvec(motion.pose[t, 0])).as_rotvec()
@@ -123,16 +124,16 @@ def place(person: Person, motion: Motion, view: View) -> BodyParams:
                                 person.joint_offset, person.body.digest)
 
 
-def posed(person: Person, params: BodyParams, t: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pose_person(person: Person, params: BodyParams, t: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Bare body (V, 3), drawn mesh (N, 3) and joints (55, 3) of frame t, m, camera frame."""
     transforms = joint_transforms(params.pose[t][None], person.joints, person.body.parents)[0]
-    bare, drawn = person.posed(transforms, params.expression[t])
+    bare, drawn = person.pose(transforms, params.expression[t])
     joints = np.einsum("jab,jb->ja", transforms[..., :3], person.joints) + transforms[..., 3]
     return bare + params.transl[t], drawn + params.transl[t], joints + params.transl[t]
 
 
 def develop(picture: Picture, options: TurntableOptions, t: int, noise: bool) -> np.ndarray:
-    """(H, W, 3) uint8 with sensor noise that grows with the square root of the light."""
+    """Frame t as (H, W, 3) uint8, with sensor noise that grows as the square root of the brightness."""
     colour = picture.colour
     if noise and options.noise:
         rng = np.random.default_rng([options.seed, 5, t])
@@ -141,10 +142,10 @@ def develop(picture: Picture, options: TurntableOptions, t: int, noise: bool) ->
     return np.clip(np.round(colour), 0, 255).astype(np.uint8)
 
 
-class Truth:
-    """Collects what is known exactly, frame by frame."""
+class TruthRecorder:
+    """Collects the arrays of truth.npz, frame by frame."""
 
-    def __init__(self, person: Person, motion: Motion, params: BodyParams, view: View):
+    def __init__(self, person: Person, motion: Motion, params: BodyParams, view: Viewpoint):
         self.person, self.motion, self.params, self.view = person, motion, params, view
         frames = params.frames
         self.vertices = np.empty((frames, len(person.body.v_template), 3), np.float32)
@@ -156,6 +157,7 @@ class Truth:
                       for wrist, j in first.values()]
 
     def add(self, t: int, bare: np.ndarray, joints: np.ndarray, picture: Picture) -> None:
+        """Records frame t. bare: (V, 3) m, bare body; joints: (55, 3) m; both in the camera frame."""
         camera = self.view.camera
         big = camera.scaled(picture.depth.shape[1], picture.depth.shape[0])
         points = self.person.body.keypoints(bare)
@@ -168,6 +170,7 @@ class Truth:
             self.hidden[t, side] = visible_points(bare[hand], picture.depth, big, 0.004).mean() < HIDDEN_SHARE
 
     def arrays(self, options: TurntableOptions) -> dict[str, np.ndarray]:
+        """The arrays of truth.npz by name, shapes (T, ...) as `make_clip` lists them."""
         p = self.params
         shaped, _ = self.person.body.rest(p.betas)
         out = {name: getattr(p, name) for name in p.__dataclass_fields__ if name not in ("model", "sigma_joints")}
@@ -178,8 +181,8 @@ class Truth:
         return out | ({"vertices": self.vertices} if options.vertices else {})
 
 
-class Video:
-    """H.264 by imageio-ffmpeg's binary, frames in through its standard input."""
+class VideoWriter:
+    """An H.264 file, encoded by imageio-ffmpeg's program."""
 
     def __init__(self, path: Path, options: TurntableOptions):
         width, height = options.size
@@ -193,9 +196,11 @@ class Video:
             stdin=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def add(self, frame: np.ndarray) -> None:
+        """frame: (H, W, 3) uint8 RGB."""
         self.process.stdin.write(frame.tobytes())
 
     def close(self) -> None:
+        """Finishes the file; raises OSError with ffmpeg's words if it failed."""
         _, said = self.process.communicate()
         if self.process.returncode:
             raise OSError(f"ffmpeg failed: {said.decode(errors='replace').strip()}")

@@ -1,4 +1,4 @@
-"""How the person moves: the turn of a clip, or the second pose set. World: y up, person at the origin, camera at +z."""
+"""Motion of the person: one turn on the spot, or the novel poses. World: y up, person at the origin, camera at +z."""
 
 from __future__ import annotations
 
@@ -8,59 +8,62 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from gsac.avatar.body import Body
 from gsac.avatar.skinning import joint_transforms
+from gsac.turntable.footsteps import plant_feet
 from gsac.turntable.options import TurntableOptions
-from gsac.turntable.planted import plant
 
 SIDES = {"left": 1.0, "right": -1.0}
+"""Side -> sign of its x in the body's axes."""
 
 
 @dataclass
 class Motion:
-    """T frames."""
+    """Pose, place and expression of T frames."""
 
     pose: np.ndarray
     """(T, 55, 3) axis-angle in SMPL-X order; the first turns the person in the world."""
     place: np.ndarray
-    """(T, 2) m, where the pelvis goes along world x and z."""
+    """(T, 2) m, world x and z of the pelvis."""
     yaw: np.ndarray
     """(T,) rad, 0 faces the camera, growing to the person's left."""
     expression: np.ndarray
     """(T, 52) in 0..1."""
 
 
-def make_motion(body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
-    """joints: (55, 3) the person's rest joints, m."""
-    return (_turn if options.poses == "turn" else _novel)(body, joints, options, rng)
+def make_motion(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
+    """joints: (55, 3) m, the person's joints in the T-pose."""
+    return (_make_turn if options.poses == "turn" else _make_novel)(body, joints, options, rng)
 
 
-def _turn(body, joints, options: TurntableOptions, rng) -> Motion:
+def _make_turn(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
+    """One uneven turn in the A-pose."""
     T = options.frames
     index = {name: i for i, name in enumerate(body.joint_names)}
     s = np.arange(T) / T
     uneven = options.sway * (0.018 * np.sin(2 * np.pi * (2 * s + rng.random())) + 0.009 * np.sin(
         2 * np.pi * (5 * s + rng.random())))
     yaw = 2 * np.pi * (s + uneven - uneven[0])
-    pose = np.repeat(a_pose(body, rng)[None], T, 0)
+    pose = np.repeat(make_a_pose(body, rng)[None], T, 0)
     stir(pose, index, options.arm_swing, rng)
     if options.feet == "turning":
-        steps(pose, index, yaw, options.sway)
+        lift_feet(pose, index, yaw, options.sway)
     if options.hidden_hand != "none":
         hide_hand(pose, index, body.parents, joints, options)
-    turns = Rotation.from_euler("YX", np.stack([yaw, wander(rng, T, 0.015 * options.sway)], 1))
+    turns = Rotation.from_euler("YX", np.stack([yaw, smooth_noise(rng, T, 0.015 * options.sway)], 1))
     pose[:, 0] = turns.as_rotvec()
-    place = np.stack([wander(rng, T, 0.03 * options.sway), wander(rng, T, 0.03 * options.sway)], 1)
+    place = np.stack([smooth_noise(rng, T, 0.03 * options.sway), smooth_noise(rng, T, 0.03 * options.sway)], 1)
     if options.feet == "planted":
-        plant(pose, index, joints, yaw, place, turns.as_matrix())
-    return Motion(pose, place, yaw, expressions(body, options, rng))
+        plant_feet(pose, index, joints, yaw, place, turns.as_matrix())
+    return Motion(pose, place, yaw, make_expressions(body, options, rng))
 
 
-def _novel(body, joints, options: TurntableOptions, rng) -> Motion:
-    """Key poses one after another, smoothly blended, seen from slowly changing sides."""
+def _make_novel(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
+    """`NOVEL_POSES` one after another, smoothly blended, while the yaw swings slowly."""
     T = options.frames
     index = {name: i for i, name in enumerate(body.joint_names)}
-    rest = a_pose(body, rng)
-    keys = [_changed(rest, index, change) for change in NOVEL_POSES]
+    rest = make_a_pose(body, rng)
+    keys = [_change_pose(rest, index, change) for change in NOVEL_POSES]
     at = np.linspace(0, len(keys), T, endpoint=False)
     first = at.astype(int)
     blend = _smooth(np.clip((at - first - 0.35) / 0.65, 0, 1))[:, None, None]
@@ -70,11 +73,11 @@ def _novel(body, joints, options: TurntableOptions, rng) -> Motion:
     yaw = 0.9 * np.sin(2 * np.pi * np.arange(T) / T * 2 + rng.random())
     lean = pose[:, 0].copy()
     pose[:, 0] = (Rotation.from_euler("Y", yaw[:, None]) * Rotation.from_rotvec(lean)).as_rotvec()
-    return Motion(pose, np.zeros((T, 2)), yaw, expressions(body, options, rng))
+    return Motion(pose, np.zeros((T, 2)), yaw, make_expressions(body, options, rng))
 
 
-def a_pose(body, rng) -> np.ndarray:
-    """(55, 3): arms 25-35 degrees from the body, elbows and fingers a little bent, feet apart."""
+def make_a_pose(body: Body, rng: np.random.Generator) -> np.ndarray:
+    """A-pose (55, 3) axis-angle: arms 25-35 degrees from the body, elbows and fingers slightly bent, feet apart."""
     index = {name: i for i, name in enumerate(body.joint_names)}
     pose = np.zeros((len(index), 3))
     away = np.radians(rng.uniform(25, 35))
@@ -96,20 +99,23 @@ def a_pose(body, rng) -> np.ndarray:
 
 STIR = {"spine1": 1.0, "spine2": 1.0, "spine3": 1.2, "neck": 1.6, "head": 2.4, "collar": 0.8, "shoulder": 3.5,
         "elbow": 3.5, "wrist": 4.0, "index1": 4.0, "middle1": 3.0, "ring1": 3.0, "pinky1": 4.0, "thumb1": 3.0}
-"""Degrees (standard deviation) that a joint wanders about each axis."""
+"""Joint -> standard deviation of its small motion about each axis, degrees."""
 
 
-def stir(pose: np.ndarray, index: dict, amount: float, rng) -> None:
-    """Adds smooth small motion to pose (T, 55, 3), in place."""
+def stir(pose: np.ndarray, index: dict[str, int], amount: float, rng: np.random.Generator) -> None:
+    """Adds smooth small motion to pose (T, 55, 3), in place. index: joint by name; amount: factor on `STIR`."""
     for name, i in index.items():
         degrees = STIR.get(name.removeprefix("left_").removeprefix("right_"))
         if degrees:
             for axis in range(3):
-                pose[:, i, axis] += wander(rng, len(pose), np.radians(degrees) * amount)
+                pose[:, i, axis] += smooth_noise(rng, len(pose), np.radians(degrees) * amount)
 
 
-def steps(pose: np.ndarray, index: dict, yaw: np.ndarray, amount: float) -> None:
-    """Small steps on the spot, each foot in turn, one every 30 degrees of the turn."""
+def lift_feet(pose: np.ndarray, index: dict[str, int], yaw: np.ndarray, amount: float) -> None:
+    """Adds small steps on the spot, one every 30 degrees, left and right alternately.
+
+    pose: (T, 55, 3), changed in place; yaw: (T,) rad; amount: factor on the height of the steps.
+    """
     for side, phase in (("left", 0.0), ("right", np.pi)):
         lift = amount * np.clip(np.sin(6 * yaw + phase), 0, None) ** 2
         pose[:, index[f"{side}_hip"], 0] -= 0.16 * lift
@@ -117,9 +123,12 @@ def steps(pose: np.ndarray, index: dict, yaw: np.ndarray, amount: float) -> None
         pose[:, index[f"{side}_ankle"], 0] -= 0.10 * lift
 
 
-def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.ndarray,
+def hide_hand(pose: np.ndarray, index: dict[str, int], parents: np.ndarray, joints: np.ndarray,
               options: TurntableOptions) -> None:
-    """Moves one hand behind the back or before the belly for a while; pose (T, 55, 3) in place."""
+    """Moves one hand behind the back, or in front of the belly, between the times `options.hidden`.
+
+    pose: (T, 55, 3), changed in place; parents: (55,) of the joints; joints: (55, 3) m, T-pose.
+    """
     side, where = options.hidden_hand.split("_")
     sign = SIDES[side]
     back = where == "back"
@@ -135,7 +144,8 @@ def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.nda
     shoulder = joints[index[f"{side}_shoulder"]]
     elbow_goal = shoulder + [sign * 0.17, -0.22, -0.12 if back else 0.02]
 
-    def miss(x):
+    def residuals(x: np.ndarray) -> np.ndarray:
+        """Of the rotations x (9,): place and direction of the hand, place of the elbow, distance from `aim`, bend of the wrist."""
         trial = start.copy()
         trial[chain] = x.reshape(3, 3)
         a = joint_transforms(trial[None], joints, parents)[0]
@@ -145,7 +155,7 @@ def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.nda
         return np.concatenate([(at[hand] - target) * 30, across * 1.0, (at[elbow] - elbow_goal) * 4,
                                (x - aim.ravel()) * 0.15, x[6:] * 0.8])
 
-    goal = least_squares(miss, aim.ravel()).x.reshape(3, 3)
+    goal = least_squares(residuals, aim.ravel()).x.reshape(3, 3)
     s = np.arange(len(pose)) / len(pose)
     ramp = 0.10
     arrive, leave = options.hidden
@@ -153,28 +163,28 @@ def hide_hand(pose: np.ndarray, index: dict, parents: np.ndarray, joints: np.nda
     pose[:, chain] += gone[:, None, None] * (goal - start[chain])
 
 
-def expressions(body, options: TurntableOptions, rng) -> np.ndarray:
-    """(T, 52): talking, smiling, brows, and a blink every half second or so."""
+def make_expressions(body: Body, options: TurntableOptions, rng: np.random.Generator) -> np.ndarray:
+    """Facial actions (T, 52) in 0..1: talking, smiling, moving brows, and a blink every 6 to 13 frames."""
     T = options.frames
     out = np.zeros((T, len(body.expression_names)), np.float32)
     if not options.expression:
         return out
     names = {n: i for i, n in enumerate(body.expression_names)}
 
-    def set_to(curve, *actions):
+    def set_to(curve: np.ndarray, *actions: str) -> None:
         for a in actions:
             out[:, names[a]] = np.clip(curve, 0, 1)
 
-    set_to(0.08 + wander(rng, T, 0.22, 4), "jawOpen")
-    smile = 0.25 + wander(rng, T, 0.35, 2)
-    set_to(smile + wander(rng, T, 0.05), "mouthSmileLeft")
-    set_to(smile + wander(rng, T, 0.05), "mouthSmileRight")
+    set_to(0.08 + smooth_noise(rng, T, 0.22, 4), "jawOpen")
+    smile = 0.25 + smooth_noise(rng, T, 0.35, 2)
+    set_to(smile + smooth_noise(rng, T, 0.05), "mouthSmileLeft")
+    set_to(smile + smooth_noise(rng, T, 0.05), "mouthSmileRight")
     set_to(0.5 * smile, "cheekSquintLeft", "cheekSquintRight")
-    brow = wander(rng, T, 0.4, 2)
+    brow = smooth_noise(rng, T, 0.4, 2)
     set_to(brow, "browInnerUp", "browOuterUpLeft", "browOuterUpRight")
     set_to(-brow * 0.8, "browDownLeft", "browDownRight")
-    set_to(wander(rng, T, 0.25, 3), "mouthPucker")
-    set_to(wander(rng, T, 0.2, 2), "mouthFunnel")
+    set_to(smooth_noise(rng, T, 0.25, 3), "mouthPucker")
+    set_to(smooth_noise(rng, T, 0.2, 2), "mouthFunnel")
     blink = np.zeros(T)
     at = int(rng.integers(2, 6))
     while at < T:
@@ -186,19 +196,20 @@ def expressions(body, options: TurntableOptions, rng) -> np.ndarray:
     return out
 
 
-def wander(rng, frames: int, scale: float, cycles: int = 3) -> np.ndarray:
-    """(frames,) smooth, periodic, of standard deviation `scale`: four random waves of up to `cycles` + 1 a clip."""
+def smooth_noise(rng: np.random.Generator, frames: int, scale: float, cycles: int = 3) -> np.ndarray:
+    """Smooth periodic noise (frames,) of standard deviation `scale`: four random waves, of up to `cycles` + 1 periods a clip."""
     s = np.arange(frames) / frames
     waves = [np.sin(2 * np.pi * (k * s + rng.random())) * rng.uniform(0.5, 1) for k in (1, 2, cycles, cycles + 1)]
     return scale * np.sum(waves, 0) * 0.9
 
 
-def _smooth(x):
+def _smooth(x: np.ndarray) -> np.ndarray:
+    """Smoothstep of x in 0..1."""
     return x * x * (3 - 2 * x)
 
 
-def _changed(rest: np.ndarray, index: dict, change: dict) -> np.ndarray:
-    """rest (55, 3) with named joints set; a name without side mirrors onto both."""
+def _change_pose(rest: np.ndarray, index: dict[str, int], change: dict[str, tuple]) -> np.ndarray:
+    """rest (55, 3) with the named joints set; a name without a side sets both, mirrored."""
     pose = rest.copy()
     for name, rotvec in change.items():
         rotvec = np.radians(np.asarray(rotvec, float))

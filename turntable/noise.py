@@ -1,4 +1,4 @@
-"""Random values that vary smoothly over space: what textures and bumps are made of."""
+"""Smooth noise over space: the material of textures and bumps."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ SIZE = 32
 
 
 def make_noise(rng: np.random.Generator) -> np.ndarray:
-    """(32, 32, 32, 3) float32 in -1..1, repeating."""
+    """(32, 32, 32, 3) float32 in -1..1; it repeats in space."""
     return rng.uniform(-1, 1, (SIZE, SIZE, SIZE, 3)).astype(np.float32)
 
 
-def sample(noise: np.ndarray, points: np.ndarray, frequency) -> np.ndarray:
-    """points: (N, 3) m; frequency: cells a metre, one or three. Returns (N, 3), trilinear."""
-    return _sample(noise, (points * np.asarray(frequency, np.float32)).astype(np.float32))
+def sample_noise(noise: np.ndarray, points: np.ndarray, frequency: float | tuple[float, float, float]) -> np.ndarray:
+    """noise: (32, 32, 32, 3); points: (N, 3) m; frequency: cells a metre, one or one an axis. Returns (N, 3), trilinear."""
+    return _sample_noise(noise, (points * np.asarray(frequency, np.float32)).astype(np.float32))
 
 
 @njit(cache=True, error_model="numpy")
-def _sample(noise, points):
+def _sample_noise(noise, points):
     out = np.zeros((len(points), 3), np.float32)
     m = SIZE - 1
     for i in range(len(points)):

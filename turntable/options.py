@@ -1,17 +1,19 @@
-"""What a truth clip can be asked to be."""
+"""Options of a truth clip."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args, get_origin, get_type_hints
+
+HiddenHand = Literal["none", "left_back", "right_back", "left_front", "right_front"]
 
 
 @dataclass(frozen=True)
 class TurntableOptions:
-    """One clip; equal options give equal clips."""
+    """One clip; equal options give equal files."""
 
     seed: int = 1
-    """Person, clothes, room, light and motion."""
+    """Decides person, clothes, room, light and motion."""
     frames: int = 60
     """Frames of the clip; the turn is spread over all of them."""
     fps: float = 10.0
@@ -25,23 +27,23 @@ class TurntableOptions:
     poses: Literal["turn", "novel"] = "turn"
     """`turn`: A-pose, once around. `novel`: squat, raised arms, reach, twist; PNG frames, no video, no noise."""
     feet: Literal["turning", "planted"] = "turning"
-    """`turning`: feet go round with the body and lift in turn. `planted`: soles rest on the floor and step after the body."""
-    hidden_hand: Literal["none", "left_back", "right_back", "left_front", "right_front"] = "none"
-    """A hand that goes behind the back, or before the belly, for a while."""
+    """`turning`: feet turn with the body and lift alternately. `planted`: soles rest on the floor, then step after the body."""
+    hidden_hand: HiddenHand = "none"
+    """The hand that moves behind the back, or in front of the belly, for part of the clip."""
     hidden_from: float | None = None
-    """Where the hand has arrived, as a share of the clip; None: when the body comes to cover it."""
+    """Time of the hand's arrival, as a share of the clip; None: when the body covers it."""
     hidden_to: float | None = None
-    """Where the hand leaves again, as a share of the clip."""
+    """Time at which the hand leaves, as a share of the clip; None: as for hidden_from."""
     expression: bool = True
-    """Mouth, smile, brows and blinks change; else a neutral face."""
+    """Whether mouth, smile, brows and blinks move; otherwise the face stays neutral."""
     arm_swing: float = 1.0
-    """How much arms, hands, spine and head stir; 1 is a few degrees, 0 holds them still."""
+    """Amplitude of small motions of arms, hands, spine and head; 1: a few degrees, 0: none."""
     sway: float = 1.0
-    """How unevenly the person turns, shifts and steps; 1 is lifelike, 0 a turntable."""
+    """Unevenness of turning, shifting and stepping; 1: lifelike, 0: a turntable."""
     outside: float = 1.0
-    """How far the body leaves the fit's shape basis; 0 stays inside."""
+    """Distance of the body from the span of the fit's shape basis, as a factor; 0: inside."""
     clothing: float = 1.0
-    """Thickness of clothes and hair as a factor."""
+    """Factor on the thickness of clothes and hair."""
     noise: float = 1.5
     """Sensor noise, standard deviation in 8-bit steps at mid grey."""
     crf: int = 18
@@ -54,7 +56,7 @@ class TurntableOptions:
     """Whether the frames before coding are kept, as frames/%06d.png."""
 
     def check(self) -> None:
-        """Raises ValueError that names the option."""
+        """Raises a ValueError that names the wrong option."""
         for name, low in (("frames", 1), ("height", 32), ("supersample", 1), ("crf", 0)):
             if getattr(self, name) < low:
                 raise ValueError(f"{name} is {getattr(self, name)}, expected at least {low}")
@@ -65,16 +67,19 @@ class TurntableOptions:
             raise ValueError(f"fps is {self.fps}, expected more than 0")
         if self.height % 2 or self.size[0] % 2:
             raise ValueError(f"size is {self.size[0]}x{self.height}, expected even numbers (H.264 wants them)")
-        for name, choices in (("poses", ("turn", "novel")), ("feet", ("turning", "planted")), ("hidden_hand", HIDDEN_HANDS)):
-            if getattr(self, name) not in choices:
-                raise ValueError(f"{name} is {getattr(self, name)!r}, expected one of {', '.join(choices)}")
+        for name, kind in get_type_hints(type(self)).items():
+            if get_origin(kind) is Literal and getattr(self, name) not in get_args(kind):
+                raise ValueError(f"{name} is {getattr(self, name)!r}, expected one of {', '.join(get_args(kind))}")
         start, stop = self.hidden
         if not 0 <= start <= stop <= 1:
             raise ValueError(f"hidden_from is {start}, hidden_to {stop}; expected 0 <= from <= to <= 1")
 
     @property
     def hidden(self) -> tuple[float, float]:
-        """Shares of the clip between which the hand is away: towards the end, facing the camera, or half-way, facing off."""
+        """First and last time of the hidden hand, shares of the clip.
+
+        Behind the back: near the end, as the person faces the camera. In front: half-way, as the person faces away.
+        """
         start, stop = (0.42, 0.58) if self.hidden_hand.endswith("front") else (0.85, 0.97)
         return (start if self.hidden_from is None else self.hidden_from,
                 stop if self.hidden_to is None else self.hidden_to)
@@ -86,7 +91,6 @@ class TurntableOptions:
 
     @property
     def focal_px(self) -> float:
+        """Focal length in pixels."""
         return self.focal or 1.05 * max(self.size)
 
-
-HIDDEN_HANDS = ("none", "left_back", "right_back", "left_front", "right_front")

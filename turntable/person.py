@@ -1,4 +1,4 @@
-"""Who turns: a body that the fit's basis does not span, in clothes and hair that its model does not have."""
+"""The person of a clip: a body outside the span of the fit's shape basis, in clothes and hair that the body model lacks."""
 
 from __future__ import annotations
 
@@ -10,64 +10,66 @@ import numpy as np
 from gsac.avatar.body import Body
 from gsac.avatar.skinning import skin
 from gsac.turntable.options import TurntableOptions
-from gsac.turntable.shell import Shell, capped, cut, draped, lifted
+from gsac.turntable.shell import Shell, cut_mesh, drape, pull_to_hull, raise_surface
 
 REGIONS = Path(__file__).with_name("regions.npz")
-"""(6, V) shares of lips, ears, eyelids, nails, inner mouth, face: MakeHuman's CC0 texture masks at the vertices, in 255ths;
-`tools/open_body/bake_regions.py` makes it."""
+"""`share` (6, V) uint8 at each vertex, in 255ths: lips, ears, eyelids, nails, inner mouth, face;
+from MakeHuman's CC0 texture masks, baked by `tools/open_body/bake_regions.py`."""
 OUTSIDE = Path(__file__).with_name("outside.npz")
-"""What single local shape sliders do: `vertices` (S, V, 3) and `joints` (S, 55, 3), m; from the open body's bake."""
+"""Effect of single local shape sliders: `vertices` (S, V, 3) and `joints` (S, 55, 3), m; baked by `tools/open_body/bake.py`."""
 EYES = slice(13574, 13718)
-"""Both eyeballs in the open body's vertices."""
+"""Vertices of both eyeballs in the open body."""
 MATERIALS = ("skin", "eye", "shirt", "trousers", "shoes", "hair")
 
 
 @dataclass
-class Look:
-    """Choices that shape and colour share."""
+class Outfit:
+    """Cut of clothes and hair, which decides both shape and colour."""
 
     sleeve: float
-    """m from the middle to the end of the sleeve, in the T-pose."""
+    """m from the mid plane to the end of the sleeve, in the T-pose."""
     hem: float
-    """m, height of the shirt's hem in the template."""
+    """m, height of the shirt's hem on the template."""
     cuff: float
-    """m, height of the trousers' end."""
+    """m, height of the trousers' end on the template."""
     hair: str
     """`short` or `bob`."""
     neckline: float
-    """m that the collar is open in front."""
+    """Slope of the neckline, m of height a metre of depth."""
 
 
 @dataclass
 class Person:
-    """C control vertices are skinned; N vertices of the drawn mesh lie between two of them."""
+    """A mesh of N drawn vertices, each on the line between two of C skinned control vertices."""
 
     body: Body
-    look: Look
-    betas: np.ndarray
+    outfit: Outfit
+    betas: np.ndarray  # (B,)
     rest: np.ndarray
-    """(C, 3) m: the bare body's V first."""
+    """(C, 3) m, T-pose; the first V are the bare body."""
     joints: np.ndarray
-    """(55, 3) m."""
+    """(55, 3) m, T-pose."""
     joint_offset: np.ndarray
-    """(55, 3) m beyond what the betas explain."""
+    """(55, 3) m from the joints that the betas give."""
     skin_index: np.ndarray
+    """(C, 4) joints of the skinning weights."""
     skin_weight: np.ndarray
+    """(C, 4)."""
     pair: np.ndarray
     """(N, 2) control vertices."""
     share: np.ndarray
-    """(N,) of the second."""
+    """(N,) weight of the second of the pair."""
     faces: np.ndarray
-    """(F, 3) of the drawn mesh: skin that shows, clothes, hair."""
+    """(F, 3) into N: visible skin, clothes, hair."""
     material: np.ndarray
     """(F,) uint8 into MATERIALS."""
     paint: np.ndarray
-    """(N, 3) m, what patterns are painted by: place on the plain template, equal for all bodies; shoes: height above the sole."""
+    """(N, 3) m, texture coordinates: place on the template body, equal for all people; y of shoes: height above the sole."""
     region: np.ndarray
-    """(N, 6) shares as in regions.npz."""
+    """(N, 6) in 0..1, see `REGIONS`."""
 
-    def posed(self, transforms: np.ndarray, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """transforms: (55, 3, 4); expression: (52,). Returns bare body (V, 3) and drawn mesh (N, 3), m."""
+    def pose(self, transforms: np.ndarray, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """transforms: (55, 3, 4) of the joints; expression: (52,). Returns bare body (V, 3) and drawn mesh (N, 3), m."""
         count = len(self.body.v_template)
         rest = self.rest.copy()
         if expression.any():
@@ -78,28 +80,29 @@ class Person:
 
     @property
     def height_m(self) -> float:
-        """Crown to sole of the bare body in the T-pose."""
+        """Height of the bare body in the T-pose, m."""
         y = self.rest[: len(self.body.v_template), 1]
         return float(y.max() - y.min())
 
 
 def make_person(options: TurntableOptions, rng: np.random.Generator) -> Person:
+    """Draws a body and its outfit."""
     body = Body.load()
     spread = np.linspace(0.8, 0.32, body.num_figure)
     betas = (rng.normal(0, 1, body.num_figure) * spread).clip(-1.6, 1.6).astype(np.float32)
-    shift, joint_offset = outside(body, options.outside, rng)
+    shift, joint_offset = leave_basis(body, options.outside, rng)
     rest, joints = body.rest(betas, None, joint_offset)
     rest = rest + shift
-    look = Look(sleeve=float(rng.choice([0.36, 0.42, 0.66])), hem=float(rng.uniform(0.07, 0.12)),
-                cuff=float(rng.choice([-0.755, -0.755, -0.755, -0.24])), hair=str(rng.choice(["short", "bob"])),
-                neckline=float(rng.uniform(0.5, 0.9)))
+    outfit = Outfit(sleeve=float(rng.choice([0.36, 0.42, 0.66])), hem=float(rng.uniform(0.07, 0.12)),
+                    cuff=float(rng.choice([-0.755, -0.755, -0.755, -0.24])), hair=str(rng.choice(["short", "bob"])),
+                    neckline=float(rng.uniform(0.5, 0.9)))
     region = np.load(REGIONS)["share"].T.astype(np.float32) / 255
-    shells, hidden = dress(body, rest, region, look, options.clothing, rng)
-    return assemble(body, look, betas, rest, joints, joint_offset, region, shells, hidden)
+    shells, hidden = dress(body, rest, region, outfit, options.clothing, rng)
+    return assemble(body, outfit, betas, rest, joints, joint_offset, region, shells, hidden)
 
 
-def outside(body: Body, amount: float, rng) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement (V, 3) and joint offset (55, 3) in m that no betas reach: local shape sliders, and a slow wobble."""
+def leave_basis(body: Body, amount: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement (V, 3) m and joint offset (55, 3) m outside the shape basis: five local sliders, and a wave over the skin."""
     with np.load(OUTSIDE) as z:
         fields, joints = z["vertices"].astype(np.float32), z["joints"]
     pick = rng.choice(len(fields), 5, replace=False)
@@ -112,59 +115,65 @@ def outside(body: Body, amount: float, rng) -> tuple[np.ndarray, np.ndarray]:
     return shift.astype(np.float32), np.tensordot(share, joints[pick], 1).astype(np.float32)
 
 
-def dress(body: Body, rest: np.ndarray, region: np.ndarray, look: Look, thick: float, rng,
+def dress(body: Body, rest: np.ndarray, region: np.ndarray, outfit: Outfit, thick: float, rng: np.random.Generator,
           ) -> tuple[list[Shell], np.ndarray]:
-    """Shells over rest (V, 3), and the skin (V,) bool that they hide for certain."""
+    """Makes clothes and hair over a body.
+
+    rest: (V, 3) m; region: (V, 6); thick: factor on thickness. Returns the shells and the vertices (V,) bool that they cover fully.
+    """
     template, faces = body.v_template, body.faces
     x, y, z = template.T
     arm = np.abs(x)
     skin_only = np.ones(len(template), bool)
     skin_only[13348:] = False  # tongue and eyeballs
-    fold = folds(template, rng)
-    neck = 0.775 - look.neckline * np.clip(z - 0.01, -0.05, 0.2)
+    fold = make_folds(template, rng)
+    neck = 0.775 - outfit.neckline * np.clip(z - 0.01, -0.05, 0.2)
     near_neck = np.clip((0.16 - arm) / 0.04, 0, 1)
     fields = {
-        "shirt": np.minimum.reduce([y - look.hem, (look.sleeve - arm) * 1.0, np.where(near_neck > 0, neck - y, 0.2)]),
-        "trousers": np.minimum.reduce([look.hem + 0.07 - y, y - look.cuff, 0.4 - arm]),
+        "shirt": np.minimum.reduce([y - outfit.hem, (outfit.sleeve - arm) * 1.0, np.where(near_neck > 0, neck - y, 0.2)]),
+        "trousers": np.minimum.reduce([outfit.hem + 0.07 - y, y - outfit.cuff, 0.4 - arm]),
         "shoes": np.minimum(-0.715 - y, 0.6 - arm),
-        "hair": hair_field(template, region, look),
+        "hair": hair_field(template, region, outfit),
     }
     waist = np.clip((0.36 - y) / 0.25, 0, 1) * (arm < 0.3)
-    sleeve = np.clip((arm - 0.25) / (look.sleeve - 0.2), 0, 1.2) * (y > 0.45)
+    sleeve = np.clip((arm - 0.25) / (outfit.sleeve - 0.2), 0, 1.2) * (y > 0.45)
     leg = np.clip((0.0 - y) / 0.7, 0, 1)
     thickness = {
-        "shirt": 0.008 + 0.010 * waist + 0.014 * sleeve * (look.sleeve < 0.5) + 0.006 * sleeve + fold * 0.006,
-        "trousers": np.where(y > look.hem - 0.03, 0.004, 0.008 + 0.020 * leg + fold * 0.008 * (0.4 + leg)),
+        "shirt": 0.008 + 0.010 * waist + 0.014 * sleeve * (outfit.sleeve < 0.5) + 0.006 * sleeve + fold * 0.006,
+        "trousers": np.where(y > outfit.hem - 0.03, 0.004, 0.008 + 0.020 * leg + fold * 0.008 * (0.4 + leg)),
         "shoes": np.full(len(template), 0.010),
-        "hair": hair_thickness(template, fields["hair"], look, rng),
+        "hair": hair_thickness(template, fields["hair"], outfit, rng),
     }
     shells = []
     hidden = np.zeros(len(template), bool)
     for name, field in fields.items():
         field = np.where(skin_only, field, -1.0)
         member = field > -0.06
-        lift = lifted(rest, faces, member, np.maximum(thickness[name], 0.003) * thick,
-                      {"shirt": 16, "trousers": 12, "shoes": 6, "hair": 6}[name])
+        lift = raise_surface(rest, faces, member, np.maximum(thickness[name], 0.003) * thick,
+                             {"shirt": 16, "trousers": 12, "shoes": 6, "hair": 6}[name])
         if name == "shirt":
-            lift = draped(lift, np.clip((0.52 - y) / 0.08, 0, 1) * (arm < 0.3) * member)
+            lift = drape(lift, np.clip((0.52 - y) / 0.08, 0, 1) * (arm < 0.3) * member)
         paint = template
         if name == "shoes":
             for sign in (1, -1):
-                lift = capped(lift, np.clip((z - 0.07) / 0.06, 0, 1) * (field > 0) * (sign * x > 0))
+                lift = pull_to_hull(lift, np.clip((z - 0.07) / 0.06, 0, 1) * (field > 0) * (sign * x > 0))
             sole = rest[skin_only, 1].min() - 0.018
             low = np.clip((-0.806 - y) / 0.014, 0, 1)
             lift[:, 1] += low * (sole - lift[:, 1]) * 0.9
             paint = np.stack([x, lift[:, 1] - sole, z], 1)
-        if name == "hair" and look.hair == "bob":
-            lift = hang(lift, template, field, thick)
-        pair, share, cut_faces = cut(faces, field)
+        if name == "hair" and outfit.hair == "bob":
+            lift = lengthen_hair(lift, template, field, thick)
+        pair, share, cut_faces = cut_mesh(faces, field)
         shells.append(Shell(name, lift.astype(np.float32), pair, share, cut_faces, paint.astype(np.float32)))
         hidden |= field > {"shirt": 0.03, "trousers": 0.02, "shoes": 0.02, "hair": 0.03}[name]
     return shells, hidden
 
 
-def hair_field(template: np.ndarray, region: np.ndarray, look: Look) -> np.ndarray:
-    """> 0 on the scalp. The line runs from the forehead over the ears to the nape."""
+def hair_field(template: np.ndarray, region: np.ndarray, outfit: Outfit) -> np.ndarray:
+    """(N,) m, positive on the scalp; the hairline runs from the forehead over the ears to the nape.
+
+    template: (N, 3) m, place on the template body; region: (N, 6).
+    """
     x, y, z = template.T
     around = np.arctan2(np.abs(x), z - 0.045)  # 0 in front, pi behind
     line = np.interp(around, [0, 0.55, 0.9, 1.25, 1.75, 2.3, np.pi],
@@ -172,18 +181,22 @@ def hair_field(template: np.ndarray, region: np.ndarray, look: Look) -> np.ndarr
     return np.where((y > 0.77) & (np.abs(x) < 0.13), np.minimum(y - line, 0.03 - 0.08 * region[:, 1]), -1.0)
 
 
-def hair_thickness(template: np.ndarray, field: np.ndarray, look: Look, rng) -> np.ndarray:
+def hair_thickness(template: np.ndarray, field: np.ndarray, outfit: Outfit, rng: np.random.Generator) -> np.ndarray:
+    """(V,) m. template: (V, 3) m; field: (V,) of `hair_field`."""
     x, y, z = template.T
-    rise = 0.15 + 0.85 * np.clip(field / 0.04, 0, 1) if look.hair == "short" else 0.3 + 0.7 * np.clip(field / 0.04, 0, 1)
+    rise = 0.15 + 0.85 * np.clip(field / 0.04, 0, 1) if outfit.hair == "short" else 0.3 + 0.7 * np.clip(field / 0.04, 0, 1)
     up = np.clip((y - 0.86) / 0.12, 0, 1)
     behind = np.clip((0.08 - z) / 0.1, 0, 1)
     tuft = sum(np.sin(template @ rng.normal(0, 60, 3) + rng.uniform(0, 6.28)) for _ in range(4)) / 4
-    base = 0.006 + 0.020 * up if look.hair == "short" else 0.014 + 0.014 * up + 0.008 * behind
+    base = 0.006 + 0.020 * up if outfit.hair == "short" else 0.014 + 0.014 * up + 0.008 * behind
     return (base + 0.006 * tuft * up) * rise
 
 
-def hang(lift: np.ndarray, template: np.ndarray, field: np.ndarray, thick: float) -> np.ndarray:
-    """Draws the lower rows of long hair down to the shoulders, behind the ears."""
+def lengthen_hair(lift: np.ndarray, template: np.ndarray, field: np.ndarray, thick: float) -> np.ndarray:
+    """Pulls the lower rows of long hair down to the shoulders, behind the ears.
+
+    lift: (V, 3) m, surface of the hair; template: (V, 3) m; field: (V,) of `hair_field`; thick: factor. Returns lift (V, 3) m.
+    """
     x, y, z = template.T
     around = np.arctan2(np.abs(x), z - 0.045)
     side = np.clip((around - 1.75) / 0.3, 0, 1)
@@ -195,14 +208,18 @@ def hang(lift: np.ndarray, template: np.ndarray, field: np.ndarray, thick: float
     return out + radial * (0.018 * low * thick)[:, None]
 
 
-def folds(template: np.ndarray, rng) -> np.ndarray:
-    """(V,) about -1..1: drapery that runs mostly across the limbs."""
+def make_folds(template: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Folds of cloth, mostly across the limbs: (V,) about -1..1. template: (V, 3) m."""
     waves = [np.sin(template @ (rng.normal(0, 1, 3) * [14, 34, 16]) + rng.uniform(0, 6.28)) for _ in range(6)]
     return np.sum(waves, 0) / 3
 
 
-def assemble(body, look, betas, rest, joints, joint_offset, region, shells: list[Shell], hidden: np.ndarray) -> Person:
-    """One control mesh and one drawn mesh of everything."""
+def assemble(body: Body, outfit: Outfit, betas: np.ndarray, rest: np.ndarray, joints: np.ndarray, joint_offset: np.ndarray,
+             region: np.ndarray, shells: list[Shell], hidden: np.ndarray) -> Person:
+    """Joins body and shells into one control mesh and one drawn mesh.
+
+    betas: (B,); rest: (V, 3) m; joints, joint_offset: (55, 3) m; region: (V, 6); hidden: (V,) bool, skin that is left out.
+    """
     count = len(rest)
     own = np.arange(count)
     bare = body.faces[~hidden[body.faces].all(1)]
@@ -224,10 +241,10 @@ def assemble(body, look, betas, rest, joints, joint_offset, region, shells: list
         at_drawn += len(shell.share)
     source, pair, share = np.concatenate(source), np.concatenate(pairs), np.concatenate(shares).astype(np.float32)
 
-    def spread(values):
+    def interpolate(values: np.ndarray) -> np.ndarray:
         a, b = values[pair[:, 0]], values[pair[:, 1]]
         return (a + (b - a) * share[:, None]).astype(np.float32)
 
-    return Person(body, look, betas, np.concatenate(control).astype(np.float32), joints, joint_offset,
+    return Person(body, outfit, betas, np.concatenate(control).astype(np.float32), joints, joint_offset,
                   body.skin_index[source], body.skin_weight[source], pair, share, np.concatenate(faces),
-                  np.concatenate(materials).astype(np.uint8), spread(np.concatenate(paints)), spread(region[source]))
+                  np.concatenate(materials).astype(np.uint8), interpolate(np.concatenate(paints)), interpolate(region[source]))

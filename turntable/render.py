@@ -1,4 +1,4 @@
-"""One frame: the drawn mesh under the lamp, over the room. World: y up; camera frame: OpenCV axes."""
+"""Draws a frame: the person under the key lamp, composited over the room. World: y up; camera frame: OpenCV axes."""
 
 from __future__ import annotations
 
@@ -8,64 +8,48 @@ import cv2
 import numpy as np
 from numba import njit
 
-from gsac.avatar.camera import Camera
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.turntable.appearance import Appearance
 from gsac.turntable.person import MATERIALS
-from gsac.turntable.room import Light, Room
+from gsac.turntable.room import Lighting, Room
+from gsac.turntable.viewpoint import Viewpoint
 
 SHADOW = 768
 """Side of the shadow map, px."""
 
 
 @dataclass
-class View:
-    """Where the camera stands."""
-
-    camera: Camera
-    rotation: np.ndarray
-    """(3, 3) world -> camera."""
-    eye: np.ndarray
-    """(3,) m, world."""
-
-    def to_camera(self, points: np.ndarray) -> np.ndarray:
-        return (points - self.eye) @ self.rotation.T
-
-    def to_world(self, points: np.ndarray) -> np.ndarray:
-        return points @ self.rotation + self.eye
-
-
-@dataclass
 class Picture:
-    """What one frame shows."""
+    """One drawn frame."""
 
     colour: np.ndarray
     """(H, W, 3) float32 sRGB in 0..255, before noise."""
     mask: np.ndarray
-    """(H, W) uint8, share of the pixel that is person: skin, clothes and hair."""
+    """(H, W) uint8, coverage of the pixel by the person: skin, clothes and hair."""
     depth: np.ndarray
-    """(sH, sW) float32 m, of every sample; inf off the person."""
+    """(sH, sW) float32 m, one value a sample, s samples a pixel along each axis; inf off the person."""
 
 
 @dataclass
 class Studio:
-    """Everything of a clip that stands still."""
+    """The constant parts of a clip: camera, colours, light and room."""
 
-    view: View
+    view: Viewpoint
     appearance: Appearance
-    light: Light
+    light: Lighting
     room: Room
     supersample: int
+    """Samples a pixel along each axis."""
 
-    def picture(self, vertices: np.ndarray, feet: np.ndarray) -> Picture:
-        """vertices: (N, 3) m drawn mesh, camera frame; feet: (K, 3) m, world."""
+    def draw(self, vertices: np.ndarray, feet: np.ndarray) -> Picture:
+        """vertices: (N, 3) m, drawn mesh, camera frame; feet: (K, 3) m, world, which darken the floor beneath them."""
         s = self.supersample
         camera = self.view.camera
         big = camera.scaled(camera.width * s, camera.height * s)
         person = self.appearance.person
         face_id, bary, depth = rasterise(vertices, person.faces, big)
         world = self.view.to_world(vertices)
-        lamp_depth = self.lamp_depth(world)
+        lamp_depth = self.draw_shadow_map(world)
         colour = np.zeros((camera.height, camera.width, 3), np.float32)
         seen = face_id >= 0
         if seen.any():
@@ -75,18 +59,22 @@ class Studio:
             shaded = self.shade(world, face_id[box], bary[box], depth[box], lamp_depth)
             colour[y0:y1, x0:x1] = cv2.resize(shaded, (int(x1 - x0), int(y1 - y0)), interpolation=cv2.INTER_AREA)
         cover = cv2.resize(seen.astype(np.float32), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
-        ground = self.room.with_shadow(np.isfinite(lamp_depth), feet)
+        ground = self.room.cast_shadow(np.isfinite(lamp_depth), feet)
         out = colour + ground * (1 - cover[..., None])
         out = np.clip(out / (1 + np.float32(0.12) * out), 0, 1) ** np.float32(1 / 2.2) * 255
         return Picture(out, np.round(cover * 255).astype(np.uint8), depth)
 
-    def lamp_depth(self, world: np.ndarray) -> np.ndarray:
-        """(S, S) m along the lamp's axis, inf where nothing blocks it."""
-        turn, lamp = self.light.camera(SHADOW)
+    def draw_shadow_map(self, world: np.ndarray) -> np.ndarray:
+        """world: (N, 3) m, drawn mesh. Returns depth (S, S) m along the lamp's axis, inf where nothing blocks the light."""
+        turn, lamp = self.light.shadow_camera(SHADOW)
         return rasterise((world - self.light.place) @ turn.T, self.appearance.person.faces, lamp)[2]
 
-    def shade(self, world, face_id, bary, depth, lamp_depth) -> np.ndarray:
-        """(h, w, 3) linear; 0 off the person."""
+    def shade(self, world: np.ndarray, face_id: np.ndarray, bary: np.ndarray, depth: np.ndarray,
+              lamp_depth: np.ndarray) -> np.ndarray:
+        """Linear RGB (h, w, 3), 0 off the person.
+
+        world: (N, 3) m, drawn mesh; face_id: (h, w), bary: (h, w, 3), depth: (h, w) m, of the z-buffer; lamp_depth: (S, S) m.
+        """
         person, light = self.appearance.person, self.light
         attributes = np.concatenate([_normals(world, person.faces), world, person.paint, person.region], 1)
         seen = face_id >= 0
@@ -94,17 +82,17 @@ class Studio:
         normal, place, paint, region = at[:, :3], at[:, 3:6], at[:, 6:9], at[:, 9:]
         material = person.material[face_id[seen]]
         albedo, gloss, bump = self.appearance.paint(material, paint, region)
-        turn, lamp = light.camera(SHADOW)
+        turn, lamp = light.shadow_camera(SHADOW)
         single = [np.ascontiguousarray(a, np.float32) for a in (
             normal, place, albedo, gloss, bump, _openness(depth)[seen], lamp_depth, turn, light.place, self.view.eye,
             light.key, light.sky, light.ground)]
         out = np.zeros(face_id.shape + (3,), np.float32)
-        out[seen] = _lit(material, *single, np.float32(lamp.focal[0]))
+        out[seen] = _light_points(material, *single, np.float32(lamp.focal[0]))
         return out
 
 
 def _openness(depth: np.ndarray) -> np.ndarray:
-    """(h, w) in 0.4..1: darker where the surface lies behind its surroundings (depth-buffer unsharp mask, Luft 2006)."""
+    """Ambient occlusion (h, w) in 0.4..1: darker behind the surroundings (unsharp mask of the depth buffer, Luft 2006)."""
     here = np.isfinite(depth)
     small = max(1, depth.shape[1] // 4), max(1, depth.shape[0] // 4)
     middle = np.median(depth[here])
@@ -120,21 +108,22 @@ def _openness(depth: np.ndarray) -> np.ndarray:
 
 
 WRAP = np.array([0.30, 0.18, 0.14], np.float32)
-"""How far light creeps round skin's terminator, by colour."""
+"""Wrap of the key light around skin's terminator, by colour."""
 GLOW = np.array([0.08, 0.05, 0.04], np.float32)
-"""What shadowed skin still passes on of the lamp's light."""
+"""Share of the key light that reaches shadowed skin through the flesh."""
 _SKIN, _EYE = MATERIALS.index("skin"), MATERIALS.index("eye")
 
 
 CORNERS_FIRST = np.array(sorted(((1.3 * x, 1.3 * y, 0) for x in range(-2, 3) for y in range(-2, 3)),
                                 key=lambda tap: (abs(tap[0]) != abs(tap[1]) or abs(tap[0]) == 1.3, tap)), np.float32)
-"""(25, 3) shadow-map taps, px; the corners and the middle stand first, and the last of those is marked."""
+"""(25, 3) shadow-map taps: x, y px and a mark. Corners and middle come first; the last of these five is marked."""
 CORNERS_FIRST[4, 2] = 1
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def _lit(material, normals, places, albedo, gloss, bump, openness, lamp_depth, turn, lamp, eye, key, sky, ground, focal):
-    """(n, 3) linear light that leaves each point for the eye."""
+def _light_points(material, normals, places, albedo, gloss, bump, openness, lamp_depth, turn, lamp, eye, key, sky, ground,
+                  focal):
+    """(n, 3) linear RGB that each point sends to the eye."""
     out = np.empty((len(places), 3), np.float32)
     n, to_eye, to_lamp, half = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
     for i in range(len(places)):

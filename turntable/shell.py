@@ -1,4 +1,4 @@
-"""Garments and hair: pieces of the body's surface, cut along a field and lifted off the skin."""
+"""Garments and hair: pieces of the body's surface, cut along a scalar field and raised off the skin."""
 
 from __future__ import annotations
 
@@ -13,29 +13,33 @@ from gsac.avatar.normals import vertex_normals
 
 @dataclass
 class Shell:
-    """N vertices, each on an edge (or a corner) of the body's mesh."""
+    """A mesh of N vertices, each on an edge or at a vertex of the body's mesh."""
 
     material: str
+    """One of `person.MATERIALS`."""
     rest: np.ndarray
-    """(V, 3) m, lifted T-pose of the whole body's vertices; only those that `pair` names matter."""
+    """(V, 3) m, raised surface in the T-pose, over all of the body's vertices; only those in `pair` are used."""
     pair: np.ndarray
     """(N, 2) body vertices."""
     share: np.ndarray
-    """(N,) of the second."""
+    """(N,) weight of the second of the pair."""
     faces: np.ndarray
     """(F, 3) into N."""
     paint: np.ndarray
-    """(V, 3) m, what its pattern is painted by."""
+    """(V, 3) m, texture coordinates."""
 
 
-def cut(faces: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Keeps the part of a mesh where field (V,) > 0, cut at the zero line. Returns pair (N, 2), share (N,), faces."""
+def cut_mesh(faces: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Keeps the part of a mesh with a positive field, cut at the zero line.
+
+    faces: (F, 3); field: (V,). Returns pair (N, 2) of vertices, share (N,) of the second, and faces (G, 3) into N.
+    """
     inside = field[faces] > 0
     count = inside.sum(1)
     whole = faces[count == 3]
     one, two = faces[count == 1], faces[count == 2]
-    one = _turned(one, inside[count == 1].argmax(1))
-    two = _turned(two, (~inside[count == 2]).argmax(1))
+    one = _rotate_corners(one, inside[count == 1].argmax(1))
+    two = _rotate_corners(two, (~inside[count == 2]).argmax(1))
     a, b, c = one.T
     o, p, q = two.T
     corner = lambda i: np.stack([i, i], -1)  # noqa: E731
@@ -54,12 +58,13 @@ def cut(faces: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     return pair, share, inverse.reshape(-1, 3)
 
 
-def lifted(rest: np.ndarray, faces: np.ndarray, member: np.ndarray, thickness: np.ndarray, rounds: int,
-           gap: float = 0.003) -> np.ndarray:
-    """The body's surface where `member` (V,) bool, raised by thickness (V,) m over a smoothed copy of itself.
+def raise_surface(rest: np.ndarray, faces: np.ndarray, member: np.ndarray, thickness: np.ndarray, rounds: int,
+                  gap: float = 0.003) -> np.ndarray:
+    """Raises the member vertices by a thickness over a smoothed copy of the body.
 
-    Vertices move along the smoothed normals only, so that patterns do not swim; none comes nearer to the skin than
-    `gap` m. Smoothing is Taubin's (1995), which does not shrink. Returns (V, 3).
+    rest: (V, 3) m; faces: (F, 3); member: (V,) bool; thickness: (V,) m; rounds: of smoothing; gap: least m to the skin.
+    Vertices move along the smoothed normals only, which keeps patterns in place. Smoothing is Taubin's (1995), without shrinkage.
+    Returns (V, 3) m.
     """
     share = sparse.diags(member.astype(float))
     keep = share @ adjacency(faces, len(rest)) @ share
@@ -77,10 +82,11 @@ def lifted(rest: np.ndarray, faces: np.ndarray, member: np.ndarray, thickness: n
     return np.where(member[:, None], out, rest)
 
 
-def draped(lift: np.ndarray, free: np.ndarray, slope: float = 0.3) -> np.ndarray:
-    """Lets cloth hang: below a bulge it comes in by at most `slope` m a metre of height. lift: (V, 3), free: (V,) 0..1.
+def drape(lift: np.ndarray, free: np.ndarray, slope: float = 0.3) -> np.ndarray:
+    """Lets cloth hang: below a bulge its radius shrinks by at most `slope` m a metre of height.
 
-    Works about the vertical axis through the free vertices' middle, in 48 sectors and rows of 2 cm.
+    lift: (V, 3) m; free: (V,) 0..1, share of the effect. Radii are taken about the vertical axis through the free vertices' mean,
+    in 48 sectors and rows of 2 cm. Returns (V, 3) m.
     """
     here = free > 0
     middle = lift[here].mean(0)
@@ -107,8 +113,11 @@ def draped(lift: np.ndarray, free: np.ndarray, slope: float = 0.3) -> np.ndarray
     return lift + d * [1, 0, 1] * (grow * free)[:, None]
 
 
-def capped(points: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Points (V, 3) drawn out onto the convex hull of those with share (V,) > 0, by that share: toes become a shoe's cap."""
+def pull_to_hull(points: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Moves points towards the convex hull of those with a positive share: toes become the cap of a shoe.
+
+    points: (V, 3) m; share: (V,) 0..1 of the way. Returns (V, 3) m.
+    """
     here = share > 0
     hull = ConvexHull(points[here])
     centre = points[here].mean(0)
@@ -123,7 +132,7 @@ def capped(points: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def adjacency(faces: np.ndarray, count: int) -> sparse.csr_matrix:
-    """(V, V) ones between neighbours."""
+    """(V, V) with ones between neighbours, V = count. faces: (F, 3)."""
     i = faces[:, [0, 1, 2, 1, 2, 0]].ravel()
     j = faces[:, [1, 2, 0, 0, 1, 2]].ravel()
     a = sparse.csr_matrix((np.ones(len(i)), (i, j)), (count, count))
@@ -131,7 +140,7 @@ def adjacency(faces: np.ndarray, count: int) -> sparse.csr_matrix:
     return a
 
 
-def _turned(faces, first):
-    """Each face's corners rotated so that corner `first` comes first."""
+def _rotate_corners(faces, first):
+    """Rotates each face's corners so that corner `first` comes first."""
     rows = np.arange(len(faces))[:, None]
     return faces[rows, (first[:, None] + np.arange(3)) % 3]

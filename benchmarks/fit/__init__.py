@@ -1,1 +1,1 @@
-"""The body fit against truth clips: how right, and after how many seconds, for both methods in one run."""
+"""The body fit against truth clips: error and seconds of both methods in one run."""

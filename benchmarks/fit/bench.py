@@ -1,9 +1,9 @@
 """gsac bench fit: the body fit by `lm` and `paper` on the same detections of truth clips, the hand gap by every method, in one run.
 
-Clips come from the turntable, with bodies outside the shape basis and seeds that measured nothing, clothed and (`bare`) without
-clothes and hair, and from `--clip` folders. What the stages before `smplx` see is computed once and kept in the cache. Hand gaps
-are the ones of `gsac bench handgap`: windows masked in turning bodies; and windows masked in the truth clips' own detections,
-filled and then fitted, for the hidden wrist.
+Clips come from the turntable, clothed and (`bare`) without clothes and hair, with bodies outside the shape basis and seeds on which
+the detector was not measured, and from `--clip` folders. The stages before `smplx` run once and are kept in the cache. Hand gaps
+are those of `gsac bench handgap`, windows masked in turning bodies. For the hidden wrist, windows are masked in the truth clips'
+own detections, filled, and then fitted.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 SEEDS = (31, 32)
-"""Not 11, 12 and 41 to 44: those measured the detector's offsets and habits."""
+"""Not 11, 12 and 41 to 44: the detector's offsets were once measured on those."""
 BARE_SEEDS = (33,)
 GAP_SEEDS = (1, 2, 3)
 
@@ -39,7 +39,7 @@ def main(argv: list[str] | None = None) -> int:
     from gsac.benchmarks.fit import chart, clips, hidden, table, trial
     from gsac.benchmarks.handgap import gaps
     from gsac.benchmarks.handgap import table as gap_table
-    from gsac.benchmarks.handgap.clips import turning_body
+    from gsac.benchmarks.handgap.clips import make_turning_body
     from gsac.cache.store import Store
     from gsac.pipeline.reporter import PlainReporter
 
@@ -47,9 +47,9 @@ def main(argv: list[str] | None = None) -> int:
     store = Store.open(say=say.note)
     options.out.mkdir(parents=True, exist_ok=True)
     kept = options.clips or options.out / "clips"
-    folders = [clips.truth_folder(kept / f"seed{seed}", seed, say) for seed in options.seeds]
-    folders += [clips.truth_folder(kept / f"bare{seed}", seed, say, clothing=0.0) for seed in options.bare_seeds]
-    cases = [clips.seen(f, store, options.out / "runs" / f.name, say) for f in [*folders, *options.clip]]
+    folders = [clips.render_seed(kept / f"seed{seed}", seed, say) for seed in options.seeds]
+    folders += [clips.render_seed(kept / f"bare{seed}", seed, say, clothing=0.0) for seed in options.bare_seeds]
+    cases = [clips.prepare_case(f, store, options.out / "runs" / f.name, say) for f in [*folders, *options.clip]]
     trial.warm_up()
     trials = []
     for case in cases:
@@ -59,15 +59,15 @@ def main(argv: list[str] | None = None) -> int:
                 say.note(f"{case.name}, focal {focal}, {method}: {trials[-1].wall_s:.1f} s")
     wrists = [h for case in cases for h in hidden.measure(case)]
     say.note("hand gaps, every method")
-    filled = gaps.summary(gaps.measure({f"seed {s}": turning_body(s) for s in options.gap_seeds}))
-    parts = [table.text(trials), *table.faster(trials)]
+    filled = gaps.summarise(gaps.measure({f"seed {s}": make_turning_body(s) for s in options.gap_seeds}))
+    parts = [table.text(trials), *table.compare_speed(trials)]
     table.write_csv(trials, options.out / "fit.csv")
     if wrists:
         parts.append("\n" + hidden.text(wrists))
         hidden.write_csv(wrists, options.out / "hidden-wrist.csv")
     if filled:
         parts.append(gap_table.text(filled, "hand gaps"))
-        gap_table.save(filled, options.out / "hand-gaps.csv")
+        gap_table.write_csv(filled, options.out / "hand-gaps.csv")
     print("\n".join(parts))
     (options.out / "fit.txt").write_text("\n".join(parts) + "\n")
     chart.draw(trials, filled, options.out)

@@ -1,4 +1,4 @@
-"""One picture of the two halves: body error against seconds, both methods; palm error against the gap, all hand methods."""
+"""The chart: joint error against seconds for both fitting methods, palm error against length of the gap for all hand methods."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from gsac.benchmarks.fit.trial import Trial
-from gsac.benchmarks.handgap.table import draw as draw_gaps
+from gsac.benchmarks.fit.trial import FitTrial
+from gsac.benchmarks.handgap.table import draw_panel as draw_gaps
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -16,12 +16,12 @@ import matplotlib.pyplot as plt  # noqa: E402
 COLOURS = {"lm": "#0b6e4f", "paper": "#b5532a"}
 LABELS = {"lm": "lm: Levenberg-Marquardt, all frames at once", "paper": "paper: published co-registration, Adam"}
 BAR_MM, BAR_S = 30.0, 5.0
-"""What the fit is held to: mean joint error, and seconds for 60 frames."""
+"""Target of the fit: mean joint error, and seconds for 60 frames."""
 TICKS_S = [n * 10.0**power for power in range(-1, 4) for n in (1, 2, 5)]
 
 
-def draw(trials: list[Trial], filled: list[dict], folder: Path) -> list[Path]:
-    """Writes fit.png and fit.svg. filled: rows of `handgap.gaps.summary`; without them the second panel is left out."""
+def draw(trials: list[FitTrial], filled: list[dict], folder: Path) -> list[Path]:
+    """Writes fit.png and fit.svg and returns their paths. filled: rows of `handgap.gaps.summarise`; none: no second panel."""
     figure, axes = plt.subplots(1, 1 + bool(filled), figsize=(7.2 + 4.6 * bool(filled), 4.8), layout="constrained", squeeze=False)
     draw_fits(axes[0, 0], trials)
     if filled:
@@ -35,10 +35,10 @@ def draw(trials: list[Trial], filled: list[dict], folder: Path) -> list[Path]:
     return paths
 
 
-def draw_fits(axes: plt.Axes, trials: list[Trial]) -> None:
-    """Filled marks know the focal length; a light line joins a clip's two fits.
+def draw_fits(axes: plt.Axes, trials: list[FitTrial]) -> None:
+    """Draws joint error against CPU seconds: filled marks are given the focal length, a light line joins both fits of a clip.
 
-    Seconds are those of the processor: the clock's depend on what else the machine does, and both methods keep one core busy.
+    CPU seconds do not depend on the machine's other load, and both methods keep one core busy.
     """
     for clip, given in dict.fromkeys((t.clip, t.focal_given) for t in trials):
         pair = sorted((t for t in trials if (t.clip, t.focal_given) == (clip, given)), key=lambda t: t.cpu_s)

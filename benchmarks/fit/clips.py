@@ -1,4 +1,4 @@
-"""Truth clips for the fit, and what the stages before it see in them. Both are made once and kept."""
+"""Truth clips for the fit, with the results of the stages before it."""
 
 from __future__ import annotations
 
@@ -6,50 +6,36 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gsac.benchmarks.fit.truth import Truth, read_truth
+from gsac.benchmarks.truth_clips import render_clip, run_clip
 from gsac.cache.store import Store
-from gsac.pipeline.params import resolve
-from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run import Chain, Options
-from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
 from gsac.stages.smplx import STAGE
 
-FRAMES, HEIGHT = 60, 1280
+FRAMES = 60
 
 
 @dataclass
-class Case:
-    """One clip that waits for its fit."""
+class FitCase:
+    """A truth clip, ready for its fit."""
 
     name: str
     truth: Truth
     inputs: dict[str, Path]
-    """Ports of `smplx`."""
+    """Port of `smplx` -> file or folder."""
     detections: Path
-    """keypoints.npz before the hand gaps are filled."""
+    """keypoints.npz before hand gaps are filled."""
 
 
-def truth_folder(folder: Path, seed: int, say: PlainReporter, clothing: float = 1.0) -> Path:
-    """The turntable's clip of a seed, rendered unless it is there; clothing: thickness of clothes and hair, a factor."""
-    if not (folder / "truth.npz").is_file():
-        from gsac.turntable.clip import make_clip
-
-        make_clip(folder, seed=seed, frames=FRAMES, height=HEIGHT, clothing=clothing,
-                  progress=lambda done, total, unit: say.progress(folder.name, done, total, unit))
-    return folder
+def render_seed(folder: Path, seed: int, say: PlainReporter, clothing: float = 1.0) -> Path:
+    """Renders a seed's clip unless it is there. clothing: factor on the thickness of clothes and hair."""
+    return render_clip(folder, say, seed=seed, frames=FRAMES, clothing=clothing)
 
 
-def seen(folder: Path, store: Store, out: Path, say: PlainReporter) -> Case:
-    """Runs what `smplx` takes with the default parameters, or takes it from the store. folder: clip.mp4, mask/, truth.npz."""
+def prepare_case(folder: Path, store: Store, out: Path, say: PlainReporter) -> FitCase:
+    """Runs the stages before `smplx` with default parameters. folder: clip.mp4, mask/ and truth.npz; out: the run's folder."""
     if not (folder / "clip.mp4").is_file() or not (folder / "truth.npz").is_file():
         raise BadInput(f"{folder}: expected a truth clip (clip.mp4, mask/, truth.npz), as gsac.turntable makes it")
-    project = Project.at_hand()
-    configs = resolve(project)
-    workspace = RunFolder(out)
-    clip = (folder / "clip.mp4").resolve()
-    workspace.prepare(clip, project, configs)
-    for last in dict.fromkeys(port.split("/")[0] for port in STAGE.inputs):
-        Chain(project, configs, store, workspace, say).run(clip, Options(until=last))
-    return Case(folder.name, read_truth(folder), {port: workspace.path(port) for port in STAGE.inputs},
-                workspace.path("keypoints/keypoints.npz"))
+    run = run_clip(folder, out, dict.fromkeys(port.split("/")[0] for port in STAGE.inputs), store, say)
+    return FitCase(folder.name, read_truth(folder), {port: run.path(port) for port in STAGE.inputs},
+                   run.path("keypoints/keypoints.npz"))

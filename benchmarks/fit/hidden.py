@@ -1,4 +1,4 @@
-"""Hands and arms taken out of the detections for a while, and where the fit then puts their wrists."""
+"""Error of a hidden wrist after the fit: arms and hands are masked in the detections for some frames."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ import numpy as np
 from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
 from gsac.avatar.wholebody import ARM, HANDS
-from gsac.benchmarks.fit.clips import Case
+from gsac.benchmarks.fit.clips import FitCase
 from gsac.benchmarks.fit.score import joint_distances
 from gsac.stages.contract import Job
 from gsac.stages.handgap.config import HandgapConfig
 from gsac.stages.smplx.config import SmplxConfig
 
 GAPS = {"left": (16, 8, 4), "right": (4, 16, 8)}
-"""Frames without elbow, wrist and hand, one window after the other."""
+"""Side -> frames without elbow, wrist and hand, of each window in order."""
 MARGIN = 6
-"""Seen frames at least before and after a window."""
+"""Least number of visible frames before and after a window."""
 BAR_MM = 40.0
-"""Median, gaps of up to 16 frames."""
+"""Target of the median, gaps of up to 16 frames."""
 
 
 @dataclass
@@ -34,15 +34,16 @@ class Hidden:
     clip: str
     side: str
     first: int
-    errors_mm: np.ndarray  # (gap,) of the wrist, pelvis on pelvis, one scale for the clip
+    errors_mm: np.ndarray  # (gap,) of the wrist; pelvis aligned, one scale a clip
 
     @property
     def gap(self) -> int:
+        """Frames of the window."""
         return len(self.errors_mm)
 
 
-def windows(frames: int) -> Iterator[tuple[str, int, int]]:
-    """Side, first frame and frame after the last; spread evenly over the clip, those left out that have no room."""
+def list_windows(frames: int) -> Iterator[tuple[str, int, int]]:
+    """Side, first frame and frame after the last of each window, evenly spaced; windows without room are left out."""
     for side, gaps in GAPS.items():
         while sum(gaps) + MARGIN * (len(gaps) + 1) > frames:
             gaps = gaps[1:]
@@ -52,23 +53,26 @@ def windows(frames: int) -> Iterator[tuple[str, int, int]]:
             yield side, first, first + gap
 
 
-def mask(keypoints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The detections without what the windows hide. The alpha stays as it is: an arm may still show in the outline."""
+def mask_windows(keypoints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Removes the points that the windows hide. The alpha is left: an arm may still show in the outline.
+
+    keypoints: arrays of keypoints.npz, (T, 133, ...) each. Returns them changed, shapes (T, 133, ...).
+    """
     out = {name: array.copy() for name, array in keypoints.items()}
-    for side, first, last in windows(len(out["xy"])):
+    for side, first, last in list_windows(len(out["xy"])):
         gone = [*range(133)[HANDS[side]], *ARM[side][1:3]]
         out["xy"][first:last, gone], out["score"][first:last, gone], out["world"][first:last, gone] = 0, 0, np.nan
     return out
 
 
-def measure(case: Case) -> list[Hidden]:
-    """Masks, fills by handgap's default, fits by smplx's default, and looks."""
+def measure(case: FitCase) -> list[Hidden]:
+    """Masks the windows, fills by handgap's default, fits by smplx's default, and compares the wrists with the truth."""
     from gsac.stages.handgap.stage import run as fill
     from gsac.stages.smplx.stage import run as fit
 
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        masked = mask(read_arrays(case.detections))
+        masked = mask_windows(read_arrays(case.detections))
         write_arrays(root / "keypoints.npz", **masked)
         split = case.inputs["split/clip.json"]
         for name in ("handgap", "smplx"):
@@ -79,11 +83,11 @@ def measure(case: Case) -> list[Hidden]:
     off = joint_distances(Body.load(), params, case.truth)
     column = {SMPLX_JOINTS[j]: i for i, j in enumerate(case.truth.joint)}
     return [Hidden(case.name, side, first, off[first:last, column[f"{side}_wrist"]])
-            for side, first, last in windows(len(masked["xy"]))]
+            for side, first, last in list_windows(len(masked["xy"]))]
 
 
 def text(found: list[Hidden]) -> str:
-    """A line for each length of gap, over all clips."""
+    """A table with a line for each length of gap, over all clips."""
     lines = ["hidden wrist after smplx, elbow and hand hidden too", "gap  windows  median mm  mean mm  worst window's median"]
     groups = [(str(gap), [h for h in found if h.gap == gap]) for gap in sorted({h.gap for h in found})]
     for name, group in [*groups, ("all", found)]:
@@ -94,7 +98,7 @@ def text(found: list[Hidden]) -> str:
 
 
 def write_csv(found: list[Hidden], path: Path) -> None:
-    """Every window."""
+    """Writes a row for each window."""
     with open(path, "w", newline="") as f:
         sheet = csv.writer(f)
         sheet.writerow(["clip", "side", "first", "gap", "median_mm", "mean_mm"])

@@ -1,4 +1,4 @@
-"""A fitted body against the truth, in the numbers that the bars are written in."""
+"""Errors of a fitted body against the truth, in the units of the targets."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.fit.truth import Truth
 
 PERSON_PX = 1000
-"""Pixel errors are for a person this high."""
+"""Height of the person that pixel errors are scaled to."""
 
 
 def score(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
-    """Errors of a fit of all of the truth's frames.
+    """Errors of a fit over all frames of the truth; errors that the truth does not allow are left out.
 
-    joints_median_mm, joints_mean_mm: body joints but the pelvis, pelvis on pelvis, one scale for the whole clip.
-    joints_metric_mm: the same mean without the scale. vertices_mean_mm: registered alike, with a scale of their own; the truth's
-    are bare, the fit's wear what it takes for clothes; skin_mean_mm: the fit's without those.
-    iou_mean, iou_worst: the bare fitted body against the clip's mask, which wears clothes and hair; iou_of_truth: the mean that
-    the true bare body itself reaches.
-    reprojection_px: median distance of body and feet points, person 1000 px high.
-    acceleration_ratio: mean |acceleration of the joints| over the truth's own; acceleration_error_ratio: mean |difference of the
-    two| over the truth's own. focal_error: relative. Missing where the truth does not tell.
+    joints_median_mm, joints_mean_mm: body joints without the pelvis, after aligning the pelvis and one scale for the clip.
+    joints_metric_mm: the mean without the scale. vertices_mean_mm: aligned likewise, with a scale of its own; the truth's vertices
+    are bare, the fit's include its clothes; skin_mean_mm: the fit's without clothes.
+    iou_mean, iou_worst: silhouette of the fitted body against the clip's mask, which shows clothes and hair; iou_of_truth: mean of
+    the true bare body.
+    reprojection_px: median distance of body and feet points, for a person 1000 px high.
+    acceleration_ratio: mean |acceleration of the joints| over the truth's; acceleration_error_ratio: mean |difference of the
+    accelerations| over the truth's. focal_error: relative.
     """
     vertices, joints = body.posed(params)
-    fitted, true = _rooted(joints[:, truth.joint]), _rooted(truth.joints)
+    fitted, true = _subtract_root(joints[:, truth.joint]), _subtract_root(truth.joints)
     scale = _scale(fitted, true)
     off = np.linalg.norm(scale * fitted - true, axis=-1)[:, 1:] * 1e3
     out = {"joints_median_mm": np.median(off), "joints_mean_mm": off.mean(),
@@ -55,22 +55,23 @@ def score(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
 
 
 def joint_distances(body: Body, params: BodyParams, truth: Truth) -> np.ndarray:
-    """(T, n) mm between the truth's joints and the fit's, aligned as in `score`."""
-    fitted, true = _rooted(body.posed(params)[1][:, truth.joint]), _rooted(truth.joints)
+    """Distance (T, n) mm between fitted and true joints, aligned as in `score`."""
+    fitted, true = _subtract_root(body.posed(params)[1][:, truth.joint]), _subtract_root(truth.joints)
     return np.linalg.norm(_scale(fitted, true) * fitted - true, axis=-1) * 1e3
 
 
-def _rooted(joints: np.ndarray) -> np.ndarray:
+def _subtract_root(joints: np.ndarray) -> np.ndarray:
+    """Joints (T, n, 3) from the first, the pelvis."""
     return np.asarray(joints - joints[:, :1], np.float64)
 
 
 def _scale(source: np.ndarray, target: np.ndarray) -> float:
-    """The one factor that brings source nearest to target."""
+    """The scale of source (..., 3) that minimises the squared distance to target (..., 3)."""
     return float((source * target).sum() / (source * source).sum())
 
 
 def _distance(source: np.ndarray, target: np.ndarray) -> float:
-    """mm, mean, source scaled to the target."""
+    """Mean distance, mm, of the scaled source from the target."""
     return float(np.linalg.norm(_scale(source, target) * source - target, axis=-1).mean() * 1e3)
 
 

@@ -1,4 +1,4 @@
-"""The trials as one table: on the screen and as CSV."""
+"""The trials as a table and as CSV."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.benchmarks.fit.trial import Trial
+from gsac.benchmarks.fit.trial import FitTrial
 
 COLUMNS = (
     ("joints_median_mm", "joints median mm", "{:.1f}", 20.0),
@@ -22,11 +22,11 @@ COLUMNS = (
     ("acceleration_error_ratio", "its error", "{:.2f}", 1.5),
     ("focal_error", "focal off", "{:.1%}", None),
 )
-"""Score -> heading, how it is written, and the bar."""
+"""Score, heading, format, and target if there is one."""
 
 
-def rows(trials: list[Trial]) -> list[list[str]]:
-    """Heading, one row a trial, and for several clips one row with the mean of each method and focal setting."""
+def rows(trials: list[FitTrial]) -> list[list[str]]:
+    """Heading, one row a trial, for several clips the mean of each method and focal setting, and the targets."""
     head = ["clip", "focal", "method", *(heading for _, heading, _, _ in COLUMNS), "wall s", "CPU s"]
     out = [head, *(_row(t.clip, [t]) for t in trials)]
     kinds = dict.fromkeys((t.focal_given, t.method) for t in trials)
@@ -36,7 +36,7 @@ def rows(trials: list[Trial]) -> list[list[str]]:
     return [*out, ["bar", "given", "lm", *bars, "5.0", "-"]]
 
 
-def text(trials: list[Trial]) -> str:
+def text(trials: list[FitTrial]) -> str:
     """The table in columns."""
     table = rows(trials)
     widths = [max(len(row[c]) for row in table) for c in range(len(table[0]))]
@@ -45,8 +45,8 @@ def text(trials: list[Trial]) -> str:
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 
-def faster(trials: list[Trial]) -> list[str]:
-    """What `lm` gains on `paper`, a sentence a focal setting."""
+def compare_speed(trials: list[FitTrial]) -> list[str]:
+    """Speed and error of `lm` relative to `paper`, a sentence a focal setting."""
     out = []
     for given in (True, False):
         both = {m: [t for t in trials if t.method == m and t.focal_given == given] for m in ("lm", "paper")}
@@ -60,8 +60,8 @@ def faster(trials: list[Trial]) -> list[str]:
     return out
 
 
-def write_csv(trials: list[Trial], path: Path) -> None:
-    """Every trial with every score, unrounded."""
+def write_csv(trials: list[FitTrial], path: Path) -> None:
+    """Writes every trial with every score, unrounded."""
     names = sorted({name for t in trials for name in t.scores})
     with open(path, "w", newline="") as f:
         sheet = csv.writer(f)
@@ -71,7 +71,7 @@ def write_csv(trials: list[Trial], path: Path) -> None:
             sheet.writerow([t.clip, t.method, t.focal_given, f"{t.wall_s:.3f}", f"{t.cpu_s:.3f}", *scores])
 
 
-def _row(clip: str, trials: list[Trial]) -> list[str]:
+def _row(clip: str, trials: list[FitTrial]) -> list[str]:
     cells = []
     for name, _, form, _ in COLUMNS:
         known = [t.scores[name] for t in trials if name in t.scores]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.body import Body, BodyParams
-from gsac.benchmarks.fit.clips import Case
+from gsac.benchmarks.fit.clips import FitCase
 from gsac.benchmarks.fit.score import score
 from gsac.stages.contract import Job
 from gsac.stages.smplx import STAGE
@@ -18,21 +18,22 @@ from gsac.stages.smplx.config import SmplxConfig
 
 
 @dataclass
-class Trial:
-    """One row of the table."""
+class FitTrial:
+    """Times and scores of one fit: a row of the table."""
 
     clip: str
     method: str
     focal_given: bool
     wall_s: float
-    """Seconds of the smplx stage, reading and writing included; loading of libraries is not."""
+    """Seconds of the smplx stage with reading and writing, without loading of libraries."""
     cpu_s: float
-    """Of all threads."""
+    """CPU seconds of all threads."""
     scores: dict[str, float]
     warnings: tuple[str, ...] = ()
 
 
-def fit(case: Case, method: str, focal_given: bool) -> Trial:
+def fit(case: FitCase, method: str, focal_given: bool) -> FitTrial:
+    """Runs the smplx stage on one clip. focal_given: whether clip.json holds the true focal length."""
     from gsac.stages.smplx.stage import run
 
     warnings: list[str] = []
@@ -48,11 +49,11 @@ def fit(case: Case, method: str, focal_given: bool) -> Trial:
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         STAGE.outputs[0].check(out / "body.npz")
         params = BodyParams.read(out / "body.npz")
-    return Trial(case.name, method, focal_given, wall, cpu, score(Body.load(), params, case.truth), tuple(warnings))
+    return FitTrial(case.name, method, focal_given, wall, cpu, score(Body.load(), params, case.truth), tuple(warnings))
 
 
 def warm_up() -> None:
-    """Loads and compiles what the methods need on a few frames of a body whose pose is known, so that no trial pays for it."""
+    """Fits a few frames of a known pose by both methods: loading and compiling is then in no trial's time."""
     import numpy as np
 
     from gsac.stages.smplx.lm.fit import fit_clip
@@ -63,7 +64,7 @@ def warm_up() -> None:
     pose = np.zeros((3, 55, 3))
     pose[:, 0, 0] = np.pi
     still = np.zeros((3, body.exprdirs.shape[2]))
-    params = BodyParams.from_pose(pose, [[0, 0, 3]] * 3, np.zeros(body.num_betas), still, 500.0, (180, 320))
+    params = BodyParams.from_pose(pose, np.tile([0, 0, 3], (3, 1)), np.zeros(body.num_betas), still, 500.0, (180, 320))
     points = body.keypoints(body.posed(params)[0])
     known = body.known_keypoints.astype(float)
     xy = np.nan_to_num(params.camera(360, 640).project(points))

@@ -1,4 +1,4 @@
-"""What is known of a truth clip, whichever program rendered it."""
+"""Reads truth.npz and masks of a truth clip, of the turntable or of the 104-bone rig."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ BONES = {"pelvis": "root", "hip": "upperleg01", "knee": "lowerleg01", "ankle": "
          "shoulder": "upperarm01", "elbow": "lowerarm01", "wrist": "wrist"}
 """Joint of the body -> bone of the 104-bone rig whose head it is."""
 POINTS = BODY_NAMES + FEET_NAMES
+"""Names of the key points."""
 
 
 @dataclass
 class Truth:
-    """T frames; the first joint is the pelvis."""
+    """Truth of T frames; the first joint is the pelvis."""
 
-    joint: np.ndarray  # (n,) index of each joint among the body's 55, at most its first 22
+    joint: np.ndarray  # (n,) index of each joint in the body's first 22
     joints: np.ndarray  # (T, n, 3) m, camera frame
-    vertices: np.ndarray | None  # (T, V, 3) m, bare body; None: the file does not hold them
+    vertices: np.ndarray | None  # (T, V, 3) m, bare body; None if the file has none
     keypoints: np.ndarray  # (T, 23, 2) px, COCO's body and feet
     focal: float  # px
     center: tuple[float, float]  # px
@@ -33,12 +34,12 @@ class Truth:
 
     @property
     def person_px(self) -> np.ndarray:
-        """(T,) height of the person, px."""
+        """Height (T,) px of the person."""
         return np.maximum(self.masks.any(2).sum(1), 1)
 
 
 def read_truth(folder: Path) -> Truth:
-    """The turntable's folder, or one of the 104-bone rig. Raises ArtifactError."""
+    """folder: truth.npz and mask/. Raises ArtifactError if arrays are missing."""
     arrays = read_arrays(folder / "truth.npz")
     masks = np.stack([cv2.imread(str(p), cv2.IMREAD_GRAYSCALE) > 127 for p in frame_paths(folder / "mask")])
     if "focal" not in arrays or "center" not in arrays:
@@ -56,7 +57,7 @@ def read_truth(folder: Path) -> Truth:
 
 
 def _bones(names: list[str]) -> tuple[np.ndarray, list[int]]:
-    """The body's first 22 joints (n,) that the rig has, and their columns in it."""
+    """Those of the body's first 22 joints (n,) that the rig has, and their columns in the rig."""
     joint, columns = [], []
     for j, name in enumerate(SMPLX_JOINTS[:22]):
         side, _, part = name.partition("_")

@@ -1,1 +1,1 @@
-"""Measures the CUDA trainer: checks against the CPU path, times, memory, distance to the card's limits."""
+"""The CUDA trainer: checks against the CPU path, times, memory, and distance to the card's limits."""

@@ -1,17 +1,24 @@
-"""python -m gsac.benchmarks.gpu [--quick] : checks, times, memory and distance to the ceilings, as one short table."""
+"""python -m gsac.benchmarks.gpu [--quick]: checks the CUDA trainer and measures times, memory and distance to the ceilings."""
 
 from __future__ import annotations
 
 import argparse
 import time
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gsac.avatar.cuda import why_not
 
+if TYPE_CHECKING:
+    from gsac.avatar.cuda.device import Device
+    from gsac.avatar.cuda.recipe import Recipe
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.figure import Figure
 
-def paper_losses(count: int = 25000, **more):
-    """Recipe `fast` with the Sobel term and without the displaced surface."""
+
+def make_bench_recipe(count: int = 25000, **more: Any) -> Recipe:
+    """Recipe `fast` with the paper's Sobel term and without the displaced surface. more: fields of the recipe."""
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import recipe_of
 
@@ -19,7 +26,7 @@ def paper_losses(count: int = 25000, **more):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.gpu", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer frames, no long training")
     quick = parser.parse_args().quick
     if why := why_not():
@@ -41,16 +48,16 @@ def main() -> None:
 
     small = figure(3, 101, 67, 4000)
     done("small figure")
-    losses = paper_losses(steps=5)
+    recipe = make_bench_recipe(steps=5)
     for count in (1, 17, 1000, 12000, 100000):
-        report(f"101x67, {count}", errors(small, start(small.body, count), losses, device, 1024 if count < 2000 else None), LIMIT)
+        report(f"101x67, {count}", errors(small, start(small.body, count), recipe, device, 1024 if count < 2000 else None), LIMIT)
     inside = figure(3, 101, 67, 100)
     inside.transl[:, 2] = 0.1
-    report("camera in the body", errors(inside, start(inside.body, 3000), losses, device), LIMIT)
+    report("camera in the body", errors(inside, start(inside.body, 3000), recipe, device), LIMIT)
     big = figure(12 if quick else 100, 1080, 1080)
     done("figure of 1080x1080")
     for count in (10000, 25000):
-        report(f"1080x1080, {count}", errors(big, start(big.body, count), losses, device), LIMIT)
+        report(f"1080x1080, {count}", errors(big, start(big.body, count), recipe, device), LIMIT)
     done("checks")
     ceilings = copy_bandwidth(device), float_rate(device)
     print(f"ceilings: copy {ceilings[0] / 1e12:.2f} TB/s, float32 {ceilings[1] / 1e12:.1f} T operations/s")
@@ -62,20 +69,21 @@ def main() -> None:
     measure_body(device, big, ceilings)
     measure_tails(device, big)
     perceptual.measure(device)
-    done("times of what is not learned by default, of long lists, of LPIPS")
+    done("times of parameters not learned by default, of long lists, of LPIPS")
     compare(big)
     done("all")
 
 
 def report(name: str, found: tuple[dict, dict], limit: float) -> None:
+    """Prints a check. found: of `check.errors`."""
     settled, everything = found
     verdict = "ok" if max(settled.values()) <= limit else "MISSED"
     print(f"check {name:18s} {verdict}  " + " ".join(f"{k} {v:.1e}" for k, v in settled.items())
           + f"; with swaps of depth order {max(everything.values()):.1e}", flush=True)
 
 
-def compare(figure) -> None:
-    """The same loop in torch + gsplat, where gsplat is installed."""
+def compare(figure: Figure) -> None:
+    """Times the same loop in torch + gsplat if these are installed."""
     from importlib.util import find_spec
 
     from gsac.benchmarks.gpu.figure import start
@@ -86,13 +94,16 @@ def compare(figure) -> None:
     from gsac.benchmarks.gpu.baseline import seconds_per_step
 
     for compiled in (False, True):
-        took = seconds_per_step(figure, start(figure.body, 25000), paper_losses(), compiled)
+        took = seconds_per_step(figure, start(figure.body, 25000), make_bench_recipe(), compiled)
         print(f"torch + gsplat, {'torch.compile' if compiled else 'eager'}: {took * 1e3:.2f} ms a step, "
               f"{took * 3000:.1f} s for 3000 steps of one frame", flush=True)
 
 
-def measure_paper(device, figure, ceilings: tuple[float, float]) -> None:
-    """Recipe `paper` kernel by kernel: one gaussian a face, four frames a step, betas learned."""
+def measure_paper(device: Device, figure: Figure, ceilings: tuple[float, float]) -> None:
+    """Times recipe `paper` kernel by kernel: one gaussian a face, four frames a step, betas learned.
+
+    ceilings: bytes and float32 operations a second.
+    """
     from types import SimpleNamespace
 
     from gsac.avatar.body import Body
@@ -114,15 +125,15 @@ def measure_paper(device, figure, ceilings: tuple[float, float]) -> None:
     trainer.close()
 
 
-def measure_rounds(device, figure) -> None:
-    """A step of the rounds that move the poses: 3000 gaussians on an eighth of the size, the displaced surface learned."""
+def measure_rounds(device: Device, figure: Figure) -> None:
+    """Times a step of the rounds that move the poses: 3000 gaussians at an eighth of the size, displaced surface learned."""
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import kernel_microseconds, step_milliseconds
     from gsac.stages.train.fast import prealign
     from gsac.stages.train.fast.trainer import OFFSET_RATE
 
-    recipe = paper_losses(prealign.COUNT, steps=600, sobel=0.0, pose_rate=0.0, offset_rate=OFFSET_RATE, offset_share=1.0)
+    recipe = make_bench_recipe(prealign.COUNT, steps=600, sobel=0.0, pose_rate=0.0, offset_rate=OFFSET_RATE, offset_share=1.0)
     trainer = CudaTrainer(figure.body, [figure.scaled(8)], figure.pose, figure.transl, start(figure.body, prealign.COUNT), recipe,
                           device)
     steps = step_milliseconds(trainer)
@@ -132,14 +143,14 @@ def measure_rounds(device, figure) -> None:
     trainer.close()
 
 
-def measure_body(device, figure, ceilings: tuple[float, float]) -> None:
-    """The kernels that expression and joints at rest cost where they are learned."""
+def measure_body(device: Device, figure: Figure, ceilings: tuple[float, float]) -> None:
+    """Times the kernels that learn expression and joints at rest."""
     from gsac.avatar.body import Body
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import kernel_microseconds, least_bytes
 
-    recipe = paper_losses(steps=600, expression_rate=1e-3, joint_rate=1e-4)
+    recipe = make_bench_recipe(steps=600, expression_rate=1e-3, joint_rate=1e-4)
     body = figure.body._replace(expression=Body.load().exprdirs)
     trainer = CudaTrainer(body, [figure.shots], figure.pose, figure.transl, start(body, 25000), recipe, device)
     trainer.train(60)
@@ -150,7 +161,8 @@ def measure_body(device, figure, ceilings: tuple[float, float]) -> None:
     trainer.close()
 
 
-def measure_tails(device, figure) -> None:
+def measure_tails(device: Device, figure: Figure) -> None:
+    """Times `blend` with long lists of gaussians, see `tails`."""
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu import tails
     from gsac.benchmarks.gpu.figure import start
@@ -158,14 +170,14 @@ def measure_tails(device, figure) -> None:
     for count, batch, smaller in ((25000, 1, 1), (25000, 4, 1), (12000, 1, 2)):
         shots = figure.shots if smaller == 1 else figure.scaled(smaller)
         trainer = CudaTrainer(figure.body, [shots], figure.pose, figure.transl, start(figure.body, count),
-                              paper_losses(count, steps=900, batch=batch), device)
+                              make_bench_recipe(count, steps=900, batch=batch), device)
         trainer.train(300)
         tails.measure(trainer, device)
         trainer.close()
 
 
-def print_kernels(trainer, kernels: dict[str, float], pairs: float, ceilings: tuple[float, float]) -> None:
-    """A line for each kernel, us, beside its floors. pairs: (gaussian, pixel) that are composited in the batch."""
+def print_kernels(trainer: CudaTrainer, kernels: dict[str, float], pairs: float, ceilings: tuple[float, float]) -> None:
+    """Prints each kernel's time beside its lower bounds. kernels: us; pairs: (gaussian, pixel) composited in the batch."""
     from gsac.benchmarks.gpu.timing import least_bytes, useful_operations
 
     least, useful = least_bytes(trainer), useful_operations(trainer, pairs)
@@ -176,7 +188,8 @@ def print_kernels(trainer, kernels: dict[str, float], pairs: float, ceilings: tu
         print(f"    {name:16s} {us:7.1f} us; at the ceilings {floors}", flush=True)
 
 
-def measure(device, figure, quick: bool, ceilings: tuple[float, float]) -> None:
+def measure(device: Device, figure: Figure, quick: bool, ceilings: tuple[float, float]) -> None:
+    """Times steps, kernels and, unless quick, whole trainings of recipe `fast`, each twice."""
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import (
@@ -187,7 +200,7 @@ def measure(device, figure, quick: bool, ceilings: tuple[float, float]) -> None:
     )
 
     for count, batch in ((25000, 1), (25000, 4), (25000, 8), (10000, 1), (100000, 1)):
-        recipe = paper_losses(count, steps=3000, batch=batch)
+        recipe = make_bench_recipe(count, steps=3000, batch=batch)
         trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, count), recipe,
                               device)
         steps = step_milliseconds(trainer)
@@ -200,7 +213,7 @@ def measure(device, figure, quick: bool, ceilings: tuple[float, float]) -> None:
     if quick:
         return
     for batch, steps in ((1, 3000), (4, 750)):
-        recipe = paper_losses(steps=steps, batch=batch)
+        recipe = make_bench_recipe(steps=steps, batch=batch)
         results = []
         for _ in range(2):
             trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 25000), recipe,

@@ -1,6 +1,6 @@
-"""The same loop in torch and gsplat: skinning, binding, gsplat's rasteriser, L2 + SSIM + Sobel + mask, Adam with learned poses.
+"""The baseline: recipe fast in torch and gsplat. Skinning, binding, gsplat's rasteriser, L2 + SSIM + Sobel + mask, Adam, poses too.
 
-It moves no surface out and limits no gaussians, which it would pay for in more launches.
+It has no displaced surface and no limits on gaussians, each of which would cost it more launches.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike
 from torch.nn import functional
 
 from gsac.avatar.cuda.adjacency import joint_levels
@@ -24,17 +25,18 @@ from gsac.stages.train.task import Fit, Task
 
 RATES = {"mu": "mu_rate", "quat": "quat_rate", "log_scale": "scale_rate", "rgb": "rgb_rate", "opacity": "opacity_rate",
          "pose": "pose_rate"}
-"""The optimiser's groups, and the names of their rates in `Recipe`."""
+"""Group of the optimiser -> name of its rate in `Recipe`."""
 
 
-def tensor(array, dtype=torch.float32) -> torch.Tensor:
+def tensor(array: ArrayLike, dtype: torch.dtype = torch.float32) -> torch.Tensor:
+    """Copies an array (...,) to the GPU."""
     return torch.as_tensor(np.ascontiguousarray(array), dtype=dtype, device="cuda")
 
 
 def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compiled: bool, steps: int = 60,
                      warm: int = 20) -> float:
-    """One frame a step, by device events; compiled: skinning + binding and the losses through torch.compile."""
-    loop = Loop(figure.body, figure.pose, figure.transl, gaussians, recipe, compiled)
+    """Seconds of a step of one frame, by device events. compiled: skinning, binding and losses run by torch.compile."""
+    loop = TorchTrainer(figure.body, figure.pose, figure.transl, gaussians, recipe, compiled)
     shots = on_device(figure.shots)
     begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
     for step in range(warm + steps):
@@ -50,14 +52,15 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
 
 
 def fit(task: Task) -> Fit:
-    """Recipe fast as the stage knows recipes, eager: frames, sizes, backgrounds and rates as on the GPU."""
+    """Recipe fast for the stage, eager, with the frames, sizes, backgrounds and rates of the CUDA trainer."""
     prealign.adjust(task, learning)
     fine, coarse = trainer.crops(task)
     gaussians = trainer.start(task, coarse, task.config.gaussians)
     recipe = recipe_of(task.config, len(gaussians))
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]
     poses = task.poses
-    loop = Loop(body_arrays(poses, task.trained, recipe), poses.pose[task.trained], poses.transl[task.trained], gaussians, recipe)
+    loop = TorchTrainer(body_arrays(poses, task.trained, recipe), poses.pose[task.trained], poses.transl[task.trained], gaussians,
+                        recipe)
     plan = draw(recipe, len(task.trained), 2)
     backgrounds, seconds, done = tensor(plan.background[:, 0]), 0.0, 0
     begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
@@ -76,7 +79,7 @@ def fit(task: Task) -> Fit:
 
 
 def on_device(shots: list[Shot]) -> list[tuple]:
-    """Pixels, lens (1, 3, 3), width and height of each."""
+    """Pixels (h, w, 4) uint8, intrinsics (1, 3, 3), width and height of each shot, on the GPU."""
     out = []
     for shot in shots:
         c = shot.camera
@@ -85,8 +88,8 @@ def on_device(shots: list[Shot]) -> list[tuple]:
     return out
 
 
-class Loop:
-    """Values, poses and optimiser on the GPU, and one step."""
+class TorchTrainer:
+    """Values, poses and optimiser on the GPU. pose: (T, 55, 3) rad; transl: (T, 3) m."""
 
     def __init__(self, body: BodyArrays, pose: np.ndarray, transl: np.ndarray, gaussians: Gaussians, recipe: Recipe,
                  compiled: bool = False):
@@ -94,14 +97,14 @@ class Loop:
 
         self.rasterization, self.face, self.light = rasterization, gaussians.face, gaussians.light
         self.eye = torch.eye(4, device="cuda")[None]
-        self.geometry, self.loss = geometry_of(body, gaussians.face, gaussians.light), loss_of(recipe)
+        self.geometry, self.loss = _make_geometry(body, gaussians.face, gaussians.light), _make_loss(recipe)
         if compiled:
             self.geometry, self.loss = torch.compile(self.geometry), torch.compile(self.loss)
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         given = (gaussians.mu, gaussians.quat, gaussians.log_scale, gaussians.rgb, np.log(opacity / (1 - opacity)))
         self.values = [tensor(a).requires_grad_() for a in given]
         self.fitted = tensor(np.concatenate([pose, transl[:, None]], 1))
-        # each frame's way from the fit has an Adam state of its own; its share makes fingers slow and holds jaw and eyes
+        # each frame's change from the fit has its own Adam state; `share` slows fingers and fixes jaw and eyes
         self.moved = [torch.zeros_like(p).requires_grad_() for p in self.fitted]
         self.share = torch.full((56, 1), HAND_SHARE, device="cuda")
         self.share[BODY], self.share[JAW_EYES], self.share[55] = 1, 0, 1
@@ -110,18 +113,22 @@ class Loop:
         self.optimiser = torch.optim.Adam(groups, betas=(0.9, 0.99), fused=True)
 
     def step(self, shot: tuple, t: int, background: torch.Tensor, rates: np.ndarray | None = None) -> torch.Tensor:
-        """One step on frame t; rates: of this step (`recipe.draw`). Returns the loss, still on the device."""
+        """Takes a step on frame t.
+
+        shot: of `on_device`; background: (3,); rates: scalar record of `recipe.draw`. Returns the loss, scalar, on the GPU.
+        """
         if rates is not None:
             for group, name in zip(self.optimiser.param_groups, RATES, strict=True):
                 group["lr"] = float(rates[name])
-        loss, _, _ = self.seen(self.fitted[t] + self.share * self.moved[t], shot, background)
+        loss, _, _ = self.evaluate(self.fitted[t] + self.share * self.moved[t], shot, background)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         self.optimiser.step()
         return loss.detach()
 
-    def seen(self, placed: torch.Tensor, shot: tuple, background: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Loss, rgb (h, w, 3) and alpha (h, w, 1) of a frame. placed: (56, 3), pose and translation."""
+    def evaluate(self, placed: torch.Tensor, shot: tuple,
+                 background: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Loss, rgb (h, w, 3) and alpha (h, w, 1) of a frame. placed: (56, 3), pose and translation; background: (3,)."""
         pixels, lens, width, height = shot
         mu, quat, log_scale, rgb, opacity = self.values
         means, covars, shade = self.geometry(placed, mu, quat, log_scale)
@@ -130,18 +137,21 @@ class Loop:
         return self.loss(drawn[0], alpha[0], pixels, background), drawn[0], alpha[0]
 
     def gaussians(self) -> Gaussians:
+        """The gaussians as they are now."""
         mu, quat, log_scale, rgb, logit = (v.detach().cpu().numpy() for v in self.values)
         return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), 1 / (1 + np.exp(-logit)), self.light)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
-        """Pose (T, 55, 3) and translation (T, 3)."""
+        """Pose (T, 55, 3) rad and translation (T, 3) m as they are now."""
         both = (self.fitted + self.share * torch.stack(self.moved)).detach().cpu().numpy()
         return both[:, :55], both[:, 55]
 
 
-def geometry_of(body: BodyArrays, face: np.ndarray, light: np.ndarray | None) -> Callable:
-    """(pose and translation (56, 3), mu, quat, log_scale) -> means (N, 3), covariances (N, 3, 3), shades (N, 3) or 1 without a
-    light (4, 3); on the first rest shape."""
+def _make_geometry(body: BodyArrays, face: np.ndarray, light: np.ndarray | None) -> Callable:
+    """Makes (pose and translation (56, 3), mu, quat, log_scale) -> means (N, 3), covariances (N, 3, 3), shades (N, 3).
+
+    The shade is 1 without a light (4, 3). Uses the first rest shape.
+    """
     rest, joints = tensor(body.rest[0]), tensor(body.joints)
     parents = np.asarray(body.parents)
     levels = joint_levels(parents)
@@ -190,8 +200,8 @@ def geometry_of(body: BodyArrays, face: np.ndarray, light: np.ndarray | None) ->
     return geometry
 
 
-def loss_of(recipe: Recipe) -> Callable:
-    """(rgb (h, w, 3) premultiplied, alpha (h, w, 1), pixels (h, w, 4) uint8, background (3,)) -> loss."""
+def _make_loss(recipe: Recipe) -> Callable:
+    """Makes (rgb (h, w, 3) premultiplied, alpha (h, w, 1), pixels (h, w, 4) uint8, background (3,)) -> loss."""
     window = torch.exp(-torch.arange(-5, 6, device="cuda") ** 2 / (2 * 1.5**2))
     window = window / window.sum()
     sobel = tensor(np.outer([1, 2, 1], [-1, 0, 1]) / 4)

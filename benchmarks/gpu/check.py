@@ -1,4 +1,4 @@
-"""One step of the CUDA trainer against the same step of the CPU path: image, loss and every gradient."""
+"""Compares a step of the CUDA trainer with the same step of the CPU path: image, loss and every gradient."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from gsac.avatar import losses
 from gsac.avatar.cuda.arrays import Shot
+from gsac.avatar.cuda.device import Device
 from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
@@ -16,15 +17,18 @@ from gsac.benchmarks.gpu.figure import Figure
 NAMES = ("image", "loss", "mu", "quat", "log_scale", "rgb", "logit", "pose", "transl")
 PER_GAUSSIAN = ("mu", "quat", "log_scale", "rgb", "logit")
 LIMIT = 1e-3
+"""Largest relative error allowed."""
 SWAPS = 1e-3
-"""Share of the gaussians that may lie so near another in depth that float32 decides which is in front. Such a pair trades
-gradients: the CPU's own float32 differs from its float64 in the same way (25,000 gaussians: 3 pairs, 5e-3 of the colours' norm)."""
+"""Share of the gaussians left out because float32 may swap their order with one at nearly the same depth, which swaps gradients.
+
+The CPU's own float32 differs from its float64 in the same way (25,000 gaussians: 3 pairs, 5e-3 of the colours' norm).
+"""
 
 
 def relative(got: np.ndarray, expected: np.ndarray, leave: int = 0) -> float:
-    """Norm of the difference over the norm of the expected (over 1 where nothing is expected).
+    """Relative error: norm of the difference over the norm of `expected`, or over 1 if that is 0.
 
-    leave: so many rows, those that differ most, are left out of the difference.
+    got, expected: (n, ...) or scalar; leave: number of rows with the largest difference to leave out.
     """
     got, expected = np.asarray(got, np.float64), np.asarray(expected, np.float64)
     size = np.linalg.norm(expected)
@@ -33,7 +37,7 @@ def relative(got: np.ndarray, expected: np.ndarray, leave: int = 0) -> float:
 
 
 def cpu_step(figure: Figure, shot: Shot, t: int, gaussians: Gaussians, background: np.ndarray, recipe: Recipe) -> dict:
-    """What frame t gives on the CPU: image (H, W, 4), loss and gradients by the names of `NAMES`."""
+    """Image (H, W, 4), loss and gradients of frame t on the CPU, by `NAMES`. background: (3,)."""
     body = figure.body
     rendering = render_bound(figure.vertices(figure.pose[t], figure.transl[t]), body.faces, gaussians, shot.camera)
     pixels = shot.pixels.astype(np.float32) / np.float32(255)
@@ -57,7 +61,7 @@ def cpu_step(figure: Figure, shot: Shot, t: int, gaussians: Gaussians, backgroun
 
 
 def cuda_step(trainer: CudaTrainer) -> dict:
-    """The next step of a trainer, under the same names; of its batch's first frame, scratch poisoned before."""
+    """The same of a trainer's next step, for its batch's first frame; scratch memory is filled with NaN before."""
     trainer.want_gradients()
     trainer.poison()
     before = trainer.state().step
@@ -76,8 +80,9 @@ def cuda_step(trainer: CudaTrainer) -> dict:
                     "transl": pose[-1]}
 
 
-def errors(figure: Figure, gaussians: Gaussians, recipe: Recipe, device=None, pair_room=None) -> tuple[dict, dict]:
-    """Relative error of each of `NAMES` at the first step: without the gaussians of `SWAPS`, and of all."""
+def errors(figure: Figure, gaussians: Gaussians, recipe: Recipe, device: Device | None = None,
+           pair_room: int | None = None) -> tuple[dict[str, float], dict[str, float]]:
+    """Relative error of each of `NAMES` at the first step: without the share `SWAPS` of the gaussians, and with all."""
     trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, gaussians, recipe, device, pair_room)
     try:
         shown = trainer.gaussians()

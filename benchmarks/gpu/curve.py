@@ -1,8 +1,8 @@
 """python -m gsac.benchmarks.gpu.curve --run DIR: held-out quality against seconds on the GPU, both recipes, one process each.
 
 Writes curve.csv, a row for each checkpoint, which `gsac bench speed-accuracy --gpu-curve FILE` draws beside the CPU's curves, and
-curve.json, what was measured where. GPU seconds are device time from the first step's kernels to the last's, waits in between
-counted; wall seconds are those of the whole fit: first colours, upload, steps, read back. Judging is in neither.
+curve.json, the summary with the device's name. GPU seconds run from the first step's kernels to the last's, waits included; wall
+seconds are those of the whole fit: first colours, upload, steps, read back. Judging is in neither.
 """
 
 from __future__ import annotations
@@ -21,12 +21,16 @@ from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.train import STAGE
 
 CHECKPOINTS = 40
+"""Checkpoints of a training."""
 TORCH = "torch + gsplat"
+"""Device name of the baseline's curves."""
 COLUMNS = ("clip", "recipe", "device", "steps", "seed", "n_gaussians", "gpu_seconds", "wall_seconds", "psnr_fg")
 
 
 @dataclass
 class Curve:
+    """Quality of one training over its time on the GPU."""
+
     clip: str
     recipe: str
     device: str
@@ -43,32 +47,32 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("bench-gpu"), metavar="DIR")
     parser.add_argument("--budgets", type=int, nargs="+", default=[400, 1600], metavar="STEPS", help="steps of recipe fast")
     parser.add_argument("--torch-steps", type=int, default=400, metavar="STEPS",
-                        help="steps of recipe fast in torch + gsplat, where that is installed; 0: none")
+                        help="steps of recipe fast in torch + gsplat if that is installed; 0: none")
     options = parser.parse_args()
     if why := why_not():
         raise SystemExit(f"benchmarks.gpu.curve: {why}")
     options.out.mkdir(parents=True, exist_ok=True)
     rows, found = [], []
     for folder in options.run:
-        case = training.of_run(folder)
+        case = training.read_run(folder)
         ends = {}
         for recipe, steps in [*(("fast", n) for n in options.budgets), ("paper", None)]:
             metrics = training.train(case, options.out / f"{case.name}_{recipe}{steps or ''}", recipe=recipe, device="cuda",
                                      gaussians=12000, curve=CHECKPOINTS, **({"steps": steps} if steps else {}))
             ends[recipe, metrics["steps"]] = metrics
-            rows += rows_of(case.name, "cuda", metrics)
+            rows += list_rows(case.name, "cuda", metrics)
         if options.torch_steps and gsplat_is_here():
             metrics = _train_in_torch(case, options.out / f"{case.name}_torch", options.torch_steps)
-            rows += rows_of(case.name, TORCH, metrics)
+            rows += list_rows(case.name, TORCH, metrics)
             ends[TORCH, metrics["steps"]] = metrics
-        found.append(summary(case.name, ends))
-        print("\n".join(words(found[-1])), flush=True)
+        found.append(summarise(case.name, ends))
+        print("\n".join(describe(found[-1])), flush=True)
     write(rows, options.out / "curve.csv")
     (options.out / "curve.json").write_text(json.dumps({"device": device_name(), "clips": found}, indent=1) + "\n")
 
 
-def rows_of(clip: str, device: str, metrics: dict) -> list[tuple]:
-    """A row for each checkpoint that was judged, the end last. Raises BadInput where no frame is held out."""
+def list_rows(clip: str, device: str, metrics: dict) -> list[tuple]:
+    """Rows of curve.csv: each judged checkpoint, the end last. Raises BadInput if no frame is held out."""
     def row(at: dict) -> tuple:
         return (clip, metrics["recipe"], device, metrics["steps"], metrics["seed"], at["n_gaussians"], at["gpu_seconds"],
                 at["seconds"], at["psnr_fg"])
@@ -78,8 +82,8 @@ def rows_of(clip: str, device: str, metrics: dict) -> list[tuple]:
     return [*(row(at) for at in metrics["curve"] if "psnr_fg" in at), row(metrics)]
 
 
-def summary(clip: str, ends: dict) -> dict:
-    """What the trainings say together: their ends, and when recipe fast is first as good as paper at its end."""
+def summarise(clip: str, ends: dict[tuple[str, int], dict]) -> dict:
+    """The trainings' ends, and the time at which recipe fast reaches the end of paper. ends: (recipe, steps) -> metrics.json."""
     out = {"clip": clip, "trainings": [
         {"recipe": recipe, "steps": steps} | {k: m[k] for k in ("gpu_seconds", "seconds", "psnr_fg", "psnr_fg_ttpo", "n_gaussians")}
         for (recipe, steps), m in ends.items()]}
@@ -90,7 +94,8 @@ def summary(clip: str, ends: dict) -> dict:
     return out | {"paper_psnr_fg": goal, "fast_reaches_it_gpu_seconds": on_gpu, "fast_reaches_it_seconds": in_all}
 
 
-def words(found: dict) -> list[str]:
+def describe(found: dict) -> list[str]:
+    """A summary in sentences."""
     lines = [f"{found['clip']}: {t['recipe']}, {t['steps']} steps: {t['gpu_seconds']:.3f} s on the GPU, {t['seconds']:.2f} in all, "
              f"{t['psnr_fg']:.2f} dB (pose moved to the image: {t['psnr_fg_ttpo']:.2f}), {t['n_gaussians']} gaussians"
              for t in found["trainings"]]
@@ -100,12 +105,13 @@ def words(found: dict) -> list[str]:
 
 
 def write(rows: list[tuple], path: Path) -> None:
+    """Writes curve.csv."""
     with open(path, "w", newline="") as f:
         csv.writer(f).writerows([COLUMNS, *rows])
 
 
 def read(path: Path) -> list[Curve]:
-    """The trainings of a curve.csv. Raises BadInput naming what it lacks."""
+    """Reads curve.csv. Raises BadInput with the names of missing columns."""
     with open(path, newline="") as f:
         rows = list(csv.DictReader(f))
     if not rows or (missing := set(COLUMNS) - set(rows[0])):
@@ -121,19 +127,21 @@ def read(path: Path) -> list[Curve]:
 
 
 def device_name() -> str:
+    """The GPU's name."""
     from gsac.avatar.cuda.device import Device
 
     return Device().name
 
 
 def gsplat_is_here() -> bool:
+    """Whether torch and gsplat are installed."""
     from importlib.util import find_spec
 
     return find_spec("torch") is not None and find_spec("gsplat") is not None
 
 
 def _train_in_torch(case: training.Case, folder: Path, steps: int) -> dict:
-    """As `training.train`; the same stage, its steps done by torch and gsplat."""
+    """As `training.train`, with the steps of the same stage run by torch and gsplat."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with multiprocessing.get_context("spawn").Pool(1) as pool:

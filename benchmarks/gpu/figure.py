@@ -1,4 +1,4 @@
-"""The made clip: the open body turning once, textured by other gaussians than those that are trained, poses disturbed."""
+"""A synthetic clip: the open body turns once, drawn by other gaussians than those to train; poses are disturbed."""
 
 from __future__ import annotations
 
@@ -17,30 +17,36 @@ from gsac.avatar.skinning import joint_transforms, rotation_matrices, skin
 from gsac.avatar.threads import Workspace
 
 SHARE = 0.8
-"""Of the image's height that the person fills."""
+"""Height of the person over that of the image."""
 CLOTH = 0.01
-"""m by which the truth stands off the body."""
+"""Distance of the drawn gaussians from the body, m."""
 TURN_ERROR, SHIFT_ERROR = 0.005, 0.002
+"""Standard deviation of the errors of pose, rad, and translation, m."""
 
 
 @dataclass
 class Figure:
+    """A body, T shots of it, and its poses."""
+
     body: BodyArrays
     shots: list[Shot]
     pose: np.ndarray
-    """(T, 55, 3) as training is told it; `true_pose` is what the shots show."""
+    """(T, 55, 3) rad, disturbed: training starts from it."""
     transl: np.ndarray
+    """(T, 3) m, disturbed."""
     true_pose: np.ndarray
+    """(T, 55, 3) rad, as in the shots."""
     true_transl: np.ndarray
+    """(T, 3) m, as in the shots."""
 
     def vertices(self, pose: np.ndarray, transl: np.ndarray) -> np.ndarray:
-        """(V, 3) m of one pose (55, 3), as the CPU path skins it."""
+        """Vertices (V, 3) m, skinned by the CPU path. pose: (55, 3) rad; transl: (3,) m."""
         b = self.body
         transforms = joint_transforms(pose[None], b.joints.astype(np.float64), b.parents)[0].astype(np.float32)
         return skin(b.rest[0], transforms, b.skin_index, b.skin_weight) + transl.astype(np.float32)
 
     def scaled(self, by: int) -> list[Shot]:
-        """The shots, so many times smaller."""
+        """The shots at 1 / `by` of their size."""
         import cv2
 
         sizes = [(s.camera.width // by, s.camera.height // by) for s in self.shots]
@@ -49,7 +55,7 @@ class Figure:
 
 
 def figure(frames: int, width: int, height: int, truth: int = 60000, seed: int = 0) -> Figure:
-    """truth: how many gaussians draw the shots."""
+    """Makes the clip. width, height: px; truth: number of gaussians that draw the shots."""
     random = np.random.default_rng(seed)
     model = Body.load()
     rest, joints = model.rest(np.zeros(model.num_betas, np.float32))
@@ -77,11 +83,12 @@ def figure(frames: int, width: int, height: int, truth: int = 60000, seed: int =
 
 
 def start(body: BodyArrays, count: int, seed: int = 3) -> Gaussians:
-    """Grey gaussians spread by area."""
+    """Grey gaussians spread by area, to start a training from."""
     return Gaussians.area(body.rest[0], body.faces, count, seed)
 
 
-def _textured(rest, faces, count, seed) -> Gaussians:
+def _textured(rest: np.ndarray, faces: np.ndarray, count: int, seed: int) -> Gaussians:
+    """Gaussians with stripes and checks, `CLOTH` off the body."""
     g = Gaussians.area(rest, faces, count, seed)
     frames = face_frames(rest, faces)
     g.mu[:, 1] += (CLOTH / np.maximum(frames.k[g.face], 1e-6)).astype(np.float32)

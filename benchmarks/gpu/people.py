@@ -1,7 +1,7 @@
-"""python -m gsac.benchmarks.gpu.people: both recipes on the GPU for many turntable people, judged also in poses never seen.
+"""python -m gsac.benchmarks.gpu.people: both recipes on the GPU for many turntable people, judged also in novel poses.
 
-People differ more than trainings of one of them do, so the difference of the recipes is given as a mean over people with its
-standard error. Clips are rendered and fitted where they are not yet, as for `gsac bench speed-accuracy`.
+The difference between people exceeds that between trainings of one person, so the recipes' difference is given as a mean over
+people with its standard error. Clips are rendered and fitted unless they are kept, as for `gsac bench speed-accuracy`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from gsac.benchmarks import training
 
 FIGURES = {"psnr_fg": "held out, dB", "flip": "FLIP", "psnr_novel": "unseen poses, dB", "flip_novel": "FLIP",
            "psnr_novel_aligned": "moved onto the image, dB", "flip_novel_aligned": "FLIP"}
+"""Metric -> heading."""
 RECIPES = ("fast", "paper")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.gpu.people", description=__doc__.splitlines()[0])
     training.declare(parser, "gpu-people")
-    parser.add_argument("--novel", type=int, default=12, metavar="FRAMES", help="of poses never seen (default: 12)")
+    parser.add_argument("--novel", type=int, default=12, metavar="FRAMES", help="frames in novel poses (default: 12)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="trainings side by side (default: 1)")
     options = parser.parse_args()
     if why := why_not():
@@ -36,7 +37,7 @@ def main() -> None:
         metrics = training.train(case, folder, cores, recipe=recipe, device="cuda", height=options.height, flip=True)
         return metrics | (judge_poses(folder, case.novel, options.height, folder / "novel") if case.novel else {})
 
-    cases = training.cases(options, PlainReporter(sys.stderr), options.novel)
+    cases = training.prepare_cases(options, PlainReporter(sys.stderr), options.novel)
     calls = [(case, recipe) for case in cases for recipe in RECIPES]
     ends = training.side_by_side(one, calls, options.jobs)
     pairs = {case.name: tuple(ends[2 * k: 2 * k + 2]) for k, case in enumerate(cases)}
@@ -49,7 +50,7 @@ def main() -> None:
 
 
 def text(pairs: dict[str, tuple[dict, dict]]) -> str:
-    """A Markdown row for each clip with both recipes' figures, and one with the mean difference and its standard error.
+    """Markdown table: a row for each clip with both recipes' metrics, and one with the mean difference and its standard error.
 
     pairs: clip -> metrics of `fast` and of `paper`.
     """

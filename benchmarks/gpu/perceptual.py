@@ -1,4 +1,4 @@
-"""LPIPS of a window on the GPU: its time, and how far its slope is from the CPU's, by precision. The weights are made up."""
+"""LPIPS of a window on the GPU: its time, and the error of its gradient against the CPU's, by precision. Weights are random."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ PRECISIONS = ("float32", "float16", "bfloat16")
 NAME = "lpips-vgg"
 
 
-def made_up(seed: int = 0) -> Lpips:
-    """The network with random weights that keep the features' size from layer to layer."""
+def make_network(seed: int = 0) -> Lpips:
+    """The network with random weights that preserve the features' magnitude from layer to layer."""
     rng = np.random.default_rng(seed)
 
     def weights(name: str, shape: tuple[int, ...]) -> np.ndarray:
@@ -28,12 +28,13 @@ def made_up(seed: int = 0) -> Lpips:
 
 
 def measure(device: Device) -> None:
+    """Prints a line for each precision."""
     if why := perceptual.why_not():
         print(f"LPIPS: {why}")
         return
     import torch
 
-    network, rng = made_up(), np.random.default_rng(1)
+    network, rng = make_network(), np.random.default_rng(1)
     image, other = np.float32(rng.random((2, SIDE, SIDE, 3)))
     value, slope = network.gradient(image, other, scaled=False)
     for precision in PRECISIONS:

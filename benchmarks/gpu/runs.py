@@ -1,7 +1,7 @@
-"""python -m gsac.benchmarks.gpu.runs CLIP [CLIP ...] : whole runs, each over a store with no result in it, as README's rows.
+"""python -m gsac.benchmarks.gpu.runs CLIP [CLIP ...]: times whole runs, each on a store without results, as rows of the README.
 
-Models and compiled kernels are those of the usual store; what is known of files that have not changed stays from run to run. A clip
-that is given twice is also held to the same bytes.
+Models and compiled kernels are those of the default store; digests of unchanged files are kept from run to run. A clip that is
+given twice must give the same bytes.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from gsac.cache.root import default_root
 from gsac.stages.contract import BadInput
 
 KEPT = ("models", "kernels")
-"""Folders of the usual store that every run may use."""
+"""Folders of the default store that every run may use."""
 RESULTS = ("actions", "objects")
-"""Folders of a store that hold what was computed."""
+"""Folders of a store that hold results."""
 SAME = ("train/avatar.npz", "train/body.npz", "export/avatar.gsac")
+"""Files that are compared between runs of one clip."""
 
 
 def main() -> None:
@@ -32,21 +33,21 @@ def main() -> None:
     clips = parser.parse_args().clips
     known: dict[Path, list[bytes]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        store = new_store(Path(folder))
+        store = make_store(Path(folder))
         for number, clip in enumerate(clips):
             out = Path(folder) / f"out{number}"
             took, summary = run(clip.absolute(), out, store)
             if not number:
-                print(row("clip", [stage["name"] for stage in summary["stages"]] + ["between them", "in all"]), flush=True)
+                print(format_row("clip", [stage["name"] for stage in summary["stages"]] + ["between them", "in all"]), flush=True)
             seconds = [stage["seconds"] for stage in summary["stages"]]
-            print(row(clip.stem, [f"{s:.1f}" for s in (*seconds, took - sum(seconds), took)]), flush=True)
+            print(format_row(clip.stem, [f"{s:.1f}" for s in (*seconds, took - sum(seconds), took)]), flush=True)
             made = [(out / name).read_bytes() for name in SAME]
             if known.setdefault(clip, made) is not made:
                 print("    the same bytes as before" if known[clip] == made else "    NOT the same bytes as before", flush=True)
 
 
-def new_store(folder: Path) -> Path:
-    """A store without a result."""
+def make_store(folder: Path) -> Path:
+    """Makes a store without results."""
     store = folder / "store"
     store.mkdir()
     for name in KEPT:
@@ -56,7 +57,7 @@ def new_store(folder: Path) -> Path:
 
 
 def run(clip: Path, out: Path, store: Path) -> tuple[float, dict]:
-    """Wall seconds of one run into `out`, with nothing computed before, and the object of its --json. BadInput where it fails."""
+    """Removes the store's results and runs a clip into `out`. Returns wall seconds and --json's object; BadInput if it fails."""
     for name in RESULTS:
         objects.remove(store / name)
     began = time.monotonic()
@@ -68,7 +69,8 @@ def run(clip: Path, out: Path, store: Path) -> tuple[float, dict]:
     return took, json.loads(done.stdout.splitlines()[-1])
 
 
-def row(head: str, cells: list[str]) -> str:
+def format_row(head: str, cells: list[str]) -> str:
+    """A row of a Markdown table."""
     return f"| {' | '.join([head, *cells])} |"
 
 

@@ -1,4 +1,4 @@
-"""What long lists cost the kernel `blend`: its time without sorting, and with every tile's list cut short."""
+"""Cost of long lists in the kernel `blend`: its time without sorting, and with every tile's list truncated."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from gsac.benchmarks.gpu.timing import kernel_microseconds
 
 LENGTH, SORT = "n = s.tile_count[tile];\n        const Now &now = s.now[b];", "sort(sorted, n);"
 CUTS = (384, 256, 128)
+"""Lengths of truncated lists."""
 
 
 @cache
-def variants(architecture: str) -> dict[str, bytes]:
-    """Machine code by what it leaves out."""
+def compile_variants(architecture: str) -> dict[str, bytes]:
+    """Machine code of each variant of the kernels."""
     text = source()
     changed = {"unsorted": text.replace(SORT, "")}
     for most in CUTS:
@@ -26,8 +27,8 @@ def variants(architecture: str) -> dict[str, bytes]:
 
 
 def measure(trainer: CudaTrainer, device: Device) -> None:
-    """One line. The trainer is of no use afterwards, the device as it was."""
-    gaussians, codes = trainer.gaussians(), variants(device.architecture)
+    """Prints a line. The trainer cannot be used afterwards; the device gets its kernels back."""
+    gaussians, codes = trainer.gaussians(), compile_variants(device.architecture)
     lists = trainer.buffers["tile_count"].read()
     lists = lists[lists > 0]
     found = {}

@@ -1,4 +1,4 @@
-"""Times by device events: whole steps by graph replays, kernels by events inside a graph, and the card's ceilings."""
+"""Times by device events, of steps, kernels and whole trainings; ceilings of the card, and lower bounds of the kernels."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from gsac.avatar.cuda.device import Buffer, Device, _call
 from gsac.avatar.cuda.kernels import compiled
 from gsac.avatar.cuda.paper import PaperTrainer
 from gsac.avatar.cuda.trainer import REPLAY, CudaTrainer
+from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
+from gsac.benchmarks.gpu.figure import Figure
 
 
 def step_milliseconds(trainer: CudaTrainer, replays: int = 30, warm: int = 3) -> list[float]:
-    """Milliseconds of a step, one value for each replay of `REPLAY` steps."""
+    """Milliseconds of a step, one value for each graph replay of `REPLAY` steps."""
     device = trainer.device
     trainer.train(warm * REPLAY)
     out = []
@@ -29,7 +31,7 @@ def step_milliseconds(trainer: CudaTrainer, replays: int = 30, warm: int = 3) ->
 
 
 def run_milliseconds(trainer: CudaTrainer, steps: int) -> float:
-    """A whole training's time on the device, from its first kernel to its last; the graph is made before."""
+    """Device time of a training from its first kernel to its last; the graph is recorded before."""
     device = trainer.device
     begin, end = device.event(), device.event()
     device.wait()
@@ -40,7 +42,7 @@ def run_milliseconds(trainer: CudaTrainer, steps: int) -> float:
 
 
 def kernel_microseconds(trainer: CudaTrainer, repeats: int = 40) -> dict[str, float]:
-    """Median time of each kernel of a step, from events recorded between them in a graph."""
+    """Kernel -> its median time in a step, us, by events recorded between the kernels in a graph."""
     device, driver = trainer.device, trainer.device._driver
     marks = [device.event() for _ in range(len(trainer.grids) + 1)]
 
@@ -63,7 +65,7 @@ def kernel_microseconds(trainer: CudaTrainer, repeats: int = 40) -> dict[str, fl
 
 
 def nearest_milliseconds(trainer: PaperTrainer) -> float:
-    """Median time of the search of the neighbours."""
+    """Median time of the nearest-neighbour search."""
     device, begin, end, times = trainer.device, trainer.device.event(), trainer.device.event(), []
     for _ in range(5):
         device.mark(begin)
@@ -74,7 +76,7 @@ def nearest_milliseconds(trainer: PaperTrainer) -> float:
 
 
 def copy_bandwidth(device: Device, size: int = 1 << 30) -> float:
-    """Bytes read and written a second by a large copy on the device."""
+    """Bytes a second, read and written, of a large copy on the device."""
     a, b = Buffer(size, np.uint8).fill(1), Buffer(size, np.uint8)
     begin, end, times = device.event(), device.event(), []
     for _ in range(12):
@@ -107,7 +109,7 @@ extern "C" __global__ void spin(Spin s) {
 
 
 def float_rate(device: Device, turns: int = 4096) -> float:
-    """float32 operations a second of independent multiply-adds, an addition and a multiplication counted as two."""
+    """float32 operations a second of independent multiply-adds, two operations each."""
     device.load(compiled(SPIN, device.architecture), ["spin"])
     blocks = device.processors * 16
     out = Buffer(blocks * 256, np.float32)
@@ -122,22 +124,22 @@ def float_rate(device: Device, turns: int = 4096) -> float:
 
 
 def useful_operations(trainer: CudaTrainer, evaluations: float) -> dict[str, float]:
-    """float32 operations that the four large kernels cannot avoid; evaluations: (gaussian, pixel) pairs that are composited."""
+    """Lower bound of the float32 operations of the four large kernels. evaluations: composited (gaussian, pixel) pairs."""
     state, ssim = trainer.state(), trainer.scene.ssim > 0
     active, near = (state.heavy + state.light) * 256, state.near * 256
     return {"blend": 32 * evaluations, "blend_backward": 62 * evaluations,
             "compare": near * 3 * (20 + ssim * (4 * 44 + 40)), "image_gradient": active * 3 * (20 + ssim * (3 * 44 + 6))}
 
 
-def evaluations(figure, gaussians, t: int = 0) -> float:
-    """(Gaussian, pixel) pairs of a frame in the 4x4 blocks that the CPU path composites."""
+def evaluations(figure: Figure, gaussians: Gaussians, t: int = 0) -> float:
+    """(Gaussian, pixel) pairs of frame t, in the 4x4 blocks that the CPU path composites."""
     vertices = figure.vertices(figure.pose[t], figure.transl[t])
     rendering = render_bound(vertices, figure.body.faces, gaussians, figure.shots[t].camera)
     return 16.0 * sum(bin(int(mask)).count("1") for mask in rendering.state.pair_mask)
 
 
 def least_bytes(trainer: CudaTrainer) -> dict[str, float]:
-    """Bytes that each kernel must move at least, from the last step's counters: inputs read once, outputs written once."""
+    """Lower bound of each kernel's bytes, by the last step's counters: inputs read once, outputs written once."""
     state, s = trainer.state(), trainer.scene
     batch, n, v, pairs = trainer.batch, s.count, s.vertex_count, state.pairs
     active, near = (state.heavy + state.light) * 256, state.near * 256

@@ -1,1 +1,1 @@
-"""Hidden hands: found and filled, every method, against the truth."""
+"""Finding and filling of hidden hands, every method against the truth."""

@@ -1,8 +1,8 @@
-"""gsac bench handgap: how well hidden hands are found and filled, against the truth of turning bodies.
+"""gsac bench handgap: errors of finding and filling hidden hands, against the truth of turning bodies.
 
-Bodies and motion are the turntable's, with sway and arm swing; nothing is rendered. A detector's errors are put on: white noise,
-and a habit that changes with the view, both as large as measured on rendered clips. Windows are masked inside the clip and at
-its ends, and every method fills the same windows. With --runs the same is done to real detections: RUN is a run's folder
+Bodies and motion are the turntable's, with sway and arm swing; nothing is rendered. A detector's errors are added: white noise, and
+a systematic error that depends on the yaw, both as large as measured on rendered clips. Windows are masked inside the clip and at
+its ends, and every method fills the same windows. --runs does the same with real detections: RUN is a run's folder
 (keypoints/keypoints.npz), TRUTH the clip's truth.npz.
 """
 
@@ -20,22 +20,22 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
     parser.add_argument("--runs", type=Path, nargs="*", default=[], metavar="RUN TRUTH", help="real detections, by pairs")
     options = parser.parse_args(argv)
-    from gsac.benchmarks.handgap.clips import detected, turning_body
-    from gsac.benchmarks.handgap.failures import detection, own_failures
-    from gsac.benchmarks.handgap.gaps import measure, summary
-    from gsac.benchmarks.handgap.table import chart, save, text
+    from gsac.benchmarks.handgap.clips import make_turning_body, read_detections
+    from gsac.benchmarks.handgap.failures import find_own_failures, measure_detection
+    from gsac.benchmarks.handgap.gaps import measure, summarise
+    from gsac.benchmarks.handgap.table import draw, text, write_csv
 
     options.out.mkdir(parents=True, exist_ok=True)
-    sources = {"bodies": {f"seed {s}": turning_body(s) for s in options.seeds}}
+    sources = {"bodies": {f"seed {s}": make_turning_body(s) for s in options.seeds}}
     if options.runs:
-        sources["detections"] = {str(r): detected(r, t) for r, t in zip(options.runs[::2], options.runs[1::2], strict=True)}
+        sources["detections"] = {str(r): read_detections(r, t) for r, t in zip(options.runs[::2], options.runs[1::2], strict=True)}
     for name, clips in sources.items():
-        rows = summary(measure(clips))
-        save(rows, options.out / f"handgap-{name}.csv")
-        chart(rows, options.out / f"handgap-{name}.png")
+        rows = summarise(measure(clips))
+        write_csv(rows, options.out / f"handgap-{name}.csv")
+        draw(rows, options.out / f"handgap-{name}.png")
         print(text(rows, name))
-    found = detection(sources["bodies"]) + detection(sources.get("detections", {}), own_failures)
-    save(found, options.out / "handgap-found.csv")
+    found = measure_detection(sources["bodies"]) + measure_detection(sources.get("detections", {}), find_own_failures)
+    write_csv(found, options.out / "handgap-found.csv")
     for row in found:
         print(f"{row['failure']:38} recall {row['recall']:.3f} of {row['wrong']:4d}   false alarms {row['false_alarms']:.4f}")
     return 0

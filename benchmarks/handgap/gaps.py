@@ -1,28 +1,33 @@
-"""Windows of hidden hands, filled by every method, and how far the palms then lie from the truth."""
+"""Palm error in windows of hidden hands, filled by every method."""
 
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gsac.avatar.wholebody import ARM, HANDS, PALM
-from gsac.benchmarks.handgap.clips import Clip
+from gsac.benchmarks.handgap.clips import HandClip
 from gsac.stages.handgap.config import METHODS, HandgapConfig
 from gsac.stages.handgap.fill import fill_gaps
 from gsac.stages.handgap.missing_hands import SIDES, Found, find_missing
 from gsac.stages.handgap.sigma import detection_sigma, person_height
 
 GAPS = (2, 4, 8, 16, 24, 32, 40)
+"""Lengths of windows, frames."""
 MARGIN = 6
-"""Seen frames at least between an inner window and the clip's ends."""
+"""Least number of visible frames between an inner window and the clip's ends."""
 
 
 @dataclass
 class Window:
+    """Frames in which hands are hidden."""
+
     first: int
     last: int
+    """The frame after the last."""
     sides: tuple[str, ...]
     place: str
     """`inside` or `end`."""
@@ -30,8 +35,8 @@ class Window:
     """`arm`: elbow, wrist and hand; `hand`: wrist and hand."""
 
 
-def windows(frames: int, gap: int, rng, inside: int = 3) -> list[Window]:
-    """At random places inside, of the left, the right and both hands in turn, and at both ends of the clip, of both."""
+def place_windows(frames: int, gap: int, rng: np.random.Generator, inside: int = 3) -> list[Window]:
+    """`inside` random windows of `gap` frames, of left, right and both hands alternately, and one of both hands at each end."""
     room = frames - gap - 2 * MARGIN
     firsts = [(int(rng.integers(room + 1)) + MARGIN, "inside") for _ in range(inside) if room >= 0]
     turn = (("left",), ("right",), ("left", "right"))
@@ -39,8 +44,8 @@ def windows(frames: int, gap: int, rng, inside: int = 3) -> list[Window]:
             for i, (first, where) in enumerate([*firsts, (0, "end"), (frames - gap, "end")]) for lost in ("arm", "hand")]
 
 
-def filled(clip: Clip, window: Window, method: str) -> tuple[np.ndarray, np.ndarray]:
-    """xy (T, 133, 2) and sigma (T, 133) px, with the window masked over what the detector itself lost."""
+def fill_window(clip: HandClip, window: Window, method: str) -> tuple[np.ndarray, np.ndarray]:
+    """Masks the window, fills it and all that the detector lost. Returns xy (T, 133, 2) px and sigma (T, 133) px."""
     config = HandgapConfig(method=method, max_gap_s=99, max_hold_s=99)
     found = find_missing(clip.xy, clip.score, clip.times, config)
     hand, wrist, elbow = found.hand.copy(), found.wrist.copy(), found.elbow.copy()
@@ -57,16 +62,17 @@ def filled(clip: Clip, window: Window, method: str) -> tuple[np.ndarray, np.ndar
     return out, np.hypot(full, drift)
 
 
-def measure(clips: dict[str, Clip], methods=METHODS, gaps=GAPS, inside: int = 3, seed: int = 0) -> list[dict]:
-    """One row a clip, window, hand and method: palm errors against the truth, and jumps where the gap begins and ends."""
+def measure(clips: dict[str, HandClip], methods: Sequence[str] = METHODS, gaps: Sequence[int] = GAPS, inside: int = 3,
+            seed: int = 0) -> list[dict]:
+    """One row a clip, window, hand and method: palm errors against the truth, and jumps at the gap's start and end."""
     rows = []
     for name, clip in clips.items():
         rng = np.random.default_rng(seed)
         frames = np.arange(len(clip.times))
         for gap in gaps:
-            for window in windows(len(frames), gap, rng, inside):
+            for window in place_windows(len(frames), gap, rng, inside):
                 for method in methods:
-                    xy, sigma = filled(clip, window, method)
+                    xy, sigma = fill_window(clip, window, method)
                     for side in window.sides:
                         palm = PALM[side]
                         off = xy[:, palm] - clip.truth[:, palm]
@@ -82,8 +88,8 @@ def measure(clips: dict[str, Clip], methods=METHODS, gaps=GAPS, inside: int = 3,
     return rows
 
 
-def summary(rows: list[dict]) -> list[dict]:
-    """One row for each of place, what is lost, gap length and method."""
+def summarise(rows: list[dict]) -> list[dict]:
+    """Averages the rows of `measure` by place, lost points, length of the gap and method."""
     groups = defaultdict(list)
     for row in rows:
         groups[row["place"], row["lost"], row["gap"], row["method"]].append(row)

@@ -1,4 +1,4 @@
-"""Tables and the chart."""
+"""Table, CSV and chart of palm errors."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 DEFAULT = HandgapConfig.method
+"""The stage's own method, drawn with a thicker line."""
 
 
 def text(rows: list[dict], title: str) -> str:
-    """Mean / median / 95 % px by gap and method, with jump and the share within sigma of the default."""
+    """Mean / median / 95th percentile, px, by gap and method; jumps, error in forearms and share within sigma of the default."""
     lines = []
     for where, lost in sorted({(r["place"], r["lost"]) for r in rows}, reverse=True):
         lines += [f"\n{title}: {where}, {lost} lost; palm error px, mean / median / 95 %",
@@ -32,18 +33,19 @@ def text(rows: list[dict], title: str) -> str:
     return "\n".join(lines)
 
 
-def chart(rows: list[dict], path: Path) -> None:
+def draw(rows: list[dict], path: Path) -> None:
+    """Writes a chart with a panel for each place and lost points. rows: of `gaps.summarise`."""
     pairs = sorted({(r["place"], r["lost"]) for r in rows}, reverse=True)
     figure, axes = plt.subplots(1, len(pairs), figsize=(4 * len(pairs), 3.6), layout="constrained", squeeze=False)
     for axis, (where, lost) in zip(axes[0], pairs, strict=True):
-        draw(axis, rows, where, lost)
+        draw_panel(axis, rows, where, lost)
     axes[0, 0].legend(fontsize=7)
     figure.savefig(path, dpi=120)
     plt.close(figure)
 
 
-def draw(axis: plt.Axes, rows: list[dict], where: str, lost: str) -> None:
-    """Palm error against the length of the gap, one line a method."""
+def draw_panel(axis: plt.Axes, rows: list[dict], where: str, lost: str) -> None:
+    """Draws palm error against length of the gap, one line a method."""
     for method in METHODS:
         line = sorted((r["gap"], r["mean_px"]) for r in rows if (r["place"], r["lost"], r["method"]) == (where, lost, method))
         axis.plot(*zip(*line, strict=True), marker="o", ms=3, lw=2.4 if method == DEFAULT else 1.2, label=method)
@@ -52,7 +54,8 @@ def draw(axis: plt.Axes, rows: list[dict], where: str, lost: str) -> None:
     axis.grid(alpha=0.3)
 
 
-def save(rows: list[dict], path: Path) -> None:
+def write_csv(rows: list[dict], path: Path) -> None:
+    """Writes rows with equal keys."""
     with open(path, "w", newline="") as f:
         writer = csv.DictWriter(f, rows[0].keys())
         writer.writeheader()

@@ -1,8 +1,8 @@
 """gsac bench paper-table: training time, number of gaussians, PSNR, SSIM and LPIPS, with three ways to fill a hidden hand.
 
-Truth clips of turning people whose hand goes behind the back or before the belly; each row is the mean of trainings with
-several seeds. PSNR and SSIM are of whole held-out frames on black, as published; the hands' PSNR stands beside them. LPIPS is
-a dash until its weights are brought (`gsac models add`).
+In the truth clips a hand moves behind the back or in front of the belly; each row is the mean of trainings with several seeds.
+PSNR and SSIM are of whole held-out frames on black, as published; the hands' PSNR is a column of its own. LPIPS is a dash without
+its weights (`gsac models add`).
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ import sys
 from pathlib import Path
 
 from gsac.benchmarks import training
+from gsac.benchmarks.truth_clips import render_clip
 
 FILLS = {"no fill": ("handgap.max_gap_s=0", "handgap.max_hold_s=0"), "paper's fill": ("handgap.method=paper",), "our fill": ()}
-"""Row -> settings of the run that fits the body."""
+"""Row -> settings of the run up to the body fit."""
 HIDDEN = ("right_back", "left_front")
-"""Which hand goes where, by turns over the clips."""
+"""The turntable's `hidden_hand` of the clips, alternately."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -41,10 +42,10 @@ def main(argv: list[str] | None = None) -> int:
     rows: dict[tuple[str, str], list[dict]] = {}
     for at, seed in enumerate(options.seeds):
         hidden = HIDDEN[at % len(HIDDEN)]
-        clip = training.clip(options.out, f"seed{seed}_{hidden}_{options.frames}", say, seed=seed, frames=options.frames,
-                             hidden_hand=hidden)
+        clip = render_clip(training.clip_folder(options.out, f"seed{seed}_{hidden}_{options.frames}"), say, seed=seed,
+                           frames=options.frames, hidden_hand=hidden)
         for fill, settings in FILLS.items():
-            case = training.fitted(options.out, clip, fill.replace(" ", "_").replace("'", ""), say, settings)
+            case = training.fit_clip(options.out, clip, fill.replace(" ", "_").replace("'", ""), say, settings)
             for repeat in range(options.repeats):
                 folder = options.out / "trainings" / f"{case.name}_{repeat}"
                 rows.setdefault((clip.name, fill), []).append(training.train(

@@ -1,4 +1,4 @@
-"""Rows of metrics as words and as CSV: mean and spread over the repeats."""
+"""The metrics as a table, mean and spread over the repeats, and as CSV."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 COLUMNS = {"time, s": ("seconds", ".0f"), "gaussians": ("n_gaussians", ".0f"), "PSNR": ("psnr_full_black", ".3f"),
            "SSIM": ("ssim", ".4f"), "LPIPS": ("lpips", ".4f"), "PSNR person": ("psnr_fg", ".2f"),
            "PSNR hands": ("psnr_hands", ".2f"), "pose aligned": ("psnr_fg_ttpo", ".2f")}
-"""Head -> figure of metrics.json, and its format."""
+"""Heading -> name in metrics.json, and format."""
 
 
 def spread(metrics: list[dict], name: str) -> tuple[float, float] | None:
-    """Mean and standard deviation over repeats; None where one of them has no such figure."""
+    """Mean and standard deviation over repeats; None if a repeat lacks the metric."""
     values = [m.get(name) for m in metrics]
     if any(value is None for value in values):
         return None
@@ -22,7 +22,7 @@ def spread(metrics: list[dict], name: str) -> tuple[float, float] | None:
 
 
 def cells(metrics: list[dict]) -> list[str]:
-    """One a column; a dash where nothing was measured."""
+    """Mean and spread for each column; a dash if it was not measured."""
     out = []
     for name, form in COLUMNS.values():
         found = spread(metrics, name)
@@ -31,7 +31,7 @@ def cells(metrics: list[dict]) -> list[str]:
 
 
 def text(rows: dict[tuple[str, str], list[dict]]) -> str:
-    """rows: (clip, fill) -> metrics.json of each repeat."""
+    """The table. rows: (clip, fill) -> metrics.json of each repeat."""
     table = [("clip", "hands", *COLUMNS)] + [(clip, fill, *cells(metrics)) for (clip, fill), metrics in rows.items()]
     widths = [max(len(row[c]) for row in table) for c in range(len(table[0]))]
     lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
@@ -39,6 +39,7 @@ def text(rows: dict[tuple[str, str], list[dict]]) -> str:
 
 
 def write_csv(rows: dict[tuple[str, str], list[dict]], path: Path) -> None:
+    """Writes a row for each repeat."""
     with open(path, "w", newline="") as f:
         sheet = csv.writer(f)
         sheet.writerow(["clip", "fill", "seed", *(name for name, _ in COLUMNS.values())])

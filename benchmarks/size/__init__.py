@@ -1,1 +1,1 @@
-"""Held-out quality against the number of gaussians, and what `train.gaussians: auto` makes of it."""
+"""Held-out quality against the number of gaussians, and the choice of `train.gaussians: auto`."""

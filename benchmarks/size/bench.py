@@ -1,6 +1,6 @@
 """gsac bench size: held-out quality against the number of gaussians, with the automatic choice marked.
 
-The line is the whole ladder of `train.gaussians: auto`; crosses are trainings that had the number from the start.
+The line has all sizes that `train.gaussians: auto` tries; crosses are trainings with a fixed number from the start.
 """
 
 from __future__ import annotations
@@ -30,37 +30,38 @@ def main(argv: list[str] | None = None) -> int:
 
     say = PlainReporter(sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)
-    ladders: dict[str, list[dict]] = {}
+    curves: dict[str, list[dict]] = {}
     scratch: dict[str, list[tuple[int, float]]] = {}
-    for case in training.cases(options, say):
+    for case in training.prepare_cases(options, say):
         common = {"height": options.height, "steps": options.steps}
         folder = options.out / "trainings"
-        ladders[case.name] = training.train(case, folder / f"{case.name}_auto", gaussians="auto", every_size=True,
-                                         **common)["size_curve"]
+        curves[case.name] = training.train(case, folder / f"{case.name}_auto", gaussians="auto", every_size=True,
+                                           **common)["size_curve"]
         scratch[case.name] = []
         for count in options.scratch:
             metrics = training.train(case, folder / f"{case.name}_{count}", gaussians=count, **common)
             scratch[case.name].append((count, metrics["psnr_fg_ttpo"]))
-    words = text(ladders)
+    words = text(curves)
     print(words)
     (options.out / "size.txt").write_text(words + "\n")
-    write_csv(ladders, options.out / "size.csv")
-    chart.draw(ladders, scratch, options.out)
+    write_csv(curves, options.out / "size.csv")
+    chart.draw(curves, scratch, options.out)
     return 0
 
 
-def text(ladders: dict[str, list[dict]]) -> str:
-    """One row a clip and size; the choice has a star."""
+def text(curves: dict[str, list[dict]]) -> str:
+    """The table, one row a clip and size; the choice has a star. curves: clip -> `size_curve` of metrics.json."""
     lines = [f"{'clip':>16}  gaussians  psnr_fg aligned   detail"]
-    for clip, rungs in ladders.items():
+    for clip, sizes in curves.items():
         lines += [f"{clip:>16}  {r['n_gaussians']:9d}  {r['psnr_fg_mean']:7.2f} +- {r['psnr_fg_error']:4.2f}  "
-                  f"{r['detail_mean']:7.3f}{'  *' if r['chosen'] else ''}" for r in rungs]
+                  f"{r['detail_mean']:7.3f}{'  *' if r['chosen'] else ''}" for r in sizes]
     return "\n".join(lines)
 
 
-def write_csv(ladders: dict[str, list[dict]], path: Path) -> None:
+def write_csv(curves: dict[str, list[dict]], path: Path) -> None:
+    """Writes a row for each clip and size."""
     with open(path, "w", newline="") as f:
         sheet = csv.writer(f)
         sheet.writerow(["clip", *FIELDS])
-        for clip, rungs in ladders.items():
-            sheet.writerows([clip, *(rung[name] for name in FIELDS)] for rung in rungs)
+        for clip, sizes in curves.items():
+            sheet.writerows([clip, *(size[name] for name in FIELDS)] for size in sizes)

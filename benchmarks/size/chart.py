@@ -1,4 +1,4 @@
-"""Quality and detail against the number of gaussians."""
+"""The chart: quality and detail against the number of gaussians."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ import matplotlib.pyplot as plt  # noqa: E402
 COLOURS = ("#0b6e4f", "#b5532a", "#33508a", "#8a6d33", "#6a3d7a")
 
 
-def draw(ladders: dict[str, list[dict]], scratch: dict[str, list[tuple[int, float]]], folder: Path) -> list[Path]:
-    """Writes size.png and .svg. ladders: clip -> rows of `size_curve`; scratch: clip -> (gaussians, dB)."""
+def draw(curves: dict[str, list[dict]], scratch: dict[str, list[tuple[int, float]]], folder: Path) -> list[Path]:
+    """Writes size.png and size.svg and returns their paths. curves: clip -> `size_curve`; scratch: clip -> (gaussians, dB)."""
     figure, (quality, detail) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
-    for i, (clip, rungs) in enumerate(ladders.items()):
-        colour, counts = COLOURS[i % len(COLOURS)], [r["n_gaussians"] for r in rungs]
+    for i, (clip, rows) in enumerate(curves.items()):
+        colour, counts = COLOURS[i % len(COLOURS)], [r["n_gaussians"] for r in rows]
         for axes, name in ((quality, "psnr_fg"), (detail, "detail")):
-            values, errors = [r[f"{name}_mean"] for r in rungs], [r[f"{name}_error"] for r in rungs]
+            values, errors = [r[f"{name}_mean"] for r in rows], [r[f"{name}_error"] for r in rows]
             axes.errorbar(counts, values, errors, color=colour, lw=1.4, capsize=3, marker=".", label=clip)
-            axes.plot(*[(r["n_gaussians"], r[f"{name}_mean"]) for r in rungs if r["chosen"]][0], "o", ms=12, mfc="none",
+            axes.plot(*[(r["n_gaussians"], r[f"{name}_mean"]) for r in rows if r["chosen"]][0], "o", ms=12, mfc="none",
                       color=colour, label=f"{clip}: auto")
         if scratch.get(clip):
             quality.plot(*zip(*scratch[clip], strict=True), "x", color=colour, label=f"{clip}: from the start")
-    sizes = sorted({r["n_gaussians"] for rungs in ladders.values() for r in rungs})
+    sizes = sorted({r["n_gaussians"] for rows in curves.values() for r in rows})
     quality.set(ylabel="held-out PSNR on the person, poses aligned, dB")
     detail.set(ylabel="gradient energy over the truth's")
     for axes in (quality, detail):

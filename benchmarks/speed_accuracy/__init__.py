@@ -1,1 +1,1 @@
-"""Held-out quality against CPU seconds of training: both recipes, several budgets, curves from checkpoints."""
+"""Held-out quality against CPU seconds of training: both recipes, several numbers of steps, curves from checkpoints."""

@@ -1,6 +1,6 @@
 """gsac bench speed-accuracy: held-out quality against CPU seconds of training, in one run on the same clips and frames.
 
-A curve's seconds are CPU seconds of all threads; judging is not counted, loading of compiled kernels is.
+A curve's seconds are CPU seconds of all threads, with loading of compiled kernels, without judging.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from gsac.benchmarks import training
 from gsac.benchmarks.speed_accuracy.trial import Trial
+from gsac.pipeline.reporter import PlainReporter
 
 CURVE = 16
 """Checkpoints of a curve."""
@@ -27,7 +28,7 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--jobs", type=int, default=1, metavar="N",
                      help="trainings side by side, each on its share of the cores (default: 1)")
     out.add_argument("--novel", type=int, default=0, metavar="FRAMES",
-                     help="also judge in so many frames of poses never seen, against truth; of rendered clips")
+                     help="also judge this many frames in novel poses against truth; rendered clips only (default: 0)")
     out.add_argument("--exact", action="store_true", help="also train rendered clips with their true poses")
     out.add_argument("--gpu-curve", type=Path, metavar="CSV",
                      help="curve.csv of `python -m gsac.benchmarks.gpu.curve`, drawn beside the CPU's curves of the same clips")
@@ -38,12 +39,11 @@ def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.gpu import curve
     from gsac.benchmarks.speed_accuracy import chart, table
-    from gsac.pipeline.reporter import PlainReporter
 
     say = PlainReporter(sys.stderr)
     on_gpu = curve.read(options.gpu_curve) if options.gpu_curve else []
     options.out.mkdir(parents=True, exist_ok=True)
-    trials = measured(training.cases(options, say, options.novel, options.exact), options, say)
+    trials = measure(training.prepare_cases(options, say, options.novel, options.exact), options, say)
     words = table.text(trials)
     print(words)
     (options.out / "speed_accuracy.txt").write_text(words + "\n")
@@ -52,10 +52,10 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def measured(cases: list[training.Case], options: argparse.Namespace, say) -> list[Trial]:
-    """All trainings of the cases; the long ones first, so that side by side none is left alone at the end."""
+def measure(cases: list[training.Case], options: argparse.Namespace, say: PlainReporter) -> list[Trial]:
+    """Runs all trainings of the cases. Long ones start first, so that jobs side by side end together."""
     from gsac.benchmarks.speed_accuracy import novel
-    from gsac.benchmarks.speed_accuracy.trial import trial
+    from gsac.benchmarks.speed_accuracy.trial import make_trial
 
     def one(case: training.Case, recipe: str, steps: int, seed: int, cores: list[int] | None) -> Trial:
         folder = options.out / "trainings" / f"{case.name}_{recipe}{steps}_{seed}"
@@ -64,7 +64,7 @@ def measured(cases: list[training.Case], options: argparse.Namespace, say) -> li
         if case.novel:
             metrics |= novel.judge_poses(folder, case.novel, options.height, folder / "novel")
         say.note(f"{folder.name}: {metrics['psnr_fg']:.2f} dB after {metrics['cpu_seconds']:.1f} CPU s")
-        return trial(case.name, metrics)
+        return make_trial(case.name, metrics)
 
     calls = [(case, recipe, steps, seed) for recipe in sorted(options.recipes, reverse=True) for case in cases
              for steps in (options.budgets if recipe == "fast" else [options.paper_steps]) for seed in range(options.repeats)]

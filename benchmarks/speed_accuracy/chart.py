@@ -1,4 +1,4 @@
-"""Quality against seconds, one panel a clip."""
+"""The chart: quality against seconds, one panel a clip."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib
 
 from gsac.benchmarks.gpu.curve import TORCH, Curve
-from gsac.benchmarks.speed_accuracy.trial import Trial, pareto
+from gsac.benchmarks.speed_accuracy.trial import Trial, pareto_front
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -18,15 +18,16 @@ GPU_LINES = {"cuda": "--", TORCH: ":"}
 
 
 def draw(trials: list[Trial], folder: Path, on_gpu: Sequence[Curve] = ()) -> list[Path]:
-    """Writes speed_accuracy.png and .svg. A line is a training, its dot the end; grey steps are the Pareto line of the clip.
+    """Writes speed_accuracy.png and speed_accuracy.svg and returns their paths.
 
-    on_gpu: drawn dashed (torch dotted) over their seconds on the GPU.
+    A line is a training, its dot the end; grey steps are the Pareto front of the clip on the CPU. on_gpu: drawn dashed (torch
+    dotted) over seconds on the GPU.
     """
     clips = list(dict.fromkeys(t.clip for t in [*trials, *on_gpu]))
     figure, panels = plt.subplots(1, len(clips), figsize=(5.4 * len(clips), 4.4), layout="constrained", squeeze=False)
     for axes, clip in zip(panels[0], clips, strict=True):
         own = [t for t in trials if t.clip == clip]
-        if best := pareto([p for t in own for p in t.curve]):
+        if best := pareto_front([p for t in own for p in t.curve]):
             axes.step(*zip(*best, strict=True), where="post", color="0.75", lw=5, alpha=0.6, zorder=0, label="Pareto line, CPU")
         named = set()
         for t in own:

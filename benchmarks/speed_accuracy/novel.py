@@ -1,7 +1,7 @@
-"""An avatar in poses that it was not trained on, against the same person's truth in these poses.
+"""Judges an avatar in poses that it was not trained on, against rendered truth of the same person in these poses.
 
-The truth's joint rotations and expressions pose the avatar's own body. Its size differs from the truth's, since one camera
-cannot see scale: a frame's translation is the one that brings the avatar's joints closest to the truth's in the image.
+The truth's joint rotations and expressions pose the avatar's own body. One camera cannot see scale, so the avatar's size differs
+from the truth's: each frame's translation is the one that brings its joints closest to the truth's in the image.
 """
 
 from __future__ import annotations
@@ -21,40 +21,41 @@ from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
 ALIGN_ROUNDS = 16
-"""Of Gauss-Newton: poses that were never seen are further off than held-out ones, and 40 of Adam's steps end half-way."""
+"""Rounds of Gauss-Newton: novel poses are further off than held-out ones, and 40 steps of Adam would end half-way."""
 BODY = slice(0, 22)
-"""Joints that are brought to the truth's: the fingers follow."""
+"""Joints that are aligned with the truth's: all but jaw, eyes and fingers."""
 
 
-def true_params(truth: Path, model: str) -> BodyParams:
-    """The truth's poses, of a turntable's truth.npz. model: digest of the body that they are to pose."""
+def read_true_params(truth: Path, model: str) -> BodyParams:
+    """The true body parameters in a turntable's truth.npz. model: digest of the body that they shall pose."""
     arrays = read_arrays(truth)
-    named = {name: arrays[name] for name in BodyParams.__dataclass_fields__ if name not in ("model", "sigma_joints")}
-    return BodyParams(**named, sigma_joints=np.full((len(arrays["transl"]), J), 1e-3, np.float32), model=model)
+    fields = {name: arrays[name] for name in BodyParams.__dataclass_fields__ if name not in ("model", "sigma_joints")}
+    return BodyParams(**fields, sigma_joints=np.full((len(arrays["transl"]), J), 1e-3, np.float32), model=model)
 
 
-def judge_poses(trained: Path, clip: Path, height: int, folder: Path) -> dict[str, float]:
-    """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first moved to its image.
+def judge_poses(trained: Path, clip: Path, height: int, folder: Path) -> dict[str, float | None]:
+    """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first aligned to its image.
 
-    trained: what `train` gave; clip: a turntable's folder of novel poses; folder: for truth, render and error images.
+    trained: output folder of `train`; clip: a turntable's folder of novel poses; folder: for truth, render and error images.
     """
     body, gaussians = Body.load(), Gaussians.read(trained / "avatar.npz")
-    truth = true_params(clip / "truth.npz", body.digest)
+    truth = read_true_params(clip / "truth.npz", body.digest)
     views = read_views(clip, truth, height)
-    params = carried_over(BodyParams.read(trained / "body.npz"), truth, body)
+    params = transfer_poses(BodyParams.read(trained / "body.npz"), truth, body)
     poses, frames = Poses(body, params), range(params.frames)
     folder.mkdir(parents=True, exist_ok=True)
-    found = named(summary(judge(gaussians, poses, frames, views, folder, flip=True)), "novel")
+    found = rename_metrics(summary(judge(gaussians, poses, frames, views, folder, flip=True)), "novel")
     converge(gaussians, poses, frames, views, ALIGN_ROUNDS)
-    return found | named(summary(judge(gaussians, poses, frames, views, flip=True)), "novel_aligned")
+    return found | rename_metrics(summary(judge(gaussians, poses, frames, views, flip=True)), "novel_aligned")
 
 
-def named(figures: dict, ending: str) -> dict[str, float]:
-    return {f"{name.removesuffix('_fg')}_{ending}": figures[name] for name in ("psnr_fg", "ssim", "flip", "detail")}
+def rename_metrics(metrics: dict[str, float | None], ending: str) -> dict[str, float | None]:
+    """PSNR, SSIM, FLIP and detail with the ending in their names."""
+    return {f"{name.removesuffix('_fg')}_{ending}": metrics[name] for name in ("psnr_fg", "ssim", "flip", "detail")}
 
 
 def read_views(clip: Path, truth: BodyParams, height: int) -> list[View]:
-    """Frames cut out with their masks, `height` px high."""
+    """The clip's frames with their masks as alpha, `height` px high."""
     views = []
     for path in frame_paths(clip / "frames"):
         rgb, mask = read_frame(path), cv2.imread(str(clip / "mask" / path.name), cv2.IMREAD_GRAYSCALE)
@@ -66,18 +67,19 @@ def read_views(clip: Path, truth: BodyParams, height: int) -> list[View]:
     return views
 
 
-def carried_over(own: BodyParams, truth: BodyParams, body: Body) -> BodyParams:
-    """The avatar's body in the truth's poses, before the truth's camera."""
+def transfer_poses(own: BodyParams, truth: BodyParams, body: Body) -> BodyParams:
+    """The avatar's body in the truth's poses, in front of the truth's camera. own: the avatar's shape."""
     params = BodyParams.from_pose(truth.pose, np.zeros_like(truth.transl), own.betas, truth.expression, truth.focal,
                                   truth.center, own.joint_offset, own.model)
     joints = body.posed(params)[1]
-    params.transl = np.stack([moved(at[BODY], to[BODY]) for at, to in zip(joints, truth.joints, strict=True)]).astype(np.float32)
+    shifts = [solve_translation(at[BODY], to[BODY]) for at, to in zip(joints, truth.joints, strict=True)]
+    params.transl = np.stack(shifts).astype(np.float32)
     params.joints = joints + params.transl[:, None]
     return params
 
 
-def moved(joints: np.ndarray, goals: np.ndarray) -> np.ndarray:
-    """(3,) m, the shift of joints (n, 3) that brings them onto the rays of the goals (n, 3), by least squares."""
+def solve_translation(joints: np.ndarray, goals: np.ndarray) -> np.ndarray:
+    """Translation (3,) m of joints (n, 3) m onto the camera rays of goals (n, 3) m, by least squares."""
     x, y = (goals[:, :2] / goals[:, 2:]).T
     one, zero = np.ones_like(x), np.zeros_like(x)
     rows = np.concatenate([np.stack([one, zero, -x], 1), np.stack([zero, one, -y], 1)])

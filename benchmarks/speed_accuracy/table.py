@@ -1,4 +1,4 @@
-"""The trials as words and as CSV."""
+"""The trials as a table and as CSV."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ import numpy as np
 from gsac.benchmarks.speed_accuracy.trial import NOVEL, Trial, hypervolume, seconds_to
 
 QUALITIES = (22.0, 24.0, 25.0, 26.0, 28.0)
+"""dB whose first time is a column."""
 HEAD = ("clip", "recipe", "steps", "seeds", "gaussians", "CPU s", "psnr_fg", "+-", "aligned", "ssim", "detail", "flip",
         "novel", "aligned", "flip", "stray", "needles", "peak GB", *(f"s to {q:g}" for q in QUALITIES))
 DIFFERENCES = {"flip": "FLIP {:+.4f}", "psnr_novel": "novel poses {:+.2f} dB", "flip_novel": "FLIP {:+.4f}",
                "psnr_novel_aligned": "aligned {:+.2f} dB", "flip_novel_aligned": "FLIP {:+.4f}"}
-"""What else the ends are compared by."""
+"""Metric -> words for its difference between the recipes' ends."""
 
 
 def text(trials: list[Trial]) -> str:
-    """One row for each clip, recipe and number of steps, then what the recipes say against each other."""
+    """One row for each clip, recipe and number of steps, then the comparison of the recipes."""
     table = [HEAD]
     for clip, recipe, steps in dict.fromkeys((t.clip, t.recipe, t.steps) for t in trials):
         table.append(_row([t for t in trials if (t.clip, t.recipe, t.steps) == (clip, recipe, steps)]))
     widths = [max(len(row[c]) for row in table) for c in range(len(HEAD))]
     lines = ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], "", *compared(trials)])
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], "", *compare_recipes(trials)])
 
 
-def compared(trials: list[Trial]) -> list[str]:
-    """For each clip: when `fast` is as good as `paper` at its end, and how far the two are apart at their ends."""
+def compare_recipes(trials: list[Trial]) -> list[str]:
+    """For each clip: the time at which `fast` reaches the end of `paper`, and the difference of their ends."""
     out = []
     for clip in dict.fromkeys(t.clip for t in trials):
         fast, paper = ([t for t in trials if (t.clip, t.recipe) == (clip, recipe)] for recipe in ("fast", "paper"))
@@ -49,7 +50,7 @@ def compared(trials: list[Trial]) -> list[str]:
 
 
 def write_csv(trials: list[Trial], path: Path) -> None:
-    """Every checkpoint, unrounded; the last of a training is its end, and what stands behind `psnr_fg` is of the end."""
+    """Writes every checkpoint, unrounded. A training's last row is its end; columns after `psnr_fg` are of the end."""
     with open(path, "w", newline="") as f:
         sheet = csv.writer(f)
         sheet.writerow(["clip", "recipe", "steps", "seed", "n_gaussians", "peak_gb", "cpu_seconds", "psnr_fg", *NOVEL])
@@ -59,7 +60,8 @@ def write_csv(trials: list[Trial], path: Path) -> None:
 
 
 def _row(some: list[Trial]) -> tuple[str, ...]:
-    def mean(name, form):
+    """Means over trials that differ in their seed only."""
+    def mean(name: str, form: str) -> str:
         values = [getattr(t, name) for t in some if getattr(t, name) is not None]
         return format(np.mean(values), form) if values else "-"
 

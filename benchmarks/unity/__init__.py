@@ -1,1 +1,1 @@
-"""The Unity package's shaders on a GPU without Unity: compiled by glslang, run through Vulkan, each pass timed."""
+"""The Unity package's shaders on a GPU without Unity: compiled by glslang, run by Vulkan, each pass timed."""

@@ -1,4 +1,4 @@
-"""python -m gsac.benchmarks.unity : each pass of the Unity package's frame on this machine's GPU, as one short table."""
+"""python -m gsac.benchmarks.unity: times each pass of the Unity package's frame on this machine's GPU."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.benchmarks.unity.frame import Frame
 from gsac.benchmarks.unity.gpu import Gpu, Painting
 from gsac.benchmarks.unity.shaders import compile_frame, missing_packages, read_frame
+from gsac.benchmarks.unity.spirv import Program
 from gsac.benchmarks.unity.timing import Clock, draw_times, pass_times
 
 LIMITS = {"vertices": 1e-5, "means": 1e-5, "order": 0}
-"""Largest error in m; order: 1 where the gaussians are not sorted."""
+"""Largest error allowed, m; order: 0 if the gaussians are sorted, else 1."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.unity", description=__doc__)
     parser.add_argument("--avatar", type=Path, help="a .gsac file; without one the open body with --count gaussians")
     parser.add_argument("--count", type=int, default=25000)
-    parser.add_argument("--shaders", type=Path, help="folder of compiled shaders: made with --compile, read without")
-    parser.add_argument("--compile", action="store_true", help="compile into --shaders and end: for a machine without glslang")
+    parser.add_argument("--shaders", type=Path, help="folder of compiled shaders: written with --compile, otherwise read")
+    parser.add_argument("--compile", action="store_true", help="compile into --shaders and exit: for a machine without glslang")
     parser.add_argument("--software", action="store_true", help="on lavapipe instead of a graphics card")
     parser.add_argument("--size", type=int, default=2000, help="px, height and width of an eye's picture")
     parser.add_argument("--distances", type=float, nargs="*", default=[2.0, 0.7], help="m from the eyes to the person")
@@ -40,20 +41,21 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         if not options.shaders:
             compile_frame(Path(folder))
-        programs = read_frame(options.shaders or folder)
+        programs = read_frame(options.shaders or Path(folder))
     report(options, programs)
 
 
-def report(options, programs) -> None:
+def report(options: argparse.Namespace, programs: dict[str, Program]) -> None:
+    """Prints the check and the table. programs: entry point -> compiled shader."""
     gpu = Gpu(options.software)
     if not gpu.timed:
         raise SystemExit(f"benchmarks.unity: {gpu.summary} has no timestamps")
     if options.avatar:
         avatar = RiggedAvatar.read(options.avatar)
     else:
-        from gsac.benchmarks.viewer.person import person
+        from gsac.benchmarks.viewer.avatar import make_avatar
 
-        avatar = person(options.count)
+        avatar = make_avatar(options.count)
     clock, frame = Clock(gpu), Frame(gpu, programs, avatar)
     print(f"{gpu.summary}; wgpu {version('wgpu')}; {frame.count} gaussians, {len(avatar.vertices)} vertices, "
           f"{len(avatar.expression_vertex)} moves of expressions", flush=True)
@@ -63,14 +65,14 @@ def report(options, programs) -> None:
           + (" ok" if all(v <= LIMITS[k] for k, v in errors.items()) else " MISSED"))
     print(f"{'pass':28s} {'dispatches':>10s} {'median us':>10s} {'p95 us':>8s} {'moved MB':>9s} {'GB/s':>7s}")
     for p in frame.passes:
-        line(p.name, len(p.jobs), times[p.name], p.moved)
-    line("frame: all of them, once", len(frame.order), times["frame"], sum(p.moved for p in frame.passes))
+        print_row(p.name, len(p.jobs), times[p.name], p.moved)
+    print_row("frame: all of them, once", len(frame.order), times["frame"], sum(p.moved for p in frame.passes))
     vertex, fragment = programs["Vertex"], programs["Fragment"]
     paintings = tuple(Painting(gpu, vertex, fragment, options.size, options.size, frame.count) for _ in range(2))
     for distance in options.distances:
         draws = draw_times(clock, paintings, frame.eyes(options.size, distance), options.repeats)
         left = paintings[0].read()
-        line(f"draw, 2 x {options.size}x{options.size}, {distance:g} m", 2, draws, 2 * options.size ** 2 * 8)
+        print_row(f"draw, 2 x {options.size}x{options.size}, {distance:g} m", 2, draws, 2 * options.size ** 2 * 8)
         print(f"    {(left[..., 3] > .5).mean() * 100:.0f} % of a picture covered")
         if options.picture:
             from PIL import Image
@@ -79,7 +81,8 @@ def report(options, programs) -> None:
             Image.fromarray(shown).save(options.picture.with_stem(f"{options.picture.stem}-{distance:g}m"))
 
 
-def line(name: str, dispatches: int, us: np.ndarray, moved: int) -> None:
+def print_row(name: str, dispatches: int, us: np.ndarray, moved: int) -> None:
+    """Prints a row of the table. us: (repeats,) of the whole pass; moved: bytes."""
     middle = np.median(us)
     print(f"{name:28s} {dispatches:10d} {middle:10.1f} {np.quantile(us, .95):8.1f} {moved / 1e6:9.2f} {moved / middle / 1e3:7.0f}",
           flush=True)

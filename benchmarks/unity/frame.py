@@ -1,4 +1,4 @@
-"""A frame of one avatar as the package's C# asks for it: Skin, Bind, the sort, and a draw for each eye of a headset."""
+"""A frame of one avatar in the package's order of passes: Skin, Bind, the sort, and a draw for each eye of a headset."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gsac_file.rigged import BLEND, RiggedAvatar
 from gsac.avatar.skinning import joint_transforms, skin
-from gsac.benchmarks.unity.gpu import Gpu, projection
-from gsac.benchmarks.unity.packing import packed
+from gsac.benchmarks.unity.gpu import Gpu, Job, Parameters, projection
+from gsac.benchmarks.unity.packing import pack_avatar
 from gsac.benchmarks.unity.spirv import Program
 
 BLOCK_BITS, HAND, ACROSS_THREADS, THREADS = 12, 16, 64, 64
-"""Of Gsac.compute: keys of a block, keys of a thread, threads of a group of SortAcross, of Skin and Bind."""
+"""As in Gsac.compute: keys a block (bits), keys a thread, threads a group of SortAcross, threads a group of Skin and Bind."""
 EVEN = {f"GsacLight{name}": np.float32([0, 0, 0, 1]) for name in ("Red", "Green", "Blue")}
+"""Light without direction."""
 LENS_DEGREES, EYES_APART = 100.0, 0.064
-"""Angle of view of a headset's eye; m between the eyes."""
+"""Field of view of a headset's eye; m between the eyes."""
 
 
 def sort_steps(count: int) -> tuple[int, list[tuple[str, dict[str, int], int]]]:
-    """(keys, [(kernel, parameters, groups)]): the bitonic network as GsacSort.cs has it run."""
+    """Number of keys, and (kernel, parameters, workgroups) of each dispatch of the bitonic sort, as in GsacSort.cs."""
     merges = max(0, (max(count, 1) - 1).bit_length() - BLOCK_BITS)
     keys = 1 << BLOCK_BITS + merges
     steps = [("SortBlocks", {"GsacSortStage": 0, "GsacSortShift": 0, "GsacSortStrides": 0}, keys >> BLOCK_BITS)]
@@ -37,20 +38,22 @@ def sort_steps(count: int) -> tuple[int, list[tuple[str, dict[str, int], int]]]:
 
 
 def index_bits(count: int) -> int:
+    """Bits of a gaussian's index in a sort key."""
     return max((count - 1).bit_length(), 1)
 
 
 @dataclass
 class Pass:
-    """A kernel's dispatches in a frame, and the fewest bytes that they move: inputs read once, outputs written once."""
+    """A kernel's dispatches in a frame."""
 
     name: str
-    jobs: list
+    jobs: list[Job]
     moved: int
+    """Least bytes to move: inputs read once, outputs written once."""
 
 
 class Frame:
-    """An avatar in its A-pose, each fourth expression half on, in the avatar's own (unmirrored) axes."""
+    """An avatar in its A-pose, each fourth expression at a half, in the avatar's own (unmirrored) axes."""
 
     def __init__(self, gpu: Gpu, programs: dict[str, Program], avatar: RiggedAvatar) -> None:
         self.gpu, self.avatar = gpu, avatar
@@ -58,7 +61,7 @@ class Frame:
         self.count, self.weights = N, np.where(np.arange(E) % 4 == 0, np.float32(.5), np.float32(0))
         self.bones = joint_transforms(avatar.pose("A")[None], avatar.joints, avatar.parents)[0].astype(np.float32)
         keys, steps = sort_steps(N)
-        for name, array in packed(avatar).items():
+        for name, array in pack_avatar(avatar).items():
             gpu.put(name, array)
         gpu.put("GsacWeights", self.weights)
         gpu.put("GsacBones", self.bones)
@@ -83,7 +86,7 @@ class Frame:
         self.order += [gpu.job(programs[name], base | parameters, groups) for name, parameters, groups in steps]
 
     def errors(self) -> dict[str, float]:
-        """Largest differences of the last frame to the trainer's arithmetic, m; whether the order is one from far to near."""
+        """Largest differences of the last frame from the trainer's skinning and binding, m; order: 0 if sorted from far to near."""
         a, g = self.avatar, self.avatar.gaussians
         rest = a.vertices.copy()
         for e, w in enumerate(self.weights):
@@ -99,8 +102,8 @@ class Frame:
         return {"vertices": float(abs(posed - vertices).max()), "means": float(abs(got - means).max()),
                 "order": 0.0 if sorted_once and np.diff(-got[order, 2]).max() < 2e-4 else 1.0}
 
-    def eyes(self, size: int, distance: float) -> dict:
-        """Parameters of a draw for both eyes of a headset, `distance` m before the person's chest."""
+    def eyes(self, size: int, distance: float) -> Parameters:
+        """Parameters of a draw for both eyes of a headset, `distance` m in front of the person's chest. size: px an eye."""
         focal = size / 2 / np.tan(np.radians(LENS_DEGREES / 2))
         camera = Camera((focal, focal), (size / 2, size / 2), size, size)
         views = []

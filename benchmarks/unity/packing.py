@@ -1,10 +1,14 @@
-"""The arrays that the package uploads once, from an avatar; the C# loader makes the same, and a test holds them equal."""
+"""Packs an avatar into the buffers that the package uploads once; the C# loader does the same, and a test holds both equal."""
+
+from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 
-def packed(avatar):
-    """Buffer name -> array, as Gsac.compute reads it."""
+
+def pack_avatar(avatar: RiggedAvatar) -> dict[str, np.ndarray]:
+    """Buffer of Gsac.compute -> array: V or V + 1 vertices (V, 4), M moves (M, 4), N gaussians (N, 4) or (N, 3, 4)."""
     V, M = len(avatar.vertices), len(avatar.expression_vertex)
     which = np.repeat(np.arange(len(avatar.expression_names)), np.diff(avatar.expression_start))
     order = np.lexsort((which, avatar.expression_vertex))

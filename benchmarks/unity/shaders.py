@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 from gsac.benchmarks.unity.spirv import Program
@@ -12,18 +13,21 @@ from gsac.viewer.wgsl import CORE, compile_spirv
 
 PROGRAMS = {"glslangValidator": "glslang-tools", "spirv-val": "spirv-tools"}
 STEREO = Path(__file__).parent / "stereo"
-"""Stands for Unity's own shader file in a headset."""
+"""Folder with a stand-in for Unity's own shader file, as in a headset."""
 KERNELS = ("Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge")
 EYES = ("Vertex", "Fragment")
 
 
 def missing_packages() -> list[str]:
-    """Debian packages that compiling needs and that are not there."""
+    """Debian packages that compiling needs and this machine lacks."""
     return sorted({package for program, package in PROGRAMS.items() if not shutil.which(program)})
 
 
-def compile_hlsl(source: Path, entry: str, stage: str, folder: Path, include=(CORE,)) -> Program:
-    """Validated for Vulkan 1.0, left in `folder` as ENTRY.spv. StageError or AssertionError with the tools' words."""
+def compile_hlsl(source: Path, entry: str, stage: str, folder: Path, include: Sequence[Path] = (CORE,)) -> Program:
+    """Compiles an entry point to `folder`/ENTRY.spv and validates it for Vulkan 1.0.
+
+    Raises ShaderError or AssertionError with the tools' words.
+    """
     out = compile_spirv(Path(source), entry, stage, Path(folder) / f"{entry}.spv", *(f"-I{i}" for i in include))
     done = subprocess.run(["spirv-val", "--target-env", "vulkan1.0", str(out)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -31,7 +35,7 @@ def compile_hlsl(source: Path, entry: str, stage: str, folder: Path, include=(CO
 
 
 def shader_passes(path: Path = CORE / "GsacSplats.shader") -> dict[str, str]:
-    """Render pipeline ("" for the built-in one) -> HLSL of its pass, from a ShaderLab file."""
+    """Reads a ShaderLab file: render pipeline ("" for the built-in one) -> HLSL of its pass."""
     passes = {}
     for part in Path(path).read_text().split("SubShader\n")[1:]:
         pipeline = re.search(r'"RenderPipeline" = "(\w+)"', part)
@@ -40,7 +44,7 @@ def shader_passes(path: Path = CORE / "GsacSplats.shader") -> dict[str, str]:
 
 
 def compile_pass(text: str, folder: Path, stand_in: Path) -> tuple[Program, Program]:
-    """Vertex and fragment program of a pass; stand_in: folder of what stands for the pipeline's files."""
+    """Compiles a pass to its vertex and fragment program. stand_in: folder of stand-ins for the render pipeline's files."""
     source = Path(folder) / "pass.hlsl"
     source.write_text(text)
     vertex, fragment = (compile_hlsl(source, entry, stage, folder, (CORE, stand_in))
@@ -49,12 +53,12 @@ def compile_pass(text: str, folder: Path, stand_in: Path) -> tuple[Program, Prog
 
 
 def compile_frame(folder: Path) -> None:
-    """All that a frame for a headset runs, as files that `read_frame` reads on a machine without a compiler."""
+    """Compiles all shaders of a headset's frame to files that `read_frame` reads, also on a machine without a compiler."""
     for name in KERNELS:
         compile_hlsl(CORE / "Gsac.compute", name, "comp", folder)
     compile_pass(shader_passes()[""], folder, STEREO)
 
 
 def read_frame(folder: Path) -> dict[str, Program]:
-    """Entry point -> Program."""
+    """Reads the files of `compile_frame`: entry point -> Program."""
     return {name: Program((Path(folder) / f"{name}.spv").read_bytes()) for name in (*KERNELS, *EYES)}

@@ -1,4 +1,4 @@
-"""What a compiled entry point binds and where, read from its SPIR-V."""
+"""Reads the bindings of a compiled entry point from its SPIR-V."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ MAGIC = 0x07230203
 ENTRY_POINT, NAME, MEMBER_NAME, TYPE_POINTER, VARIABLE, DECORATE, MEMBER_DECORATE = 15, 5, 6, 32, 59, 71, 72
 BLOCK, NON_WRITABLE, BINDING, OFFSET = 2, 24, 33, 35
 BLOCK_SIZE = 512
-"""Bytes of a parameter block; the package's are smaller."""
+"""Bytes of a parameter block, more than the package's need."""
 
 
 def _text(words: list[int]) -> str:
+    """A string literal."""
     return struct.pack(f"<{len(words)}I", *words).split(b"\0")[0].decode()
 
 
@@ -52,7 +53,7 @@ class Program:
         self.bindings: dict[int, tuple[str, str | None]] = {}
         """Binding -> (kind of buffer, its name; None for the parameters)."""
         self.parameters: dict[str, int] = {}
-        """Parameter -> its place in the parameter block."""
+        """Parameter -> offset in the parameter block, bytes."""
         for variable, number in binding.items():
             struct_type = kind[variable]
             if struct_type in blocks:
@@ -62,7 +63,7 @@ class Program:
                 self.bindings[number] = ("read-only-storage" if struct_type in readonly else "storage", names[variable])
 
     def uniform(self, values: dict) -> bytes:
-        """values: parameter -> int (a uint there) or floats, a matrix by columns. Returns the parameter block."""
+        """The parameter block. values: parameter -> int (a uint there), floats, or a matrix by columns."""
         block = bytearray(BLOCK_SIZE)
         for name, place in self.parameters.items():
             raw = np.asarray(values[name], np.uint32 if isinstance(values[name], int) else np.float32).tobytes()

@@ -1,34 +1,40 @@
-"""Times on the GPU's own clock, by timestamp queries; medians of many."""
+"""Times on the GPU's own clock, by timestamp queries."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gsac.benchmarks.unity.frame import Frame
-from gsac.benchmarks.unity.gpu import Gpu, Painting
+from gsac.benchmarks.unity.gpu import Gpu, Job, Painting, Parameters
+
+if TYPE_CHECKING:
+    from wgpu import GPUCommandEncoder
 
 IN_A_ROW = 16
-"""How often a dispatch runs between two timestamps, so that they weigh little."""
+"""Repeats of a dispatch between two timestamps, which makes their own cost small."""
 
 
 class Clock:
+    """Timestamps of a device."""
+
     def __init__(self, gpu: Gpu) -> None:
         from wgpu.backends.wgpu_native import lib
 
         usage = gpu.wgpu.BufferUsage
         self.gpu = gpu
-        self.nanoseconds = lib.wgpuQueueGetTimestampPeriod(gpu.device.queue._internal)  # wgpu has no other way to it
+        self.nanoseconds = lib.wgpuQueueGetTimestampPeriod(gpu.device.queue._internal)  # wgpu has no public way
         self.queries = gpu.device.create_query_set(type="timestamp", count=4)
         self.resolved = gpu.device.create_buffer(size=32, usage=usage.QUERY_RESOLVE | usage.COPY_SRC)
 
     def between(self, first: int) -> dict:
-        """Timestamps `first` and the next about a pass."""
+        """The `timestamps` of a pass: query `first` at its start, the next at its end."""
         return {"query_set": self.queries, "beginning_of_pass_write_index": first, "end_of_pass_write_index": first + 1}
 
-    def microseconds(self, repeats: int, encode: Callable) -> np.ndarray:
-        """encode(encoder) writes timestamps 0 and 1, perhaps 2 and 3 after them. Returns (repeats,) from the first to the last."""
+    def microseconds(self, repeats: int, encode: Callable[[GPUCommandEncoder], int]) -> np.ndarray:
+        """Time (repeats,) us from the first timestamp to the last. encode: writes them and returns the last one's number."""
         took = []
         for _ in range(repeats + repeats // 4 + 1):
             encoder = self.gpu.device.create_command_encoder()
@@ -41,10 +47,10 @@ class Clock:
 
 
 def pass_times(clock: Clock, frame: Frame, repeats: int) -> dict[str, np.ndarray]:
-    """Pass -> us of all its dispatches in a frame; `frame`: of the whole frame, once, as Unity runs it."""
+    """Pass -> time (repeats,) us of all its dispatches in a frame; `frame`: of the whole frame, once, as Unity runs it."""
 
-    def encoder_of(jobs):
-        def encode(encoder):
+    def encoder_of(jobs: list[Job]) -> Callable[[GPUCommandEncoder], int]:
+        def encode(encoder: GPUCommandEncoder) -> int:
             clock.gpu.dispatch(encoder, jobs, clock.between(0))
             return 1
         return encode
@@ -53,11 +59,11 @@ def pass_times(clock: Clock, frame: Frame, repeats: int) -> dict[str, np.ndarray
     return times | {"frame": clock.microseconds(repeats, encoder_of(frame.order))}
 
 
-def draw_times(clock: Clock, paintings: tuple[Painting, Painting], parameters: dict, repeats: int) -> np.ndarray:
-    """us of the draws of both eyes, their targets' clearing included."""
+def draw_times(clock: Clock, paintings: tuple[Painting, Painting], parameters: Parameters, repeats: int) -> np.ndarray:
+    """Time (repeats,) us of drawing both eyes, with clearing of their targets."""
     groups = [painting.group(parameters) for painting in paintings]
 
-    def encode(encoder):
+    def encode(encoder: GPUCommandEncoder) -> int:
         for eye, (painting, group) in enumerate(zip(paintings, groups, strict=True)):
             painting.encode(encoder, group, clock.between(2 * eye), eye)
         return 3

@@ -1,1 +1,1 @@
-"""The viewer page against PlayCanvas on the same splats."""
+"""Frame rate of the viewer page against PlayCanvas on the same splats."""

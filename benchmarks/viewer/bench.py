@@ -1,7 +1,7 @@
 """gsac bench viewer: frames a second of viewer.html, walking, against PlayCanvas with the same splats standing still.
 
-All in headless Chromium without a graphics card at the same size and distance, in turns, each frame waited for. PlayCanvas draws
-through software GL; viewer.html in each of its three ways, of which it takes `software` there. Needs chromium and npm.
+Both run in headless Chromium without a graphics card, at the same size and distance, in turn; every frame is waited for. PlayCanvas
+draws by software GL; viewer.html by each of its three backends, of which it chooses `software` by itself. Needs chromium and npm.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
-    from gsac.benchmarks.viewer.race import Count
+    from gsac.benchmarks.viewer.race import FrameRate
 
 PACKAGE = "playcanvas@2.23.3"
 PAGE = Path(__file__).with_name("playcanvas.html")
 DRAWS = ("software", "webgl", "webgpu")
+"""Backends of viewer.html."""
 THEIRS = "PlayCanvas"
 CAMERA = {"fov": 30.0, "dist": 3.8, "bg": "3a6080"}
+"""Parameters of both pages: degrees, m, colour."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -35,9 +37,9 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--avatar", type=Path, metavar="FILE", help="an avatar.gsac; default: a made-up person")
     out.add_argument("--gaussians", type=int, default=6000, metavar="N", help="of the made-up person; default: 6000")
     out.add_argument("--size", type=int, default=512, metavar="PX", help="of the square picture; default: 512")
-    out.add_argument("--draw", choices=DRAWS, nargs="+", default=DRAWS, help="how viewer.html draws; default: each way in turn")
+    out.add_argument("--draw", choices=DRAWS, nargs="+", default=DRAWS, help="backends of viewer.html; default: all")
     out.add_argument("--rounds", type=int, default=3, metavar="N", help="default: 3")
-    out.add_argument("--seconds", type=float, default=6.0, metavar="N", help="of one count; default: 6")
+    out.add_argument("--seconds", type=float, default=6.0, metavar="N", help="length of one measurement; default: 6")
     return out
 
 
@@ -49,28 +51,28 @@ def main(argv: list[str] | None = None) -> int:
         raise BadInput("gsac bench viewer needs chromium and npm (Debian packages of those names)")
     options.out.mkdir(parents=True, exist_ok=True)
     avatar = prepare(options)
-    counts: dict[str, list[race.Count]] = {}
-    with race.served(options.out.absolute()) as address:
+    rates: dict[str, list[race.FrameRate]] = {}
+    with race.serve(options.out.absolute()) as address:
         for k in range(options.rounds):
             for name, page in pages(avatar, options.draw).items():
                 picture = options.out / f"{name.lower()}.png" if k == 0 else None
-                counts.setdefault(name, []).append(race.count(f"{address}/{page}", options.size, options.seconds, picture))
-                print(f"round {k + 1}: {name:11} {counts[name][-1].fps:6.2f} frames a second", file=sys.stderr)
-    words = text(counts, len(avatar.gaussians["face"]), options.size)
+                rates.setdefault(name, []).append(race.measure(f"{address}/{page}", options.size, options.seconds, picture))
+                print(f"round {k + 1}: {name:11} {rates[name][-1].fps:6.2f} frames a second", file=sys.stderr)
+    words = text(rates, len(avatar.gaussians["face"]), options.size)
     print(words)
     (options.out / "viewer.txt").write_text(words + "\n")
     return 0
 
 
 def prepare(options: argparse.Namespace) -> RiggedAvatar:
-    """Writes the two pages and the splats, and has npm bring PlayCanvas. Returns the avatar."""
+    """Writes both pages and the splats, and installs PlayCanvas by npm. Returns the avatar."""
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
-    from gsac.benchmarks.viewer.person import person
+    from gsac.benchmarks.viewer.avatar import make_avatar
     from gsac.stages.export.ply import ply_bytes
     from gsac.stages.export.stage import posed_gaussians
     from gsac.viewer.page import page_bytes
 
-    avatar = person(options.gaussians) if options.avatar is None else RiggedAvatar.read(options.avatar)
+    avatar = make_avatar(options.gaussians) if options.avatar is None else RiggedAvatar.read(options.avatar)
     if "walk" not in avatar.clips:
         raise BadInput(f"{options.avatar}: it carries no clip walk; export it with export.animations=walk")
     splats = posed_gaussians(avatar, avatar.pose("A"))
@@ -86,7 +88,7 @@ def prepare(options: argparse.Namespace) -> RiggedAvatar:
 
 
 def pages(avatar: RiggedAvatar, draws: Sequence[str] = ("software",)) -> dict[str, str]:
-    """Addresses of viewer.html by way of drawing and of PlayCanvas, with the same camera; PlayCanvas has the feet at y = 0."""
+    """Addresses of viewer.html, one a backend, and of PlayCanvas, with the same camera; PlayCanvas has the feet at y = 0."""
     middle = float(avatar.vertices[:, 1].max() + avatar.ground) / 2
     camera = "&".join(f"{name}={value}" for name, value in CAMERA.items())
     ours = f"clip=walk&yaw=0&pitch=0&target=0,{middle:.4f},0&{camera}"
@@ -94,11 +96,11 @@ def pages(avatar: RiggedAvatar, draws: Sequence[str] = ("software",)) -> dict[st
             THEIRS: f"playcanvas.html#file=avatar.ply&height={middle - avatar.ground:.4f}&{camera}"}
 
 
-def text(counts: dict[str, list[Count]], count: int, size: int) -> str:
-    """Medians over the rounds, and how many times as many frames ours gives."""
-    fps = {name: statistics.median(c.fps for c in found) for name, found in counts.items()}
-    work = {name: 1000 * statistics.median(c.processor_s for c in found) for name, found in counts.items()}
+def text(rates: dict[str, list[FrameRate]], count: int, size: int) -> str:
+    """Medians over the rounds, and their ratios to PlayCanvas. count: gaussians; size: px."""
+    fps = {name: statistics.median(r.fps for r in found) for name, found in rates.items()}
+    work = {name: 1000 * statistics.median(r.cpu_s for r in found) for name, found in rates.items()}
     rows = [f"{name:11}  {fps[name]:6.2f} fps  {fps[name] / fps[THEIRS]:5.2f} x {THEIRS}  "
-            f"{work[name]:6.1f} ms of processor a frame ({work[THEIRS] / work[name]:.2f} x)   "
-            f"rounds: {', '.join(f'{c.fps:.2f}' for c in found)}" for name, found in counts.items()]
+            f"{work[name]:6.1f} CPU ms a frame ({work[THEIRS] / work[name]:.2f} x)   "
+            f"rounds: {', '.join(f'{r.fps:.2f}' for r in found)}" for name, found in rates.items()]
     return "\n".join([f"{count} gaussians, {size} x {size}, no graphics card; ours walks, {THEIRS} stands still", *rows])

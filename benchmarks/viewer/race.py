@@ -1,4 +1,4 @@
-"""Frames a second of a page in headless Chromium: every frame is waited for, so that none is counted before it is drawn."""
+"""Frame rate of a page in headless Chromium. Every frame is waited for, so that none is counted before it is drawn."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from gsac.benchmarks.viewer.browser import WEBGPU, Browser
 from gsac.stages.contract import StageError
 
 WARM_S = 2.0
+"""Seconds before the measurement starts."""
 UNCAPPED = ("--disable-frame-rate-limit", "--disable-gpu-vsync")
-"""Chromium draws as fast as it can: a screen's 60 frames a second would hide how much faster one page is."""
+"""Flags that lift the limit of 60 frames a second."""
 WATCH = """
 (() => {
   if (window.drawn !== undefined) return;
@@ -37,20 +38,22 @@ WATCH = """
   };
 })()
 """
-"""Makes viewer.html count its frames and hide its controls, which the other page does not have; that one counts by itself."""
+"""Script that makes viewer.html count its frames and hide its controls; the other page has none and counts by itself."""
 
 
-class Quiet(http.server.SimpleHTTPRequestHandler):
+class _QuietHandler(http.server.SimpleHTTPRequestHandler):
+    """Serves files without a log."""
+
     extensions_map = http.server.SimpleHTTPRequestHandler.extensions_map | {".mjs": "text/javascript"}
 
-    def log_message(self, *words) -> None:
+    def log_message(self, *words: object) -> None:
         pass
 
 
 @contextlib.contextmanager
-def served(folder: Path) -> Iterator[str]:
-    """The address of a folder's files on this machine."""
-    handler = functools.partial(Quiet, directory=str(folder))
+def serve(folder: Path) -> Iterator[str]:
+    """Serves a folder's files on this machine; gives the address."""
+    handler = functools.partial(_QuietHandler, directory=str(folder))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://127.0.0.1:{server.server_address[1]}"
@@ -58,14 +61,16 @@ def served(folder: Path) -> Iterator[str]:
 
 
 @dataclass
-class Count:
+class FrameRate:
+    """One measurement of a page."""
+
     fps: float
-    processor_s: float
-    """Processor time of all of the browser's processes for one frame; other work on the machine changes it little."""
+    cpu_s: float
+    """CPU seconds a frame of all of the browser's processes; the machine's other load changes it little."""
 
 
-def processor_s(pid: int) -> float:
-    """Seconds that a process and all below it have worked so far; those that have ended are left out."""
+def cpu_seconds(pid: int) -> float:
+    """CPU seconds so far of a process and its running descendants."""
     parents, spent = {}, {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
@@ -77,22 +82,22 @@ def processor_s(pid: int) -> float:
     return sum(spent.get(one, 0) for one in family) / os.sysconf("SC_CLK_TCK")
 
 
-def count(address: str, size: int, seconds: float, picture: Path | None) -> Count:
-    """A page at an address; picture: where to keep what it shows."""
+def measure(address: str, size: int, seconds: float, picture: Path | None) -> FrameRate:
+    """Measures the page at an address, `size` px a side. picture: file for a screenshot. Raises StageError if the page fails."""
     page = Browser(size, size, UNCAPPED + (WEBGPU if "draw=webgpu" in address else ()))
     try:
         page.open(address)
         page.run(WATCH)
         time.sleep(WARM_S)
-        began, worked, first = time.monotonic(), processor_s(page.process.pid), page.run("window.drawn")
+        began, worked, first = time.monotonic(), cpu_seconds(page.process.pid), page.run("window.drawn")
         time.sleep(seconds)
-        frames, ended, done = page.run("window.drawn") - first, time.monotonic(), processor_s(page.process.pid)
+        frames, ended, done = page.run("window.drawn") - first, time.monotonic(), cpu_seconds(page.process.pid)
         if picture is not None:
             import cv2
 
             cv2.imwrite(str(picture), page.picture()[:, :, ::-1])
         if page.errors:
             raise StageError(f"{address}: the page failed: {page.errors[0]}")
-        return Count(frames / (ended - began), (done - worked) / max(frames, 1))
+        return FrameRate(frames / (ended - began), (done - worked) / max(frames, 1))
     finally:
         page.close()

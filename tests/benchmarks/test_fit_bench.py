@@ -1,3 +1,5 @@
+"""The fit benchmark's table, chart and windows, on made-up trials."""
+
 import csv
 
 import numpy as np
@@ -5,8 +7,8 @@ import pytest
 
 from gsac.avatar.wholebody import ARM, HANDS
 from gsac.benchmarks.fit import bench, chart, hidden, table
-from gsac.benchmarks.fit.clips import seen
-from gsac.benchmarks.fit.trial import Trial
+from gsac.benchmarks.fit.clips import prepare_case
+from gsac.benchmarks.fit.trial import FitTrial
 from gsac.stages.contract import BadInput
 from gsac.stages.handgap.config import METHODS
 
@@ -14,7 +16,7 @@ from gsac.stages.handgap.config import METHODS
 def trial(clip, method, given, seconds, mm):
     scores = {"joints_median_mm": mm * 0.8, "joints_mean_mm": mm, "iou_mean": 0.9, "iou_worst": 0.8, "reprojection_px": 5.0,
               "focal_error": 0.0 if given else 0.04}
-    return Trial(clip, method, given, seconds, seconds * 2, scores)
+    return FitTrial(clip, method, given, seconds, seconds * 2, scores)
 
 
 TRIALS = [trial("a", "lm", True, 4.0, 20.0), trial("a", "paper", True, 40.0, 30.0),
@@ -37,9 +39,9 @@ def test_one_clip_needs_no_mean_row():
 
 
 def test_the_gain_is_said_in_wall_and_cpu_time():
-    assert table.faster(TRIALS) == ["focal given: lm is 12.0x faster than paper by the clock and 12.0x by CPU time, "
+    assert table.compare_speed(TRIALS) == ["focal given: lm is 12.0x faster than paper by the clock and 12.0x by CPU time, "
                                     "at 0.62 of its mean joint error"]
-    assert table.faster(TRIALS[:1]) == []
+    assert table.compare_speed(TRIALS[:1]) == []
 
 
 def test_the_csv_holds_every_score_unrounded(tmp_path):
@@ -59,7 +61,7 @@ def test_the_chart_is_written_as_picture_and_as_vectors(tmp_path):
 
 def test_a_folder_that_is_no_truth_clip_is_refused_by_name(tmp_path):
     with pytest.raises(BadInput, match="expected a truth clip"):
-        seen(tmp_path, None, tmp_path / "out", None)
+        prepare_case(tmp_path, None, tmp_path / "out", None)
 
 
 def test_clips_that_measured_the_detector_are_not_what_is_reported():
@@ -73,27 +75,27 @@ def test_a_bare_clip_is_rendered_without_clothes(tmp_path, monkeypatch):
 
     asked = []
     monkeypatch.setattr(clip, "make_clip", lambda folder, **options: asked.append((folder.name, options["clothing"])))
-    clips.truth_folder(tmp_path / "seed5", 5, None)
-    clips.truth_folder(tmp_path / "bare5", 5, None, clothing=0.0)
+    clips.render_seed(tmp_path / "seed5", 5, None)
+    clips.render_seed(tmp_path / "bare5", 5, None, clothing=0.0)
     assert asked == [("seed5", 1.0), ("bare5", 0.0)]
 
 
 def test_windows_of_one_hand_are_apart_and_as_long_as_they_say():
     for frames in (60, 40, 24):
-        found = list(hidden.windows(frames))
+        found = list(hidden.list_windows(frames))
         assert found and all(last <= frames - hidden.MARGIN for *_, last in found)
         for side in HANDS:
             ends = [0, *(t for s, *span in found if s == side for t in span)]
             assert np.diff(ends)[::2].min() >= hidden.MARGIN
-    lengths = sorted(last - first for side, first, last in hidden.windows(60) if side == "left")
+    lengths = sorted(last - first for side, first, last in hidden.list_windows(60) if side == "left")
     assert lengths == sorted(hidden.GAPS["left"])
 
 
 def test_masking_hides_arm_and_hand_there_and_nothing_else():
     seen = {"xy": np.ones((60, 133, 2)), "score": np.ones((60, 133)), "world": np.ones((60, 133, 3))}
-    masked = hidden.mask(seen)
+    masked = hidden.mask_windows(seen)
     hide = np.zeros((60, 133), bool)
-    for side, first, last in hidden.windows(60):
+    for side, first, last in hidden.list_windows(60):
         hide[first:last, [*range(133)[HANDS[side]], *ARM[side][1:3]]] = True
     assert np.array_equal(masked["score"] == 0, hide) and np.array_equal(np.isnan(masked["world"]).all(-1), hide)
     assert seen["score"].all()

@@ -1,3 +1,5 @@
+"""Scores of a fitted body: each error shows in its own number only."""
+
 import dataclasses
 from pathlib import Path
 

@@ -16,7 +16,7 @@ def metrics(recipe, ends, steps=100):
 
 def test_checkpoints_come_back_from_the_file_as_they_were_written(tmp_path):
     ends = [(0.1, 20.0), (0.2, 22.5)]
-    rows = curve.rows_of("a", "cuda", metrics("fast", ends)) + curve.rows_of("a", curve.TORCH, metrics("fast", ends[:1]))
+    rows = curve.list_rows("a", "cuda", metrics("fast", ends)) + curve.list_rows("a", curve.TORCH, metrics("fast", ends[:1]))
     curve.write(rows, tmp_path / "curve.csv")
     ours, torch = curve.read(tmp_path / "curve.csv")
     assert (ours.clip, ours.recipe, ours.device, ours.steps, ours.n_gaussians) == ("a", "fast", "cuda", 100, 50)
@@ -34,11 +34,11 @@ def test_a_file_that_is_no_curve_is_refused_by_the_column_that_it_lacks(tmp_path
 
 def test_the_summary_says_when_fast_is_first_as_good_as_paper():
     fast, paper = metrics("fast", [(0.1, 20.0), (0.2, 22.0), (0.3, 23.0)]), metrics("paper", [(3.0, 21.0)])
-    found = curve.summary("a", {("fast", 100): fast, ("paper", 100): paper})
+    found = curve.summarise("a", {("fast", 100): fast, ("paper", 100): paper})
     assert found["paper_psnr_fg"] == 21.0 and found["fast_reaches_it_gpu_seconds"] == 0.2
-    assert "21.00 dB after 0.200 s on the GPU, 0.40 in all" in curve.words(found)[-1]
-    found = curve.summary("a", {("fast", 100): fast, ("paper", 100): metrics("paper", [(3.0, 25.0)])})
-    assert found["fast_reaches_it_gpu_seconds"] is None and "never" in curve.words(found)[-1]
+    assert "21.00 dB after 0.200 s on the GPU, 0.40 in all" in curve.describe(found)[-1]
+    found = curve.summarise("a", {("fast", 100): fast, ("paper", 100): metrics("paper", [(3.0, 25.0)])})
+    assert found["fast_reaches_it_gpu_seconds"] is None and "never" in curve.describe(found)[-1]
 
 
 def test_the_chart_draws_gpu_curves_of_clips_that_the_cpu_did_not_train(tmp_path):

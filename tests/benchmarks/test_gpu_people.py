@@ -1,4 +1,4 @@
-"""The table of many people: both recipes of each, and how far they are apart on average."""
+"""The table of many people: both recipes of each, and their mean difference."""
 
 from __future__ import annotations
 

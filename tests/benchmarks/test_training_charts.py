@@ -1,4 +1,4 @@
-"""What the training charts are made of, on made-up trainings."""
+"""Tables and charts of trainings, on made-up ones."""
 
 import csv
 from dataclasses import replace
@@ -10,7 +10,7 @@ from gsac.benchmarks import training
 from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart
 from gsac.benchmarks.speed_accuracy import chart, novel, table
-from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto, seconds_to
+from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto_front, seconds_to
 from gsac.pipeline.commands.bench import names
 from gsac.stages.contract import BadInput
 
@@ -28,8 +28,8 @@ def test_seconds_to_a_quality_are_those_of_the_first_checkpoint_that_has_it():
 
 
 def test_the_pareto_line_holds_what_nothing_beats():
-    assert pareto(FAST.curve + PAPER.curve) == FAST.curve
-    assert pareto([(1.0, 21.0), (1.0, 23.0), (2.0, 22.0)]) == [(1.0, 23.0)]
+    assert pareto_front(FAST.curve + PAPER.curve) == FAST.curve
+    assert pareto_front([(1.0, 21.0), (1.0, 23.0), (2.0, 22.0)]) == [(1.0, 23.0)]
 
 
 def test_hypervolume_is_the_area_to_an_hour_and_20_db():
@@ -78,12 +78,12 @@ def test_joints_are_moved_onto_the_rays_of_the_truth():
     rng = np.random.default_rng(0)
     truth = rng.normal(0, 0.4, (22, 3)) + [0.2, 0.1, 4.0]
     small, shift = 0.9 * truth, np.array([0.3, -0.2, 0.5])
-    assert novel.moved(small - shift, truth) == pytest.approx(shift, abs=1e-9), "nearer and smaller looks the same"
+    assert novel.solve_translation(small - shift, truth) == pytest.approx(shift, abs=1e-9), "nearer and smaller looks the same"
 
 
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):
     with pytest.raises(BadInput, match="there is no split/frames"):
-        training.of_run(tmp_path)
+        training.read_run(tmp_path)
 
 
 def test_every_benchmark_is_found_by_its_name():

@@ -1,10 +1,12 @@
+"""The viewer benchmark: both pages show the same view, and ratios are of medians."""
+
+from gsac.benchmarks.viewer.avatar import make_avatar
 from gsac.benchmarks.viewer.bench import pages, text
-from gsac.benchmarks.viewer.person import person
-from gsac.benchmarks.viewer.race import Count, processor_s
+from gsac.benchmarks.viewer.race import FrameRate, cpu_seconds
 
 
 def test_both_pages_look_at_the_same_point_from_the_same_distance():
-    avatar = person(200)
+    avatar = make_avatar(200)
     ours, theirs = pages(avatar).values()
     asked = [dict(part.split("=") for part in page.split("#")[1].split("&")) for page in (ours, theirs)]
     assert {k: asked[0][k] for k in ("fov", "dist", "bg")} == {k: asked[1][k] for k in ("fov", "dist", "bg")}
@@ -14,9 +16,9 @@ def test_both_pages_look_at_the_same_point_from_the_same_distance():
 
 
 def test_the_ratio_is_of_medians():
-    counts = {"webgl": [Count(10, .02), Count(30, .04), Count(12, .03)],
-              "software": [Count(18, .01)] * 3,
-              "PlayCanvas": [Count(6, .09), Count(5, .06), Count(7, .05)]}
+    counts = {"webgl": [FrameRate(10, .02), FrameRate(30, .04), FrameRate(12, .03)],
+              "software": [FrameRate(18, .01)] * 3,
+              "PlayCanvas": [FrameRate(6, .09), FrameRate(5, .06), FrameRate(7, .05)]}
     words = text(counts, 6000, 512)
     assert "6000 gaussians, 512 x 512" in words
     for name, frames, processor in (("webgl", "2.00", "2.00"), ("software", "3.00", "6.00"), ("PlayCanvas", "1.00", "1.00")):
@@ -28,9 +30,9 @@ def test_processor_time_counts_a_child_that_works():
     import os
     import subprocess
     import sys
-    before = processor_s(os.getpid())
+    before = cpu_seconds(os.getpid())
     child = subprocess.Popen([sys.executable, "-c", "print(sum(i * i for i in range(3000000)), flush=True); input()"],
                              stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     child.stdout.readline()
-    assert processor_s(os.getpid()) - before > 0.05
+    assert cpu_seconds(os.getpid()) - before > 0.05
     child.communicate(b"\n")

@@ -36,5 +36,5 @@ def test_a_vertex_takes_the_masks_value_at_its_place_and_the_mean_on_a_seam(bake
     vt = np.array([[0.25, 0.2], [0.75, 0.2], [0.5, 0.9], [0.5, 0.2]])
     faces = np.array([[0, 1, 2], [0, 1, 2]])
     ft = np.array([[0, 1, 2], [0, 1, 3]])
-    got = bake.share_of(mask, vt, ft, faces)
+    got = bake.sample_mask(mask, vt, ft, faces)
     np.testing.assert_allclose(got, [0.25, 0.75, 0.25], atol=0.01)

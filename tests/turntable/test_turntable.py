@@ -1,4 +1,7 @@
+"""Truth clips: what the files promise, from the options to the last frame."""
+
 import dataclasses
+from typing import get_args
 
 import cv2
 import numpy as np
@@ -11,9 +14,9 @@ from gsac.avatar.zbuffer import silhouette
 from gsac.turntable import clip
 from gsac.turntable.__main__ import main
 from gsac.turntable.motion import make_motion
-from gsac.turntable.options import HIDDEN_HANDS, TurntableOptions
+from gsac.turntable.options import HiddenHand, TurntableOptions
 from gsac.turntable.person import make_person
-from gsac.turntable.shell import capped, cut, draped
+from gsac.turntable.shell import cut_mesh, drape, pull_to_hull
 
 SMALL = TurntableOptions(seed=3, frames=6, height=320, lossless=True)
 
@@ -47,11 +50,11 @@ def test_masks_are_the_silhouettes_of_the_drawn_person(made):
     person = make_person(SMALL, np.random.default_rng([SMALL.seed, 1]))
     motion = make_motion(person.body, person.joints, SMALL, np.random.default_rng([SMALL.seed, 2]))
     studio = clip.make_studio(person, SMALL)
-    params = clip.place(person, motion, studio.view)
+    params = clip.place_person(person, motion, studio.view)
     camera = studio.view.camera.scaled(360, 640)
     for t, mask in enumerate(masks(out)):
         assert mask.shape == (320, 180)
-        drawn = clip.posed(person, params, t)[1]
+        drawn = clip.pose_person(person, params, t)[1]
         cover = silhouette(drawn, person.faces, camera).reshape(320, 2, 180, 2).mean((1, 3))
         np.testing.assert_allclose(mask, cover * 255, atol=0.51)
 
@@ -119,8 +122,8 @@ def test_planted_feet_stay_where_they_are_until_they_step():
     person = make_person(options, np.random.default_rng(1))
     motion = make_motion(person.body, person.joints, options, np.random.default_rng(2))
     view = clip.make_view(person, options, np.random.default_rng(3))
-    params = clip.place(person, motion, view)
-    feet = np.stack([view.to_world(clip.posed(person, params, t)[2][[7, 8, 10, 11]]) for t in range(60)])
+    params = clip.place_person(person, motion, view)
+    feet = np.stack([view.to_world(clip.pose_person(person, params, t)[2][clip.FEET]) for t in range(60)])
     way = np.linalg.norm(np.diff(feet, axis=0), axis=-1)  # left and right ankles, left and right balls
     still = np.stack([way[:, [0, 2]].max(1), way[:, [1, 3]].max(1)], 1) < 1e-3
     assert (still.mean(0) > 0.4).all() and still.any(1).mean() > 0.9 and way.max() > 0.05
@@ -146,7 +149,7 @@ def test_equal_options_give_equal_files_and_another_seed_another_person(made, tm
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hand", [h for h in HIDDEN_HANDS if h != "none"])
+@pytest.mark.parametrize("hand", [h for h in get_args(HiddenHand) if h != "none"])
 def test_a_hidden_hand_is_flagged_while_it_is_away(hand, tmp_path):
     options = TurntableOptions(seed=5, frames=20, height=240, hidden_hand=hand, supersample=2, vertices=False)
     clip.make_clip(tmp_path, options)
@@ -201,7 +204,7 @@ def test_command_line_makes_a_clip_and_refuses_a_bad_size(tmp_path, capsys):
 
 def test_a_cut_follows_the_fields_zero_line():
     vertices = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
-    pair, share, faces = cut(np.array([[0, 1, 2], [0, 2, 3]]), 0.75 - vertices[:, 0])
+    pair, share, faces = cut_mesh(np.array([[0, 1, 2], [0, 2, 3]]), 0.75 - vertices[:, 0])
     points = vertices[pair[:, 0]] + (vertices[pair[:, 1]] - vertices[pair[:, 0]]) * share[:, None]
     a, b, c = points[faces].transpose(1, 0, 2)
     area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum()
@@ -212,14 +215,14 @@ def test_draped_cloth_falls_straight_below_a_bulge():
     angle, y = np.meshgrid(np.linspace(0, 2 * np.pi, 60, endpoint=False), np.linspace(0, 1, 60))
     radius = 0.1 + 0.1 * np.exp(-((y - 0.8) / 0.05) ** 2)
     points = np.stack([radius * np.sin(angle), y, radius * np.cos(angle)], -1).reshape(-1, 3)
-    out = np.hypot(*draped(points, np.ones(len(points)), slope=0.1)[:, [0, 2]].T).reshape(60, 60)
+    out = np.hypot(*drape(points, np.ones(len(points)), slope=0.1)[:, [0, 2]].T).reshape(60, 60)
     assert (out >= radius - 1e-9).all()
     assert out[30].min() > 0.15 and abs(out[-1] - 0.1).max() < 0.02
 
 
 def test_capped_points_lie_on_the_hull():
     points = np.random.default_rng(0).normal(size=(200, 3))
-    out = capped(points, np.ones(200))
+    out = pull_to_hull(points, np.ones(200))
     from scipy.spatial import ConvexHull
 
     depth = (ConvexHull(points).equations @ np.c_[out, np.ones(200)].T).max(0)

@@ -10,7 +10,7 @@ from gsac.avatar.light import DARKEST, shade
 from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.gpu import Painting, projection
-from gsac.benchmarks.unity.packing import packed
+from gsac.benchmarks.unity.packing import pack_avatar
 from gsac.benchmarks.unity.shaders import KERNELS
 
 pytestmark = pytest.mark.slow
@@ -102,7 +102,7 @@ def test_the_draw_is_two_triangles_a_gaussian_with_the_files_blending_made_linea
 
 def test_what_is_uploaded_is_what_the_kernels_were_tested_with(frame, files):
     asked, _ = frame
-    expected = packed(RiggedAvatar.read(files / "person.gsac"))
+    expected = pack_avatar(RiggedAvatar.read(files / "person.gsac"))
     flips = {"GsacRest": (-1, 1, 1, 1), "GsacMoves": (-1, 1, 1, 1), "GsacLocal": (1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1)}
     for name, array in expected.items():
         got = asked[name].view(array.dtype).reshape(len(array), -1)

@@ -9,7 +9,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.frame import EVEN, index_bits, sort_steps
-from gsac.benchmarks.unity.packing import packed
+from gsac.benchmarks.unity.packing import pack_avatar
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +36,7 @@ def frame(avatar):
 def on_gpu(gpu, kernels, avatar, frame):
     """The device after skin and bind of that frame, and the kernels' parameters."""
     V, N = len(avatar.vertices), len(avatar.gaussians["face"])
-    for name, array in packed(avatar).items():
+    for name, array in pack_avatar(avatar).items():
         gpu.put(name, array)
     gpu.put("GsacWeights", frame["weights"])
     gpu.put("GsacBones", frame["bones"].astype(np.float32))
@@ -88,7 +88,7 @@ def test_a_face_without_area_gives_a_point_and_no_nan(gpu, kernels, figure):
     vertices = figure.vertices.copy()
     f = figure.faces[figure.gaussians["face"][0]]
     vertices[f[1]] = vertices[f[0]]
-    flat = packed(replace(figure, vertices=vertices))
+    flat = pack_avatar(replace(figure, vertices=vertices))
     N = len(flat["GsacCorners"])
     for name in ("GsacCorners", "GsacLocal"):
         gpu.put(name, flat[name])

@@ -9,7 +9,7 @@ from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.raster import render
 from gsac.avatar.rotation import exp
 from gsac.benchmarks.unity.gpu import Painting, projection
-from gsac.benchmarks.unity.packing import packed
+from gsac.benchmarks.unity.packing import pack_avatar
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +52,7 @@ def picture(gpu, passes, scene, pipeline, flipped=False, linear=0):
     splats[:, :3], splats[:, 3:9], splats[:, 9:] = bound.means, c[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], scene.get("shade", 1)
     order = np.argsort(-(bound.means @ scene["total"][2]), kind="stable").astype(np.uint32)
     gpu.put("GsacSplats", splats)
-    gpu.put("GsacColours", packed(scene["avatar"])["GsacColours"])
+    gpu.put("GsacColours", pack_avatar(scene["avatar"])["GsacColours"])
     gpu.put("GsacKeys", order | np.uint32(5 << 13))
     view = np.vstack([scene["view"], [0, 0, 0, 1]])
     eye = -scene["view"][:, :3].T @ scene["view"][:, 3]

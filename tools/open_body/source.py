@@ -1,4 +1,4 @@
-"""Anny's linear body, y up: in its own rest pose, and in the T-pose with SMPL-X's joints."""
+"""Anny's linear body, y up, in its own rest pose and in the T-pose with SMPL-X's joints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TO_Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 
 
 class Source:
-    """The model about a mean body. A body is told by coefficients (K,) of anny's blend shapes."""
+    """The model around a mean body. Coefficients (K,) of anny's blend shapes make a body."""
 
     def __init__(self) -> None:
         self.model = anny.Anny(rig="anny", topology="anny", local_changes="all", facial_actions="all",
@@ -29,7 +29,7 @@ class Source:
         self.weights = fold_weights(self.model, self.bones)
 
     def stand(self, mean: np.ndarray) -> None:
-        """Takes the turns to the T-pose, and the jaw's place, from the body with these coefficients."""
+        """Computes the rotations to the T-pose and the jaw's place on the mean body. mean: (K,) coefficients."""
         self.mean_vertices, heads = self.rest(mean)
         self.mean_heads = dict(zip(self.bones, heads, strict=True))
         self.rotations = t_pose_rotations(self.mean_heads, finger_tails(self.mean_heads, self.mean_vertices, self.weights))
@@ -39,23 +39,26 @@ class Source:
         self.a_inverse = np.linalg.inv(np.einsum("vj,jba->vab", self.weights, self.rotations))
 
     def coefficients(self, phenotypes: np.ndarray, local: np.ndarray) -> np.ndarray:
-        """(S, K) of bodies with anny's phenotypes (S, 6) and local sliders (S, L), faces at rest."""
+        """Coefficients (S, K) of bodies with neutral faces. phenotypes: (S, 6) of anny; local: (S, L) sliders."""
         with torch.no_grad():
             return self.model._get_phenotype_blendshape_coefficients(
                 torch.as_tensor(phenotypes), torch.as_tensor(local), torch.zeros(len(local), ACTIONS, dtype=torch.float64)).numpy()
 
     def rest(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (V, 3) and bone heads (B, 3) in anny's rest pose."""
+        """Vertices (V, 3) m and bone heads (B, 3) m in anny's rest pose. c: (K,) coefficients."""
         return self.vertices + np.tensordot(c, self.shape_vertices, 1), self.heads + np.tensordot(c, self.shape_heads, 1)
 
     def joints(self, vertices: np.ndarray, heads: np.ndarray) -> np.ndarray:
-        """(55, 3) in anny's rest pose; the jaw rides on the skin beside the ear."""
+        """Joints (55, 3) m in anny's rest pose; the jaw moves with the skin beside the ear.
+
+        vertices: (V, 3) m; heads: (B, 3) m; of `rest`.
+        """
         at = dict(zip(self.bones, heads, strict=True))
         shift = (vertices[self.ear] - self.mean_vertices[self.ear]).mean(0) * np.array([0, 1, 1])
         return np.stack([self.jaw + shift if j == "jaw" else at[head_bone(j)] for j in JOINTS])
 
     def t_pose(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (V, 3) in the T-pose, whose LBS back to anny's rest pose is exact, and joints (55, 3)."""
+        """Vertices (V, 3) m in the T-pose, whose LBS back to anny's rest pose is exact, and joints (55, 3) m. c: (K,)."""
         vertices, heads = self.rest(c)
         joints = self.joints(vertices, heads)
         out = joints.copy()

@@ -16,7 +16,7 @@ pytestmark = [
 @pytest.mark.parametrize("size, count", [((101, 67), 17), ((101, 67), 3000), ((333, 500), 20000)])
 def test_image_loss_and_gradients_are_those_of_gsplat(size, count):
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.baseline import Loop, on_device, tensor
+    from gsac.benchmarks.gpu.baseline import TorchTrainer, on_device, tensor
     from gsac.benchmarks.gpu.check import LIMIT, PER_GAUSSIAN, SWAPS, cuda_step, relative
     from gsac.benchmarks.gpu.figure import figure, start
     from gsac.stages.train.config import TrainConfig
@@ -30,9 +30,9 @@ def test_image_loss_and_gradients_are_those_of_gsplat(size, count):
     got = cuda_step(trainer)
     trainer.close()
 
-    loop = Loop(made.body, made.pose, made.transl, shown, recipe)
+    loop = TorchTrainer(made.body, made.pose, made.transl, shown, recipe)
     placed = loop.fitted[t].clone().requires_grad_()
-    loss, rgb, alpha = loop.seen(placed, on_device([made.shots[t]])[0], tensor(background))
+    loss, rgb, alpha = loop.evaluate(placed, on_device([made.shots[t]])[0], tensor(background))
     loss.backward()
     expected = {name: value.grad.cpu().numpy() for name, value in zip(PER_GAUSSIAN, loop.values, strict=True)}
     expected |= {"pose": placed.grad[:55].cpu().numpy(), "transl": placed.grad[55].cpu().numpy(), "loss": loss.item(),

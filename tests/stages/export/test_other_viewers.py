@@ -9,7 +9,7 @@ import pytest
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.benchmarks.viewer.bench import CAMERA, PACKAGE, PAGE, pages
-from gsac.benchmarks.viewer.race import served
+from gsac.benchmarks.viewer.race import serve
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]
@@ -62,7 +62,7 @@ def test_playcanvas_shows_what_our_page_shows(exported, node_package, name):
         shutil.copy(file, folder / file.name)
     ours, theirs = pages(RiggedAvatar.read(exported / "avatar.gsac")).values()
     pose = {"avatar.ply": "A", "avatar.glb": "T"}[name]
-    with served(folder) as address:
+    with serve(folder) as address:
         got = shown(f"{address}/{theirs.replace('avatar.ply', name)}")
         want = shown(f"{address}/{ours.replace('clip=walk', f'pose={pose}')}&still")
     a, b = person(got), person(want)
@@ -80,7 +80,7 @@ def test_spark_shows_the_spz_the_right_way_round(exported, node_package):
         shutil.copy(exported / file, folder / file)
     height = (avatar.vertices[:, 1].max() - avatar.ground) / 2
     (folder / "show.html").write_text(SHOW_SPZ.replace("HEIGHT", f"{height:.4f}").replace("DISTANCE", str(CAMERA["dist"])))
-    with served(folder) as address:
+    with serve(folder) as address:
         got = shown(f"{address}/show.html")
         want = shown(f"{address}/{pages(avatar)['software'].replace('clip=walk', 'pose=A')}&still")
     a, b = person(got), person(want)

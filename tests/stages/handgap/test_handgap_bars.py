@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gsac.benchmarks.handgap.clips import turning_body
-from gsac.benchmarks.handgap.failures import detection
-from gsac.benchmarks.handgap.gaps import measure, summary
+from gsac.benchmarks.handgap.clips import make_turning_body
+from gsac.benchmarks.handgap.failures import measure_detection
+from gsac.benchmarks.handgap.gaps import measure, summarise
 
 pytestmark = pytest.mark.slow
 METHODS = ("turning", "gp", "hermite", "paper")
@@ -14,14 +14,14 @@ LOST = ("arm", "hand")
 
 @pytest.fixture(scope="module")
 def clips():
-    return {seed: turning_body(seed) for seed in (1, 2, 3, 4, 5)}
+    return {seed: make_turning_body(seed) for seed in (1, 2, 3, 4, 5)}
 
 
 @pytest.fixture(scope="module")
 def errors(clips):
     """place, what is lost, gap, method -> mean palm error px; within: share of all errors within sigma."""
     rows = measure(clips, METHODS, gaps=(2, 8, 24), inside=4)
-    means = {(r["place"], r["lost"], r["gap"], r["method"]): r["mean_px"] for r in summary(rows)}
+    means = {(r["place"], r["lost"], r["gap"], r["method"]): r["mean_px"] for r in summarise(rows)}
     return means | {"within": np.concatenate([r["within"] for r in rows if r["method"] == "turning"]).mean()}
 
 
@@ -48,6 +48,6 @@ def test_two_errors_of_three_lie_within_sigma(errors):
 
 
 def test_missing_and_misplaced_hands_are_found(clips):
-    for row in detection(clips):
+    for row in measure_detection(clips):
         assert row["wrong"] == 0 or row["recall"] >= 0.95, row
         assert row["false_alarms"] <= 0.01, row

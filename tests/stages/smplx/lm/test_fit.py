@@ -14,7 +14,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.sightings import HIPS
 from gsac.stages.smplx.state import to_params
-from gsac.turntable.shell import draped
+from gsac.turntable.shell import drape
 from support.turning_person import FOCAL, HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
 
 
@@ -63,7 +63,7 @@ def in_a_shirt(body: Body, bare: BodyParams) -> tuple[Body, BodyParams]:
     """Cloth that falls from the chest to the hips; joints stay where they are."""
     rest, joints = body.rest(bare.betas)
     trunk = (rest[:, 1] > 0.07) & (rest[:, 1] < 0.52) & (np.abs(rest[:, 0]) < 0.2)
-    shirt = replace(body, v_template=body.v_template + draped(rest, trunk * np.clip((0.52 - rest[:, 1]) / 0.08, 0, 1)) - rest)
+    shirt = replace(body, v_template=body.v_template + drape(rest, trunk * np.clip((0.52 - rest[:, 1]) / 0.08, 0, 1)) - rest)
     return shirt, replace(bare, joint_offset=joints - shirt.rest(bare.betas)[1])
 
 

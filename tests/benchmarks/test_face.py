@@ -1,4 +1,4 @@
-"""The people that the face's table is measured on, and what the shipped table makes of one whom it never saw."""
+"""The made-up people on whom the face's table is measured, and the committed table on people whom it never saw."""
 
 import os
 from pathlib import Path
@@ -12,14 +12,14 @@ from gsac.avatar.body import Body
 from gsac.avatar.facemesh import MODELS, Face, FaceMesh
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.avatar.region import Region
-from gsac.benchmarks import face_people
-from gsac.benchmarks.face_drawing import Head, Look
-from gsac.benchmarks.face_people import DRAWN, Reader, any_expression
+from gsac.benchmarks.face import people as face_people
+from gsac.benchmarks.face.drawing import Head, Portrait
+from gsac.benchmarks.face.people import DRAWN, Reader, sample_expression
 from gsac.benchmarks.perception import ACTIONS
 from gsac.stages.face.actions import TABLE, Actions, pace, smooth, solve
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.landmarks import align, look
-from gsac.turntable.motion import expressions
+from gsac.turntable.motion import make_expressions
 from gsac.turntable.options import TurntableOptions
 from support.scripts import script
 
@@ -49,14 +49,14 @@ def people(tmp_path_factory, store) -> list[dict]:
         patch.setattr(face_people, "FRAMES", 18)
         patch.setattr(face_people, "DRAWN", UNKNOWN[1])
         reader = Reader(store)
-        return [reader.person(seed, tmp_path_factory.mktemp("people")) for seed in UNKNOWN]
+        return [reader.read(seed, tmp_path_factory.mktemp("people")) for seed in UNKNOWN]
 
 
 def drawn_clip(mesh: FaceMesh, mirror: np.ndarray, seed: int) -> dict[str, np.ndarray]:
     """A drawn head that turns past the camera, 50 to 110 px between the eyes' outer corners, with a truth clip's expressions."""
     body, rng = Body.load(), np.random.default_rng([seed, 78])
-    head, share = Head(body, rng.normal(0, 1, body.num_figure), Look.of(rng)), rng.uniform(0.45, 1)
-    expression = expressions(body, TurntableOptions(seed=seed, frames=90), np.random.default_rng([seed, 2]))[:LENGTH]
+    head, share = Head(body, rng.normal(0, 1, body.num_figure), Portrait.sample(rng)), rng.uniform(0.45, 1)
+    expression = make_expressions(body, TurntableOptions(seed=seed, frames=90), np.random.default_rng([seed, 2]))[:LENGTH]
     nod = 0.1 * np.sin(np.arange(LENGTH) / 5 + seed) - 0.05
     turn = Rotation.from_euler("YX", np.stack([np.linspace(-0.95, 0.95, LENGTH), nod], 1)).as_matrix()
     landmarks = np.full((LENGTH, 468, 3), np.nan)
@@ -81,7 +81,7 @@ def test_nobody_is_measured_on_whom_truth_clips_show():
 def test_expressions_are_in_range_and_now_and_then_at_rest():
     names = Body.load().expression_names
     rng = np.random.default_rng(0)
-    many = np.array([any_expression(names, rng) for _ in range(300)])
+    many = np.array([sample_expression(names, rng) for _ in range(300)])
     assert many.min() == 0 and many.max() <= 1 and 10 < (~many.any(axis=1)).sum() < 60
     assert (many > 0).any(axis=0).all()
 

@@ -1,7 +1,7 @@
-"""People of the turntable whose faces do many things, as the face network reads them: what `face_actions` learns from.
+"""Landmarks that the face network finds on made-up people with known expressions: the data of `tools/face_actions.py`.
 
-A person's seed decides body, colours, light and room as in any truth clip; here each of `FRAMES` frames has a yaw, a nod and an
-expression of its own, and only the head is drawn, at a size that differs from person to person, and coded as a video.
+A person's seed decides body, colours, light and room, as in any truth clip. Each of `FRAMES` frames has a random yaw, nod and
+expression; only the head is drawn, at a size that differs between people, and coded as a video.
 """
 
 from __future__ import annotations
@@ -21,70 +21,74 @@ from gsac.avatar.network_files import model_path
 from gsac.avatar.region import Region
 from gsac.avatar.wholebody import INDEX
 from gsac.avatar.zbuffer import interpolate, rasterise
-from gsac.benchmarks.face_drawing import SMALLEST, Head, Look
+from gsac.benchmarks.face.drawing import SMALLEST, Head, Portrait
 from gsac.benchmarks.perception import video_frames
 from gsac.stages.face.landmarks import look
-from gsac.turntable.clip import Video, develop, make_studio, make_view, place, posed, studio_rng
+from gsac.turntable.clip import FEET, VideoWriter, develop, make_studio, make_view, place_person, pose_person, studio_rng
 from gsac.turntable.motion import make_motion
 from gsac.turntable.options import TurntableOptions
 from gsac.turntable.person import Person, make_person
 
 FRAMES = 44
+"""Frames of a person."""
 DRAWN = 2000
-"""Seeds from here on are drawn heads."""
+"""Seeds from this one on are heads of `drawing`; smaller ones are people of the turntable."""
 HEIGHTS = (1200, 2800)
-"""Pixels of the whole person's picture: 35 to 80 between the eyes."""
+"""Least and largest height, px, of the whole person's picture: 35 to 80 px between the eyes."""
 FRONTAL = 0.35
-"""Radians of yaw up to which a point's pixel tells where on the skin it lies."""
+"""Largest yaw, rad, at which a point's pixel is taken for its place on the skin."""
 MARGIN = 2.6
-"""Drawn about the eyes, in distances between them."""
+"""Margin of the drawn window about the eyes, in distances between them."""
 EYES = [INDEX["left_eye"], INDEX["right_eye"]]
 
 
-def looks_of(seeds: list[int], store: Path, folder: Path) -> list[dict[str, np.ndarray]]:
-    """One dict a person, kept in folder so that a broken run goes on: landmarks (T, 468, 3) px or NaN, expression (T, 52), and
-    places (468, 3) m, where on the plain template the points lie, NaN where no frontal frame tells."""
+def read_people(seeds: list[int], store: Path, folder: Path) -> list[dict[str, np.ndarray]]:
+    """The arrays of `Reader.read`, shapes (T, ...), for each seed; kept in `folder`, so that an interrupted run can go on."""
     reader, out = Reader(store), []
     folder.mkdir(parents=True, exist_ok=True)
     for seed in seeds:
         kept = folder / f"{seed}.npz"
         if not kept.exists():
-            write_arrays(kept, **reader.person(seed, folder))
+            write_arrays(kept, **reader.read(seed, folder))
             print(f"person {seed}", flush=True)
         out.append(read_arrays(kept))
     return out
 
 
 class Reader:
-    """Draws people and looks at them as the stage does."""
+    """Draws people and runs the face network on them as the stage does."""
 
     def __init__(self, store: Path):
         self.mesh = FaceMesh({name: model_path(name, store) for name in MODELS}, threads=1)
         self.mirror: np.ndarray | None = None
 
-    def person(self, seed: int, folder: Path) -> dict[str, np.ndarray]:
+    def read(self, seed: int, folder: Path) -> dict[str, np.ndarray]:
+        """One person: landmarks (T, 468, 3) px, NaN where no face was found; expression (T, 52); places (468, 3) m.
+
+        places: the points on the template's skin; NaN where no frontal frame shows them. folder: for the video, which is removed.
+        """
         if seed >= DRAWN:
-            return self.drawn(seed)
-        scene = Scene.of(seed)
+            return self._read_drawn(seed)
+        scene = Scene.sample(seed)
         clip = folder / f"{seed}.mp4"
         scene.film(clip)
         landmarks = np.full((FRAMES, POINTS, 3), np.nan, np.float32)
         images = list(video_frames(clip))
         if self.mirror is None:
-            self.mirror = mirror_of(self._find(images, scene, int(np.abs(scene.yaw).argmin())).points)
+            self.mirror = find_mirror(self._find(images, scene, int(np.abs(scene.yaw).argmin())).points)
         for t, image in enumerate(images):
             face = self._find(images, scene, t)
             if face is not None:
                 landmarks[t] = self._look(image, face)
         clip.unlink()
-        return {"landmarks": landmarks, "expression": scene.expression, "places": scene.places(landmarks)}
+        return {"landmarks": landmarks, "expression": scene.expression, "places": scene.locate(landmarks)}
 
-    def drawn(self, seed: int) -> dict[str, np.ndarray]:
-        """Another person, drawn plainly; where the points lie on the skin only the turntable's people tell."""
+    def _read_drawn(self, seed: int) -> dict[str, np.ndarray]:
+        """As `read`, of a head of `drawing`; places are all NaN, the turntable's people give them."""
         rng, body = np.random.default_rng([seed, 77]), Body.load()
-        head = Head(body, rng.normal(0, 1, body.num_figure), Look.of(rng))
+        head = Head(body, rng.normal(0, 1, body.num_figure), Portrait.sample(rng))
         share = float(np.exp(rng.uniform(np.log(SMALLEST), 0)))
-        expression = np.array([any_expression(body.expression_names, rng) for _ in range(FRAMES)], np.float32)
+        expression = np.array([sample_expression(body.expression_names, rng) for _ in range(FRAMES)], np.float32)
         turn = Rotation.from_euler("ZXY", rng.normal(0, 1, (FRAMES, 3)) * [0.08, 0.18, 0])
         yaw = rng.uniform(-1, 1, FRAMES)
         turn = (Rotation.from_euler("Y", yaw[:, None]) * turn).as_matrix()
@@ -96,36 +100,38 @@ class Reader:
             if face is None:
                 continue
             if self.mirror is None:
-                self.mirror = mirror_of(face.points)
+                self.mirror = find_mirror(face.points)
             landmarks[t] = self._look(image, face)
         return {"landmarks": landmarks, "expression": expression, "places": np.full((POINTS, 3), np.nan, np.float32)}
 
     def _look(self, image: np.ndarray, face: Face) -> np.ndarray:
-        """(468, 3) px, NaN where the network does not believe in it."""
+        """Landmarks (468, 3) px, NaN where the network finds no face. image: (H, W, 3) uint8."""
         seen = look(self.mesh, image, face.points, self.mirror)
         return seen.points if seen.presence >= 0.5 else np.full((POINTS, 3), np.nan)
 
     def _find(self, images: list[np.ndarray], scene: Scene, t: int) -> Face | None:
+        """The face in frame t, searched for around the true eyes."""
         middle = scene.eyes[t] - scene.corner
         return self.mesh.find(images[t], Region((float(middle[0]), float(middle[1])), 6 * scene.apart))
 
 
 @dataclasses.dataclass
 class Scene:
-    """One person before the camera."""
+    """One person of the turntable in T random poses of the head."""
 
     person: Person
     options: TurntableOptions
     expression: np.ndarray  # (T, 52)
     yaw: np.ndarray  # (T,) rad
-    frames: list  # of `posed`
-    eyes: np.ndarray  # (T, 2) px of the whole picture, between the eyes
-    apart: float  # px, the most between the eyes
-    corner: np.ndarray  # (2,) px of the window in the whole picture
-    window: Camera
+    frames: list[tuple[np.ndarray, np.ndarray, np.ndarray]]  # T times bare (V, 3), drawn (N, 3), joints (55, 3), of `pose_person`
+    eyes: np.ndarray  # (T, 2) px of the whole picture, middle of both eyes
+    apart: float  # px, largest distance between the eyes
+    corner: np.ndarray  # (2,) px, the window's first pixel in the whole picture
+    window: Camera  # of the part of the picture that is drawn
 
     @classmethod
-    def of(cls, seed: int) -> Scene:
+    def sample(cls, seed: int) -> Scene:
+        """Draws the person of a seed."""
         rng = np.random.default_rng([seed, 77])
         height = int(np.exp(rng.uniform(*np.log(HEIGHTS))) // 2 * 2)
         options = TurntableOptions(seed=seed, height=height, frames=FRAMES)
@@ -137,11 +143,11 @@ class Scene:
         turned = np.stack([nod / 2, rng.normal(0, 0.1, FRAMES), tilt], 1)
         pose[:, names.index("head")] = Rotation.from_euler("XYZ", turned).as_rotvec()
         pose[:, names.index("neck")] = Rotation.from_euler("X", (nod / 2)[:, None]).as_rotvec()
-        expression = np.array([any_expression(person.body.expression_names, rng) for _ in range(FRAMES)], np.float32)
+        expression = np.array([sample_expression(person.body.expression_names, rng) for _ in range(FRAMES)], np.float32)
         motion = dataclasses.replace(motion, pose=pose, yaw=yaw, expression=expression)
         view = make_view(person, options, studio_rng(options))
-        params = place(person, motion, view)
-        frames = [posed(person, params, t) for t in range(FRAMES)]
+        params = place_person(person, motion, view)
+        frames = [pose_person(person, params, t) for t in range(FRAMES)]
         eyes = np.array([view.camera.project(person.body.keypoints(bare))[EYES] for bare, _, _ in frames])
         apart = float(np.linalg.norm(eyes[:, 0] - eyes[:, 1], axis=-1).max())
         middle = eyes.mean(1)
@@ -153,16 +159,20 @@ class Scene:
                    Camera(view.camera.focal, center, width, height))
 
     def film(self, clip: Path) -> None:
+        """Writes the window as a video."""
         studio = make_studio(self.person, self.options, self.window)
         options = dataclasses.replace(self.options, width=self.window.width, height=self.window.height)
-        video = Video(clip, options)
+        video = VideoWriter(clip, options)
         for t, (_, drawn, joints) in enumerate(self.frames):
-            picture = studio.picture(drawn, studio.view.to_world(joints[[7, 8, 10, 11]]))
+            picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
             video.add(develop(picture, options, t, noise=True))
         video.close()
 
-    def places(self, landmarks: np.ndarray) -> np.ndarray:
-        """landmarks: (T, 468, 3) px in the window. (468, 3) m: the median over frontal frames, NaN where there is none."""
+    def locate(self, landmarks: np.ndarray) -> np.ndarray:
+        """Places (468, 3) m on the template's skin, median over frontal frames, NaN without one.
+
+        landmarks: (T, 468, 3) px in the window.
+        """
         body: Body = self.person.body
         found = np.full((FRAMES, POINTS, 3), np.nan, np.float32)
         for t in np.flatnonzero((np.abs(self.yaw) < FRONTAL) & np.isfinite(landmarks[:, 0, 0])):
@@ -178,9 +188,12 @@ class Scene:
         return out
 
 
-def any_expression(names: tuple[str, ...], rng: np.random.Generator) -> np.ndarray:
-    """(52,) now and then at rest; half of the time talking, smiling, brows and lids as truth clips have them, independent of each
-    other; else a few actions out of all, most of them on both sides."""
+def sample_expression(names: tuple[str, ...], rng: np.random.Generator) -> np.ndarray:
+    """Random facial actions (52,) in 0..1.
+
+    8 % are neutral; 47 % mix talking, smiling, brows and lids as truth clips do, but independently; the rest have one to five
+    random actions, mostly on both sides.
+    """
     out, index = np.zeros(len(names)), {name: i for i, name in enumerate(names)}
 
     def put(value: float, *actions: str) -> None:
@@ -217,9 +230,8 @@ def any_expression(names: tuple[str, ...], rng: np.random.Generator) -> np.ndarr
     return out
 
 
-def mirror_of(points: np.ndarray) -> np.ndarray:
-    """points: (468, 3), nearly symmetric about the middle of the face. Returns (468,) the pairing that is its own inverse and lies
-    closest."""
+def find_mirror(points: np.ndarray) -> np.ndarray:
+    """Index (468,) of each landmark's mirror image, an involution. points: (468, 3) px of a nearly symmetric face."""
     across = points[LEFT_EYE] - points[RIGHT_EYE]
     across /= np.linalg.norm(across)
     centred = points - (points[LEFT_EYE] + points[RIGHT_EYE]) / 2

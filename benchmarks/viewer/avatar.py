@@ -1,4 +1,4 @@
-"""An avatar to show where none is given: the open body, gaussians by area, clothes of two colours, the left hand red."""
+"""A made-up avatar: the open body, gaussians spread by area, clothes of two colours, the left hand red."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from gsac.stages.export.stage import rigged
 
 SEED = 1
 WRIST = 20
+"""The left wrist's joint."""
 
 
-def person(count: int) -> RiggedAvatar:
-    """A person of `count` gaussians with the walk and the wave."""
+def make_avatar(count: int) -> RiggedAvatar:
+    """An avatar of `count` gaussians with the clips walk and wave."""
     body, rng = Body.load(), np.random.default_rng(SEED)
     betas = np.zeros(body.num_betas, np.float32)
     params = BodyParams.from_pose(np.zeros((1, 55, 3)), np.zeros((1, 3)), betas, np.zeros((1, len(body.expression_names))), 1000,

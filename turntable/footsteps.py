@@ -1,6 +1,6 @@
-"""Feet that stand: soles stay where they are on the floor while the body turns over them, and step after it one at a time.
+"""Planted feet: soles rest on the floor while the body turns over them, then step after it one at a time.
 
-World: y up, the person turns about the origin. The legs are solved from hip to ankle (two bones, the knee over the toes).
+World: y up, the person turns about the origin. Legs by inverse kinematics of two bones, the knee over the toes.
 """
 
 from __future__ import annotations
@@ -13,19 +13,21 @@ STEPS = 8
 SWING = 0.4
 """Share of the time between two steps that a foot is in the air."""
 LIFT = 0.06
-"""m that a foot rises."""
+"""m, height of a step."""
 BEND = 0.005
-"""m that the hips hang lower than straight legs would hold them."""
+"""m by which the hips are lower than on straight legs."""
 
 
-def plant(pose: np.ndarray, index: dict, joints: np.ndarray, yaw: np.ndarray, place: np.ndarray, turns: np.ndarray) -> None:
+def plant_feet(pose: np.ndarray, index: dict[str, int], joints: np.ndarray, yaw: np.ndarray, place: np.ndarray,
+               turns: np.ndarray) -> None:
     """Sets hips, knees and ankles of pose (T, 55, 3), in place.
 
-    joints: (55, 3) rest, m; yaw: (T,) rad; place: (T, 2) m of the pelvis; turns: (T, 3, 3) of the pelvis in the world.
+    index: joint by name; joints: (55, 3) m, T-pose; yaw: (T,) rad; place: (T, 2) m, world x and z of the pelvis;
+    turns: (T, 3, 3), the pelvis' rotation in the world.
     """
     pelvis = joints[index["pelvis"]]
     legs = {side: [joints[index[f"{side}_{part}"]] for part in ("hip", "knee", "ankle")] for side in ("left", "right")}
-    stance = {side: _stance(pose[0], index, leg, pelvis, side) for side, leg in legs.items()}
+    stance = {side: _find_stance(pose[0], index, leg, pelvis, side) for side, leg in legs.items()}
     height = min(_reach(leg, stance[side][1], pelvis) for side, leg in legs.items()) - BEND
     for (side, leg), phase in zip(legs.items(), (0.0, 0.5), strict=True):
         foot, rise = _steps(yaw, phase)
@@ -41,22 +43,22 @@ def plant(pose: np.ndarray, index: dict, joints: np.ndarray, yaw: np.ndarray, pl
                 pose[t, index[f"{side}_{part}"]] = Rotation.from_matrix(turn).as_rotvec()
 
 
-def _stance(pose: np.ndarray, index: dict, leg: list, pelvis: np.ndarray, side: str) -> tuple[float, np.ndarray]:
-    """Where the A-pose has a foot: its turn outwards, rad, and its ankle (2,) across and along, from the pelvis, m."""
+def _find_stance(pose: np.ndarray, index: dict[str, int], leg: list, pelvis: np.ndarray, side: str) -> tuple[float, np.ndarray]:
+    """A foot in the A-pose: its outward turn, rad, and x and z (2,) m of its ankle from the pelvis."""
     hip = Rotation.from_rotvec(pose[index[f"{side}_hip"]])
     ankle = leg[0] - pelvis + hip.apply(leg[2] - leg[0])
     return float(pose[index[f"{side}_hip"], 1]), ankle[[0, 2]]
 
 
 def _reach(leg: list, ankle: np.ndarray, pelvis: np.ndarray) -> float:
-    """Height of the pelvis over the ankles, m, when this leg is straight and as far from upright as its steps take it."""
+    """Height of the pelvis over the ankle, m, with this leg straight at the farthest point of a step."""
     upper, lower = np.linalg.norm(leg[1] - leg[0]), np.linalg.norm(leg[2] - leg[1])
     away = leg[0][[0, 2]] - pelvis[[0, 2]] - Rotation.from_euler("z", np.pi / STEPS).as_matrix()[:2, :2] @ ankle
     return float(np.sqrt((upper + lower) ** 2 - away @ away) - (leg[0] - pelvis)[1])
 
 
 def _steps(yaw: np.ndarray, phase: float) -> tuple[np.ndarray, np.ndarray]:
-    """The foot's own yaw (T,), which waits and then catches up, and how far it is lifted (T,), m."""
+    """The foot's yaw (T,) rad, which waits and then catches up with the body, and its height (T,) m."""
     at = yaw / (2 * np.pi) * STEPS + phase
     share = np.clip((at % 1 - (1 - SWING)) / SWING, 0, 1)
     swung = share * share * (3 - 2 * share)
@@ -64,7 +66,7 @@ def _steps(yaw: np.ndarray, phase: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _two_bones(leg: list, hip: np.ndarray, ankle: np.ndarray, forward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World turns (3, 3) of thigh and shank that bring the ankle from hip (3,) to its place (3,), knee towards `forward` (3,)."""
+    """Rotations (3, 3) of thigh and shank in the world that reach from hip (3,) to ankle (3,), knee towards `forward` (3,)."""
     upper, lower = np.linalg.norm(leg[1] - leg[0]), np.linalg.norm(leg[2] - leg[1])
     way = ankle - hip
     length = min(np.linalg.norm(way), 0.9995 * (upper + lower))
@@ -79,7 +81,7 @@ def _two_bones(leg: list, hip: np.ndarray, ankle: np.ndarray, forward: np.ndarra
 
 
 def _axes(bone: np.ndarray, hinge: np.ndarray) -> np.ndarray:
-    """(3, 3) columns: along the bone, the hinge made square to it, and the third."""
+    """(3, 3) columns: along the bone, the hinge orthogonal to it, and their cross product."""
     bone = bone / np.linalg.norm(bone)
     hinge = hinge - bone * (bone @ hinge)
     hinge = hinge / np.linalg.norm(hinge)

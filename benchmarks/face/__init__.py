@@ -1,0 +1,1 @@
+"""Made-up faces, from which `tools/face_actions.py` measures the face network."""
