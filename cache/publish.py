@@ -11,7 +11,6 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gsac.cache import objects
 from gsac.cache.digest import tree_digest
@@ -19,9 +18,7 @@ from gsac.cache.errors import CacheError, IntegrityError, from_os_error
 from gsac.cache.key import KeyParts
 from gsac.cache.lock import common
 from gsac.cache.record import Record, RunInfo
-
-if TYPE_CHECKING:
-    from gsac.cache.store import Store
+from gsac.cache.store import Store
 
 STEPS = (
     "started",
@@ -76,7 +73,7 @@ def publish(
                 objects.sync_one(place)
             objects.sync_one(store.root / "objects")
             step("places synced")
-            return _record(store, Record(parts.key(), parts, digests, info, footprints), replace, step)
+            return _record(store, Record(parts.key, parts, digests, info, footprints), replace, step)
     except OSError as error:
         raise from_os_error(error, store.root, needed) from error
 

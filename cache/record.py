@@ -68,7 +68,7 @@ class Record:
                 info=RunInfo(**raw["info"]),
                 footprints={name: Footprint(**f) for name, f in raw["footprints"].items()},
             )
-            sound = record.parts.key() == record.key and record.footprints.keys() == record.outputs.keys()
+            sound = record.parts.key == record.key and record.footprints.keys() == record.outputs.keys()
         except (ValueError, KeyError, TypeError, AttributeError):
             return None
         return record if sound else None

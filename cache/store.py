@@ -22,8 +22,7 @@ from gsac.cache.errors import from_os_error
 from gsac.cache.key import KeyParts
 from gsac.cache.lock import exclusive
 from gsac.cache.memo import Memo, memo_in
-from gsac.cache.publish import publish
-from gsac.cache.record import Record, RunInfo
+from gsac.cache.record import Record
 from gsac.cache.root import default_root
 
 FOLDERS = ("objects", "actions", "tmp", "leases", "quarantine", "partial", "models")
@@ -114,18 +113,6 @@ class Store:
     def partial(self, key: str) -> Path:
         """Folder that a run of the key may make and leave behind, unlike `private`; only the holder of the key touches it."""
         return self.root / "partial" / key
-
-    def publish(
-        self,
-        parts: KeyParts,
-        folder: Path,
-        outputs: tuple[str, ...],
-        info: RunInfo,
-        replace: bool = False,
-        step: Callable[[str], None] = lambda name: None,
-    ) -> Record:
-        """See `publish.publish`."""
-        return publish(self, parts, folder, outputs, info, replace, step)
 
     def previous(self, stage: str, like: KeyParts) -> Record | None:
         """The record of the stage that differs least from `like` (the newest of equals), to explain a new key."""

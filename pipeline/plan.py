@@ -80,7 +80,7 @@ class Verdict:
 
 def judge(store: Store, parts: KeyParts, forced: bool = False) -> Verdict:
     """Whether the result of this key is there; if not, what differs from the most similar earlier run."""
-    record = store.lookup(parts.key())
+    record = store.lookup(parts.key)
     if forced:
         return Verdict(parts.stage, Reason.FORCED, parts, record)
     if record is not None:

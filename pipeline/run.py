@@ -125,7 +125,8 @@ class Chain:
                 makers = {self.graph.producer[p] for p in unknown}
                 verdicts.append(waits(name, [maker for maker in self.graph.steps if maker in makers]))
                 continue
-            verdict = self._judge(name, digests, options)
+            parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
+            verdict = judge(self.store, parts, forced=name in options.force)
             verdicts.append(verdict)
             if verdict.current:
                 digests |= _ports(verdict.record)
@@ -145,9 +146,10 @@ class Chain:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]
                 actor.begun = partial(actor.prepare, *following) if following else partial(at_last, name)
-                inputs = {port: digests[port] for port in self.graph.step(name).deps}
-                lease.add(self.keys.parts(name, inputs).key())
-                verdict = self._judge(name, digests, options)
+                inputs = self.graph.step(name).deps
+                parts = self.keys.parts(name, {port: digests[port] for port in inputs})
+                lease.add(parts.key)
+                verdict = judge(self.store, parts, forced=name in options.force)
                 if verdict.current:
                     outcome, record = Outcome.CACHED, verdict.record
                 elif name in required:
@@ -167,10 +169,6 @@ class Chain:
     def _actor(self) -> Actor:
         return Actor(self.keys, self.store, self.reporter, self.workspace.root / "logs")
 
-    def _judge(self, name: str, digests: dict[str, str], options: Options) -> Verdict:
-        parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
-        return judge(self.store, parts, forced=name in options.force)
-
     def _done(self, verdict: Verdict, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(verdict, outcome, record, self.configs[verdict.stage]))
         self.metrics |= record.info.metrics
@@ -182,7 +180,7 @@ class Chain:
             yield
         except (StageError, CacheError) as error:
             self.reporter.ends(verdict.stage, Outcome.FAILED, 0.0)
-            self.results.append(StageResult(verdict.stage, Outcome.FAILED, verdict.sentence, verdict.parts.key(),
+            self.results.append(StageResult(verdict.stage, Outcome.FAILED, verdict.sentence, verdict.parts.key,
                                             params=plain(self.configs[verdict.stage]), error=str(error)))
             raise StageFailedError(verdict.stage, error, actor.logs / f"{verdict.stage}.log") from error
 

@@ -15,6 +15,7 @@ from gsac.cache import objects
 from gsac.cache.errors import FULL, CacheError, CacheFullError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
+from gsac.cache.publish import publish
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store
 from gsac.pipeline.child import Child, StageBugError, tail
@@ -104,13 +105,13 @@ class Actor:
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
         name, parts = verdict.stage, verdict.parts
-        with single_flight(self.store, parts.key(), lambda: self._waiting(name)) as there:
+        with single_flight(self.store, parts.key, lambda: self._waiting(name)) as there:
             if there is not None and not forced:
                 return Outcome.CACHED, there
             models = self.keys.models.need(parts.models, self.reporter.note)
             self.reporter.starts(name, verdict.reason.value)
             stage = self.keys.project.stage(name)
-            scratch = self.store.partial(parts.key())
+            scratch = self.store.partial(parts.key)
             if forced:
                 objects.remove(scratch)
             with self.store.private(name) as folder:
@@ -124,7 +125,7 @@ class Actor:
                 outputs = tuple(output.path for output in stage.outputs)
                 if METRICS_OUTPUT in outputs:
                     info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
-                record = self.store.publish(parts, folder, outputs, info, replace=forced)
+                record = publish(self.store, parts, folder, outputs, info, replace=forced)
             objects.remove(scratch)
         self.reporter.ends(name, Outcome.RAN, info.seconds)
         return Outcome.RAN, record

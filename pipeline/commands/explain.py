@@ -31,12 +31,12 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         for change in verdict.changes:
             voice.note(f"  {change.sentence}")
         if verdict.parts is not None:
-            voice.note(f"key {verdict.parts.key()} is made of")
+            voice.note(f"key {verdict.parts.key} is made of")
             for line in part_lines(verdict.parts):
                 voice.note(f"  {line}")
     if arguments.json:
         emit({"stage": verdict.stage, "reason": verdict.reason.value,
-              "key": verdict.parts.key() if verdict.parts else None,
+              "key": verdict.parts.key if verdict.parts else None,
               "changes": [
                   {"kind": c.kind.value, "name": c.name, "before": c.before, "after": c.after, "why": c.sentence}
                   for c in verdict.changes

@@ -78,7 +78,7 @@ def foretell(chain: Chain, clip: Path, options: Options, voice: PlainReporter, j
         info = verdict.record.info if verdict.record is not None else None
         voice.ends(verdict.stage, outcome, info.seconds if info else 0.0, f"{verdict.reason.value}: {verdict.sentence}")
         rows.append({"name": verdict.stage, "status": outcome.value, "seconds": info.seconds if info else None,
-                     "key": verdict.parts.key() if verdict.parts else None, "reason": verdict.reason.value})
+                     "key": verdict.parts.key if verdict.parts else None, "reason": verdict.reason.value})
     if json:
         emit({"stages": rows, "outputs": {}, "metrics": {}})
     return ExitCode.OK

@@ -69,7 +69,7 @@ def do_one(keys: Keys, store: Store, voice: PlainReporter, name: str, digests: d
            out: Path, logs: Path, force: bool) -> StageResult:
     """One stage through the store; its outputs are shown at `out/<output>`."""
     parts = keys.parts(name, digests)
-    with in_use(store, [parts.key()]):
+    with in_use(store, [parts.key]):
         verdict = judge(store, parts, force)
         outcome, record = Outcome.CACHED, verdict.record
         if not verdict.current:

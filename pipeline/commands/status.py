@@ -35,5 +35,5 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if arguments.json:
         emit({"up_to_date": current, "stages": [
             {"name": v.stage, "up_to_date": v.current, "reason": v.reason.value, "why": v.sentence,
-             "key": v.parts.key() if v.parts else None} for v in verdicts]})
+             "key": v.parts.key if v.parts else None} for v in verdicts]})
     return ExitCode.OK if current else ExitCode.STALE

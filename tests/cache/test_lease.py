@@ -6,7 +6,7 @@ from gsac.cache.lease import in_use, live_keys, single_flight
 from gsac.cache.lock import common
 
 COMPUTE_ONCE = """
-with single_flight(store, parts_of().key()) as found:
+with single_flight(store, parts_of().key) as found:
     if found is None:
         print("computed")
         time.sleep(0.3)
@@ -57,7 +57,7 @@ def test_threads_of_one_process_take_turns_too(store, make, parts_of):
     computed = []
 
     def compute():
-        with single_flight(store, parts_of().key()) as found:
+        with single_flight(store, parts_of().key) as found:
             if found is None:
                 computed.append(1)
                 time.sleep(0.05)
