@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gsac.stages.contract import BadInput
+from gsac.stages.contract import BadInput, did_you_mean
 
 CLIP = "clip"
 """The port of the source clip; no step makes it."""
@@ -67,7 +67,7 @@ class Graph:
 
     def step(self, name: str) -> Step:
         if name not in self.steps:
-            raise BadInput(f"unknown stage {name}; known: {', '.join(self.steps)}")
+            raise BadInput(f"unknown stage {name}{did_you_mean(name, self.steps)}; known: {', '.join(self.steps)}")
         return self.steps[name]
 
     def parents(self, name: str) -> set[str]:

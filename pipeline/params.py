@@ -12,7 +12,7 @@ from typing import Any
 
 from gsac.pipeline.graph import parse_yaml, read_yaml
 from gsac.pipeline.project import Project
-from gsac.stages.contract import BadInput, make_config
+from gsac.stages.contract import BadInput, did_you_mean, make_config
 
 HEAD = "# Every parameter, its default and its meaning. Written by `python -m gsac.pipeline.params` from them.\n\n"
 Values = dict[str, dict[str, Any]]
@@ -32,7 +32,7 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
         for section, parameters in sections.items():
             if section not in values:
                 known = ", ".join(project.graph.steps)
-                raise BadInput(f"{source}: unknown section {section!r}; known: {known}")
+                raise BadInput(f"{source}: unknown section {section!r}{did_you_mean(str(section), values)}; known: {known}")
             if section not in wanted:
                 continue
             values[section] |= parameters

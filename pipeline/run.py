@@ -15,6 +15,7 @@ from gsac.cache.lease import in_use
 from gsac.cache.record import Record
 from gsac.cache.store import Store
 from gsac.pipeline import dvc_sync
+from gsac.pipeline.errors import NotUpToDateError, StageFailedError
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
@@ -28,20 +29,6 @@ from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
 """Stages whose code is loaded while one is at work: some are done before the next has loaded."""
-
-
-class NotUpToDateError(Exception):
-    """Something that should be there already is not (exit code 3)."""
-
-
-class StageFailedError(Exception):
-    """A stage failed; `cause` says how. What was finished before it is kept."""
-
-    def __init__(self, stage: str, cause: Exception, log: Path):
-        seen = f" (log: {log})" if log.is_file() and log.stat().st_size else ""
-        super().__init__(f"stage {stage} failed: {cause}{seen}")
-        self.stage = stage
-        self.cause = cause
 
 
 @dataclass

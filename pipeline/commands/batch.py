@@ -7,9 +7,9 @@ import os
 from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
-from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, add_params
 from gsac.pipeline.executors import EXECUTORS, ClipResult, make_executor
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project

@@ -7,8 +7,8 @@ import dataclasses
 import re
 
 from gsac.cache import gc, listing, verify
-from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, answers, open_store
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput

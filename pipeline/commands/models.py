@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, answers, open_store
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.model_store import Models
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.reporter import PlainReporter

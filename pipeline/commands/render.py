@@ -7,8 +7,8 @@ import re
 import time
 from pathlib import Path
 
-from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.reporter import PlainReporter, reporter
 from gsac.stages.contract import BadInput, StageError

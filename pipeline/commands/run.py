@@ -6,14 +6,15 @@ import argparse
 from pathlib import Path
 
 from gsac.cache.store import Store
-from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, add_params, open_store
+from gsac.pipeline.errors import StageFailedError
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 from gsac.pipeline.report.refresh import Early, refresh_report
 from gsac.pipeline.reporter import PlainReporter, reporter
-from gsac.pipeline.run import Chain, Options, StageFailedError
+from gsac.pipeline.run import Chain, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
 

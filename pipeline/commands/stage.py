@@ -8,16 +8,17 @@ from pathlib import Path
 from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
 from gsac.cache.store import Store
-from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, add_params, open_store, open_workspace
+from gsac.pipeline.errors import StageFailedError
 from gsac.pipeline.graph import CLIP
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.plan import judge
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter, reporter
-from gsac.pipeline.run import StageFailedError, StageResult
+from gsac.pipeline.run import StageResult
 from gsac.pipeline.run_folder import OWN_STORE, link
 from gsac.pipeline.stage_runner import Actor
 from gsac.stages.contract import BadInput, StageError

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import dataclasses
 
-from gsac.pipeline.cli import emit
 from gsac.pipeline.commands.options import add_json, add_params, add_workspace, answers, open_store_of, open_workspace
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.run import Chain, Options
