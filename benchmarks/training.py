@@ -108,9 +108,9 @@ def _train(inputs: dict[str, Path], folder: Path, values: dict, cores: list[int]
 def networks(config) -> dict[str, Path]:
     """Files of what the stage only wishes for, as far as the user has brought them."""
     from gsac.cache.store import Store
-    from gsac.pipeline.model_store import Models
+    from gsac.pipeline.model_store import ModelStore
 
-    models = Models(Store.open())
+    models = ModelStore(Store.open())
     return models.need([name for name in config.wishes() if name in models.brought], print)
 
 
@@ -146,7 +146,7 @@ def fitted(out: Path, folder: Path, variant: str, say, settings: tuple[str, ...]
     from gsac.cache.store import Store
     from gsac.pipeline.params import resolve
     from gsac.pipeline.project import Project
-    from gsac.pipeline.run import Chain, Options
+    from gsac.pipeline.run import ClipRun, Options
     from gsac.pipeline.run_folder import RunFolder
 
     name = f"{folder.name}_{variant}" if variant else folder.name
@@ -154,5 +154,5 @@ def fitted(out: Path, folder: Path, variant: str, say, settings: tuple[str, ...]
     configs, workspace = resolve(project, sets=settings), RunFolder(out / "runs" / name)
     workspace.prepare(video, project, configs)
     for last in ("segment", "smplx"):
-        Chain(project, configs, Store.open(say=say.note), workspace, say).run(video, Options(until=last))
+        ClipRun(project, configs, Store.open(say=say.note), workspace, say).run(video, Options(until=last))
     return Case(name, {port: workspace.path(port) for port in STAGE.inputs})

@@ -16,6 +16,8 @@ from gsac.pipeline import commands
 from gsac.pipeline.errors import exit_code, sentence
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.reporter import Verbosity
+from gsac.pipeline.versions import package_version
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -48,6 +50,8 @@ def make_parser(argv: list[str]) -> argparse.ArgumentParser:
     """The parser of this command line: all commands by name, and the arguments of the one that was typed."""
     parser = argparse.ArgumentParser(
         prog="gsac", description="One phone clip of a turning person in, an animatable Gaussian avatar out.")
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    _add_verbosity(parser, default=Verbosity.NORMAL)
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     typed = next((word for word in argv if not word.startswith("-")), None)
     added = {} if typed in commands.COMMANDS else commands.load_added()
@@ -59,8 +63,25 @@ def make_parser(argv: list[str]) -> argparse.ArgumentParser:
     for name, help_text in helps.items():
         command = subparsers.add_parser(name, help=help_text, description=help_text[0].upper() + help_text[1:] + ".")
         if name == typed:
+            _add_verbosity(command)
             (added.get(name) or commands.load(name)).declare(command)
     return parser
+
+
+def _add_verbosity(parser: argparse.ArgumentParser, default: Any = argparse.SUPPRESS) -> None:
+    """-q and -v, which stand before the command's name or after it."""
+    both = parser.add_mutually_exclusive_group()
+    for letter, verbosity in (("q", Verbosity.QUIET), ("v", Verbosity.VERBOSE)):
+        both.add_argument(f"-{letter}", f"--{verbosity.value}", dest="verbosity", action="store_const", const=verbosity,
+                          default=default, help=verbosity.sentence)
+
+
+class _Version(argparse.Action):
+    """Reads the version only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *parsed: Any) -> None:
+        print(f"gsac {package_version('gsac')}")
+        parser.exit()
 
 
 def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None, error: BaseException) -> ExitCode:

@@ -23,19 +23,19 @@ LOCK = "dvc.lock"
 MEMO_KIND = "md5"
 
 
-def write_lock(workspace: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
+def write_lock(run_folder: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
     """Entries of the steps that have just finished; those of others stay as they were."""
     import yaml
 
     if not steps:
         return
-    known = _entries(workspace.root / LOCK)
-    fresh = {name: _entry(workspace, graph.step(name), configs[name], store) for name in steps}
+    known = _entries(run_folder.root / LOCK)
+    fresh = {name: _entry(run_folder, graph.step(name), configs[name], store) for name in steps}
     entries = {name: fresh.get(name) or known[name] for name in graph.steps if name in fresh or name in known}
     store.memo.flush()
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     dumper.ignore_aliases = lambda self, data: True
-    write_text(workspace.root / LOCK, yaml.dump({"schema": "2.0", "stages": entries}, Dumper=dumper, sort_keys=False))
+    write_text(run_folder.root / LOCK, yaml.dump({"schema": "2.0", "stages": entries}, Dumper=dumper, sort_keys=False))
 
 
 def _entries(path: Path) -> dict[str, Any]:
@@ -45,16 +45,16 @@ def _entries(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _entry(workspace: RunFolder, step: Step, config: Any, store: Store) -> dict[str, Any]:
-    entry: dict[str, Any] = {"cmd": step.cmd, "deps": [_hash(workspace, port, store) for port in sorted(step.deps)]}
+def _entry(run_folder: RunFolder, step: Step, config: Any, store: Store) -> dict[str, Any]:
+    entry: dict[str, Any] = {"cmd": step.cmd, "deps": [_hash(run_folder, port, store) for port in sorted(step.deps)]}
     if step.params:
         entry["params"] = {PARAMS: {step.name: plain(config)}}
-    entry["outs"] = [_hash(workspace, port, store) for port in sorted(step.outs)]
+    entry["outs"] = [_hash(run_folder, port, store) for port in sorted(step.outs)]
     return entry
 
 
-def _hash(workspace: RunFolder, port: str, store: Store) -> dict[str, Any]:
-    path = workspace.path(port).resolve()
+def _hash(run_folder: RunFolder, port: str, store: Store) -> dict[str, Any]:
+    path = run_folder.path(port).resolve()
     files = tree_files(path)
     sizes = sum(file.stat().st_size for file in files.values())
     entry = {"path": port, "hash": "md5"}

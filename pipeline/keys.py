@@ -10,7 +10,7 @@ from gsac.avatar.cuda import why_not
 from gsac.cache.code import code_parts
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
-from gsac.pipeline.model_store import Models
+from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.params import plain
 from gsac.pipeline.project import Project
 from gsac.pipeline.versions import package_version
@@ -29,7 +29,7 @@ class Keys:
     def __init__(self, project: Project, configs: dict[str, Any], store: Store):
         self.project = project
         self.configs = configs
-        self.models = Models(store)
+        self.models = ModelStore(store)
         self.memo = store.memo
 
     @cached_property

@@ -26,7 +26,7 @@ LIST = "brought.json"
 Say = Callable[[str], None]
 
 
-class Models:
+class ModelStore:
     """The model files of one store."""
 
     def __init__(self, store: Store):

@@ -82,7 +82,7 @@ class RunFolder:
         return tree_digest(path.resolve(), store.memo)[0]
 
     def prepare(self, clip: Path, project: Project, configs: dict[str, Any]) -> None:
-        """Makes the folder a workspace for this clip and these parameters."""
+        """Makes it the folder of this clip and these parameters."""
         self._refuse_foreign(project)
         if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
             raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "

@@ -10,7 +10,7 @@ from gsac.cache.store import Store
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run import Chain, Options
+from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
 from gsac.stages.smplx import STAGE
@@ -50,6 +50,6 @@ def seen(folder: Path, store: Store, out: Path, say: PlainReporter) -> Case:
     clip = (folder / "clip.mp4").resolve()
     workspace.prepare(clip, project, configs)
     for last in dict.fromkeys(port.split("/")[0] for port in STAGE.inputs):
-        Chain(project, configs, store, workspace, say).run(clip, Options(until=last))
+        ClipRun(project, configs, store, workspace, say).run(clip, Options(until=last))
     return Case(folder.name, read_truth(folder), {port: workspace.path(port) for port in STAGE.inputs},
                 workspace.path("keypoints/keypoints.npz"))

@@ -7,10 +7,10 @@ import re
 import time
 from pathlib import Path
 
-from gsac.pipeline.commands.options import add_json
+from gsac.pipeline.commands.options import add_json, progress_reporter
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.reporter import PlainReporter, reporter
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
 
 FILE = "avatar.gsac"
@@ -45,8 +45,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if out.suffix.lower() != ".mp4" or out.is_dir() or not out.parent.is_dir():
         raise BadInput(f"--out {arguments.out}: expected a file .mp4 in a folder that exists")
     file = find_avatar(arguments.avatar)
-    with reporter(plain=arguments.json) as voice:
-        frames, seconds = film(file, arguments, out, (width, height), background, voice)
+    with progress_reporter(arguments) as reporter:
+        frames, seconds = film(file, arguments, out, (width, height), background, reporter)
     if arguments.json:
         emit({"stages": [{"name": "render", "status": Outcome.RAN.value, "seconds": seconds, "key": None}],
               "outputs": {"video": str(out)},
@@ -58,7 +58,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int], background: list[float],
-         voice: PlainReporter) -> tuple[int, float]:
+         reporter: PlainReporter) -> tuple[int, float]:
     """Writes the video. Returns its frames and the seconds that it took."""
     import numpy as np
 
@@ -68,7 +68,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
     from gsac.avatar.video import Video, VideoError
 
     began = time.monotonic()
-    voice.starts("render", f"{file.name} to {out}")
+    reporter.starts("render", f"{file.name} to {out}")
     try:
         avatar = RiggedAvatar.read(file)
         motion = find_motion(arguments.motion, avatar)
@@ -76,14 +76,14 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
                 else performance(motion, arguments.fps, arguments.seconds))
         with Video(out, *size, arguments.fps) as video:
             for done, frame in enumerate(frames(avatar, plan, *size, np.array(background))):
-                voice.progress("render", done, len(plan), "frames")
+                reporter.progress("render", done, len(plan), "frames")
                 video.add(frame)
     except ArtifactError as e:
         raise BadInput(str(e)) from e
     except VideoError as e:
         raise StageError(str(e)) from e
     seconds = time.monotonic() - began
-    voice.ends("render", Outcome.RAN, seconds)
+    reporter.ends("render", Outcome.RAN, seconds)
     return len(plan), seconds
 
 
