@@ -1,4 +1,4 @@
-"""What has to run, and why."""
+"""Which stages have to run, and why."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gsac.cache.store import Store
 
 
 class Reason(Enum):
-    """Why a stage has to run, or that it need not; the value is the word of `--json`."""
+    """Why a stage has to run, or need not; the value is the word of `--json`."""
 
     UP_TO_DATE = "up to date"
     FORCED = "forced"

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
 from gsac.pipeline.commands.options import add_json, add_params, progress_reporter
-from gsac.pipeline.executors import EXECUTORS, ClipResult, make_executor
+from gsac.pipeline.executors import EXECUTORS, make_executor
+from gsac.pipeline.executors.executor import ClipResult
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.params import resolve

@@ -108,6 +108,11 @@ def test_weights_of_lpips_come_as_one_file_or_two_and_are_kept_as_the_same_file(
     assert not list((store.root / "models").glob("add-*"))
 
 
+def test_adding_without_a_file_is_answered_by_a_sentence(store):
+    with pytest.raises(BadInput, match="no file was given for mine; use `gsac models add mine FILE`"):
+        ModelStore(store).add("mine")
+
+
 @pytest.mark.parametrize("name", ["", "a/b", ".hidden"])
 def test_a_name_that_is_no_name_is_refused(store, tmp_path, name):
     file = tmp_path / "f"

@@ -84,7 +84,7 @@ def test_the_stage_after_the_next_is_loaded_as_well_and_each_runs_in_its_own_pro
     for name in ("left", "right"):
         toy.edit(f"{name}/stage.py", "from gsac.toy", NOTES + "from gsac.toy")
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3")
-    toy.wait_for(lambda: loaded(toy) == 2)
+    toy.wait_for(lambda: loaded(toy) == 2 and toy.runs)
     assert toy.runs == ["cut"]
     assert process.wait(60) == 0 and toy.runs == ["cut", "left", "right", "join"]
     assert loaded(toy) == 2
