@@ -1,7 +1,7 @@
-"""How a result becomes part of the store: whole or not at all, whenever the process dies.
+"""Publishes a result: it appears in the store whole or not at all, whenever the process dies.
 
-The steps run in the order of STEPS. Up to the last rename nothing can be found by anybody; the action record is written
-last and only it makes a result count. An object without a record is rubbish that gc sweeps.
+The steps run in the order of STEPS. Nobody can find a result before its action record, which is written last. An object
+without a record is rubbish that gc removes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from gsac.cache import objects
 from gsac.cache.digest import tree_digest
 from gsac.cache.errors import CacheError, IntegrityError, from_os_error
 from gsac.cache.key import KeyParts
-from gsac.cache.lock import common
+from gsac.cache.lock import shared
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store
 
@@ -31,7 +31,7 @@ STEPS = (
     "recorded",
     "record synced",
 )
-"""`placed` comes once an output. A test kills the process right after each."""
+"""`placed` occurs once an output. A test kills the process right after each step."""
 
 
 def publish(
@@ -46,8 +46,8 @@ def publish(
     """Moves `folder/<output>` into the store and writes the record; an equal key that is published already wins.
 
     replace: the new result takes the place of a published one (a forced run), whose record stays beside it until gc
-    finds it unused. Returns the record that now counts.
-    Raises CacheReadOnlyError, CacheFullError or CacheError; then nothing has changed that a lookup could see.
+    finds it unused; step: called after each of STEPS. Returns the record that is valid now.
+    Raises CacheReadOnlyError, CacheFullError or CacheError; no lookup then sees any change.
     """
     needed = None
     try:
@@ -65,7 +65,7 @@ def publish(
         for output in outputs:
             objects.sync(folder / output)
         step("synced")
-        with common(store.root / "lock"):
+        with shared(store.root / "lock"):
             for output in outputs:
                 footprints[output] = _place(store, folder / output, digests[output], output)
                 step("placed")

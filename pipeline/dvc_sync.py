@@ -1,4 +1,4 @@
-"""dvc.lock as DVC itself would write it, so that `dvc status` agrees after a run. DVC is never imported.
+"""Writes dvc.lock as DVC itself would, so that `dvc status` agrees after a run. DVC is never imported.
 
 Schema 2.0: a file is its md5 and size; a folder the md5 of the JSON list of its files, `.dir`, with size and count.
 Outputs are `cache: false` in dvc.yaml, so DVC wants no objects of its own: they stay in gsac's store.
@@ -24,7 +24,7 @@ MEMO_KIND = "md5"
 
 
 def write_lock(run_folder: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
-    """Entries of the steps that have just finished; those of others stay as they were."""
+    """Writes entries of the steps that have just finished; those of others stay as they are."""
     import yaml
 
     if not steps:

@@ -1,6 +1,6 @@
-"""dvc.yaml as a graph: steps in running order, and who needs whom.
+"""dvc.yaml as a graph: steps in running order, and which needs which.
 
-Reads the part of DVC's file that one clip needs, and names what it does not read:
+Reads the part of DVC's format that one clip needs, and refuses the rest by name:
 `cmd: gsac stage NAME`, `deps`, `params` (whole sections), `outs` (optionally `cache: false`), `desc`.
 """
 
@@ -29,11 +29,11 @@ class Step:
     params: tuple[str, ...]
     """Sections of params.yaml."""
     outs: tuple[str, ...]
-    """Ports made, `<name>/<output path>`."""
+    """Ports written, `<name>/<output path>`."""
 
 
 class Graph:
-    """Steps by name, in an order that runs every step after what it reads."""
+    """Steps by name, each after the steps whose outputs it reads."""
 
     def __init__(self, steps: list[Step], source: str = "dvc.yaml"):
         self.source = source
@@ -51,7 +51,7 @@ class Graph:
 
     @classmethod
     def load(cls, path: Path) -> Graph:
-        """Raises BadInput naming the file, the step and the key that is not understood."""
+        """The graph of a dvc.yaml. BadInput names the file, the step and the key that is not understood."""
         return cls(_parse(read_yaml(path), str(path)), str(path))
 
     def _ordered(self, steps: list[Step]) -> dict[str, Step]:
@@ -66,11 +66,13 @@ class Graph:
         return done
 
     def step(self, name: str) -> Step:
+        """The step of a name; BadInput where there is none."""
         if name not in self.steps:
             raise BadInput(f"unknown stage {name}{did_you_mean(name, self.steps)}; known: {', '.join(self.steps)}")
         return self.steps[name]
 
     def parents(self, name: str) -> set[str]:
+        """Steps whose outputs `name` reads."""
         return {self.producer[p] for p in self.step(name).deps if p != CLIP}
 
     def above(self, name: str) -> set[str]:
@@ -99,7 +101,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 
 def parse_yaml(text: str, source: str) -> Any:
-    """What the text holds. BadInput for text that is not YAML, and for a key given twice, of which YAML would keep the last."""
+    """The value of a YAML text. BadInput where it is not YAML, or a key is given twice (YAML would keep the last)."""
     import yaml
 
     class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):

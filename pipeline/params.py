@@ -1,4 +1,4 @@
-"""Parameters: defaults of the stages' dataclasses, then --params FILE, then --set; and params.yaml made from them."""
+"""Parameters: defaults of the stages' dataclasses, overridden by --params FILE, then by --set; and params.yaml, made from them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Values = dict[str, dict[str, Any]]
 
 
 def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = (), only: str = "") -> dict[str, Any]:
-    """Config instance of every stage, or of `only` one. BadInput names the parameter and where it came from."""
+    """Config instance of every stage, or of `only` one. BadInput names the parameter and its source."""
     wanted = [only] if only else list(project.graph.steps)
     sources: list[tuple[str, Values]] = []
     if file is not None:

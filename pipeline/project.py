@@ -54,7 +54,7 @@ class Project:
 
 
 def check_agreement(step: Step, stage: Stage) -> None:
-    """dvc.yaml and STAGE say the same ports."""
+    """BadInput where dvc.yaml and STAGE name different ports."""
     outs = {f"{stage.name}/{output.path}" for output in stage.outputs}
     for what, declared, listed in (
         ("name", {stage.name}, {step.name}),

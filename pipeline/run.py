@@ -28,7 +28,7 @@ from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
-"""Stages whose code is loaded while one is at work: some are done before the next has loaded."""
+"""Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
 
 
 @dataclass
@@ -40,7 +40,7 @@ class StageResult:
     reason: str
     key: str = ""
     seconds: float = 0.0
-    """Of the run that made the result, be it this one or an earlier one."""
+    """Of the run that computed the result, this one or an earlier one."""
     cpu_seconds: float = 0.0
     peak_rss_mb: float = 0.0
     warnings: list[str] = field(default_factory=list)
@@ -50,6 +50,7 @@ class StageResult:
 
     @classmethod
     def of(cls, plan: StagePlan, outcome: Outcome, record: Record, config: Any) -> StageResult:
+        """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
                    info.peak_rss_mb, info.warnings, plain(config), info.metrics)
@@ -102,7 +103,7 @@ class ClipRun:
         return [name for name in self.graph.steps if name in wanted]
 
     def forecast(self, clip: Path, options: Options) -> list[StagePlan]:
-        """What would run and why, as far as that is known without running anything."""
+        """What would run and why, as far as it is known before anything runs."""
         digests = {CLIP: self._clip_digest(clip)}
         plans = []
         for name in self.select(options):
@@ -200,7 +201,7 @@ class ClipRun:
 
 
 def clip_digest(clip: Path, store: Store) -> str:
-    """Tree digest of a file or folder. BadInput where it is not there or cannot be read."""
+    """Tree digest of a file or folder. BadInput where it does not exist or cannot be read."""
     if not clip.exists():
         raise BadInput(f"{clip}: no such file or folder; give a video or a folder of photos")
     try:

@@ -1,4 +1,4 @@
-"""One stage, once: from the cache if it is there, else computed in a process of its own, checked and published."""
+"""Gets one stage's result: from the cache if it is there, else computed in a process of its own, checked and published."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from gsac.stages.contract import BadInput, StageError
 METRICS_OUTPUT = "metrics.json"
 """An output of this name is also kept in the action record."""
 LITTLE_ROOM = 16 << 20
-"""A stage that fails with fewer bytes than this left had no room: many libraries that write do not say so."""
+"""A stage that fails with fewer bytes than this free ran out of disk: many libraries do not say so themselves."""
 
 
 @dataclass
@@ -70,7 +70,7 @@ class StageRunner:
         self._drop(keep=names)
         for name in names:
             if name not in self.prepared:
-                with contextlib.suppress(CacheError, BadInput):  # it will be raised again when the stage's turn comes
+                with contextlib.suppress(CacheError, BadInput):  # raised again when the stage's turn comes
                     code = self.keys.code(name)
                     self.prepared[name] = Prepared(code, self._child(name, self._log(name, ".next")))
 
@@ -172,14 +172,14 @@ class StageRunner:
                 self.on_start()
                 end = child.follow(hear)
             except BaseException:
-                child.close()  # before the folder goes that it writes to
+                child.close()  # before its output folder is removed
                 raise
             finally:
                 self._show_log(name, log, ended=True)
         except StageError as error:
             if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
                 raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
-            if not isinstance(error, StageBugError):  # it would only come to the same end again
+            if not isinstance(error, StageBugError):  # another run would only fail in the same way
                 objects.remove(scratch)
             raise
         info.seconds, info.cpu_seconds, info.peak_rss_mb = end["seconds"], end["cpu_seconds"], end["peak_rss_mb"]

@@ -23,7 +23,7 @@ from typing import Any, TextIO
 from gsac.stages.contract import BadInput, Job, Stage, StageError, make_config
 
 LEAST_GAP_S = 0.1
-"""Progress is said at most this often."""
+"""At least this long between two progress events."""
 
 
 class EventStream:
@@ -35,17 +35,20 @@ class EventStream:
         self._last = 0.0
 
     def send(self, event: str, **fields: Any) -> None:
+        """Writes one event."""
         with self._lock:
             self._stream.write(json.dumps({"event": event, **fields}) + "\n")
             self._stream.flush()
 
     def progress(self, done: int, total: int, unit: str) -> None:
+        """Sends progress, not too often; the last always."""
         now = time.monotonic()
         if done >= total or now - self._last >= LEAST_GAP_S:
             self._last = now
             self.send("progress", done=int(done), total=int(total), unit=str(unit))
 
     def warn(self, message: str) -> None:
+        """Sends a warning for the user."""
         self.send("warning", message=str(message))
 
 
@@ -54,7 +57,7 @@ def main() -> None:
     start = json.loads(sys.stdin.readline())
     os.set_inheritable(start["events"], False)
     events = EventStream(os.fdopen(start["events"], "w"))
-    with contextlib.suppress(Exception):  # it will fail again, and be heard, when there is an order
+    with contextlib.suppress(Exception):  # it fails again, and is reported, once there is an order
         importlib.import_module(start["declaration"])
         entry = importlib.import_module(start["entry"])
         if hasattr(entry, "warm"):
@@ -66,13 +69,13 @@ def main() -> None:
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     try:
         _work(order, events)
-    except Exception as error:  # whatever a stage does wrong, the parent must hear of it
+    except Exception as error:  # the parent must hear of any failure
         traceback.print_exc()
         events.send("failed", kind=_kind(error), message=_message(error))
     else:
         events.send("done", seconds=time.time() - order["started"], **cost())
     sys.stdout.flush()
-    os._exit(0)  # what is written is written: libraries that tidy up their threads and memory take seconds to
+    os._exit(0)  # all is written, and libraries take seconds to tear down their threads and memory
 
 
 def _work(order: dict[str, Any], events: EventStream) -> None:
@@ -93,7 +96,7 @@ def _work(order: dict[str, Any], events: EventStream) -> None:
 
 
 def _config(stage: Stage, params: dict[str, Any]) -> Any:
-    """Of all the stage's parameters, as the parent knew them when the run began; StageError where there are others by now."""
+    """The config that the parent sent; StageError where the stage's parameters were edited since."""
     edited = {field.name for field in dataclasses.fields(stage.config)} ^ params.keys()
     if edited:
         raise StageError(f"its parameters were edited since the run began ({', '.join(sorted(edited))}); run again")
@@ -101,7 +104,7 @@ def _config(stage: Stage, params: dict[str, Any]) -> Any:
 
 
 def check_outputs(stage: Stage, folder: Path) -> None:
-    """Every declared output is there and what its port promises, else StageError."""
+    """StageError unless every declared output was written and passes its check."""
     for output in stage.outputs:
         path = folder / output.path
         if not path.exists():

@@ -37,8 +37,8 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
     rows = listing.ls(store)
     for row in rows:
         age = f"{row.age_s / 86400:6.1f} d"
-        reporter.note(f"{row.stage:<10} {row.key[:16]}  {size(row.bytes):>9}  {age}  {row.seconds:8.1f} s")
-    reporter.note(f"{len(rows)} results, {size(sum(row.bytes for row in rows))} in {store.root}")
+        reporter.note(f"{row.stage:<10} {row.key[:16]}  {format_size(row.bytes):>9}  {age}  {row.seconds:8.1f} s")
+    reporter.note(f"{len(rows)} results, {format_size(sum(row.bytes for row in rows))} in {store.root}")
     if arguments.json:
         emit({"root": str(store.root), "results": [dataclasses.asdict(row) for row in rows]})
     return ExitCode.OK
@@ -50,7 +50,7 @@ def do_verify(arguments: argparse.Namespace) -> ExitCode:
     report = verify.verify(store)
     for name in report.lost:
         reporter.note(f"{name}: dropped; it will be computed again")
-    reporter.note(f"{report.objects} objects, {size(report.bytes)} sound, {len(report.damaged)} damaged in {store.root}")
+    reporter.note(f"{report.objects} objects, {format_size(report.bytes)} sound, {len(report.damaged)} damaged in {store.root}")
     if arguments.json:
         emit({"sound": report.sound, **dataclasses.asdict(report)})
     return ExitCode.OK if report.sound else ExitCode.INTEGRITY
@@ -65,13 +65,14 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
     verb = "would remove" if arguments.dry_run else "removed"
     left = len(report.temps) + len(report.partial)
     reporter.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {left} left-overs of dead runs: "
-                f"{size(report.freed_bytes)}; {size(report.kept_bytes)} stay")
+                f"{format_size(report.freed_bytes)}; {format_size(report.kept_bytes)} stay")
     if arguments.json:
         emit(dataclasses.asdict(report))
     return ExitCode.OK
 
 
-def size(count: int) -> str:
+def format_size(count: int) -> str:
+    """`1.2 MB`"""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000:
             return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"

@@ -24,7 +24,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     root = arguments.out.absolute()
     with progress_reporter(arguments) as reporter:
-        clip = truth_clip(root / "clip", reporter)
+        clip = make_truth_clip(root / "clip", reporter)
         run_folder = run_clip(clip, root / "avatar", open_store(reporter, root / "avatar" / OWN_STORE), reporter)
     print(f"avatar:  {run_folder.root / 'export' / 'avatar.gsac'}")
     print(f"viewer:  {run_folder.root / 'export' / 'viewer.html'}   (or `gsac view {run_folder.root}`)")
@@ -32,8 +32,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def truth_clip(folder: Path, reporter: PlainReporter) -> Path:
-    """clip.mp4 in the folder; made if it is not there yet, whole or not at all."""
+def make_truth_clip(folder: Path, reporter: PlainReporter) -> Path:
+    """clip.mp4 in the folder; rendered, whole or not at all, if it is not there yet."""
     if (folder / CLIP_FILE).is_file():
         return folder / CLIP_FILE
     from gsac.turntable.clip import make_clip

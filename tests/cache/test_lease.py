@@ -3,7 +3,7 @@ import threading
 import time
 
 from gsac.cache.lease import in_use, live_keys, single_flight
-from gsac.cache.lock import common
+from gsac.cache.lock import shared
 
 COMPUTE_ONCE = """
 with single_flight(store, parts_of().key) as found:
@@ -119,7 +119,7 @@ def test_a_key_cannot_be_claimed_while_gc_sweeps(store):
     claimed = threading.Event()
     with in_use(store) as lease:
         claim = threading.Thread(target=lambda: (lease.add("k" * 64), claimed.set()))
-        with common(store.root / "lock", alone=True):
+        with shared(store.root / "lock", alone=True):
             claim.start()
             assert not claimed.wait(0.2)
         assert claimed.wait(5)
