@@ -15,7 +15,8 @@ HELP = "run a benchmark"
 
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("name", metavar="NAME", help=f"one of: {', '.join(names()) or 'none yet'}")
-    command.add_argument("rest", nargs=argparse.REMAINDER, help="arguments of the benchmark")
+    command.add_argument("rest", nargs=argparse.REMAINDER, metavar="ARGUMENT",
+                         help="handed on; `gsac bench NAME --help` lists them")
     command.set_defaults(do=do)
 
 

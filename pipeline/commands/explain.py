@@ -11,7 +11,7 @@ from gsac.pipeline.outcomes import ExitCode
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("stage", metavar="STAGE")
+    command.add_argument("stage", metavar="STAGE", help="its name in dvc.yaml")
     add_run_folder(command)
     add_params(command)
     add_json(command)

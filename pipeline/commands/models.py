@@ -20,7 +20,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     one.add_argument("names", nargs="*", metavar="NAME", help="default: all that are missing")
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")
-    one.add_argument("name", metavar="NAME")
+    one.add_argument("name", metavar="NAME", help="as parameters refer to it, for example smplx.body_model")
     one.add_argument("files", type=Path, nargs="+", metavar="FILE",
                      help="lpips-vgg, lpips-alex: one file with all weights, or the network's and the heads' one after the other")
     one.set_defaults(do=do_add)

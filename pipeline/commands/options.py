@@ -27,7 +27,8 @@ def add_json(command: argparse.ArgumentParser) -> None:
 
 
 def add_run_folder(command: argparse.ArgumentParser) -> None:
-    command.add_argument("folder", nargs="?", type=Path, default=Path("."), help="the folder of a run (default: here)")
+    command.add_argument("folder", nargs="?", type=Path, default=Path("."), metavar="DIR",
+                         help="the folder of a run (default: here)")
 
 
 def progress_reporter(arguments: argparse.Namespace) -> PlainReporter:

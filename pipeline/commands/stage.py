@@ -25,7 +25,7 @@ from gsac.stages.contract import BadInput, StageError
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("name", metavar="NAME")
+    command.add_argument("name", metavar="NAME", help="its name in dvc.yaml")
     command.add_argument("--inputs", type=Path, metavar="DIR", help="artifacts: DIR/<input stage>/..., DIR/clip")
     command.add_argument("--out", type=Path, metavar="DIR",
                          help="gets the outputs, with --inputs; `--out DIR/NAME` feeds the next stage")
