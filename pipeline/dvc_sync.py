@@ -15,7 +15,7 @@ from typing import Any
 from gsac.cache.digest import tree_files
 from gsac.cache.store import Store
 from gsac.pipeline.graph import Graph, Step, read_yaml
-from gsac.pipeline.params import plain
+from gsac.pipeline.params import config_values
 from gsac.pipeline.run_folder import PARAMS, RunFolder, write_text
 from gsac.stages.contract import BadInput
 
@@ -48,7 +48,7 @@ def _entries(path: Path) -> dict[str, Any]:
 def _entry(run_folder: RunFolder, step: Step, config: Any, store: Store) -> dict[str, Any]:
     entry: dict[str, Any] = {"cmd": step.cmd, "deps": [_hash(run_folder, port, store) for port in sorted(step.deps)]}
     if step.params:
-        entry["params"] = {PARAMS: {step.name: plain(config)}}
+        entry["params"] = {PARAMS: {step.name: config_values(config)}}
     entry["outs"] = [_hash(run_folder, port, store) for port in sorted(step.outs)]
     return entry
 

@@ -11,7 +11,7 @@ from gsac.cache.code import code_parts
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
 from gsac.pipeline.model_store import ModelStore
-from gsac.pipeline.params import plain
+from gsac.pipeline.params import config_values
 from gsac.pipeline.project import Project
 from gsac.pipeline.versions import package_version
 from gsac.stages.contract import BadInput, Stage
@@ -62,7 +62,7 @@ class Keys:
         """The key's parts of a stage. inputs: port -> tree digest."""
         stage = self.project.stage(name)
         config, device = self.configs[name], self.device_of(name)
-        params = plain(config)
+        params = config_values(config)
         if device:
             params.pop("device", None)  # the device that was chosen counts, not how
         return KeyParts(

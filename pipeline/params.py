@@ -43,7 +43,7 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
     return {name: configs.get(name) or make_config(project.stage(name), {}) for name in wanted}
 
 
-def plain(config: Any) -> dict[str, Any]:
+def config_values(config: Any) -> dict[str, Any]:
     """Config instance as parameter -> value."""
     return dataclasses.asdict(config)
 
@@ -52,7 +52,7 @@ def to_yaml(configs: dict[str, Any], notes: bool = True) -> str:
     """params.yaml with every parameter; notes: with the meaning of each above it."""
     blocks = []
     for section, config in configs.items():
-        values = plain(config)
+        values = config_values(config)
         if not values:
             blocks.append(f"{section}: {{}}\n")
             continue

@@ -15,7 +15,7 @@ from gsac.pipeline import commands
 from gsac.pipeline.cli import make_parser
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.params import meanings, plain
+from gsac.pipeline.params import config_values, meanings
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.project import Project
 from gsac.stages.contract import BadInput, Stage
@@ -42,7 +42,8 @@ def cli_page() -> str:
         (added.get(name) or commands.load(name)).declare(parser)
         blocks += [f"## gsac {name}", f"{text[0].upper()}{text[1:]}.", *_command(parser)]
     blocks += ["## Exit codes", _table(("code", ""), ((str(int(code)), code.sentence) for code in ExitCode)),
-               "## Words of `--json`", "`status` of a stage:", _words(Outcome), "`reason`, why it has to run or need not:", _words(Reason)]
+               "## Words of `--json`", "`status` of a stage:", _words(Outcome),
+               "`reason`, why a stage has to run or need not:", _words(Reason)]
     return "\n\n".join(blocks) + "\n"
 
 
@@ -74,12 +75,12 @@ def _link(stage: str) -> str:
 
 def _parameters(stage: Stage) -> str:
     config = stage.config()
-    if not plain(config):
+    if not config_values(config):
         return "None."
     meaning, kinds = meanings(stage.config), typing.get_type_hints(stage.config)
     return _table(("parameter", "type", "default", "meaning"),
                   ((f"`{stage.name}.{name}`", _kind(kinds[name]), f"`{_value(value)}`", meaning[name])
-                   for name, value in plain(config).items()))
+                   for name, value in config_values(config).items()))
 
 
 def _kind(hint: Any) -> str:
@@ -94,7 +95,8 @@ def _value(value: Any) -> str:
 
 def _dependencies(stage: Stage) -> str:
     config = stage.config()
-    rows = {"model files, with the defaults": stage.models(config), "model files, where the user has added them": stage.wishes(config),
+    rows = {"model files, with the defaults": stage.models(config),
+            "model files, where the user has added them": stage.wishes(config),
             "versions of packages": stage.packages, "device class": ("cpu or cuda",) if stage.uses_device else ()}
     return "\n".join(["- its code", *(f"- {what}: {', '.join(names)}" for what, names in rows.items() if names)])
 

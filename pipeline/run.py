@@ -19,11 +19,11 @@ from gsac.pipeline.errors import NotUpToDateError, StageFailedError
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.params import plain
+from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run_folder import METRICS, RUN, RunFolder
+from gsac.pipeline.run_folder import LOGS, METRICS, RUN, RunFolder
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
@@ -53,7 +53,7 @@ class StageResult:
         """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, plain(config), info.metrics)
+                   info.peak_rss_mb, info.warnings, config_values(config), info.metrics)
 
     def to_json(self) -> dict[str, Any]:
         row = {
@@ -154,7 +154,7 @@ class ClipRun:
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
 
     def _stage_runner(self) -> StageRunner:
-        return StageRunner(self.keys, self.store, self.reporter, self.folder.root / "logs")
+        return StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
 
     def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))
@@ -168,7 +168,7 @@ class ClipRun:
         except (StageError, CacheError) as error:
             self.reporter.ends(plan.stage, Outcome.FAILED, 0.0)
             self.results.append(StageResult(plan.stage, Outcome.FAILED, plan.sentence, plan.parts.key,
-                                            params=plain(self.configs[plan.stage]), error=str(error)))
+                                            params=config_values(self.configs[plan.stage]), error=str(error)))
             raise StageFailedError(plan.stage, error, runner.logs / f"{plan.stage}.log") from error
 
     @contextlib.contextmanager

@@ -21,7 +21,7 @@ from gsac.cache.store import Store
 from gsac.pipeline.child import Child, LogReader, StageBugError, tail
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.params import plain
+from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
@@ -161,7 +161,7 @@ class StageRunner:
         order = {
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
             "scratch": str(scratch),
-            "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
+            "params": config_values(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
             "device": info.device,
         }
         try:

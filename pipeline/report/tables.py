@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.params import meanings, plain
+from gsac.pipeline.params import config_values, meanings
 from gsac.pipeline.report.results import Results, number
 
 MB = 1e6
@@ -68,7 +68,7 @@ def defaults_and_meanings(results: Results, stage: str) -> tuple[dict[str, Any],
     """Defaults and meanings of a stage's parameters; empty where the stage is not at hand."""
     try:
         config = results.project.stage(stage).config
-        return plain(config()), meanings(config)
+        return config_values(config()), meanings(config)
     except Exception:  # a stage of another version: the values alone are shown
         return {}, {}
 
