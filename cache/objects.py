@@ -28,7 +28,7 @@ def object_path(root: Path, digest: str, output: str) -> Path:
 def measure(path: Path) -> Footprint | None:
     """Number of files, size and times of an object, without reading it; None where it is missing."""
     files = size = stamp = 0
-    folders = [path]
+    folders = [str(path)]
     try:
         if path.is_file():
             stat = path.stat()

@@ -31,8 +31,9 @@ def verify(store: Store) -> VerifyReport:
     for path in sorted((store.root / "objects").glob("*/*")):
         digest = path.name[:64]
         report.objects += 1
-        if objects.is_sound(path, digest):
-            report.bytes += objects.measure(path).bytes
+        footprint = objects.measure(path)
+        if footprint is not None and objects.is_sound(path, digest):
+            report.bytes += footprint.bytes
         elif path.exists():  # gc may have taken it meanwhile
             report.damaged.append(path.name)
             store.quarantine(path, digest)

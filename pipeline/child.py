@@ -56,6 +56,8 @@ class Child:
             raise
         finally:
             os.close(write)
+        assert self._process.stdin is not None
+        self._orders = self._process.stdin
         self._tell({"declaration": declaration, "entry": entry, "device": device, "events": write})
 
     def __enter__(self) -> Child:
@@ -73,7 +75,7 @@ class Child:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         with contextlib.suppress(OSError):
-            self._process.stdin.close()
+            self._orders.close()
         self._temporary.cleanup()
 
     def order(self, order: dict[str, Any]) -> None:
@@ -104,8 +106,8 @@ class Child:
 
     def _tell(self, words: dict[str, Any]) -> None:
         with contextlib.suppress(BrokenPipeError):  # died at once: `run` sees it
-            self._process.stdin.write(json.dumps(words).encode() + b"\n")
-            self._process.stdin.flush()
+            self._orders.write(json.dumps(words).encode() + b"\n")
+            self._orders.flush()
 
 
 def _judge(end: dict | None, code: int, log: Path) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import sys
 from typing import Any
 
 from gsac.pipeline import commands
-from gsac.pipeline.errors import exit_code, sentence
+from gsac.pipeline.errors import attached_summary, exit_code, sentence
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.reporter import Verbosity
@@ -85,9 +85,9 @@ class _Version(argparse.Action):
 
 
 def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None, error: BaseException) -> ExitCode:
-    """Says why, with --json on stdout too; what was done before, a command leaves in the error's `summary`."""
+    """Says why, with --json on stdout too; what was done before, a command attaches to the error."""
     if getattr(arguments, "json", False):
-        emit({"stages": [], "outputs": {}, "metrics": {}} | getattr(error, "summary", {}) | {"error": message})
+        emit({"stages": [], "outputs": {}, "metrics": {}} | attached_summary(error) | {"error": message})
     print(f"gsac: {message}", file=sys.stderr, flush=True)
     return code
 

@@ -68,14 +68,14 @@ def _hash(run_folder: RunFolder, port: str, store: Store) -> dict[str, Any]:
 
 def _md5s(paths: list[Path], store: Store) -> list[str]:
     stats = [path.stat() for path in paths]
-    known = [store.memo.get(MEMO_KIND, stat) for stat in stats]
-    unknown = [i for i, digest in enumerate(known) if digest is None]
+    known = {i: digest for i, stat in enumerate(stats) if (digest := store.memo.get(MEMO_KIND, stat)) is not None}
+    unknown = [i for i in range(len(paths)) if i not in known]
     if unknown:
         with ThreadPoolExecutor() as pool:
             for i, digest in zip(unknown, pool.map(_md5, [paths[i] for i in unknown]), strict=True):
                 store.memo.put(MEMO_KIND, stats[i], digest)
                 known[i] = digest
-    return known
+    return [known[i] for i in range(len(paths))]
 
 
 def _md5(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from pathlib import Path
+from typing import Any
 
 from gsac.cache.errors import CacheError, CacheReadOnlyError, IntegrityError
 from gsac.pipeline.outcomes import ExitCode
@@ -28,6 +29,16 @@ class StageFailedError(Exception):
         self.cause = cause
 
 
+def attach_summary(error: BaseException, summary: dict[str, Any]) -> None:
+    """Keeps with an error what was done before it, for --json."""
+    vars(error)["summary"] = summary
+
+
+def attached_summary(error: BaseException) -> dict[str, Any]:
+    """What `attach_summary` kept, {} without."""
+    return vars(error).get("summary", {})
+
+
 def exit_code(error: BaseException) -> ExitCode | None:
     """What an exception means to the shell; None for a bug of ours."""
     if isinstance(error, StageFailedError):
@@ -50,6 +61,6 @@ def exit_code(error: BaseException) -> ExitCode | None:
 def sentence(error: Exception) -> str:
     """The line that the user reads."""
     if isinstance(error, OSError):
-        reason = NO_ROOM.get(error.errno, error.strerror)
+        reason = NO_ROOM.get(error.errno or 0, error.strerror)
         return f"{error.filename}: {reason}" if error.filename else str(reason)
     return str(error)

@@ -104,8 +104,10 @@ def parse_yaml(text: str, source: str) -> Any:
     """The value of a YAML text. BadInput where it is not YAML, or a key is given twice (YAML would keep the last)."""
     import yaml
 
-    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-        def construct_mapping(self, node, deep=False):
+    base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+    class Loader(base):
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict:
             seen = set()
             for key, _ in node.value:
                 if str(key.value) in seen:
@@ -131,9 +133,9 @@ def _step(name: str, body: Any, source: str) -> Step:
     if not isinstance(body, dict):
         raise BadInput(f"{source}: {where} must be a mapping")
     _only(body, STEP_KEYS, source, where)
-    cmd = body.get("cmd")
-    if cmd != f"gsac stage {name}":
-        raise BadInput(f"{source}: {where} has the command {cmd!r}; gsac only reads `gsac stage {name}`")
+    cmd = f"gsac stage {name}"
+    if body.get("cmd") != cmd:
+        raise BadInput(f"{source}: {where} has the command {body.get('cmd')!r}; gsac only reads `{cmd}`")
     outs = tuple(_out(out, source, where) for out in _list(body, "outs", source, where))
     for out in outs:
         if not out.startswith(f"{name}/"):

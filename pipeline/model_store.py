@@ -108,7 +108,7 @@ class ModelStore:
                 return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"))
             if len(files) > 1:
                 raise BadInput(f"{name} is one file; {len(files)} were given")
-            return self._add(name, files[0])
+            return self._add(name, next(iter(files)))
 
     def _add(self, name: str, file: Path) -> Path:
         from gsac.avatar.network_files import MODELS
@@ -167,7 +167,7 @@ def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
     from gsac.avatar.weight_file import WeightsError
 
     try:
-        np.savez(target, **gather(name, files))
+        np.savez(target, **gather(name, files))  # pyright: ignore[reportArgumentType], names of arrays
     except WeightsError as error:
         raise BadInput(str(error)) from error
     return target

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import inspect
+import itertools
 import textwrap
 from collections.abc import Iterable
 from pathlib import Path
@@ -73,10 +74,12 @@ def defaults_yaml(project: Project) -> str:
 
 def meanings(config: type) -> dict[str, str]:
     """Field -> the line of meaning under it in the dataclass's source."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(config))).body[0].body
+    declaration = ast.parse(textwrap.dedent(inspect.getsource(config))).body[0]
+    assert isinstance(declaration, ast.ClassDef)
     found = {}
-    for field, after in zip(body, body[1:], strict=False):
-        if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+    for field, after in itertools.pairwise(declaration.body):
+        if (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+                and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)):
             found[field.target.id] = " ".join(str(after.value.value).split())
     return found
 

@@ -70,6 +70,11 @@ class StagePlan:
         return self.reason is Reason.UP_TO_DATE
 
     @property
+    def cached(self) -> Record | None:
+        """The record of the result, where the stage need not run."""
+        return self.record if self.up_to_date else None
+
+    @property
     def sentence(self) -> str:
         if self.detail:
             return self.detail

@@ -32,7 +32,7 @@ class Project:
             module = importlib.import_module(package)
         except ImportError as e:
             raise BadInput(f"{OWN_STAGES}={package}: cannot be imported ({e})") from e
-        return cls(package, Path(module.__file__).with_name("dvc.yaml"))
+        return cls(package, Path(module.__path__[0]) / "dvc.yaml")
 
     @cached_property
     def graph(self) -> Graph:

@@ -8,7 +8,6 @@ import inspect
 import types
 import typing
 from collections.abc import Iterable, Iterator
-from enum import Enum
 from typing import Any
 
 from gsac.pipeline import commands
@@ -50,7 +49,7 @@ def cli_page() -> str:
 def stage_page(project: Project, name: str) -> str:
     """One stage: its module's docstring, ports, parameters, and what else its key holds."""
     stage = project.stage(name)
-    lead, *rest = inspect.getdoc(importlib.import_module(f"{project.package}.{name}")).split("\n\n")
+    lead, *rest = (inspect.getdoc(importlib.import_module(f"{project.package}.{name}")) or f"{name}: no docstring").split("\n\n")
     title, _, sentence = lead.partition(": ")
     blocks = [f"# {title}", WRITTEN.strip(), f"{sentence[0].upper()}{sentence[1:]}"]
     blocks += [f"```text\n{part}\n```" if part.startswith("takes") else part for part in rest]
@@ -110,7 +109,7 @@ def _command(parser: argparse.ArgumentParser) -> Iterator[str]:
         if arguments:
             yield _argument_table(arguments)
         return
-    helps = {action.dest: action.help for action in below._choices_actions}
+    helps = {action.dest: action.help or action.dest for action in below._choices_actions}
     for name, one in below.choices.items():
         yield f"### {parser.prog} {name}"
         yield f"{helps[name][0].upper()}{helps[name][1:]}."
@@ -131,7 +130,7 @@ def _synopsis(action: argparse.Action) -> str:
 def _operand(action: argparse.Action) -> str:
     if action.nargs == 0:
         return ""
-    name = action.metavar or action.dest.upper()
+    name = str(action.metavar or action.dest.upper())
     return f"{name} ..." if action.nargs in ("*", "+", argparse.REMAINDER) else name
 
 
@@ -141,7 +140,7 @@ def _argument_table(arguments: Iterable[argparse.Action]) -> str:
     return _table(("argument", "meaning"), rows)
 
 
-def _words(words: type[Enum]) -> str:
+def _words(words: type[Outcome] | type[Reason]) -> str:
     return _table(("word", ""), ((f"`{word.value}`", word.sentence) for word in words))
 
 

@@ -130,7 +130,7 @@ class TerminalReporter(PlainReporter):
         self._bar.start()
 
     def progress(self, stage: str, done: int, total: int, unit: str) -> None:
-        if self._bar is not None:
+        if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=done, total=total or None, words=self._words(done, total, unit))
 
     def warning(self, stage: str, message: str) -> None:

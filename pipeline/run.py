@@ -56,6 +56,7 @@ class StageResult:
                    info.peak_rss_mb, info.warnings, config_values(config), info.metrics)
 
     def to_json(self) -> dict[str, Any]:
+        """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
@@ -104,7 +105,7 @@ class ClipRun:
 
     def forecast(self, clip: Path, options: Options) -> list[StagePlan]:
         """What would run and why, as far as it is known before anything runs."""
-        digests = {CLIP: self._clip_digest(clip)}
+        digests = {CLIP: clip_digest(clip, self.store)}
         plans = []
         for name in self.select(options):
             unknown = [p for p in self.graph.step(name).deps if p not in digests]
@@ -115,8 +116,8 @@ class ClipRun:
             parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
             plan = plan_stage(self.store, parts, forced=name in options.force)
             plans.append(plan)
-            if plan.up_to_date:
-                digests |= _ports(plan.record)
+            if plan.cached is not None:
+                digests |= _ports(plan.cached)
         return plans
 
     def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
@@ -126,10 +127,11 @@ class ClipRun:
         """
         steps = self.select(options)
         required = self.graph.above(options.start) if options.start else set()
-        source = self._clip_digest(clip)
+        source = clip_digest(clip, self.store)
         digests = {CLIP: source}
         paths = {CLIP: clip}
-        with in_use(self.store) as lease, self._writing_results(clip), self._stage_runner() as runner:
+        runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
+        with in_use(self.store) as lease, self._writing_results(clip), runner:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]
                 runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
@@ -137,15 +139,14 @@ class ClipRun:
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
                 lease.add(parts.key)
                 plan = plan_stage(self.store, parts, forced=name in options.force)
-                if plan.up_to_date:
-                    outcome, record = Outcome.CACHED, plan.record
-                elif name in required:
-                    raise NotUpToDateError(f"stage {name} is not up to date ({plan.sentence}); "
-                                           f"run without --from {options.start}")
-                else:
-                    with self._recording_failure(plan, runner):
+                outcome, record = Outcome.CACHED, plan.cached
+                if record is None:
+                    if name in required:
+                        raise NotUpToDateError(f"stage {name} is not up to date ({plan.sentence}); "
+                                               f"run without --from {options.start}")
+                    with self._recording_failure(plan, parts.key, runner):
                         outcome, record = runner.run(
-                            plan, {port: paths[port] for port in inputs}, forced=name in options.force,
+                            parts, plan.reason, {port: paths[port] for port in inputs}, forced=name in options.force,
                             still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
@@ -153,21 +154,18 @@ class ClipRun:
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
 
-    def _stage_runner(self) -> StageRunner:
-        return StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
-
     def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))
         self.metrics |= record.info.metrics
         self.folder.place(self.store, record)
 
     @contextlib.contextmanager
-    def _recording_failure(self, plan: StagePlan, runner: StageRunner) -> Iterator[None]:
+    def _recording_failure(self, plan: StagePlan, key: str, runner: StageRunner) -> Iterator[None]:
         try:
             yield
         except (StageError, CacheError) as error:
             self.reporter.ends(plan.stage, Outcome.FAILED, 0.0)
-            self.results.append(StageResult(plan.stage, Outcome.FAILED, plan.sentence, plan.parts.key,
+            self.results.append(StageResult(plan.stage, Outcome.FAILED, plan.sentence, key,
                                             params=config_values(self.configs[plan.stage]), error=str(error)))
             raise StageFailedError(plan.stage, error, runner.logs / f"{plan.stage}.log") from error
 
@@ -192,11 +190,8 @@ class ClipRun:
             "metrics": self.metrics,
         }
 
-    def _clip_digest(self, clip: Path) -> str:
-        return clip_digest(clip, self.store)
-
     def _unchanged(self, clip: Path, digest: str) -> None:
-        if self._clip_digest(clip) != digest:
+        if clip_digest(clip, self.store) != digest:
             raise BadInput(f"{clip} changed while it was being read; run again when it is complete")
 
 

@@ -22,7 +22,7 @@ from gsac.pipeline.child import Child, LogReader, StageBugError, tail
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.params import config_values
-from gsac.pipeline.plan import StagePlan
+from gsac.pipeline.plan import Reason
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
 
@@ -98,20 +98,19 @@ class StageRunner:
         self._drop(keep=tuple(self.prepared.keys() - {name}))
         return self._child(name, log)
 
-    def run(self, plan: StagePlan, inputs: dict[str, Path], forced: bool = False,
+    def run(self, parts: KeyParts, reason: Reason, inputs: dict[str, Path], forced: bool = False,
             still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
         """The stage's result: from the cache if it is there by now, else computed.
 
         inputs: port -> read-only path; still_valid: called before publishing, raises if inputs changed.
-
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
-        name, parts = plan.stage, plan.parts
+        name = parts.stage
         with single_flight(self.store, parts.key, lambda: self._waiting(name)) as there:
             if there is not None and not forced:
                 return Outcome.CACHED, there
             models = self.keys.models.need(parts.models, self.reporter.note)
-            self.reporter.starts(name, plan.reason.value)
+            self.reporter.starts(name, reason.value)
             stage = self.keys.project.stage(name)
             scratch = self.store.partial(parts.key)
             if forced:
@@ -133,7 +132,7 @@ class StageRunner:
         return Outcome.RAN, record
 
     def _check_code(self, parts: KeyParts, because: StageError | None = None) -> None:
-        """StageError where the stage's code is no longer what the key names: what ran may be neither the old nor the new."""
+        """StageError where the stage's code was edited since its key was made: what ran may be neither the old nor the new."""
         now = self.keys.code(parts.stage)
         edited = sorted(name for name in now.keys() | parts.code.keys() if now.get(name) != parts.code.get(name))
         if edited:
@@ -146,7 +145,6 @@ class StageRunner:
         name = parts.stage
         now = datetime.datetime.now(datetime.UTC)
         info = RunInfo(started=now.isoformat(timespec="seconds"), device=parts.device or self.keys.device)
-
         log = LogReader(self._log(name))
 
         def hear(event: dict[str, Any]) -> None:

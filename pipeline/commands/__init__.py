@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
-from typing import Protocol
+from typing import Protocol, cast
 
 from gsac.pipeline.project import shipped_dag
 from gsac.stages.contract import BadInput, did_you_mean
@@ -41,7 +41,7 @@ class Command(Protocol):
 
 def load(name: str) -> Command:
     """The module of a command of this package."""
-    return importlib.import_module(f"{__name__}.{name}")
+    return cast(Command, importlib.import_module(f"{__name__}.{name}"))
 
 
 def load_added() -> dict[str, Command]:

@@ -71,7 +71,7 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def format_size(count: int) -> str:
+def format_size(count: float) -> str:
     """`1.2 MB`"""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000:
@@ -82,8 +82,7 @@ def format_size(count: int) -> str:
 
 def parse_size(text: str) -> int:
     """Bytes of `500M`, `20G`, `1.5 TB`."""
-    match = re.fullmatch(r"\s*([0-9.]+)\s*([KMGT]?)B?\s*", text, re.IGNORECASE)
-    try:
-        return int(float(match.group(1)) * UNITS[match.group(2).upper()])
-    except (AttributeError, ValueError) as e:
-        raise BadInput(f"--max-size {text}: expected a size such as 500M or 20G") from e
+    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*([KMGT]?)B?\s*", text, re.IGNORECASE)
+    if match is None:
+        raise BadInput(f"--max-size {text}: expected a size such as 500M or 20G")
+    return int(float(match.group(1)) * UNITS[match.group(2).upper()])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
-from gsac.pipeline.errors import StageFailedError
+from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
@@ -56,7 +56,7 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
         clip_run.run(clip, options, early.start)
         write_report(clip_run, reporter, early)
     except BaseException as error:
-        error.summary = clip_run.summary()
+        attach_summary(error, clip_run.summary())
         if isinstance(error, StageFailedError):
             write_report(clip_run, reporter)
         raise

@@ -10,7 +10,7 @@ from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import add_json, add_params, open_run_folder, open_store, progress_reporter
-from gsac.pipeline.errors import StageFailedError
+from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
@@ -61,7 +61,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
             result = run_task(task, reporter, arguments.force)
         except StageFailedError as error:
             failed = StageResult(task.name, Outcome.FAILED, "", error=str(error.cause))
-            error.summary = {"stages": [failed.to_json()]}
+            attach_summary(error, {"stages": [failed.to_json()]})
             raise
     if arguments.json:
         outputs = task.keys.project.stage(task.name).outputs
@@ -97,11 +97,11 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
         plan = plan_stage(store, parts, force)
-        outcome, record = Outcome.CACHED, plan.record
-        if not plan.up_to_date:
+        outcome, record = Outcome.CACHED, plan.cached
+        if record is None:
             try:
                 with StageRunner(task.keys, store, reporter, task.logs) as runner:
-                    outcome, record = runner.run(plan, task.paths, forced=force)
+                    outcome, record = runner.run(parts, plan.reason, task.paths, forced=force)
             except StageError as error:
                 raise StageFailedError(name, error, task.logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:

@@ -23,7 +23,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         clip_run, plans = forecast(arguments, reporter)
         plans = [
             dataclasses.replace(plan, reason=Reason.OUTPUT)
-            if plan.up_to_date and not clip_run.folder.shows(clip_run.store, plan.record) else plan for plan in plans
+            if plan.cached is not None and not clip_run.folder.shows(clip_run.store, plan.cached) else plan for plan in plans
         ]
         for plan in plans:
             why = "" if plan.up_to_date else plan.sentence

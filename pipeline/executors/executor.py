@@ -39,3 +39,4 @@ class Executor(AbstractContextManager, Protocol):
 
     def collect(self) -> Iterator[ClipResult]:
         """Results as they come, one for each submitted job."""
+        ...

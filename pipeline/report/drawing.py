@@ -68,7 +68,7 @@ def draw_keypoints(image: np.ndarray, xy: np.ndarray, score: np.ndarray, least: 
         if shown[a] and shown[b]:
             colour = SIDE_COLOURS[side_of(a) if side_of(a) == side_of(b) else "middle"]
             draw_line(image, xy[a], xy[b], colour, max(1, round(width * unit)))
-    for i in np.flatnonzero(shown):
+    for i in np.flatnonzero(shown).tolist():
         if filled[i]:
             draw_dot(image, xy[i], 2.6 * unit, FILLED_COLOUR, 1)
         elif FACE.start <= i < FACE.stop:
@@ -84,7 +84,7 @@ def draw_keypoints(image: np.ndarray, xy: np.ndarray, score: np.ndarray, least: 
 def over_magenta(image: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     """The cut-out on magenta, (H, W, 3) uint8. image: (H, W, 3) uint8; alpha: (H, W) in 0..1."""
     a = alpha[..., None]
-    return np.uint8(np.round(image * a + MAGENTA * (1 - a)))
+    return np.round(image * a + MAGENTA * (1 - a)).astype(np.uint8)
 
 
 def draw_body(image: np.ndarray, vertices: np.ndarray, faces: np.ndarray, face_id: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ def draw_body(image: np.ndarray, vertices: np.ndarray, faces: np.ndarray, face_i
     seen = face_id >= 0
     out = image.astype(np.float32)
     out[seen] = 0.4 * out[seen] + 0.6 * shade[face_id[seen], None] * BODY_COLOUR
-    return np.uint8(np.clip(out, 0, 255))
+    return np.clip(out, 0, 255).astype(np.uint8)
 
 
 def draw_reprojection(image: np.ndarray, detected: np.ndarray, projected: np.ndarray, shown: np.ndarray) -> None:
@@ -110,7 +110,7 @@ def draw_reprojection(image: np.ndarray, detected: np.ndarray, projected: np.nda
     detected: (133, 2) px; projected: (133, 2) px; shown: (133,) bool.
     """
     unit = max(image.shape[0] / 640, 0.6)
-    for i in np.flatnonzero(shown[: FEET.stop]):
+    for i in np.flatnonzero(shown[: FEET.stop]).tolist():
         colour = SIDE_COLOURS[side_of(BODY.start + i)]
         draw_line(image, detected[i], projected[i], (255, 255, 255), max(1, round(unit)))
         draw_dot(image, detected[i], 2.4 * unit, colour)

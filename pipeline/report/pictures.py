@@ -161,6 +161,7 @@ class Footage:
             room = MARGIN * (high - low).max()
             low, high = np.clip(low - room, 0, (w - 1, h - 1)), np.clip(high + room, 1, (w, h))
             if (high - low).min() >= 16:
-                box = (*np.floor(low).astype(int).tolist(), *np.ceil(high).astype(int).tolist())
+                (x0, y0), (x1, y1) = np.floor(low).astype(int).tolist(), np.ceil(high).astype(int).tolist()
+                box = (x0, y0, x1, y1)
         scale = min(width / (box[2] - box[0]), height / (box[3] - box[1]), 1.0)
         return Crop(*box, scale)

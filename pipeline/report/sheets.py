@@ -208,7 +208,7 @@ def heldout_sheet(results: Results) -> Sheet:
     judged = [(rows[f]["psnr_fg"], f) for f in frames if number(rows.get(f, {}).get("psnr_fg")) is not None]
     worst = min(judged)[1] if judged else None
     triples = {stem: [read_frame(folder / f"{stem}_{kind}.png") for kind in ("truth", "render", "error")]
-               for stem in sorted(chosen | ({worst} - {None}))}
+               for stem in sorted(chosen | ({worst} if worst else set()))}
     y, x = person_box([image for triple in triples.values() for image in triple[:2]])
     pictures = []
     for stem, triple in triples.items():
