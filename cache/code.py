@@ -69,7 +69,7 @@ def code_parts(
 
 
 def _module(file: Path, package: str, memo: Memo) -> tuple[str, list[str]]:
-    """Digest of a module, and what it refers to that may be first-party."""
+    """Digest of a module, and its references that may be first-party."""
     stat = file.stat()
     known = memo.get(f"{MEMO_KIND} {package}", stat)
     if known is None:

@@ -1,4 +1,4 @@
-"""Errors of the store; each names the folder and what to do about it."""
+"""Errors of the store; each names the folder and the remedy."""
 
 from __future__ import annotations
 

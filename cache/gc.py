@@ -29,7 +29,7 @@ PARTIAL_S = 86400.0
 
 @dataclass
 class GcReport:
-    """What was removed, or would be on a dry run."""
+    """Everything removed, or that would be on a dry run."""
 
     records: list[str] = field(default_factory=list)
     """`<stage>/<key>`"""
@@ -112,7 +112,7 @@ def _entries(store: Store, grace_s: float) -> tuple[list[_Entry], list[Path]]:
 
 
 def _choose(entries: list[_Entry], sizes: dict[str, int], keep_days: float | None, max_bytes: int | None) -> None:
-    """Marks as doomed what is too old, then the longest unused until the rest fits; shared objects count once."""
+    """Marks as doomed the results that are too old, then the longest unused until the rest fits; shared objects count once."""
     if keep_days is not None:
         oldest = time.time() - keep_days * 86400
         for entry in entries:

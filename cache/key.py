@@ -1,4 +1,4 @@
-"""What a result depends on, and the specification of every hash in the store.
+"""The key of a result, made of everything it depends on; and the specification of every hash in the store.
 
 All digests are sha256 in lower-case hex. Each pre-image except that of a plain file starts with its kind and version,
 so no two kinds of thing can collide by having the same bytes:

@@ -53,7 +53,7 @@ class Memo:
             self._pending.append((kind, *identity(stat), value))
 
     def flush(self) -> None:
-        """Writes what `put` has buffered."""
+        """Writes the values that `put` has buffered."""
         rows, self._pending = self._pending, []
         if not rows or self._connection is None:
             return

@@ -1,4 +1,4 @@
-"""Objects: files and folders under objects/ab/<digest>[suffix], named by the digest of what is in them.
+"""Objects: files and folders under objects/ab/<digest>[suffix], named by the digest of their content.
 
 The suffix is that of the output's name, since readers and browsers rely on it; the digest is of the content alone.
 """
@@ -56,7 +56,7 @@ def is_sound(path: Path, digest: str, memo: Memo | None = None) -> bool:
 
 
 def read_manifest(path: Path) -> dict[str, list]:
-    """The manifest by reading every byte, whatever the memo says."""
+    """The manifest by reading every byte, without the memo."""
     return tree_digest(path, NO_MEMO)[1]
 
 

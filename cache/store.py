@@ -40,7 +40,7 @@ class Store:
         self.root = Path(root).absolute()
         self.say = say
         self.below = below
-        with contextlib.suppress(OSError):  # a read-only store can still be read; whoever writes gets the error
+        with contextlib.suppress(OSError):  # a read-only store can still be read; writing to it raises
             for name in FOLDERS:
                 (self.root / name).mkdir(parents=True, exist_ok=True)
 
@@ -51,7 +51,7 @@ class Store:
 
     @property
     def memo(self) -> Memo:
-        """What is known of files by their stat."""
+        """The memo of file digests beside the store's objects."""
         return memo_in(self.root)
 
     @property

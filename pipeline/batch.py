@@ -55,7 +55,7 @@ def make_jobs(clips: list[Path], out: Path, arguments: tuple[str, ...]) -> list[
 
 
 def run_batch(jobs: list[ClipJob], executor: Executor, on_result: Callable[[ClipResult], None]) -> list[ClipResult]:
-    """Every job, whatever becomes of the others; results in the order of the jobs."""
+    """Runs every job, also after one that fails; results in the order of the jobs."""
     results = {}
     with executor:
         for job in jobs:

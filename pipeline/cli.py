@@ -36,7 +36,7 @@ def execute(argv: list[str]) -> ExitCode:
         return arguments.do(arguments)
     except KeyboardInterrupt as error:
         return _give_up("interrupted; finished stages are kept", ExitCode.INTERRUPTED, arguments, error)
-    except BrokenPipeError:  # whoever read the answer has gone: the rest goes nowhere, and quietly
+    except BrokenPipeError:  # the reader of the answer has gone: the rest is dropped
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.INTERRUPTED
     except Exception as error:
@@ -85,7 +85,7 @@ class _Version(argparse.Action):
 
 
 def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None, error: BaseException) -> ExitCode:
-    """Says why, with --json on stdout too; what was done before, a command attaches to the error."""
+    """Prints the message, with --json also an object on stdout that holds what the command had done before the error."""
     if getattr(arguments, "json", False):
         emit({"stages": [], "outputs": {}, "metrics": {}} | attached_summary(error) | {"error": message})
     print(f"gsac: {message}", file=sys.stderr, flush=True)

@@ -11,7 +11,7 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput, StageError
 
 PATH_ERRORS = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
-"""A path that the user gave cannot be what it has to be."""
+"""errno of a path from the user that cannot be read or written as it should."""
 NO_ROOM = {errno.ENOSPC: "no room left on the disk", errno.EDQUOT: "the disk quota is used up"}
 
 
@@ -20,7 +20,7 @@ class NotUpToDateError(Exception):
 
 
 class StageFailedError(Exception):
-    """A stage failed; `cause` says how. What was finished before it is kept."""
+    """A stage failed with the error `cause`; stages that were finished before it are kept."""
 
     def __init__(self, stage: str, cause: Exception, log: Path):
         seen = f" (log: {log})" if log.is_file() and log.stat().st_size else ""
@@ -30,17 +30,17 @@ class StageFailedError(Exception):
 
 
 def attach_summary(error: BaseException, summary: dict[str, Any]) -> None:
-    """Keeps with an error what was done before it, for --json."""
+    """Adds to an error the object of --json on the stages before it."""
     vars(error)["summary"] = summary
 
 
 def attached_summary(error: BaseException) -> dict[str, Any]:
-    """What `attach_summary` kept, {} without."""
+    """The object that `attach_summary` added, {} without one."""
     return vars(error).get("summary", {})
 
 
 def exit_code(error: BaseException) -> ExitCode | None:
-    """What an exception means to the shell; None for a bug of ours."""
+    """The exit code for an exception; None for a bug of ours."""
     if isinstance(error, StageFailedError):
         return exit_code(error.cause) or ExitCode.FAILED
     if isinstance(error, NotUpToDateError):

@@ -35,7 +35,7 @@ class ModelStore:
 
     @property
     def brought(self) -> dict[str, str]:
-        """Name -> sha256 of what `gsac models add` put here."""
+        """Name -> sha256 of the files that `gsac models add` put here."""
         found: dict[str, str] = {}
         for root in reversed(self._roots):
             with contextlib.suppress(FileNotFoundError):
@@ -63,7 +63,7 @@ class ModelStore:
         return self.path(name).is_file()
 
     def need(self, names: Iterable[str], say: Say) -> dict[str, Path]:
-        """Files by name, checked; pulls what can be pulled once. BadInput names what is missing or wrong."""
+        """Files by name, checked; pulls missing ones once. BadInput names a file that is missing or wrong."""
         names = tuple(names)
         missing = [name for name in names if not self.is_here(name)]
         if missing:

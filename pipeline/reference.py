@@ -47,7 +47,7 @@ def cli_page() -> str:
 
 
 def stage_page(project: Project, name: str) -> str:
-    """One stage: its module's docstring, ports, parameters, and what else its key holds."""
+    """One stage: its module's docstring, ports, parameters, and the rest of its key."""
     stage = project.stage(name)
     lead, *rest = (inspect.getdoc(importlib.import_module(f"{project.package}.{name}")) or f"{name}: no docstring").split("\n\n")
     title, _, sentence = lead.partition(": ")

@@ -121,7 +121,8 @@ class ClipRun:
         return plans
 
     def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
-        """Runs what has to; fills `results`, `metrics` and the folder. at_last: called with the last stage's name once it works.
+        """Runs the stages that are not up to date; fills `results`, `metrics` and the folder. at_last: called with the
+        last stage's name once it is at work.
 
         Raises StageFailedError, NotUpToDateError, CacheError; run.json and finished stages are kept in any case.
         """

@@ -51,7 +51,7 @@ class StageRunner:
     logs: Path
     """Folder for `<stage>.log`."""
     on_start: Callable[[], None] = lambda: None
-    """Called when a stage's process has its order: what can be done meanwhile."""
+    """Called once a stage's process has its order, for work that can be done meanwhile."""
     prepared: dict[str, Prepared] = field(default_factory=dict)
     """By stage."""
     leaving: list[Child] = field(default_factory=list)

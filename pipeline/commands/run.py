@@ -50,7 +50,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
-    """The run and its report; the JSON object says what was done whether it ends well or not."""
+    """The run and its report; the JSON object lists the stages done whether it ends well or not."""
     early = EarlySections(clip_run.folder)
     try:
         clip_run.run(clip, options, early.start)

@@ -1,4 +1,4 @@
-"""Marks over frames: keypoints by side, what was filled or is missing, a shaded body, reprojection errors."""
+"""Draws over frames: keypoints by side, filled and missing ones, a shaded body, reprojection errors."""
 
 from __future__ import annotations
 

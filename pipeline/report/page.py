@@ -276,4 +276,4 @@ SECTIONS = (
     ("training", "Training", "Loss and held-out quality over the seconds of training, without the time for "
      "judging.", "train/metrics.json", None, lambda paint: training_charts(paint.results, paint.charts)),
 )
-"""Name, title, what it shows, port, what draws pictures, and charts."""
+"""Name, title, lead, port, function that draws the pictures, and function that draws the charts."""

@@ -27,7 +27,7 @@ class EarlySections:
         return draw_sections(self.folder.root, running)
 
     def sections(self) -> dict[str, Any]:
-        """By name; what is not among them is still to be drawn."""
+        """Sections by name; those that are missing are still to be drawn."""
         with contextlib.suppress(Exception):
             return self._drawn.result() if self._drawn else {}
         return {}

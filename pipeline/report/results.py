@@ -76,7 +76,7 @@ class Results:
         return content
 
     def done(self, stage: str) -> bool:
-        """Whether the run has a result of the stage; without run.json nobody knows, and it counts as done."""
+        """Whether the run has a result of the stage; without run.json it counts as done."""
         return not self.has_run or self.rows.get(stage, {}).get("status") in DONE
 
     def path(self, port: str) -> Path:

@@ -29,7 +29,7 @@ PERSON_WHITE = 250
 
 @dataclass
 class Sheet:
-    """Pictures of one section and what was measured on the way."""
+    """Pictures of one section and the figures measured for it."""
 
     pictures: list[Picture]
     figures: dict[str, str] = field(default_factory=dict)

@@ -93,7 +93,7 @@ def networks(results: Results) -> list[dict[str, str]]:
         try:
             stage = results.project.stage(name)
             needed = stage.models(make_config(stage, row.get("params") or {}))
-        except Exception:  # a stage of another version: what it needs is not known here
+        except Exception:  # a stage of another version: its needs are unknown here
             continue
         for model in needed:
             known = MODELS.get(model)

@@ -3,6 +3,8 @@
 import signal
 from pathlib import Path
 
+from gsac.pipeline.child import LogReader
+
 NOTES = """
 import os
 
@@ -97,3 +99,14 @@ def test_libraries_in_a_stages_process_have_one_thread_unless_the_user_says_othe
     assert (toy.out / "logs" / "left.log").read_text().startswith("1\n")
     assert toy.run("--force", "left", OPENCV_FOR_THREADS_NUM="2").code == 0
     assert (toy.out / "logs" / "left.log").read_text().startswith("2\n")
+
+
+def test_a_growing_log_is_read_line_by_line_and_each_line_once(tmp_path):
+    log = tmp_path / "cut.log"
+    reader = LogReader(log)
+    assert reader.new_lines() == [], "the file is not there yet"
+    log.write_text("first\nsec")
+    assert reader.new_lines() == ["first"]
+    log.write_text("first\nsecond\nno end")
+    assert reader.new_lines() == ["second"]
+    assert reader.new_lines(ended=True) == ["no end"] and reader.new_lines(ended=True) == []
