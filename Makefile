@@ -5,7 +5,7 @@ TORCH ?= torch==2.13.0
 BIN := .venv/bin
 READY := .venv/.gsac-ready
 
-.PHONY: setup demo test test-fast params shaders lint debian
+.PHONY: setup demo test test-fast params docs shaders lint debian
 
 setup: $(READY)
 
@@ -21,7 +21,7 @@ $(READY): pyproject.toml
 demo: setup
 	$(BIN)/gsac demo
 
-test: setup debian
+test: setup debian lint
 	$(BIN)/python -m pytest
 
 test-fast: setup
@@ -34,6 +34,10 @@ debian:
 # Writes params.yaml from the stages' defaults.
 params: setup
 	$(BIN)/python -m gsac.pipeline.params
+
+# Writes docs/cli.md and docs/stages/ from the commands and the stages' declarations.
+docs: setup
+	$(BIN)/python -m gsac.pipeline.reference
 
 # Writes the viewer page's shaders from the Unity package's HLSL; needs glslang-tools and npm.
 shaders: setup

@@ -114,9 +114,9 @@ def _train(inputs: dict[str, Path], folder: Path, values: dict, cores: list[int]
 
 def _find_networks(config: TrainConfig) -> dict[str, Path]:
     """Files of the optional networks that the user has brought."""
-    from gsac.pipeline.model_store import Models
+    from gsac.pipeline.model_store import ModelStore
 
-    models = Models(Store.open())
+    models = ModelStore(Store.open())
     return models.need([name for name in config.wishes() if name in models.brought], print)
 
 

@@ -10,7 +10,7 @@ from gsac.cache.store import Store
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run import Chain, Options
+from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import RunFolder
 
 HEIGHT = 1280
@@ -36,5 +36,5 @@ def run_clip(folder: Path, out: Path, stages: Iterable[str], store: Store, say: 
     configs = resolve(project, sets=settings)
     run.prepare(clip, project, configs)
     for last in stages:
-        Chain(project, configs, store, run, say).run(clip, Options(until=last))
+        ClipRun(project, configs, store, run, say).run(clip, Options(until=last))
     return run

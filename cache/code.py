@@ -2,9 +2,9 @@
 
 Nothing is imported to find out. Imports inside functions count, and so do the `__init__` of every package on the way,
 strings that are the full name of a first-party module (`"gsac.stages.handgap.gp"` in a table of methods), and files
-that lie beside a module or below it and that it names by a string or by a path of strings: a CUDA kernel, a page
-template, a table of ours in `.npz`. A stage declares as model files what does not ship with the package. Imports whose
-names are put together at run time escape: `extra` names them.
+beside or below a module that it names by a string or by a path of strings: a CUDA kernel, a page template, an `.npz`
+table. Files that do not ship with the package are declared by the stage as model files. Imports whose names are put
+together at run time are not seen: `extra` names them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FIRST_PARTY = "gsac"
 FILE_SUFFIXES = tuple(f".{s}" for s in (
     "npz npy json cu cuh c h cpp cs js css html jinja glsl wgsl hlsl compute shader asmdef unity md".split()))
 MEMO_KIND = f"module 3 python {sys.version_info.major}.{sys.version_info.minor}"
-"""To be raised when `module_digest` reads sources otherwise, so that what was remembered before is not taken for its word."""
+"""To be raised when `module_digest` reads sources in another way, so that no memo of the old way is used."""
 
 
 def code_parts(
@@ -60,16 +60,16 @@ def code_parts(
         is_package = file.name == "__init__.py"
         parts[name], named = _module(file, name if is_package else name.rpartition(".")[0], memo)
         for reference in named:
-            if reference.startswith(FIRST_PARTY + "."):
-                waiting.append(reference)
-            elif (file.parent / reference).is_file():
+            if reference.endswith(FILE_SUFFIXES) and (file.parent / reference).is_file():  # `gsac.js` too is a file, not a module
                 parts[f"{name}/{reference}"] = file_digest(file.parent / reference, memo)
+            elif reference.startswith(FIRST_PARTY + "."):
+                waiting.append(reference)
     memo.flush()
     return dict(sorted(parts.items()))
 
 
 def _module(file: Path, package: str, memo: Memo) -> tuple[str, list[str]]:
-    """Digest of a module, and what it refers to that may be first-party."""
+    """Digest of a module, and its references that may be first-party."""
     stat = file.stat()
     known = memo.get(f"{MEMO_KIND} {package}", stat)
     if known is None:

@@ -18,12 +18,12 @@ Manifest = dict[str, list]
 
 
 def typed_digest(kind: str, payload: bytes) -> str:
-    """sha256 with the kind of thing in front, so that no two kinds can ever share a pre-image."""
+    """sha256 of a payload behind its kind, so that two kinds never share a pre-image."""
     return hashlib.sha256(f"gsac {kind}\n".encode() + payload).hexdigest()
 
 
 def canonical(value: Any) -> bytes:
-    """The one JSON text of a value: sorted keys, no spaces, ASCII, floats by repr; NaN or infinity is a ValueError."""
+    """The canonical JSON of a value: sorted keys, no spaces, ASCII, floats by repr. ValueError for NaN or infinity."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode()
 
 
@@ -47,6 +47,7 @@ def tree_digest(path: Path, memo: Memo | None = None) -> tuple[str, Manifest]:
 
 
 def manifest_digest(manifest: Manifest) -> str:
+    """Tree digest of a manifest."""
     return typed_digest("tree 1", canonical(manifest))
 
 

@@ -1,4 +1,4 @@
-"""What can go wrong with the store, said so that a person knows which folder it is and what to do."""
+"""Errors of the store; each names the folder and the remedy."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ INTEGRITY = "run `gsac cache verify`; what it finds damaged is moved to quaranti
 
 
 class CacheError(Exception):
-    """The store cannot do what was asked. `hint` says what to do about it."""
+    """An operation on the store failed; `hint` tells the user what to do."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(f"{message}; {hint}" if hint else message)
@@ -23,11 +23,11 @@ class CacheReadOnlyError(CacheError):
 
 
 class CacheFullError(CacheError):
-    """The disk or the quota of the store's folder is used up."""
+    """The disk or the quota of the store's folder is full."""
 
 
 class IntegrityError(CacheError):
-    """What lies in the store is not what was put there."""
+    """An object in the store is not what was put there."""
 
 
 def from_os_error(error: OSError, folder: Path, needed: int | None = None) -> CacheError:

@@ -1,6 +1,6 @@
-"""Forgetting: old results, rubbish of dead runs. Never what a run in progress uses.
+"""Garbage collection: removes old results and left-overs of dead runs, never what a run in progress uses.
 
-gc holds the store's lock alone while it marks and moves its victims aside, so no publish is half-way. It deletes after.
+gc holds the store's lock alone while it marks its victims and moves them aside, so no publish is half-way; it deletes them after.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ from pathlib import Path
 from gsac.cache import objects
 from gsac.cache.errors import from_os_error
 from gsac.cache.lease import live_keys
-from gsac.cache.lock import common, if_free
+from gsac.cache.lock import if_free, shared
 from gsac.cache.record import Record
 from gsac.cache.store import Store
 
 GRACE_S = 3600.0
 """A result used within this time stays, lease or not."""
 QUARANTINE_S = 7 * 86400.0
+"""Damaged objects are kept this long."""
 PARTIAL_S = 86400.0
-"""What a stopped run left for the next one stays this long."""
+"""The partial work of a stopped run is kept this long for the next run."""
 
 
 @dataclass
 class GcReport:
-    """What was removed, or would be on a dry run."""
+    """Everything removed, or that would be on a dry run."""
 
     records: list[str] = field(default_factory=list)
     """`<stage>/<key>`"""
@@ -36,7 +37,7 @@ class GcReport:
     temps: list[str] = field(default_factory=list)
     quarantined: list[str] = field(default_factory=list)
     partial: list[str] = field(default_factory=list)
-    """Keys whose stopped runs left something that nobody came back for."""
+    """Keys of stopped runs whose partial work no run has taken up."""
     freed_bytes: int = 0
     kept_bytes: int = 0
     dry_run: bool = False
@@ -62,14 +63,14 @@ def collect(
     dry_run: bool = False,
     grace_s: float = GRACE_S,
 ) -> GcReport:
-    """Removes results not used for `keep_days`, then the longest unused until `max_bytes` hold, then all rubbish.
+    """Removes results not used for `keep_days`, then the longest unused until the rest fits into `max_bytes`, then all rubbish.
 
-    With neither bound only rubbish goes: objects of no record, folders of dead runs, old quarantine, and what stopped runs left
-    for others that have not come.
+    Rubbish: objects of no record, folders of dead runs, old quarantine, old partial work of stopped runs. Results used within
+    `grace_s` stay. dry_run: only reports.
     """
     report = GcReport(dry_run=dry_run)
     try:
-        with store.private("gc") as aside, common(store.root / "lock", alone=True), contextlib.ExitStack() as held:
+        with store.private("gc") as aside, shared(store.root / "lock", alone=True), contextlib.ExitStack() as held:
             entries, broken = _entries(store, grace_s)
             stored = {path.name: path for path in (store.root / "objects").glob("*/*")}
             _choose(entries, {name: _bytes(path) for name, path in stored.items()}, keep_days, max_bytes)
@@ -77,7 +78,7 @@ def collect(
             wanted = {name for entry in entries if not entry.doomed for name in entry.names}
             rubbish = [path for name, path in stored.items() if name not in wanted]
             temps = _orphans(store, held)
-            left = _left(store, {entry.record.key for entry in entries})
+            left = _abandoned(store, {entry.record.key for entry in entries})
             damaged = [path for path in (store.root / "quarantine").iterdir() if _age(path) > QUARANTINE_S]
             report.records = sorted(f"{entry.record.parts.stage}/{entry.record.key}" for entry in doomed)
             report.objects = sorted(path.name for path in rubbish)
@@ -98,7 +99,7 @@ def collect(
 
 
 def _entries(store: Store, grace_s: float) -> tuple[list[_Entry], list[Path]]:
-    """Whole records, longest unused first, and the files of records that are not whole."""
+    """Sound records, the longest unused first, and the files of records that are not sound."""
     live, now = live_keys(store), time.time()
     entries, broken = [], []
     for file in store.record_files():
@@ -111,7 +112,7 @@ def _entries(store: Store, grace_s: float) -> tuple[list[_Entry], list[Path]]:
 
 
 def _choose(entries: list[_Entry], sizes: dict[str, int], keep_days: float | None, max_bytes: int | None) -> None:
-    """Marks as doomed what is too old, then the longest unused until the rest fits; shared objects count once."""
+    """Marks as doomed the results that are too old, then the longest unused until the rest fits; shared objects count once."""
     if keep_days is not None:
         oldest = time.time() - keep_days * 86400
         for entry in entries:
@@ -142,15 +143,15 @@ def _orphans(store: Store, held: contextlib.ExitStack) -> list[Path]:
     return orphans
 
 
-def _left(store: Store, done: set[str]) -> list[Path]:
-    """Folders of partial/ that no living run holds, and that are old or whose key is done."""
+def _abandoned(store: Store, done: set[str]) -> list[Path]:
+    """Folders of partial/ that no living run uses and that are old, or whose key has its result."""
     live = live_keys(store)
     return [path for path in (store.root / "partial").iterdir()
             if path.name not in live and (path.name in done or _age(path) > PARTIAL_S)]
 
 
 def _age(path: Path) -> float:
-    """Seconds since the file or folder came to lie where it lies."""
+    """Seconds since the file or folder was put where it is."""
     return time.time() - path.lstat().st_ctime
 
 

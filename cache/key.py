@@ -1,4 +1,4 @@
-"""What a result depends on, and the specification of every hash in the store.
+"""The key of a result, made of everything it depends on; and the specification of every hash in the store.
 
 All digests are sha256 in lower-case hex. Each pre-image except that of a plain file starts with its kind and version,
 so no two kinds of thing can collide by having the same bytes:
@@ -22,6 +22,7 @@ import enum
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import Any
 
 from gsac.cache.digest import canonical, typed_digest
@@ -70,7 +71,7 @@ class Change:
 
 @dataclass(frozen=True)
 class KeyParts:
-    """Everything that a stage's result may depend on."""
+    """Everything that a stage's result may depend on. Not to be changed once made: its key is computed once."""
 
     stage: str
     inputs: dict[str, str] = field(default_factory=dict)
@@ -86,7 +87,9 @@ class KeyParts:
     device: str = ""
     """Device class (cpu, cuda) where the stage says that it matters, else empty."""
 
+    @cached_property
     def key(self) -> str:
+        """The action digest. CacheError names a parameter that JSON cannot hold."""
         try:
             return typed_digest(f"action {KEY_VERSION}", canonical(asdict(self)))
         except (TypeError, ValueError):

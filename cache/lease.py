@@ -1,4 +1,4 @@
-"""Living claims on the store: one run at a time computes a key, and gc keeps off what a run in progress uses."""
+"""Claims of running processes: one run at a time computes a key, and gc spares what a run in progress uses."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from gsac.cache.errors import CacheReadOnlyError, from_os_error
-from gsac.cache.lock import common, exclusive, if_free
+from gsac.cache.lock import exclusive, if_free, shared
 from gsac.cache.record import Record
 from gsac.cache.store import Store
 
 
 @contextlib.contextmanager
 def single_flight(store: Store, key: str, waiting: Callable[[], None] = lambda: None) -> Iterator[Record | None]:
-    """Holds the key alone and gives what is published under it by then: None means that it is ours to compute.
+    """Locks the key and gives the record published under it by then; None: the caller computes it.
 
-    `waiting` is called once if another run is at it. Should that run die, the next one gets the key at once.
-    A read-only store cannot be locked: then every run computes for itself.
+    `waiting` is called once if another run holds the key. Should that run die, the next one gets the key at once.
+    A read-only store cannot be locked: every run then computes for itself.
     """
     with contextlib.ExitStack() as held:
         with contextlib.suppress(CacheReadOnlyError):
@@ -36,8 +36,9 @@ class Lease:
         self._store, self._file, self._descriptor = store, file, descriptor
 
     def add(self, *keys: str) -> None:
+        """Keeps gc from removing the results of these keys."""
         if self._descriptor is not None:
-            with common(self._store.root / "lock"):  # not while gc sweeps
+            with shared(self._store.root / "lock"):  # not while gc sweeps
                 os.write(self._descriptor, "".join(f"{key}\n" for key in keys).encode())
 
 

@@ -1,4 +1,4 @@
-"""What lies in the store, one row a result."""
+"""Lists the results in the store, one row each."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from gsac.cache.store import Store
 
 @dataclass(frozen=True)
 class Row:
+    """One result."""
+
     stage: str
     key: str
     bytes: int
     age_s: float
-    """Since it was last used."""
+    """s since it was last used."""
     seconds: float
-    """What the run that made it took."""
+    """Of the run that computed it."""
 
 
 def ls(store: Store) -> list[Row]:

@@ -1,4 +1,4 @@
-"""Lock files under flock: the kernel frees them when their holder dies, however it dies."""
+"""Lock files under flock: the kernel frees them when their holder dies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def exclusive(path: Path, waiting: Callable[[], None] = lambda: None) -> Iterator[int]:
-    """Holds `path` alone, gives its descriptor, removes it at the end; `waiting` is called once if it blocks."""
+    """Locks the file `path` alone, gives its descriptor, and removes the file at the end; `waiting` is called once if it blocks."""
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         if not _try(descriptor, fcntl.LOCK_EX):
@@ -31,8 +31,8 @@ def exclusive(path: Path, waiting: Callable[[], None] = lambda: None) -> Iterato
 
 
 @contextlib.contextmanager
-def common(path: Path, alone: bool = False) -> Iterator[None]:
-    """Holds the lasting lock file `path`, together with others or alone."""
+def shared(path: Path, alone: bool = False) -> Iterator[None]:
+    """Locks the lock file `path`, which stays, together with others or alone."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
@@ -44,7 +44,7 @@ def common(path: Path, alone: bool = False) -> Iterator[None]:
 
 @contextlib.contextmanager
 def if_free(path: Path) -> Iterator[bool]:
-    """True, holding `path` alone, where no living process holds it; else False at once."""
+    """True, with `path` locked alone, where no living process holds it; else False at once."""
     try:
         descriptor = os.open(path, os.O_RDWR)
     except FileNotFoundError:

@@ -1,8 +1,8 @@
-"""What is known about a file as long as its stat stays the same: its digest, or the digest and imports of a module.
+"""Remembers facts about a file while its stat stays the same: its digest, or a module's digest and imports.
 
-One small SQLite file in the store, safe under many processes. It only saves time: unreadable, locked, or lost, it is
-as if empty. A file touched within the last two seconds is never memoised, since it could change again within the
-clock's grain and keep its stat.
+One small SQLite file in the store, safe under many processes. It only saves time: if it is unreadable, locked or
+lost, files are hashed again. A file touched within the last two seconds is never memoised, since it could change
+again within the clock's grain and keep its stat.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from functools import lru_cache
 from pathlib import Path
 
 SETTLED_NS = 2_000_000_000
+"""A file touched more recently may change again and keep its stat."""
 SCHEMA = """create table if not exists memo (
     kind text, device int, inode int, size int, mtime_ns int, ctime_ns int, value text,
     primary key (kind, device, inode)) without rowid"""
 
 
-def settled(stat: os.stat_result) -> bool:
-    """Whether the file was last touched long enough ago (and not in the future) for its stat to stand for it."""
+def is_settled(stat: os.stat_result) -> bool:
+    """Whether the file was last touched long enough ago, and not in the future, for its stat to identify its content."""
     return time.time_ns() - max(stat.st_mtime_ns, stat.st_ctime_ns) > SETTLED_NS
 
 
@@ -34,6 +35,7 @@ class Memo:
         self._connection = self._open()
 
     def get(self, kind: str, stat: os.stat_result) -> str | None:
+        """The value of this kind, None where it is not known."""
         if self._connection is None:
             return None
         try:
@@ -46,10 +48,12 @@ class Memo:
         return row[0] if row else None
 
     def put(self, kind: str, stat: os.stat_result, value: str) -> None:
-        if settled(stat):
+        """Remembers a value; not of a file that was touched just now."""
+        if is_settled(stat):
             self._pending.append((kind, *identity(stat), value))
 
     def flush(self) -> None:
+        """Writes the values that `put` has buffered."""
         rows, self._pending = self._pending, []
         if not rows or self._connection is None:
             return
@@ -92,6 +96,6 @@ def _memo(root: Path, pid: int, thread: int) -> Memo:
 
 
 def identity(stat: os.stat_result) -> tuple[int, int, int, int, int]:
-    """What of a stat stands for the content: not the access time, which reading changes."""
+    """The fields of a stat that identify the content; not the access time, which reading changes."""
     inode = stat.st_ino if stat.st_ino < 2**63 else stat.st_ino - 2**64  # SQLite integers are signed
     return stat.st_dev, inode, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns

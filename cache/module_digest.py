@@ -1,4 +1,4 @@
-"""What a Python source says, without how it is written: comments, formatting and docstrings do not count."""
+"""Digest and references of a Python source; comments, formatting and docstrings do not count."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 from gsac.cache.digest import canonical, typed_digest
 
-WRITING = ("kind", "type_comment", "ctx")
-"""Fields that say how something is written, or what its place says anyway."""
+NOT_MEANING = ("kind", "type_comment", "ctx")
+"""Fields of the syntax tree that hold how something is written, or follow from its place."""
 
 
 def read_source(source: bytes, package: str) -> tuple[str, set[str]]:
@@ -22,27 +22,27 @@ def read_source(source: bytes, package: str) -> tuple[str, set[str]]:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
         return typed_digest("module unparsed 1", source), set()
-    return typed_digest("module 1", canonical(normalised(tree))), set(_references(tree, package))
+    return typed_digest("module 1", canonical(normalise(tree))), set(_references(tree, package))
 
 
-def normalised(node: Any) -> Any:
+def normalise(node: Any) -> Any:
     """The tree as nested lists. Empty fields are left out, so that a field new in a later Python changes nothing."""
     if isinstance(node, ast.AST):
         fields = [
-            [name, normalised(value)]
+            [name, normalise(value)]
             for name, value in ast.iter_fields(node)
-            if name not in WRITING and (value not in (None, []) or isinstance(node, ast.Constant))
+            if name not in NOT_MEANING and (value not in (None, []) or isinstance(node, ast.Constant))
         ]
         return [type(node).__name__, *fields]
     if isinstance(node, list):
-        return [normalised(item) for item in node if not _is_bare_string(item)]
+        return [normalise(item) for item in node if not _is_bare_string(item)]
     if node is None or isinstance(node, (str, int)):
         return node
     return [type(node).__name__, repr(node)]  # bytes, floats, complex numbers, the ellipsis
 
 
 def _is_bare_string(node: Any) -> bool:
-    """A docstring, or a string that documents the line above."""
+    """A docstring, or a string that documents the field above it."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 

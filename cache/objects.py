@@ -1,6 +1,6 @@
-"""Objects: files and folders under objects/ab/<digest>[suffix], named by the digest of what is in them.
+"""Objects: files and folders under objects/ab/<digest>[suffix], named by the digest of their content.
 
-The suffix is that of the output's name, since readers and browsers go by it; the digest is of the content alone.
+The suffix is that of the output's name, since readers and browsers rely on it; the digest is of the content alone.
 """
 
 from __future__ import annotations
@@ -16,17 +16,19 @@ from gsac.cache.record import Footprint
 
 
 def object_name(digest: str, output: str) -> str:
+    """File or folder name of an object. output: the output's relative path."""
     return digest + PurePosixPath(output).suffix
 
 
 def object_path(root: Path, digest: str, output: str) -> Path:
+    """Where an object lies in the store at `root`."""
     return root / "objects" / digest[:2] / object_name(digest, output)
 
 
 def measure(path: Path) -> Footprint | None:
-    """What is seen of an object without reading it; None where it is missing."""
+    """Number of files, size and times of an object, without reading it; None where it is missing."""
     files = size = stamp = 0
-    folders = [path]
+    folders = [str(path)]
     try:
         if path.is_file():
             stat = path.stat()
@@ -45,7 +47,7 @@ def measure(path: Path) -> Footprint | None:
 
 
 def is_sound(path: Path, digest: str, memo: Memo | None = None) -> bool:
-    """Whether the content is what the digest says. Without a memo every byte is read."""
+    """Whether the content has this digest. Without a memo every byte is read."""
     try:
         found = tree_digest(path, memo)[0] if memo else manifest_digest(read_manifest(path))
     except (OSError, CacheError):
@@ -54,7 +56,7 @@ def is_sound(path: Path, digest: str, memo: Memo | None = None) -> bool:
 
 
 def read_manifest(path: Path) -> dict[str, list]:
-    """The manifest by reading every byte, whatever the memo says."""
+    """The manifest by reading every byte, without the memo."""
     return tree_digest(path, NO_MEMO)[1]
 
 
@@ -77,6 +79,7 @@ def sync(path: Path) -> None:
 
 
 def sync_one(path: Path) -> None:
+    """fsync of one file or folder."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -85,18 +88,20 @@ def sync_one(path: Path) -> None:
 
 
 def seal_files(path: Path) -> None:
+    """Makes every file of a tree read-only."""
     for file in tree_files(path).values():
         file.chmod(0o444)
 
 
 def seal_folders(path: Path) -> None:
-    """Done after the rename: a folder that may not be written cannot be moved."""
+    """Makes every folder of a tree read-only; after the rename, since a read-only folder cannot be moved."""
     if path.is_dir():
         for folder, _, _ in os.walk(path, topdown=False):
             os.chmod(folder, 0o555)
 
 
 def unseal_folders(path: Path) -> None:
+    """Makes the folders of a tree writable again."""
     if path.is_dir() and not path.is_symlink():
         os.chmod(path, 0o755)
         for folder, folders, _ in os.walk(path):
@@ -105,7 +110,7 @@ def unseal_folders(path: Path) -> None:
 
 
 def remove(path: Path) -> None:
-    """Removes a file or folder, sealed or not; what cannot be removed stays for the next gc."""
+    """Removes a file or folder, sealed or not; what cannot be removed is left to the next gc."""
     with contextlib.suppress(OSError):
         if path.is_dir() and not path.is_symlink():
             import shutil  # only where something is removed: it is slow to import

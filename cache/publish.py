@@ -1,7 +1,7 @@
-"""How a result becomes part of the store: whole or not at all, whenever the process dies.
+"""Publishes a result: it appears in the store whole or not at all, whenever the process dies.
 
-The steps run in the order of STEPS. Up to the last rename nothing can be found by anybody; the action record is written
-last and only it makes a result count. An object without a record is rubbish that gc sweeps.
+The steps run in the order of STEPS. Nobody can find a result before its action record, which is written last. An object
+without a record is rubbish that gc removes.
 """
 
 from __future__ import annotations
@@ -11,17 +11,14 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gsac.cache import objects
 from gsac.cache.digest import tree_digest
 from gsac.cache.errors import CacheError, IntegrityError, from_os_error
 from gsac.cache.key import KeyParts
-from gsac.cache.lock import common
+from gsac.cache.lock import shared
 from gsac.cache.record import Record, RunInfo
-
-if TYPE_CHECKING:
-    from gsac.cache.store import Store
+from gsac.cache.store import Store
 
 STEPS = (
     "started",
@@ -34,7 +31,7 @@ STEPS = (
     "recorded",
     "record synced",
 )
-"""`placed` comes once an output. A test kills the process right after each."""
+"""`placed` occurs once an output. A test kills the process right after each step."""
 
 
 def publish(
@@ -49,8 +46,8 @@ def publish(
     """Moves `folder/<output>` into the store and writes the record; an equal key that is published already wins.
 
     replace: the new result takes the place of a published one (a forced run), whose record stays beside it until gc
-    finds it unused. Returns the record that now counts.
-    Raises CacheReadOnlyError, CacheFullError or CacheError; then nothing has changed that a lookup could see.
+    finds it unused; step: called after each of STEPS. Returns the record that is valid now.
+    Raises CacheReadOnlyError, CacheFullError or CacheError; no lookup then sees any change.
     """
     needed = None
     try:
@@ -68,7 +65,7 @@ def publish(
         for output in outputs:
             objects.sync(folder / output)
         step("synced")
-        with common(store.root / "lock"):
+        with shared(store.root / "lock"):
             for output in outputs:
                 footprints[output] = _place(store, folder / output, digests[output], output)
                 step("placed")
@@ -76,7 +73,7 @@ def publish(
                 objects.sync_one(place)
             objects.sync_one(store.root / "objects")
             step("places synced")
-            return _record(store, Record(parts.key(), parts, digests, info, footprints), replace, step)
+            return _record(store, Record(parts.key, parts, digests, info, footprints), replace, step)
     except OSError as error:
         raise from_os_error(error, store.root, needed) from error
 

@@ -1,4 +1,4 @@
-"""The action record: which run made which outputs from what, written once and never changed."""
+"""The action record: the key's parts, the outputs and the figures of one run, written once and never changed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RECORD_VERSION = 1
 
 @dataclass
 class RunInfo:
-    """How the run went that made the outputs; a cached stage reports this, not zeros."""
+    """Time, memory, metrics and warnings of the run that made the outputs; a cached stage reports these."""
 
     started: str = ""
     """ISO 8601, UTC."""
@@ -28,7 +28,7 @@ class RunInfo:
 
 @dataclass(frozen=True)
 class Footprint:
-    """What a glance at an object should see: if it sees something else, the object is hashed again."""
+    """File count, size and times of an object; where they differ from those recorded, the object is hashed again."""
 
     files: int
     bytes: int
@@ -49,14 +49,16 @@ class Record:
 
     @property
     def bytes(self) -> int:
+        """Size of all outputs."""
         return sum(f.bytes for f in self.footprints.values())
 
     def to_json(self) -> str:
+        """The text of the record's file."""
         return json.dumps({"version": RECORD_VERSION, **asdict(self)}, indent=1, sort_keys=True) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> Record | None:
-        """None where the text is not a whole record of this version whose parts give its key."""
+        """The record of a file's text; None unless it is whole, of this version, and its parts give its key."""
         try:
             raw = json.loads(text)
             if raw.pop("version") != RECORD_VERSION:
@@ -68,7 +70,7 @@ class Record:
                 info=RunInfo(**raw["info"]),
                 footprints={name: Footprint(**f) for name, f in raw["footprints"].items()},
             )
-            sound = record.parts.key() == record.key and record.footprints.keys() == record.outputs.keys()
+            sound = record.parts.key == record.key and record.footprints.keys() == record.outputs.keys()
         except (ValueError, KeyError, TypeError, AttributeError):
             return None
         return record if sound else None

@@ -1,12 +1,12 @@
-"""The store: a folder of objects named by content and of action records that say which run made them.
+"""The store: a folder of objects named by content, and of action records, which name the run that made them.
 
 objects/ab/<digest>[suffix]      outputs, files or folders, read-only
 actions/<stage>/<key>.json       records; a result counts from the moment its record is there
 actions/<stage>/<key>.<ns>.json  records of results that a forced run has replaced
 tmp/ leases/ quarantine/         work in progress, locks, what was found damaged
-partial/<key>/                   what a run left that was stopped, for the next one of the same key
-models/<sha256>/<name>           model files, kept by hand
-memo.sqlite lock                 stat memo; held in common by publishers, alone by gc
+partial/<key>/                   work of a stopped run, for the next run of the same key
+models/<sha256>/<name>           model files, which gc leaves alone
+memo.sqlite lock                 stat memo; lock held by publishers together, by gc alone
 """
 
 from __future__ import annotations
@@ -22,26 +22,25 @@ from gsac.cache.errors import from_os_error
 from gsac.cache.key import KeyParts
 from gsac.cache.lock import exclusive
 from gsac.cache.memo import Memo, memo_in
-from gsac.cache.publish import publish
-from gsac.cache.record import Record, RunInfo
+from gsac.cache.record import Record
 from gsac.cache.root import default_root
 
 FOLDERS = ("objects", "actions", "tmp", "leases", "quarantine", "partial", "models")
 USED_AGAIN_S = 3600
-"""A hit renews the record's date (gc goes by it) at most this often."""
+"""s: a hit renews the record's time, by which gc decides, at most this often."""
 
 
 class Store:
-    """Results by key. `say` gets full sentences about what was found damaged.
+    """Results by key. say: called with a sentence about each damaged object.
 
-    below: a store to read from where this one has nothing, such as a shared one that may not be written.
+    below: a store to read from where this one has no result, such as a shared one that is read-only.
     """
 
     def __init__(self, root: Path, say: Callable[[str], None] = lambda message: None, below: Store | None = None) -> None:
         self.root = Path(root).absolute()
         self.say = say
         self.below = below
-        with contextlib.suppress(OSError):  # a read-only store can still be read; whoever writes gets the error
+        with contextlib.suppress(OSError):  # a read-only store can still be read; writing to it raises
             for name in FOLDERS:
                 (self.root / name).mkdir(parents=True, exist_ok=True)
 
@@ -52,28 +51,32 @@ class Store:
 
     @property
     def memo(self) -> Memo:
+        """The memo of file digests beside the store's objects."""
         return memo_in(self.root)
 
     @property
     def writable(self) -> bool:
+        """Whether results can be published here."""
         return os.access(self.root / "tmp", os.W_OK) and os.access(self.root / "actions", os.W_OK)
 
     def record_path(self, stage: str, key: str) -> Path:
+        """Where the record of a key lies."""
         return self.root / "actions" / stage / f"{key}.json"
 
     def record_files(self, stage: str = "*") -> list[Path]:
+        """Files of all records, or of one stage's."""
         return list((self.root / "actions").glob(f"{stage}/*.json"))
 
     def path(self, record: Record, output: str) -> Path:
-        """The output in the store; not to be written."""
+        """The output's file or folder in the store; read-only."""
         path = objects.object_path(self.root, record.outputs[output], output)
         return self.below.path(record, output) if self.below is not None and not path.exists() else path
 
     def lookup(self, key: str, deep: bool = False) -> Record | None:
-        """The record of a finished run, if its outputs are all there and as they were.
+        """The record of a finished run, if all its outputs are there and unchanged.
 
-        A file whose size or time is not as recorded is hashed again; deep reads every byte. What is damaged goes to
-        quarantine, the record with it, and the answer is None: a miss, not an error.
+        An output whose size or time is not as recorded is hashed again; deep: every byte is read. A damaged output goes to
+        quarantine, its record is dropped, and the answer is None: a miss, not an error.
         """
         for file in (self.root / "actions").glob(f"*/{key}.json"):
             text = _read(file)
@@ -87,7 +90,7 @@ class Store:
         return self.below.lookup(key, deep) if self.below is not None else None
 
     def read(self, file: Path) -> Record | None:
-        """The record in a file, None if it is not whole or of another version."""
+        """The record in a file; None if it is torn or of another version."""
         return Record.from_json(_read(file))
 
     def record_change(self, key: str) -> contextlib.AbstractContextManager:
@@ -96,7 +99,7 @@ class Store:
 
     @contextlib.contextmanager
     def private(self, stage: str) -> Iterator[Path]:
-        """An empty folder of one's own on the store's filesystem, removed at the end, or by gc if its owner died."""
+        """An empty private folder on the store's filesystem, removed at the end, or by gc if its owner died."""
         folder = self.root / "tmp" / f"{stage}-{os.getpid()}-{os.urandom(6).hex()}"
         try:
             lock = contextlib.ExitStack()
@@ -112,20 +115,8 @@ class Store:
                 objects.remove(folder)
 
     def partial(self, key: str) -> Path:
-        """Folder that a run of the key may make and leave behind, unlike `private`; only the holder of the key touches it."""
+        """Folder that a run of the key may make and, unlike `private`, leave behind; only the run that holds the key touches it."""
         return self.root / "partial" / key
-
-    def publish(
-        self,
-        parts: KeyParts,
-        folder: Path,
-        outputs: tuple[str, ...],
-        info: RunInfo,
-        replace: bool = False,
-        step: Callable[[str], None] = lambda name: None,
-    ) -> Record:
-        """See `publish.publish`."""
-        return publish(self, parts, folder, outputs, info, replace, step)
 
     def previous(self, stage: str, like: KeyParts) -> Record | None:
         """The record of the stage that differs least from `like` (the newest of equals), to explain a new key."""
@@ -136,7 +127,7 @@ class Store:
         return min(records, key=lambda record: len(record.parts.diff(like)), default=None)
 
     def quarantine(self, path: Path, digest: str) -> None:
-        """Moves a damaged object out of the way, unless somebody has put a sound one in its place meanwhile."""
+        """Moves a damaged object to quarantine/, unless another process has put a sound one in its place."""
         with contextlib.suppress(OSError), exclusive(self.root / "leases" / f"{path.name}.quarantine"):
             if path.exists() and not objects.is_sound(path, digest):
                 target = self.root / "quarantine" / f"{path.name}.{time.time_ns()}"

@@ -1,4 +1,4 @@
-"""Reading every byte of the store: what is not what it was is moved to quarantine/, and will be computed again."""
+"""Checks every byte of the store; damaged objects are moved to quarantine/ and computed again when needed."""
 
 from __future__ import annotations
 
@@ -10,28 +10,30 @@ from gsac.cache.store import Store
 
 @dataclass
 class VerifyReport:
-    """What a whole check found; names are `<stage>/<key>` and object names."""
+    """The outcome of a check; records are named `<stage>/<key>`, objects by their file names."""
 
     objects: int = 0
     bytes: int = 0
     damaged: list[str] = field(default_factory=list)
-    """Objects whose content is not what their name says."""
+    """Objects whose content does not have the digest in their name."""
     lost: list[str] = field(default_factory=list)
-    """Records dropped because an output is damaged or missing, or because they are not whole themselves."""
+    """Records dropped because an output is damaged or missing, or because they are torn."""
 
     @property
     def sound(self) -> bool:
+        """Whether nothing was damaged or lost."""
         return not self.damaged and not self.lost
 
 
 def verify(store: Store) -> VerifyReport:
-    """Checks every object and record; after it, every record that is left is whole."""
+    """Checks every object and record; every record that is left is sound."""
     report = VerifyReport()
     for path in sorted((store.root / "objects").glob("*/*")):
         digest = path.name[:64]
         report.objects += 1
-        if objects.is_sound(path, digest):
-            report.bytes += objects.measure(path).bytes
+        footprint = objects.measure(path)
+        if footprint is not None and objects.is_sound(path, digest):
+            report.bytes += footprint.bytes
         elif path.exists():  # gc may have taken it meanwhile
             report.damaged.append(path.name)
             store.quarantine(path, digest)

@@ -1,1 +1,1 @@
-"""The engine: reads `dvc.yaml`, says what has to run and why, runs it, and keeps every result in the cache."""
+"""The engine: reads `dvc.yaml`, decides which stages have to run and why, runs them, and keeps every result in the cache."""

@@ -1,4 +1,4 @@
-"""Many clips over one store: which clips there are, where each goes, and what became of them."""
+"""Runs many clips over one store: finds them, gives each a folder, collects their results."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from gsac.pipeline.executors import ClipJob, ClipResult, Executor
+from gsac.pipeline.executors.executor import ClipJob, ClipResult, Executor
 from gsac.stages.contract import BadInput
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".ts", ".mpg", ".mpeg")
@@ -54,13 +54,13 @@ def make_jobs(clips: list[Path], out: Path, arguments: tuple[str, ...]) -> list[
     return jobs
 
 
-def run_batch(jobs: list[ClipJob], executor: Executor, heard: Callable[[ClipResult], None]) -> list[ClipResult]:
-    """Every job, whatever becomes of the others; results in the order of the jobs."""
+def run_batch(jobs: list[ClipJob], executor: Executor, on_result: Callable[[ClipResult], None]) -> list[ClipResult]:
+    """Runs every job, also after one that fails; results in the order of the jobs."""
     results = {}
     with executor:
         for job in jobs:
             executor.submit(job)
         for result in executor.collect():
             results[result.job] = result
-            heard(result)
+            on_result(result)
     return [results[job] for job in jobs]

@@ -1,4 +1,4 @@
-"""The parent's side of a stage's process: starts it, passes its events on, and ends it when told to."""
+"""The parent's side of a stage's process: starts it, passes its events on, and ends it."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from typing import Any
 from gsac.stages.contract import BadInput, StageError
 
 GRACE_S = 2.0
-"""A process that says no more has this long to leave by itself, so that it can be seen how."""
+"""Time for a process that has closed its events to exit by itself, so that its exit code is known."""
 LOG_TAIL = 4000
-
+"""Bytes of a log that are shown or kept."""
 
 ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1",
     "MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30), "MALLOC_TOP_PAD_": str(32 << 20),
 }
-"""Of a stage's process, where the user has not set it. Stages share their frames out among threads of their own: those of a library
-for one small matrix or image only wait beside them, the busier the more cores there are. And glibc is to keep freed memory: to ask
-for that of every image anew costs a tenth of the time of smplx and train."""
+"""Of a stage's process, where the user has not set it. Stages spread their frames over threads of their own; a library's threads
+for one small matrix or image would only compete with them, more so the more cores there are. And glibc keeps freed memory: to ask
+the kernel again for every image costs a tenth of the time of smplx and train."""
 
 
 class StageBugError(StageError):
@@ -35,10 +35,10 @@ class StageBugError(StageError):
 
 
 class Child:
-    """A stage's process. It loads the stage's code at once and waits for its order; it ends with the context."""
+    """A stage's process. It loads the stage's code at once, then waits for its order; leaving the context kills it."""
 
     def __init__(self, declaration: str, entry: str, device: str, log: Path):
-        """declaration, entry: modules of the stage; device: what it will run on; log: where its prints go."""
+        """declaration, entry: modules of the stage; device: what it will run on; log: file for its stdout and stderr."""
         self.log = log
         self._temporary = tempfile.TemporaryDirectory(prefix="gsac-", ignore_cleanup_errors=True)
         self._events, write = os.pipe()
@@ -56,6 +56,8 @@ class Child:
             raise
         finally:
             os.close(write)
+        assert self._process.stdin is not None
+        self._orders = self._process.stdin
         self._tell({"declaration": declaration, "entry": entry, "device": device, "events": write})
 
     def __enter__(self) -> Child:
@@ -65,7 +67,7 @@ class Child:
         self.close()
 
     def close(self) -> None:
-        """The whole group goes at once: what it was writing is private and is dropped, its temporary files are removed."""
+        """Kills the process group and removes its temporary files; what it was writing is private and is dropped."""
         if self._events >= 0:
             os.close(self._events)
             self._events = -1
@@ -73,16 +75,16 @@ class Child:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         with contextlib.suppress(OSError):
-            self._process.stdin.close()
+            self._orders.close()
         self._temporary.cleanup()
 
     def order(self, order: dict[str, Any]) -> None:
-        """Once: lets it begin."""
+        """Gives it its one order."""
         self._tell(order | {"started": time.time()})
 
     def follow(self, on_event: Callable[[dict], None]) -> dict[str, Any]:
-        """Waits until the order is done. Returns the fields of the `done` event; BadInput, StageError or StageBugError as the
-        stage failed."""
+        """Waits until the order is done. Returns the fields of the `done` event; raises BadInput, StageError or StageBugError as
+        the stage failed."""
         end, events = None, os.fdopen(self._events)
         self._events = -1
         with events:
@@ -99,12 +101,13 @@ class Child:
         return _judge(end, self._process.returncode, self.log)
 
     def rename_log(self, log: Path) -> None:
+        """Moves the log file, which the process goes on writing to."""
         self.log = self.log.replace(log)
 
     def _tell(self, words: dict[str, Any]) -> None:
         with contextlib.suppress(BrokenPipeError):  # died at once: `run` sees it
-            self._process.stdin.write(json.dumps(words).encode() + b"\n")
-            self._process.stdin.flush()
+            self._orders.write(json.dumps(words).encode() + b"\n")
+            self._orders.flush()
 
 
 def _judge(end: dict | None, code: int, log: Path) -> dict[str, Any]:
@@ -118,8 +121,26 @@ def _judge(end: dict | None, code: int, log: Path) -> dict[str, Any]:
     return end
 
 
+class LogReader:
+    """Reads a log file while it grows."""
+
+    def __init__(self, log: Path):
+        self._log = log
+        self._position = 0
+
+    def new_lines(self, ended: bool = False) -> list[str]:
+        """Lines that were not returned before; one without its end only where the writer has ended."""
+        with contextlib.suppress(OSError), self._log.open("rb") as stream:
+            stream.seek(self._position)
+            text = stream.read()
+            text = text if ended else text[:text.rfind(b"\n") + 1]
+            self._position += len(text)
+            return text.decode(errors="replace").splitlines()
+        return []
+
+
 def tail(log: Path) -> str:
-    """End of what the stage printed."""
+    """The last lines that the stage printed."""
     with contextlib.suppress(OSError):
         with log.open("rb") as stream:
             stream.seek(max(0, log.stat().st_size - LOG_TAIL))

@@ -7,35 +7,17 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import errno
-import importlib
-import json
 import os
 import signal
 import sys
 from typing import Any
 
-from gsac.cache.errors import CacheError, CacheReadOnlyError, IntegrityError
+from gsac.pipeline import commands
+from gsac.pipeline.errors import attached_summary, exit_code, sentence
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
-from gsac.stages.contract import BadInput, StageError
-
-COMMANDS = {
-    "run": "run a clip through the stages",
-    "demo": "make a truth clip and run the whole job on it",
-    "status": "what is up to date in the folder of a run",
-    "explain": "what changed in the key of a stage",
-    "stage": "run one stage, on a run's folder or on fixture artifacts",
-    "batch": "run many clips over one cache",
-    "cache": "list, check and clean the cache",
-    "models": "list, pull and add model files",
-    "bench": "run a benchmark",
-    "view": "show an avatar in the browser",
-    "render": "make a video of an avatar, moving or from all sides",
-    "report": "write report.html of a run's folder",
-}
-
-PATH_ERRORS = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
-"""A path that the user gave cannot be what it has to be."""
+from gsac.pipeline.reporter import Verbosity
+from gsac.pipeline.versions import package_version
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -50,76 +32,64 @@ def execute(argv: list[str]) -> ExitCode:
             signal.signal(how, _interrupt)
     arguments = None
     try:
-        arguments = _parser(argv).parse_args(argv)
+        arguments = make_parser(argv).parse_args(argv)
         return arguments.do(arguments)
     except KeyboardInterrupt as error:
         return _give_up("interrupted; finished stages are kept", ExitCode.INTERRUPTED, arguments, error)
-    except BrokenPipeError:  # whoever read the answer has gone: the rest goes nowhere, and quietly
+    except BrokenPipeError:  # the reader of the answer has gone: the rest is dropped
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.INTERRUPTED
     except Exception as error:
         code = exit_code(error)
         if code is None:
             raise
-        return _give_up(_words(error), code, arguments, error)
+        return _give_up(sentence(error), code, arguments, error)
 
 
-def exit_code(error: BaseException) -> ExitCode | None:
-    """What an exception means to the shell; None for what nobody foresaw."""
-    from gsac.pipeline.run import NotUpToDateError, StageFailedError
-
-    if isinstance(error, StageFailedError):
-        return exit_code(error.cause) or ExitCode.FAILED
-    if isinstance(error, NotUpToDateError):
-        return ExitCode.STALE
-    if isinstance(error, (BadInput, CacheReadOnlyError)):
-        return ExitCode.USAGE
-    if isinstance(error, IntegrityError):
-        return ExitCode.INTEGRITY
-    if isinstance(error, (StageError, CacheError)):
-        return ExitCode.FAILED
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return ExitCode.FAILED
-    if isinstance(error, OSError) and error.errno in PATH_ERRORS:
-        return ExitCode.USAGE
-    return None
-
-
-def emit(content: dict[str, Any]) -> None:
-    """The one object of --json: the last line of stdout."""
-    print(json.dumps(content), flush=True)
-
-
-def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None, error: BaseException) -> ExitCode:
-    """Says why, with --json on stdout too; what was done before, a command leaves in the error's `summary`."""
-    if getattr(arguments, "json", False):
-        emit({"stages": [], "outputs": {}, "metrics": {}} | getattr(error, "summary", {}) | {"error": message})
-    _complain(message)
-    return code
-
-
-def _parser(argv: list[str]) -> argparse.ArgumentParser:
+def make_parser(argv: list[str]) -> argparse.ArgumentParser:
+    """The parser of this command line: all commands by name, and the arguments of the one that was typed."""
     parser = argparse.ArgumentParser(
         prog="gsac", description="One phone clip of a turning person in, an animatable Gaussian avatar out.")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    _add_verbosity(parser, default=Verbosity.NORMAL)
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     typed = next((word for word in argv if not word.startswith("-")), None)
-    for name, help_text in COMMANDS.items():
-        command = commands.add_parser(name, help=help_text, description=help_text[0].upper() + help_text[1:] + ".")
+    added = {} if typed in commands.COMMANDS else commands.load_added()
+    if typed is not None and typed not in commands.COMMANDS and typed not in added:
+        raise commands.unknown_command(typed, added)
+    helps = commands.COMMANDS | {name: module.HELP for name, module in added.items()}
+    if typed is None:
+        helps |= dict.fromkeys(commands.not_installed(added), commands.SETUP)
+    for name, help_text in helps.items():
+        command = subparsers.add_parser(name, help=help_text, description=help_text[0].upper() + help_text[1:] + ".")
         if name == typed:
-            importlib.import_module(f"gsac.pipeline.commands.{name}").declare(command)
+            _add_verbosity(command)
+            (added.get(name) or commands.load(name)).declare(command)
     return parser
 
 
-def _words(error: Exception) -> str:
-    if isinstance(error, OSError):
-        what = {errno.ENOSPC: "no room left on the disk", errno.EDQUOT: "the disk quota is used up"}
-        reason = what.get(error.errno, error.strerror)
-        return f"{error.filename}: {reason}" if error.filename else str(reason)
-    return str(error)
+def _add_verbosity(parser: argparse.ArgumentParser, default: Any = argparse.SUPPRESS) -> None:
+    """-q and -v, which stand before the command's name or after it."""
+    both = parser.add_mutually_exclusive_group()
+    for letter, verbosity in (("q", Verbosity.QUIET), ("v", Verbosity.VERBOSE)):
+        both.add_argument(f"-{letter}", f"--{verbosity.value}", dest="verbosity", action="store_const", const=verbosity,
+                          default=default, help=verbosity.sentence)
 
 
-def _complain(message: str) -> None:
+class _Version(argparse.Action):
+    """Reads the version only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *parsed: Any) -> None:
+        print(f"gsac {package_version('gsac')}")
+        parser.exit()
+
+
+def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None, error: BaseException) -> ExitCode:
+    """Prints the message, with --json also an object on stdout that holds what the command had done before the error."""
+    if getattr(arguments, "json", False):
+        emit({"stages": [], "outputs": {}, "metrics": {}} | attached_summary(error) | {"error": message})
     print(f"gsac: {message}", file=sys.stderr, flush=True)
+    return code
 
 
 def _interrupt(signum: int, frame: Any) -> None:

@@ -1,4 +1,4 @@
-"""dvc.lock as DVC itself would write it, so that `dvc status` agrees after a run. DVC is never imported.
+"""Writes dvc.lock as DVC itself would, so that `dvc status` agrees after a run. DVC is never imported.
 
 Schema 2.0: a file is its md5 and size; a folder the md5 of the JSON list of its files, `.dir`, with size and count.
 Outputs are `cache: false` in dvc.yaml, so DVC wants no objects of its own: they stay in gsac's store.
@@ -15,7 +15,7 @@ from typing import Any
 from gsac.cache.digest import tree_files
 from gsac.cache.store import Store
 from gsac.pipeline.graph import Graph, Step, read_yaml
-from gsac.pipeline.params import plain
+from gsac.pipeline.params import config_values
 from gsac.pipeline.run_folder import PARAMS, RunFolder, write_text
 from gsac.stages.contract import BadInput
 
@@ -23,19 +23,19 @@ LOCK = "dvc.lock"
 MEMO_KIND = "md5"
 
 
-def write_lock(workspace: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
-    """Entries of the steps that have just finished; those of others stay as they were."""
+def write_lock(run_folder: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
+    """Writes entries of the steps that have just finished; those of others stay as they are."""
     import yaml
 
     if not steps:
         return
-    known = _entries(workspace.root / LOCK)
-    fresh = {name: _entry(workspace, graph.step(name), configs[name], store) for name in steps}
+    known = _entries(run_folder.root / LOCK)
+    fresh = {name: _entry(run_folder, graph.step(name), configs[name], store) for name in steps}
     entries = {name: fresh.get(name) or known[name] for name in graph.steps if name in fresh or name in known}
     store.memo.flush()
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     dumper.ignore_aliases = lambda self, data: True
-    write_text(workspace.root / LOCK, yaml.dump({"schema": "2.0", "stages": entries}, Dumper=dumper, sort_keys=False))
+    write_text(run_folder.root / LOCK, yaml.dump({"schema": "2.0", "stages": entries}, Dumper=dumper, sort_keys=False))
 
 
 def _entries(path: Path) -> dict[str, Any]:
@@ -45,16 +45,16 @@ def _entries(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _entry(workspace: RunFolder, step: Step, config: Any, store: Store) -> dict[str, Any]:
-    entry: dict[str, Any] = {"cmd": step.cmd, "deps": [_hash(workspace, port, store) for port in sorted(step.deps)]}
+def _entry(run_folder: RunFolder, step: Step, config: Any, store: Store) -> dict[str, Any]:
+    entry: dict[str, Any] = {"cmd": step.cmd, "deps": [_hash(run_folder, port, store) for port in sorted(step.deps)]}
     if step.params:
-        entry["params"] = {PARAMS: {step.name: plain(config)}}
-    entry["outs"] = [_hash(workspace, port, store) for port in sorted(step.outs)]
+        entry["params"] = {PARAMS: {step.name: config_values(config)}}
+    entry["outs"] = [_hash(run_folder, port, store) for port in sorted(step.outs)]
     return entry
 
 
-def _hash(workspace: RunFolder, port: str, store: Store) -> dict[str, Any]:
-    path = workspace.path(port).resolve()
+def _hash(run_folder: RunFolder, port: str, store: Store) -> dict[str, Any]:
+    path = run_folder.path(port).resolve()
     files = tree_files(path)
     sizes = sum(file.stat().st_size for file in files.values())
     entry = {"path": port, "hash": "md5"}
@@ -68,14 +68,14 @@ def _hash(workspace: RunFolder, port: str, store: Store) -> dict[str, Any]:
 
 def _md5s(paths: list[Path], store: Store) -> list[str]:
     stats = [path.stat() for path in paths]
-    known = [store.memo.get(MEMO_KIND, stat) for stat in stats]
-    unknown = [i for i, digest in enumerate(known) if digest is None]
+    known = {i: digest for i, stat in enumerate(stats) if (digest := store.memo.get(MEMO_KIND, stat)) is not None}
+    unknown = [i for i in range(len(paths)) if i not in known]
     if unknown:
         with ThreadPoolExecutor() as pool:
             for i, digest in zip(unknown, pool.map(_md5, [paths[i] for i in unknown]), strict=True):
                 store.memo.put(MEMO_KIND, stats[i], digest)
                 known[i] = digest
-    return known
+    return [known[i] for i in range(len(paths))]
 
 
 def _md5(path: Path) -> str:

@@ -1,6 +1,6 @@
-"""dvc.yaml as a graph: steps in running order, and who needs whom.
+"""dvc.yaml as a graph: steps in running order, and which needs which.
 
-Reads the part of DVC's file that one clip needs, and names what it does not read:
+Reads the part of DVC's format that one clip needs, and refuses the rest by name:
 `cmd: gsac stage NAME`, `deps`, `params` (whole sections), `outs` (optionally `cache: false`), `desc`.
 """
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gsac.stages.contract import BadInput
+from gsac.stages.contract import BadInput, did_you_mean
 
 CLIP = "clip"
 """The port of the source clip; no step makes it."""
@@ -29,11 +29,11 @@ class Step:
     params: tuple[str, ...]
     """Sections of params.yaml."""
     outs: tuple[str, ...]
-    """Ports made, `<name>/<output path>`."""
+    """Ports written, `<name>/<output path>`."""
 
 
 class Graph:
-    """Steps by name, in an order that runs every step after what it reads."""
+    """Steps by name, each after the steps whose outputs it reads."""
 
     def __init__(self, steps: list[Step], source: str = "dvc.yaml"):
         self.source = source
@@ -51,7 +51,7 @@ class Graph:
 
     @classmethod
     def load(cls, path: Path) -> Graph:
-        """Raises BadInput naming the file, the step and the key that is not understood."""
+        """The graph of a dvc.yaml. BadInput names the file, the step and the key that is not understood."""
         return cls(_parse(read_yaml(path), str(path)), str(path))
 
     def _ordered(self, steps: list[Step]) -> dict[str, Step]:
@@ -66,11 +66,13 @@ class Graph:
         return done
 
     def step(self, name: str) -> Step:
+        """The step of a name; BadInput where there is none."""
         if name not in self.steps:
-            raise BadInput(f"unknown stage {name}; known: {', '.join(self.steps)}")
+            raise BadInput(f"unknown stage {name}{did_you_mean(name, self.steps)}; known: {', '.join(self.steps)}")
         return self.steps[name]
 
     def parents(self, name: str) -> set[str]:
+        """Steps whose outputs `name` reads."""
         return {self.producer[p] for p in self.step(name).deps if p != CLIP}
 
     def above(self, name: str) -> set[str]:
@@ -99,11 +101,13 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 
 def parse_yaml(text: str, source: str) -> Any:
-    """What the text holds. BadInput for text that is not YAML, and for a key given twice, of which YAML would keep the last."""
+    """The value of a YAML text. BadInput where it is not YAML, or a key is given twice (YAML would keep the last)."""
     import yaml
 
-    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-        def construct_mapping(self, node, deep=False):
+    base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+    class Loader(base):
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict:
             seen = set()
             for key, _ in node.value:
                 if str(key.value) in seen:
@@ -129,9 +133,9 @@ def _step(name: str, body: Any, source: str) -> Step:
     if not isinstance(body, dict):
         raise BadInput(f"{source}: {where} must be a mapping")
     _only(body, STEP_KEYS, source, where)
-    cmd = body.get("cmd")
-    if cmd != f"gsac stage {name}":
-        raise BadInput(f"{source}: {where} has the command {cmd!r}; gsac only reads `gsac stage {name}`")
+    cmd = f"gsac stage {name}"
+    if body.get("cmd") != cmd:
+        raise BadInput(f"{source}: {where} has the command {body.get('cmd')!r}; gsac only reads `{cmd}`")
     outs = tuple(_out(out, source, where) for out in _list(body, "outs", source, where))
     for out in outs:
         if not out.startswith(f"{name}/"):

@@ -1,4 +1,4 @@
-"""Keys of stages: inputs, parameters, code, model files, package versions and device, gathered."""
+"""Gathers a stage's key: inputs, parameters, code, model files, package versions and device."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from gsac.avatar.cuda import why_not
 from gsac.cache.code import code_parts
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
-from gsac.pipeline.model_store import Models
-from gsac.pipeline.params import plain
+from gsac.pipeline.model_store import ModelStore
+from gsac.pipeline.params import config_values
 from gsac.pipeline.project import Project
 from gsac.pipeline.versions import package_version
 from gsac.stages.contract import BadInput, Stage
 
 DEVICE = "GSAC_DEVICE"
-"""Environment variable: `cpu` or `cuda`, instead of what is found."""
+"""Environment variable: `cpu` or `cuda`, instead of the device that is found."""
 DEVICES = ("cpu", "cuda")
 AUTO = "auto"
 """Value of a stage's parameter `device` that leaves the choice to the engine."""
@@ -29,17 +29,18 @@ class Keys:
     def __init__(self, project: Project, configs: dict[str, Any], store: Store):
         self.project = project
         self.configs = configs
-        self.models = Models(store)
+        self.models = ModelStore(store)
         self.memo = store.memo
 
     @cached_property
     def device(self) -> str:
+        """The device class of this machine."""
         return device_class()
 
     def device_of(self, name: str) -> str:
-        """What the stage computes on: its own parameter `device`, or what there is where that is `auto`; empty: it is all the same.
+        """The device class that the stage computes on: its parameter `device`, or this machine's where that is `auto`.
 
-        Raises BadInput where the parameter names a device that is not there.
+        Empty where the result does not depend on it. BadInput where the parameter names a device that is not there.
         """
         if not self.project.stage(name).uses_device:
             return ""
@@ -50,20 +51,20 @@ class Keys:
         return self.device if wanted == AUTO else wanted
 
     def _models(self, stage: Stage, config: Any) -> list[str]:
-        """What the stage must have, and what it wishes for as far as it is here."""
+        """Model files that the stage needs, and optional ones that the user has added."""
         return [*stage.models(config), *(name for name in stage.wishes(config) if name in self.models.brought)]
 
     def code(self, name: str) -> dict[str, str]:
-        """Digests of all that the stage's result depends on of our code."""
+        """Digests of our modules and files that the stage's result depends on."""
         return code_parts(self.project.entry(name), self.project.stage(name).code, self.memo)
 
     def parts(self, name: str, inputs: dict[str, str]) -> KeyParts:
-        """inputs: port -> tree digest."""
+        """The key's parts of a stage. inputs: port -> tree digest."""
         stage = self.project.stage(name)
         config, device = self.configs[name], self.device_of(name)
-        params = plain(config)
+        params = config_values(config)
         if device:
-            params.pop("device", None)  # what was chosen counts, not whether it was asked for
+            params.pop("device", None)  # the device that was chosen counts, not how
         return KeyParts(
             stage=name,
             inputs=dict(inputs),

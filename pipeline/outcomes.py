@@ -1,4 +1,4 @@
-"""Exit codes of the command, outcomes of a stage, and the words for both."""
+"""Exit codes of the command and outcomes of a stage; each says its own sentence."""
 
 from __future__ import annotations
 
@@ -10,26 +10,47 @@ class ExitCode(IntEnum):
 
     OK = 0
     FAILED = 1
-    """A stage failed."""
     USAGE = 2
-    """The command line, a parameter or an input file is at fault."""
     STALE = 3
-    """Something is not up to date."""
     INTEGRITY = 4
-    """The cache holds something that is not what it says."""
     INTERRUPTED = 130
+
+    @property
+    def sentence(self) -> str:
+        return _EXIT_CODES[self]
+
+
+_EXIT_CODES = {
+    ExitCode.OK: "all is well",
+    ExitCode.FAILED: "a stage failed, or the cache could not keep its result",
+    ExitCode.USAGE: "the command line, a parameter or an input file is at fault",
+    ExitCode.STALE: "something is not up to date",
+    ExitCode.INTEGRITY: "the cache holds something else than was put there",
+    ExitCode.INTERRUPTED: "stopped by Ctrl-C or a signal; finished stages are kept",
+}
 
 
 class Outcome(Enum):
-    """What became of one stage in one run; the value is the word of `--json` and `run.json`."""
+    """The end of one stage in one run; the value is the word of `--json` and `run.json`."""
 
     RAN = "ran"
     CACHED = "cached"
     FAILED = "failed"
     PLANNED = "planned"
-    """Would run; only `--dry-run` says so."""
+
+    @property
+    def sentence(self) -> str:
+        return _OUTCOMES[self][0]
 
     @property
     def style(self) -> str:
         """Colour in a terminal."""
-        return {"ran": "green", "cached": "cyan", "failed": "bold red", "planned": "yellow"}[self.value]
+        return _OUTCOMES[self][1]
+
+
+_OUTCOMES = {
+    Outcome.RAN: ("computed in this run", "green"),
+    Outcome.CACHED: ("taken from the cache", "cyan"),
+    Outcome.FAILED: ("gave no result; `error` says why", "bold red"),
+    Outcome.PLANNED: ("would run; only with `--dry-run`", "yellow"),
+}

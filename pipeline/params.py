@@ -1,10 +1,11 @@
-"""Parameters: defaults of the stages' dataclasses, then --params FILE, then --set; and params.yaml made from them."""
+"""Parameters: defaults of the stages' dataclasses, overridden by --params FILE, then by --set; and params.yaml, made from them."""
 
 from __future__ import annotations
 
 import ast
 import dataclasses
 import inspect
+import itertools
 import textwrap
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 
 from gsac.pipeline.graph import parse_yaml, read_yaml
 from gsac.pipeline.project import Project
-from gsac.stages.contract import BadInput, make_config
+from gsac.stages.contract import BadInput, did_you_mean, make_config
 
 HEAD = "# Every parameter, its default and its meaning. Written by `python -m gsac.pipeline.params` from them.\n\n"
 Values = dict[str, dict[str, Any]]
@@ -20,7 +21,7 @@ Values = dict[str, dict[str, Any]]
 
 
 def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = (), only: str = "") -> dict[str, Any]:
-    """Config instance of every stage, or of `only` one. BadInput names the parameter and where it came from."""
+    """Config instance of every stage, or of `only` one. BadInput names the parameter and its source."""
     wanted = [only] if only else list(project.graph.steps)
     sources: list[tuple[str, Values]] = []
     if file is not None:
@@ -32,7 +33,7 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
         for section, parameters in sections.items():
             if section not in values:
                 known = ", ".join(project.graph.steps)
-                raise BadInput(f"{source}: unknown section {section!r}; known: {known}")
+                raise BadInput(f"{source}: unknown section {section!r}{did_you_mean(str(section), values)}; known: {known}")
             if section not in wanted:
                 continue
             values[section] |= parameters
@@ -43,7 +44,7 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
     return {name: configs.get(name) or make_config(project.stage(name), {}) for name in wanted}
 
 
-def plain(config: Any) -> dict[str, Any]:
+def config_values(config: Any) -> dict[str, Any]:
     """Config instance as parameter -> value."""
     return dataclasses.asdict(config)
 
@@ -52,7 +53,7 @@ def to_yaml(configs: dict[str, Any], notes: bool = True) -> str:
     """params.yaml with every parameter; notes: with the meaning of each above it."""
     blocks = []
     for section, config in configs.items():
-        values = plain(config)
+        values = config_values(config)
         if not values:
             blocks.append(f"{section}: {{}}\n")
             continue
@@ -73,10 +74,12 @@ def defaults_yaml(project: Project) -> str:
 
 def meanings(config: type) -> dict[str, str]:
     """Field -> the line of meaning under it in the dataclass's source."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(config))).body[0].body
+    declaration = ast.parse(textwrap.dedent(inspect.getsource(config))).body[0]
+    assert isinstance(declaration, ast.ClassDef)
     found = {}
-    for field, after in zip(body, body[1:], strict=False):
-        if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+    for field, after in itertools.pairwise(declaration.body):
+        if (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+                and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)):
             found[field.target.id] = " ".join(str(after.value.value).split())
     return found
 

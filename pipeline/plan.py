@@ -1,4 +1,4 @@
-"""What has to run, and why."""
+"""Which stages have to run, and why."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gsac.cache.store import Store
 
 
 class Reason(Enum):
-    """Why a stage has to run, or that it need not; the value is the word of `--json`."""
+    """Why a stage has to run, or need not; the value is the word of `--json`."""
 
     UP_TO_DATE = "up to date"
     FORCED = "forced"
@@ -52,8 +52,8 @@ LEADING = (Reason.PARAM, Reason.CODE, Reason.MODEL, Reason.PACKAGE, Reason.DEVIC
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What is known about one stage before it runs."""
+class StagePlan:
+    """Whether one stage has to run and why, before anything runs."""
 
     stage: str
     reason: Reason
@@ -66,8 +66,13 @@ class Verdict:
     detail: str = ""
 
     @property
-    def current(self) -> bool:
+    def up_to_date(self) -> bool:
         return self.reason is Reason.UP_TO_DATE
+
+    @property
+    def cached(self) -> Record | None:
+        """The record of the result, where the stage need not run."""
+        return self.record if self.up_to_date else None
 
     @property
     def sentence(self) -> str:
@@ -78,21 +83,21 @@ class Verdict:
         return self.reason.sentence
 
 
-def judge(store: Store, parts: KeyParts, forced: bool = False) -> Verdict:
-    """Whether the result of this key is there; if not, what differs from the most similar earlier run."""
-    record = store.lookup(parts.key())
+def plan_stage(store: Store, parts: KeyParts, forced: bool = False) -> StagePlan:
+    """Whether the result of this key is in the cache; if not, what differs from the most similar earlier run."""
+    record = store.lookup(parts.key)
     if forced:
-        return Verdict(parts.stage, Reason.FORCED, parts, record)
+        return StagePlan(parts.stage, Reason.FORCED, parts, record)
     if record is not None:
-        return Verdict(parts.stage, Reason.UP_TO_DATE, parts, record)
+        return StagePlan(parts.stage, Reason.UP_TO_DATE, parts, record)
     before = store.previous(parts.stage, parts)
     changes = before.parts.diff(parts) if before is not None else []
     if not changes:
-        return Verdict(parts.stage, Reason.FIRST_RUN, parts)
+        return StagePlan(parts.stage, Reason.FIRST_RUN, parts)
     reasons = {_BY_CHANGE[change.kind] for change in changes if change.kind in _BY_CHANGE}
-    return Verdict(parts.stage, next(r for r in LEADING if r in reasons), parts, changes=changes)
+    return StagePlan(parts.stage, next(r for r in LEADING if r in reasons), parts, changes=changes)
 
 
-def waits(stage: str, above: list[str]) -> Verdict:
-    """A stage whose inputs are not known before those above have run."""
-    return Verdict(stage, Reason.UPSTREAM, detail=f"runs if the result of {', '.join(above)} changes")
+def plan_waiting(stage: str, above: list[str]) -> StagePlan:
+    """Of a stage whose inputs are not known before those above have run."""
+    return StagePlan(stage, Reason.UPSTREAM, detail=f"runs if the result of {', '.join(above)} changes")

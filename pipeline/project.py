@@ -32,7 +32,7 @@ class Project:
             module = importlib.import_module(package)
         except ImportError as e:
             raise BadInput(f"{OWN_STAGES}={package}: cannot be imported ({e})") from e
-        return cls(package, Path(module.__file__).with_name("dvc.yaml"))
+        return cls(package, Path(module.__path__[0]) / "dvc.yaml")
 
     @cached_property
     def graph(self) -> Graph:
@@ -54,7 +54,7 @@ class Project:
 
 
 def check_agreement(step: Step, stage: Stage) -> None:
-    """dvc.yaml and STAGE say the same ports."""
+    """BadInput where dvc.yaml and STAGE name different ports."""
     outs = {f"{stage.name}/{output.path}" for output in stage.outputs}
     for what, declared, listed in (
         ("name", {stage.name}, {step.name}),

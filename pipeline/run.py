@@ -1,4 +1,4 @@
-"""Runs one clip's chain of stages, or says what would run."""
+"""Runs the stages of one clip, or says what would run."""
 
 from __future__ import annotations
 
@@ -15,33 +15,20 @@ from gsac.cache.lease import in_use
 from gsac.cache.record import Record
 from gsac.cache.store import Store
 from gsac.pipeline import dvc_sync
+from gsac.pipeline.errors import NotUpToDateError, StageFailedError
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.params import plain
-from gsac.pipeline.plan import Verdict, judge, waits
+from gsac.pipeline.params import config_values
+from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run_folder import METRICS, RUN, RunFolder
-from gsac.pipeline.stage_runner import Actor
+from gsac.pipeline.run_folder import LOGS, METRICS, RUN, RunFolder
+from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
-"""Stages whose code is loaded while one is at work: some are done before the next has loaded."""
-
-
-class NotUpToDateError(Exception):
-    """Something that should be there already is not (exit code 3)."""
-
-
-class StageFailedError(Exception):
-    """A stage failed; `cause` says how. What was finished before it is kept."""
-
-    def __init__(self, stage: str, cause: Exception, log: Path):
-        seen = f" (log: {log})" if log.is_file() and log.stat().st_size else ""
-        super().__init__(f"stage {stage} failed: {cause}{seen}")
-        self.stage = stage
-        self.cause = cause
+"""Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
 
 
 @dataclass
@@ -53,7 +40,7 @@ class StageResult:
     reason: str
     key: str = ""
     seconds: float = 0.0
-    """Of the run that made the result, be it this one or an earlier one."""
+    """Of the run that computed the result, this one or an earlier one."""
     cpu_seconds: float = 0.0
     peak_rss_mb: float = 0.0
     warnings: list[str] = field(default_factory=list)
@@ -62,12 +49,14 @@ class StageResult:
     error: str | None = None
 
     @classmethod
-    def of(cls, verdict: Verdict, outcome: Outcome, record: Record, config: Any) -> StageResult:
+    def of(cls, plan: StagePlan, outcome: Outcome, record: Record, config: Any) -> StageResult:
+        """Of a stage that has a record."""
         info = record.info
-        return cls(verdict.stage, outcome, verdict.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, plain(config), info.metrics)
+        return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
+                   info.peak_rss_mb, info.warnings, config_values(config), info.metrics)
 
     def to_json(self) -> dict[str, Any]:
+        """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
@@ -78,7 +67,7 @@ class StageResult:
 
 @dataclass
 class Options:
-    """What part of the chain, and how."""
+    """Which stages, and how."""
 
     until: str | None = None
     """Last stage; what it does not need does not run."""
@@ -88,21 +77,20 @@ class Options:
     """Stages that run whether their result is there or not."""
 
 
-class Chain:
-    """The stages of one clip in one workspace over one store."""
+class ClipRun:
+    """The stages of one clip, their results shown in one folder and kept in one store."""
 
-    def __init__(self, project: Project, configs: dict[str, Any], store: Store, workspace: RunFolder,
-                 reporter: PlainReporter):
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, folder: RunFolder, reporter: PlainReporter):
         self.graph = project.graph
         self.configs = configs
         self.store = store
-        self.workspace = workspace
+        self.folder = folder
         self.reporter = reporter
         self.keys = Keys(project, configs, store)
         self.results: list[StageResult] = []
         self.metrics: dict[str, Any] = {}
 
-    def selected(self, options: Options) -> list[str]:
+    def select(self, options: Options) -> list[str]:
         """Stages in running order. BadInput names a stage that is unknown or left out."""
         for name in (options.until, options.start, *options.force):
             if name is not None:
@@ -115,87 +103,83 @@ class Chain:
                 raise BadInput(f"stage {name} does not run with --until {options.until}")
         return [name for name in self.graph.steps if name in wanted]
 
-    def forecast(self, clip: Path, options: Options) -> list[Verdict]:
-        """What would run and why, as far as that is known without running anything."""
-        digests = {CLIP: self._clip_digest(clip)}
-        verdicts = []
-        for name in self.selected(options):
+    def forecast(self, clip: Path, options: Options) -> list[StagePlan]:
+        """What would run and why, as far as it is known before anything runs."""
+        digests = {CLIP: clip_digest(clip, self.store)}
+        plans = []
+        for name in self.select(options):
             unknown = [p for p in self.graph.step(name).deps if p not in digests]
             if unknown:
                 makers = {self.graph.producer[p] for p in unknown}
-                verdicts.append(waits(name, [maker for maker in self.graph.steps if maker in makers]))
+                plans.append(plan_waiting(name, [maker for maker in self.graph.steps if maker in makers]))
                 continue
-            verdict = self._judge(name, digests, options)
-            verdicts.append(verdict)
-            if verdict.current:
-                digests |= _ports(verdict.record)
-        return verdicts
+            parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
+            plan = plan_stage(self.store, parts, forced=name in options.force)
+            plans.append(plan)
+            if plan.cached is not None:
+                digests |= _ports(plan.cached)
+        return plans
 
     def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
-        """Runs what has to; fills `results` and `metrics` and the workspace. at_last: told when the last stage has begun.
+        """Runs the stages that are not up to date; fills `results`, `metrics` and the folder. at_last: called with the
+        last stage's name once it is at work.
 
         Raises StageFailedError, NotUpToDateError, CacheError; run.json and finished stages are kept in any case.
         """
-        steps = self.selected(options)
+        steps = self.select(options)
         required = self.graph.above(options.start) if options.start else set()
-        source = self._clip_digest(clip)
+        source = clip_digest(clip, self.store)
         digests = {CLIP: source}
         paths = {CLIP: clip}
-        with in_use(self.store) as lease, self._kept(clip), self._actor() as actor:
+        runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
+        with in_use(self.store) as lease, self._writing_results(clip), runner:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]
-                actor.begun = partial(actor.prepare, *following) if following else partial(at_last, name)
-                inputs = {port: digests[port] for port in self.graph.step(name).deps}
-                lease.add(self.keys.parts(name, inputs).key())
-                verdict = self._judge(name, digests, options)
-                if verdict.current:
-                    outcome, record = Outcome.CACHED, verdict.record
-                elif name in required:
-                    raise NotUpToDateError(f"stage {name} is not up to date ({verdict.sentence}); "
-                                           f"run without --from {options.start}")
-                else:
-                    with self._failing(verdict, actor):
-                        outcome, record = actor.act(
-                            verdict, {port: paths[port] for port in inputs}, forced=name in options.force,
+                runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
+                inputs = self.graph.step(name).deps
+                parts = self.keys.parts(name, {port: digests[port] for port in inputs})
+                lease.add(parts.key)
+                plan = plan_stage(self.store, parts, forced=name in options.force)
+                outcome, record = Outcome.CACHED, plan.cached
+                if record is None:
+                    if name in required:
+                        raise NotUpToDateError(f"stage {name} is not up to date ({plan.sentence}); "
+                                               f"run without --from {options.start}")
+                    with self._recording_failure(plan, parts.key, runner):
+                        outcome, record = runner.run(
+                            parts, plan.reason, {port: paths[port] for port in inputs}, forced=name in options.force,
                             still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
-                self._done(verdict, outcome, record)
+                self._record(plan, outcome, record)
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
 
-    def _actor(self) -> Actor:
-        return Actor(self.keys, self.store, self.reporter, self.workspace.root / "logs")
-
-    def _judge(self, name: str, digests: dict[str, str], options: Options) -> Verdict:
-        parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
-        return judge(self.store, parts, forced=name in options.force)
-
-    def _done(self, verdict: Verdict, outcome: Outcome, record: Record) -> None:
-        self.results.append(StageResult.of(verdict, outcome, record, self.configs[verdict.stage]))
+    def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
+        self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))
         self.metrics |= record.info.metrics
-        self.workspace.place(self.store, record)
+        self.folder.place(self.store, record)
 
     @contextlib.contextmanager
-    def _failing(self, verdict: Verdict, actor: Actor) -> Iterator[None]:
+    def _recording_failure(self, plan: StagePlan, key: str, runner: StageRunner) -> Iterator[None]:
         try:
             yield
         except (StageError, CacheError) as error:
-            self.reporter.ends(verdict.stage, Outcome.FAILED, 0.0)
-            self.results.append(StageResult(verdict.stage, Outcome.FAILED, verdict.sentence, verdict.parts.key(),
-                                            params=plain(self.configs[verdict.stage]), error=str(error)))
-            raise StageFailedError(verdict.stage, error, actor.logs / f"{verdict.stage}.log") from error
+            self.reporter.ends(plan.stage, Outcome.FAILED, 0.0)
+            self.results.append(StageResult(plan.stage, Outcome.FAILED, plan.sentence, key,
+                                            params=config_values(self.configs[plan.stage]), error=str(error)))
+            raise StageFailedError(plan.stage, error, runner.logs / f"{plan.stage}.log") from error
 
     @contextlib.contextmanager
-    def _kept(self, clip: Path) -> Iterator[None]:
+    def _writing_results(self, clip: Path) -> Iterator[None]:
         """run.json, metrics.json and dvc.lock are written however the run ends."""
         try:
             yield
         finally:
-            self.workspace.write_json(RUN, {"clip": str(clip), **self.summary()})
-            self.workspace.write_json(METRICS, self.metrics)
+            self.folder.write_json(RUN, {"clip": str(clip), **self.summary()})
+            self.folder.write_json(METRICS, self.metrics)
             done = [r.name for r in self.results if r.outcome is not Outcome.FAILED]
-            dvc_sync.write_lock(self.workspace, self.graph, done, self.configs, self.store)
+            dvc_sync.write_lock(self.folder, self.graph, done, self.configs, self.store)
 
     def summary(self) -> dict[str, Any]:
         """The object of --json."""
@@ -203,20 +187,17 @@ class Chain:
         ports = [port for name in self.graph.steps if name in done for port in self.graph.step(name).outs]
         return {
             "stages": [result.to_json() for result in self.results],
-            "outputs": self.workspace.outputs(ports),
+            "outputs": self.folder.outputs(ports),
             "metrics": self.metrics,
         }
 
-    def _clip_digest(self, clip: Path) -> str:
-        return clip_digest(clip, self.store)
-
     def _unchanged(self, clip: Path, digest: str) -> None:
-        if self._clip_digest(clip) != digest:
+        if clip_digest(clip, self.store) != digest:
             raise BadInput(f"{clip} changed while it was being read; run again when it is complete")
 
 
 def clip_digest(clip: Path, store: Store) -> str:
-    """Tree digest of a file or folder. BadInput where it is not there or cannot be read."""
+    """Tree digest of a file or folder. BadInput where it does not exist or cannot be read."""
     if not clip.exists():
         raise BadInput(f"{clip}: no such file or folder; give a video or a folder of photos")
     try:

@@ -28,7 +28,7 @@ DAG, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "params.yaml", "run.json", "metr
 LOGS = "logs"
 
 OWN_STORE = ".store"
-"""Where results lie if the cache cannot be written."""
+"""Holds the results of a run whose cache cannot be written."""
 
 
 class RunFolder:
@@ -49,6 +49,7 @@ class RunFolder:
 
     @property
     def clip(self) -> Path:
+        """The link to the source clip."""
         return self.root / CLIP
 
     @property
@@ -62,6 +63,7 @@ class RunFolder:
         return Project(at_hand.package, self.root / DAG)
 
     def path(self, port: str) -> Path:
+        """Where the folder shows a port."""
         return self.root / port
 
     def require_clip(self) -> Path:
@@ -72,7 +74,7 @@ class RunFolder:
         return self.clip.resolve()
 
     def digest(self, port: str, store: Store) -> str:
-        """Tree digest of what lies at a port. BadInput where there is nothing."""
+        """Tree digest of the file or folder at a port. BadInput where there is none."""
         if port == CLIP:
             self.require_clip()
         path = self.path(port)
@@ -82,7 +84,7 @@ class RunFolder:
         return tree_digest(path.resolve(), store.memo)[0]
 
     def prepare(self, clip: Path, project: Project, configs: dict[str, Any]) -> None:
-        """Makes the folder a workspace for this clip and these parameters."""
+        """Makes it the folder of this clip and these parameters."""
         self._refuse_foreign(project)
         if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
             raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
@@ -97,7 +99,7 @@ class RunFolder:
             raise BadInput(f"{self.clip} is there and is not a link; move it away or choose another --out")
 
     def place(self, store: Store, record: Record) -> None:
-        """Shows a finished run's outputs in this folder."""
+        """Links a finished stage's outputs into this folder."""
         for output in record.outputs:
             link(store.path(record, output), self.root / record.parts.stage / output)
 
@@ -112,7 +114,7 @@ class RunFolder:
         return path.exists() and tree_digest(path.resolve(), store.memo)[0] == record.outputs[output]
 
     def _refuse_foreign(self, project: Project) -> None:
-        """Nobody's other dvc.yaml is written over."""
+        """BadInput where the folder holds files of another project, which would be overwritten."""
         if self.root.exists() and not self.root.is_dir():
             raise BadInput(f"{self.root} is a file; --out must be a folder")
         if self.root == project.dag.parent:
@@ -129,15 +131,16 @@ class RunFolder:
                                "over; choose another folder, or move it away")
 
     def write_json(self, name: str, content: Any) -> None:
+        """Writes a JSON file into the folder."""
         write_text(self.root / name, json.dumps(content, indent=1) + "\n")
 
     def outputs(self, ports: Iterable[str]) -> dict[str, str]:
-        """Port -> absolute path, of those that are there."""
+        """Port -> absolute path, of the ports that the folder shows."""
         return {port: str(self.path(port)) for port in ports if self.path(port).exists()}
 
 
 def write_text(path: Path, text: str) -> None:
-    """Whole or not at all; an equal file is left as it is."""
+    """Writes a file whole or not at all; a file of equal content is left untouched."""
     with contextlib.suppress(OSError, UnicodeDecodeError):
         if path.read_text() == text:
             return
@@ -152,7 +155,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def link(target: Path, path: Path) -> None:
-    """`path` becomes a link to `target`, a copy where the filesystem has no links; what was there goes."""
+    """Makes `path` a link to `target`, or a copy where the filesystem has no links; replaces what was there."""
     if path.is_symlink() and os.readlink(path) == str(target):
         return
     path.parent.mkdir(parents=True, exist_ok=True)

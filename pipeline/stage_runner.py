@@ -1,4 +1,4 @@
-"""One stage, once: from the cache if it is there, else computed in a process of its own, checked and published."""
+"""Gets one stage's result: from the cache if it is there, else computed in a process of its own, checked and published."""
 
 from __future__ import annotations
 
@@ -15,25 +15,26 @@ from gsac.cache import objects
 from gsac.cache.errors import FULL, CacheError, CacheFullError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
+from gsac.cache.publish import publish
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store
-from gsac.pipeline.child import Child, StageBugError, tail
+from gsac.pipeline.child import Child, LogReader, StageBugError, tail
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.params import plain
-from gsac.pipeline.plan import Verdict
+from gsac.pipeline.params import config_values
+from gsac.pipeline.plan import Reason
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
 
 METRICS_OUTPUT = "metrics.json"
 """An output of this name is also kept in the action record."""
 LITTLE_ROOM = 16 << 20
-"""A stage that fails with fewer bytes than this left had no room: many libraries that write do not say so."""
+"""A stage that fails with fewer bytes than this free ran out of disk: many libraries do not say so themselves."""
 
 
 @dataclass
-class Ready:
-    """A process that has loaded a stage's code."""
+class Prepared:
+    """A process that has loaded a stage's code and waits for its order."""
 
     code: dict[str, str]
     """Digests of that code, before it was loaded."""
@@ -41,41 +42,41 @@ class Ready:
 
 
 @dataclass
-class Actor:
-    """Does stages for one run; as a context, it ends what it has started."""
+class StageRunner:
+    """Runs stages of one run, one after another; as a context, it ends the processes it has started."""
 
     keys: Keys
     store: Store
     reporter: PlainReporter
     logs: Path
     """Folder for `<stage>.log`."""
-    begun: Callable[[], None] = lambda: None
-    """Called when a stage's process has its order: what can be done meanwhile."""
-    ready: dict[str, Ready] = field(default_factory=dict)
+    on_start: Callable[[], None] = lambda: None
+    """Called once a stage's process has its order, for work that can be done meanwhile."""
+    prepared: dict[str, Prepared] = field(default_factory=dict)
     """By stage."""
-    done: list[Child] = field(default_factory=list)
-    """Processes that may still be leaving, which takes a while where they held much memory."""
+    leaving: list[Child] = field(default_factory=list)
+    """Processes that may not have ended yet, which takes a while where they held much memory."""
 
-    def __enter__(self) -> Actor:
+    def __enter__(self) -> StageRunner:
         return self
 
     def __exit__(self, *exc) -> None:
         self._drop()
-        while self.done:
-            self.done.pop().close()
+        while self.leaving:
+            self.leaving.pop().close()
 
     def prepare(self, *names: str) -> None:
-        """Starts a process for each stage that loads its code, to be there when the stage's inputs are; ends those of others."""
+        """Starts a process a stage, which loads the stage's code while its inputs are made; ends the prepared ones of others."""
         self._drop(keep=names)
         for name in names:
-            if name not in self.ready:
-                with contextlib.suppress(CacheError, BadInput):  # it will be raised again when the stage's turn comes
+            if name not in self.prepared:
+                with contextlib.suppress(CacheError, BadInput):  # raised again when the stage's turn comes
                     code = self.keys.code(name)
-                    self.ready[name] = Ready(code, self._child(name, self._log(name, ".next")))
+                    self.prepared[name] = Prepared(code, self._child(name, self._log(name, ".next")))
 
     def _drop(self, keep: tuple[str, ...] = ()) -> None:
-        for name in self.ready.keys() - set(keep):
-            child = self.ready.pop(name).child
+        for name in self.prepared.keys() - set(keep):
+            child = self.prepared.pop(name).child
             child.close()
             child.log.unlink(missing_ok=True)
 
@@ -87,30 +88,31 @@ class Actor:
     def _log(self, name: str, more: str = "") -> Path:
         return self.logs / f"{name}.log{more}"
 
-    def _taken(self, parts: KeyParts) -> Child:
-        """A process for the stage: the one that is ready, if it has loaded the code that the key names, else a new one."""
+    def _take_child(self, parts: KeyParts) -> Child:
+        """A process for the stage: the prepared one, if it has loaded the code that the key names, else a new one."""
         name, log = parts.stage, self._log(parts.stage)
-        if name in self.ready and self.ready[name].code == parts.code:
-            child = self.ready.pop(name).child
+        if name in self.prepared and self.prepared[name].code == parts.code:
+            child = self.prepared.pop(name).child
             child.rename_log(log)
             return child
-        self._drop(keep=tuple(self.ready.keys() - {name}))
+        self._drop(keep=tuple(self.prepared.keys() - {name}))
         return self._child(name, log)
 
-    def act(self, verdict: Verdict, inputs: dict[str, Path], forced: bool = False,
+    def run(self, parts: KeyParts, reason: Reason, inputs: dict[str, Path], forced: bool = False,
             still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
-        """inputs: port -> read-only path. `still_valid` runs before publishing; it raises if inputs changed.
+        """The stage's result: from the cache if it is there by now, else computed.
 
+        inputs: port -> read-only path; still_valid: called before publishing, raises if inputs changed.
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
-        name, parts = verdict.stage, verdict.parts
-        with single_flight(self.store, parts.key(), lambda: self._waiting(name)) as there:
+        name = parts.stage
+        with single_flight(self.store, parts.key, lambda: self._waiting(name)) as there:
             if there is not None and not forced:
                 return Outcome.CACHED, there
             models = self.keys.models.need(parts.models, self.reporter.note)
-            self.reporter.starts(name, verdict.reason.value)
+            self.reporter.starts(name, reason.value)
             stage = self.keys.project.stage(name)
-            scratch = self.store.partial(parts.key())
+            scratch = self.store.partial(parts.key)
             if forced:
                 objects.remove(scratch)
             with self.store.private(name) as folder:
@@ -124,13 +126,13 @@ class Actor:
                 outputs = tuple(output.path for output in stage.outputs)
                 if METRICS_OUTPUT in outputs:
                     info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
-                record = self.store.publish(parts, folder, outputs, info, replace=forced)
+                record = publish(self.store, parts, folder, outputs, info, replace=forced)
             objects.remove(scratch)
         self.reporter.ends(name, Outcome.RAN, info.seconds)
         return Outcome.RAN, record
 
     def _check_code(self, parts: KeyParts, because: StageError | None = None) -> None:
-        """StageError where the stage's code is no longer what the key names: what ran may be neither the old nor the new."""
+        """StageError where the stage's code was edited since its key was made: what ran may be neither the old nor the new."""
         now = self.keys.code(parts.stage)
         edited = sorted(name for name in now.keys() | parts.code.keys() if now.get(name) != parts.code.get(name))
         if edited:
@@ -143,8 +145,10 @@ class Actor:
         name = parts.stage
         now = datetime.datetime.now(datetime.UTC)
         info = RunInfo(started=now.isoformat(timespec="seconds"), device=parts.device or self.keys.device)
+        log = LogReader(self._log(name))
 
         def hear(event: dict[str, Any]) -> None:
+            self._show_log(name, log)
             if event["event"] == "progress":
                 self.reporter.progress(name, event["done"], event["total"], event["unit"])
             else:
@@ -155,28 +159,35 @@ class Actor:
         order = {
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
             "scratch": str(scratch),
-            "params": plain(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
+            "params": config_values(self.keys.configs[name]), "models": {model: str(path) for model, path in models.items()},
             "device": info.device,
         }
         try:
-            child = self._taken(parts)
-            self.done.append(child)
+            child = self._take_child(parts)
+            self.leaving.append(child)
             try:
                 child.order(order)
-                self.begun()
+                self.on_start()
                 end = child.follow(hear)
             except BaseException:
-                child.close()  # before the folder goes that it writes to
+                child.close()  # before its output folder is removed
                 raise
+            finally:
+                self._show_log(name, log, ended=True)
         except StageError as error:
             if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
                 raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
-            if not isinstance(error, StageBugError):  # it would only come to the same end again
+            if not isinstance(error, StageBugError):  # another run would only fail in the same way
                 objects.remove(scratch)
             raise
         info.seconds, info.cpu_seconds, info.peak_rss_mb = end["seconds"], end["cpu_seconds"], end["peak_rss_mb"]
         info.log_tail = tail(self._log(name))
         return info
+
+    def _show_log(self, name: str, log: LogReader, ended: bool = False) -> None:
+        if self.reporter.verbose:
+            for line in log.new_lines(ended):
+                self.reporter.log(name, line)
 
     def _waiting(self, name: str) -> None:
         self.reporter.note(f"{name}: another run computes the same result; waiting for it")

@@ -1,4 +1,4 @@
-"""Installed versions of distributions, read off the names of their `.dist-info` folders.
+"""Installed versions of distributions, from the names of their `.dist-info` folders.
 
 `importlib.metadata` would read and parse each METADATA file: a third of what a run with nothing to do may cost.
 """
@@ -11,7 +11,7 @@ import sys
 from functools import cache
 
 ABSENT = "absent"
-"""Stands for the version of what is not installed: a stage may do without an optional package."""
+"""The version of a package that is not installed: some are optional."""
 
 
 def package_version(package: str) -> str:
@@ -21,7 +21,7 @@ def package_version(package: str) -> str:
 
 @cache
 def _installed(path: tuple[str, ...]) -> dict[str, str]:
-    """Normal name -> version; what comes first on the path counts, as for imports."""
+    """Normal name -> version; the first on the path counts, as for imports."""
     found: dict[str, str] = {}
     for folder in path:
         try:
@@ -37,5 +37,5 @@ def _installed(path: tuple[str, ...]) -> dict[str, str]:
 
 
 def _normal(name: str) -> str:
-    """PEP 503."""
+    """The name normalised by PEP 503."""
     return re.sub(r"[-_.]+", "-", name).lower()

@@ -1,6 +1,6 @@
-"""The child process that does one stage: builds the Job, runs it, checks what it wrote, and says how it goes.
+"""The child process of one stage: builds the Job, runs it, checks what it wrote, and sends events to its parent.
 
-Reads two JSON lines from stdin: what to load and where to write events to, a file descriptor; and when there is work the order.
+Reads two JSON lines from stdin: which modules to load and the file descriptor for events; later, once inputs are there, the order.
 Stdin stays open as long as the parent lives; when it closes, the child and its children go.
 """
 
@@ -23,38 +23,41 @@ from typing import Any, TextIO
 from gsac.stages.contract import BadInput, Job, Stage, StageError, make_config
 
 LEAST_GAP_S = 0.1
-"""Progress is said at most this often."""
+"""At least this long between two progress events."""
 
 
-class Voice:
-    """Events to the parent, one JSON object a line."""
+class EventStream:
+    """Events for the parent, one JSON object a line."""
 
     def __init__(self, stream: TextIO):
         self._stream = stream
         self._lock = threading.Lock()
         self._last = 0.0
 
-    def say(self, event: str, **fields: Any) -> None:
+    def send(self, event: str, **fields: Any) -> None:
+        """Writes one event."""
         with self._lock:
             self._stream.write(json.dumps({"event": event, **fields}) + "\n")
             self._stream.flush()
 
     def progress(self, done: int, total: int, unit: str) -> None:
+        """Sends progress, not too often; the last always."""
         now = time.monotonic()
         if done >= total or now - self._last >= LEAST_GAP_S:
             self._last = now
-            self.say("progress", done=int(done), total=int(total), unit=str(unit))
+            self.send("progress", done=int(done), total=int(total), unit=str(unit))
 
     def warn(self, message: str) -> None:
-        self.say("warning", message=str(message))
+        """Sends a warning for the user."""
+        self.send("warning", message=str(message))
 
 
 def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     start = json.loads(sys.stdin.readline())
     os.set_inheritable(start["events"], False)
-    voice = Voice(os.fdopen(start["events"], "w"))
-    with contextlib.suppress(Exception):  # it will fail again, and be heard, when there is an order
+    events = EventStream(os.fdopen(start["events"], "w"))
+    with contextlib.suppress(Exception):  # it fails again, and is reported, once there is an order
         importlib.import_module(start["declaration"])
         entry = importlib.import_module(start["entry"])
         if hasattr(entry, "warm"):
@@ -65,17 +68,17 @@ def main() -> None:
     order = start | json.loads(line)
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     try:
-        _work(order, voice)
-    except Exception as error:  # whatever a stage does wrong, the parent must hear of it
+        _work(order, events)
+    except Exception as error:  # the parent must hear of any failure
         traceback.print_exc()
-        voice.say("failed", kind=_kind(error), message=_message(error))
+        events.send("failed", kind=_kind(error), message=_message(error))
     else:
-        voice.say("done", seconds=time.time() - order["started"], **cost())
+        events.send("done", seconds=time.time() - order["started"], **cost())
     sys.stdout.flush()
-    os._exit(0)  # what is written is written: libraries that tidy up their threads and memory take seconds to
+    os._exit(0)  # all is written, and libraries take seconds to tear down their threads and memory
 
 
-def _work(order: dict[str, Any], voice: Voice) -> None:
+def _work(order: dict[str, Any], events: EventStream) -> None:
     stage: Stage = importlib.import_module(order["declaration"]).STAGE
     run = importlib.import_module(order["entry"]).run
     out = Path(order["out"])
@@ -86,14 +89,14 @@ def _work(order: dict[str, Any], voice: Voice) -> None:
         config=_config(stage, order["params"]),
         models={name: Path(path) for name, path in order["models"].items()},
         device=order["device"],
-        progress=voice.progress,
-        warn=voice.warn,
+        progress=events.progress,
+        warn=events.warn,
     ))
     check_outputs(stage, out)
 
 
 def _config(stage: Stage, params: dict[str, Any]) -> Any:
-    """Of all the stage's parameters, as the parent knew them when the run began; StageError where there are others by now."""
+    """The config that the parent sent; StageError where the stage's parameters were edited since."""
     edited = {field.name for field in dataclasses.fields(stage.config)} ^ params.keys()
     if edited:
         raise StageError(f"its parameters were edited since the run began ({', '.join(sorted(edited))}); run again")
@@ -101,7 +104,7 @@ def _config(stage: Stage, params: dict[str, Any]) -> Any:
 
 
 def check_outputs(stage: Stage, folder: Path) -> None:
-    """Every declared output is there and what its port promises, else StageError."""
+    """StageError unless every declared output was written and passes its check."""
     for output in stage.outputs:
         path = folder / output.path
         if not path.exists():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -83,12 +83,21 @@ def make_config(stage: Stage, values: dict[str, Any]) -> Any:
     known = typing.get_type_hints(stage.config)
     for name in values:
         if name not in known:
-            raise BadInput(f"unknown parameter {stage.name}.{name}; known: {', '.join(sorted(known)) or 'none'}")
+            raise BadInput(f"unknown parameter {stage.name}.{name}{did_you_mean(name, known, f'{stage.name}.')}; "
+                           f"known: {', '.join(sorted(known)) or 'none'}")
     config = stage.config(**{name: _typed(f"{stage.name}.{name}", v, known[name]) for name, v in values.items()})
     check = getattr(config, "check", None)
     if check is not None:
         check()
     return config
+
+
+def did_you_mean(word: str, known: Iterable[str], before: str = "") -> str:
+    """` (did you mean train?)` for a word that is nearly a known one, else empty. before: put in front of the suggestion."""
+    import difflib
+
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f" (did you mean {before}{near[0]}?)" if near else ""
 
 
 def _typed(name: str, value: Any, hint: Any) -> Any:

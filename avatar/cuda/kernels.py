@@ -28,9 +28,8 @@ def source() -> str:
 
 
 def folder() -> Path:
-    """$GSAC_CACHE/kernels, else ~/.cache/gsac/kernels."""
-    named = os.environ.get("GSAC_CACHE")
-    return (Path(named) if named else Path.home() / ".cache" / "gsac") / "kernels"
+    """$GSAC_CACHE/kernels, else ~/.cache/gsac/kernels: below the root of gsac.cache, which is not imported here."""
+    return Path(os.environ.get("GSAC_CACHE") or "~/.cache/gsac").expanduser().absolute() / "kernels"
 
 
 def cubin(architecture: str) -> bytes:

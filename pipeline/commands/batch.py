@@ -1,4 +1,4 @@
-"""gsac batch FOLDER | LIST"""
+"""gsac batch FOLDER | LIST: many clips over one cache."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import os
 from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
-from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, add_params
-from gsac.pipeline.executors import EXECUTORS, ClipResult, make_executor
+from gsac.pipeline.commands.options import add_json, add_params, progress_reporter
+from gsac.pipeline.executors import EXECUTORS, make_executor
+from gsac.pipeline.executors.executor import ClipResult
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import PlainReporter, duration
+from gsac.pipeline.reporter import duration
 from gsac.stages.contract import BadInput
 
 
@@ -31,7 +32,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    voice = PlainReporter()
+    reporter = progress_reporter(arguments)
     workers = max(1, (os.cpu_count() or 1) // 2) if arguments.jobs is None else arguments.jobs
     if workers < 1:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
@@ -40,13 +41,13 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     resolve(project, arguments.params, arguments.set)  # one error now, not one a clip
     if arguments.until:
         project.graph.step(arguments.until)
-    jobs = make_jobs(find_clips(arguments.source), arguments.out, passed_on(arguments))
-    voice.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
-    results = run_batch(jobs, executor, lambda result: voice.note(words(result)))
+    jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
+    reporter.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
+    results = run_batch(jobs, executor, lambda result: reporter.note(describe(result)))
     failed = [result for result in results if result.code != ExitCode.OK]
-    voice.note(f"{len(results) - len(failed)} of {len(results)} clips are done")
+    reporter.result(f"{len(results) - len(failed)} of {len(results)} clips are done")
     for result in failed:
-        voice.note(f"failed: {result.job.clip}: {result.error}")
+        reporter.result(f"failed: {result.job.clip}: {result.error}")
     if arguments.json:
         emit({"clips": [{
             "clip": str(r.job.clip), "out": str(r.job.out), "status": "failed" if r.code else "done", "code": r.code,
@@ -54,14 +55,15 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FAILED if failed else ExitCode.OK
 
 
-def passed_on(arguments: argparse.Namespace) -> tuple[str, ...]:
-    """What every clip's run is told."""
+def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """Arguments of every clip's `gsac run`."""
     told = ["--params", str(arguments.params.absolute())] if arguments.params else []
     told += [word for text in arguments.set for word in ("--set", text)]
     return tuple(told + (["--until", arguments.until] if arguments.until else []))
 
 
-def words(result: ClipResult) -> str:
+def describe(result: ClipResult) -> str:
+    """One clip's line."""
     rows = result.summary.get("stages", [])
     ran = sum(row["status"] == "ran" for row in rows)
     warnings = sum(len(row["warnings"]) for row in rows)

@@ -1,4 +1,4 @@
-"""gsac cache ls | verify | gc"""
+"""gsac cache ls | verify | gc: what lies in the store, whether it is sound, and what may go."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import dataclasses
 import re
 
 from gsac.cache import gc, listing, verify
-from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, answers, open_store
+from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
 
 UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
@@ -33,46 +32,47 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
-    store = open_store(PlainReporter())
+    reporter = answer_reporter(arguments)
+    store = open_store(progress_reporter(arguments))
     rows = listing.ls(store)
-    people = answers(arguments)
     for row in rows:
         age = f"{row.age_s / 86400:6.1f} d"
-        people.note(f"{row.stage:<10} {row.key[:16]}  {size(row.bytes):>9}  {age}  {row.seconds:8.1f} s")
-    people.note(f"{len(rows)} results, {size(sum(row.bytes for row in rows))} in {store.root}")
+        reporter.note(f"{row.stage:<10} {row.key[:16]}  {format_size(row.bytes):>9}  {age}  {row.seconds:8.1f} s")
+    reporter.note(f"{len(rows)} results, {format_size(sum(row.bytes for row in rows))} in {store.root}")
     if arguments.json:
         emit({"root": str(store.root), "results": [dataclasses.asdict(row) for row in rows]})
     return ExitCode.OK
 
 
 def do_verify(arguments: argparse.Namespace) -> ExitCode:
-    people = answers(arguments)
-    store = open_store(people)
+    reporter = answer_reporter(arguments)
+    store = open_store(reporter)
     report = verify.verify(store)
     for name in report.lost:
-        people.note(f"{name}: dropped; it will be computed again")
-    people.note(f"{report.objects} objects, {size(report.bytes)} sound, {len(report.damaged)} damaged in {store.root}")
+        reporter.note(f"{name}: dropped; it will be computed again")
+    reporter.note(f"{report.objects} objects, {format_size(report.bytes)} sound, {len(report.damaged)} damaged in {store.root}")
     if arguments.json:
         emit({"sound": report.sound, **dataclasses.asdict(report)})
     return ExitCode.OK if report.sound else ExitCode.INTEGRITY
 
 
 def do_gc(arguments: argparse.Namespace) -> ExitCode:
-    people = answers(arguments)
+    reporter = answer_reporter(arguments)
     limit = parse_size(arguments.max_size) if arguments.max_size else None
     if arguments.keep_days is not None and arguments.keep_days < 0:
         raise BadInput(f"--keep-days {arguments.keep_days}: expected 0 or more")
-    report = gc.collect(open_store(people), arguments.keep_days, limit, arguments.dry_run)
+    report = gc.collect(open_store(reporter), arguments.keep_days, limit, arguments.dry_run)
     verb = "would remove" if arguments.dry_run else "removed"
     left = len(report.temps) + len(report.partial)
-    people.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {left} left-overs of dead runs: "
-                f"{size(report.freed_bytes)}; {size(report.kept_bytes)} stay")
+    reporter.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {left} left-overs of dead runs: "
+                f"{format_size(report.freed_bytes)}; {format_size(report.kept_bytes)} stay")
     if arguments.json:
         emit(dataclasses.asdict(report))
     return ExitCode.OK
 
 
-def size(count: int) -> str:
+def format_size(count: float) -> str:
+    """`1.2 MB`"""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000:
             return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
@@ -82,8 +82,7 @@ def size(count: int) -> str:
 
 def parse_size(text: str) -> int:
     """Bytes of `500M`, `20G`, `1.5 TB`."""
-    match = re.fullmatch(r"\s*([0-9.]+)\s*([KMGT]?)B?\s*", text, re.IGNORECASE)
-    try:
-        return int(float(match.group(1)) * UNITS[match.group(2).upper()])
-    except (AttributeError, ValueError) as e:
-        raise BadInput(f"--max-size {text}: expected a size such as 500M or 20G") from e
+    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*([KMGT]?)B?\s*", text, re.IGNORECASE)
+    if match is None:
+        raise BadInput(f"--max-size {text}: expected a size such as 500M or 20G")
+    return int(float(match.group(1)) * UNITS[match.group(2).upper()])

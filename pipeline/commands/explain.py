@@ -1,45 +1,41 @@
-"""gsac explain STAGE"""
+"""gsac explain STAGE: what changed in its key since the most similar earlier run."""
 
 from __future__ import annotations
 
 import argparse
 
 from gsac.cache.key import KeyParts
-from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, add_params, add_workspace, answers, open_store_of, open_workspace
+from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, forecast
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.run import Chain, Options
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("stage", metavar="STAGE")
-    add_workspace(command)
+    command.add_argument("stage", metavar="STAGE", help="its name in dvc.yaml")
+    add_run_folder(command)
     add_params(command)
     add_json(command)
     command.set_defaults(do=do)
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    workspace, project, configs = open_workspace(arguments, arguments.folder)
-    project.graph.step(arguments.stage)
-    with answers(arguments) as voice:
-        chain = Chain(project, configs, open_store_of(workspace, voice), workspace, voice)
-        verdict = chain.forecast(workspace.require_clip(), Options(until=arguments.stage))[-1]
-        voice.note(f"{verdict.stage}: {verdict.reason.value}")
-        if not verdict.changes:
-            voice.note(f"  {verdict.sentence}")
-        for change in verdict.changes:
-            voice.note(f"  {change.sentence}")
-        if verdict.parts is not None:
-            voice.note(f"key {verdict.parts.key()} is made of")
-            for line in part_lines(verdict.parts):
-                voice.note(f"  {line}")
+    with answer_reporter(arguments) as reporter:
+        plan = forecast(arguments, reporter, until=arguments.stage)[1][-1]
+        reporter.note(f"{plan.stage}: {plan.reason.value}")
+        if not plan.changes:
+            reporter.note(f"  {plan.sentence}")
+        for change in plan.changes:
+            reporter.note(f"  {change.sentence}")
+        if plan.parts is not None:
+            reporter.note(f"key {plan.parts.key} is made of")
+            for line in part_lines(plan.parts):
+                reporter.note(f"  {line}")
     if arguments.json:
-        emit({"stage": verdict.stage, "reason": verdict.reason.value,
-              "key": verdict.parts.key() if verdict.parts else None,
+        emit({"stage": plan.stage, "reason": plan.reason.value,
+              "key": plan.parts.key if plan.parts else None,
               "changes": [
                   {"kind": c.kind.value, "name": c.name, "before": c.before, "after": c.after, "why": c.sentence}
-                  for c in verdict.changes
+                  for c in plan.changes
               ]})
     return ExitCode.OK
 

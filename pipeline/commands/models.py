@@ -1,15 +1,14 @@
-"""gsac models ls | pull | add"""
+"""gsac models ls | pull | add: the networks' files in the store."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, answers, open_store
-from gsac.pipeline.model_store import Models
+from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter
+from gsac.pipeline.json_output import emit
+from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.reporter import PlainReporter
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -21,7 +20,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     one.add_argument("names", nargs="*", metavar="NAME", help="default: all that are missing")
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")
-    one.add_argument("name", metavar="NAME")
+    one.add_argument("name", metavar="NAME", help="as parameters refer to it, for example smplx.body_model")
     one.add_argument("files", type=Path, nargs="+", metavar="FILE",
                      help="lpips-vgg, lpips-alex: one file with all weights, or the network's and the heads' one after the other")
     one.set_defaults(do=do_add)
@@ -30,8 +29,8 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
     from gsac.avatar.network_files import BROUGHT, MODELS
 
-    people = answers(arguments)
-    models = Models(open_store(people))
+    reporter = answer_reporter(arguments)
+    models = ModelStore(open_store(reporter))
     brought = models.brought
     rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name),
              "licence": MODELS[name].licence if name in MODELS else "your own"}
@@ -39,7 +38,7 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
     rows += [{"name": name, "sha256": "", "here": False, "licence": "your own"} for name in BROUGHT if name not in brought]
     for row in rows:
         here = "here" if row["here"] else "missing" if row["sha256"] else "not brought"
-        people.note(f"{row['name']:<32} {here:<11} {row['sha256'][:16]:<16}  {row['licence']}")
+        reporter.note(f"{row['name']:<32} {here:<11} {row['sha256'][:16]:<16}  {row['licence']}")
     if arguments.json:
         emit({"models": rows})
     return ExitCode.OK
@@ -48,16 +47,16 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
 def do_pull(arguments: argparse.Namespace) -> ExitCode:
     from gsac.avatar.network_files import MODELS
 
-    people = PlainReporter()
-    models = Models(open_store(people))
+    reporter = progress_reporter(arguments)
+    models = ModelStore(open_store(reporter))
     names = arguments.names or list(MODELS)
-    models.need(names, people.note)
-    people.note(f"{len(names)} model files are in {models.root}")
+    models.need(names, reporter.note)
+    reporter.result(f"{len(names)} model files are in {models.root}")
     return ExitCode.OK
 
 
 def do_add(arguments: argparse.Namespace) -> ExitCode:
-    people = PlainReporter()
-    path = Models(open_store(people)).add(arguments.name, *arguments.files)
-    people.note(f"{arguments.name} is {path}")
+    reporter = progress_reporter(arguments)
+    path = ModelStore(open_store(reporter)).add(arguments.name, *arguments.files)
+    reporter.result(f"{arguments.name} is {path}")
     return ExitCode.OK

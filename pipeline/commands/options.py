@@ -9,8 +9,10 @@ from typing import Any
 
 from gsac.cache.store import Store
 from gsac.pipeline.params import resolve
+from gsac.pipeline.plan import StagePlan
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.reporter import PlainReporter, open_reporter
+from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 
 
@@ -24,17 +26,25 @@ def add_json(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="one JSON object as the last line of stdout")
 
 
-def add_workspace(command: argparse.ArgumentParser) -> None:
-    command.add_argument("folder", nargs="?", type=Path, default=Path("."), help="the folder of a run (default: here)")
+def add_run_folder(command: argparse.ArgumentParser) -> None:
+    command.add_argument("folder", nargs="?", type=Path, default=Path("."), metavar="DIR",
+                         help="the folder of a run (default: here)")
 
 
-def answers(arguments: argparse.Namespace) -> PlainReporter:
-    """What was asked for goes to stdout, unless --json has it."""
-    return PlainReporter(sys.stderr if arguments.json else sys.stdout)
+def progress_reporter(arguments: argparse.Namespace) -> PlainReporter:
+    """Of a command that does something, on stderr."""
+    return open_reporter(arguments.verbosity, plain=getattr(arguments, "json", False))
+
+
+def answer_reporter(arguments: argparse.Namespace) -> PlainReporter:
+    """Of a command that answers a question: on stdout, or on stderr where --json has stdout."""
+    if arguments.json:
+        return open_reporter(arguments.verbosity, plain=True)
+    return PlainReporter(sys.stdout)
 
 
 def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
-    """The store of GSAC_CACHE, which says aloud what it finds damaged.
+    """The store of GSAC_CACHE; it reports what it finds damaged.
 
     Where it may only be read, results of this run go to `instead`, and what it holds is still used.
     """
@@ -45,17 +55,26 @@ def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
     return Store(instead, say=reporter.note, below=store)
 
 
-def open_store_of(workspace: RunFolder, reporter: PlainReporter) -> Store:
+def open_store_of(run_folder: RunFolder, reporter: PlainReporter) -> Store:
     """The store that a run in this folder would use now: its own where the cache may only be read."""
-    store, own = Store.open(say=reporter.note), workspace.root / OWN_STORE
+    store, own = Store.open(say=reporter.note), run_folder.root / OWN_STORE
     return store if store.writable or not own.is_dir() else Store(own, say=reporter.note, below=store)
 
 
-def open_workspace(
+def open_run_folder(
     arguments: argparse.Namespace, start: Path, only: str = ""
 ) -> tuple[RunFolder, Project, dict[str, Any]]:
     """The folder of a run, its stages, and its parameters (of `only` one stage) with --params and --set on top."""
-    workspace = RunFolder.around(start)
-    project = workspace.project(Project.at_hand())
-    file = getattr(arguments, "params", None) or workspace.params
-    return workspace, project, resolve(project, file, arguments.set, only)
+    run_folder = RunFolder.around(start)
+    project = run_folder.project(Project.at_hand())
+    file = getattr(arguments, "params", None) or run_folder.params
+    return run_folder, project, resolve(project, file, arguments.set, only)
+
+
+def forecast(arguments: argparse.Namespace, reporter: PlainReporter, until: str | None = None) -> tuple[ClipRun, list[StagePlan]]:
+    """The run in `arguments.folder` as it would go now, up to one stage; nothing runs."""
+    folder, project, configs = open_run_folder(arguments, arguments.folder)
+    if until is not None:
+        project.graph.step(until)
+    clip_run = ClipRun(project, configs, open_store_of(folder, reporter), folder, reporter)
+    return clip_run, clip_run.forecast(folder.require_clip(), Options(until=until))

@@ -1,4 +1,4 @@
-"""gsac render AVATAR: a video of the avatar, moving as a motion file says or seen from all sides."""
+"""gsac render AVATAR: a video of the avatar, moved by a motion file or seen from all sides."""
 
 from __future__ import annotations
 
@@ -6,16 +6,23 @@ import argparse
 import re
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json
+from gsac.pipeline.commands.options import add_json, progress_reporter
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.reporter import PlainReporter, reporter
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
+
+if TYPE_CHECKING:
+    from gsac.avatar.gsac_file.rigged import RiggedAvatar
+    from gsac.avatar.motion.source import Motion
 
 FILE = "avatar.gsac"
 SIZES = (16, 4096)
+"""Least and largest width or height, px."""
 TURN_S = 6.0
+"""How long the turn takes, s, unless told."""
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -35,8 +42,8 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    width, height = size(arguments.size)
-    background = colour(arguments.background)
+    width, height = parse_size(arguments.size)
+    background = parse_colour(arguments.background)
     if not 1 <= arguments.fps <= 240:
         raise BadInput(f"--fps {arguments.fps:g}: expected 1 to 240")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 3600:
@@ -45,8 +52,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if out.suffix.lower() != ".mp4" or out.is_dir() or not out.parent.is_dir():
         raise BadInput(f"--out {arguments.out}: expected a file .mp4 in a folder that exists")
     file = find_avatar(arguments.avatar)
-    with reporter(plain=arguments.json) as voice:
-        frames, seconds = film(file, arguments, out, (width, height), background, voice)
+    with progress_reporter(arguments) as reporter:
+        frames, seconds = film(file, arguments, out, (width, height), background, reporter)
     if arguments.json:
         emit({"stages": [{"name": "render", "status": Outcome.RAN.value, "seconds": seconds, "key": None}],
               "outputs": {"video": str(out)},
@@ -58,8 +65,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int], background: list[float],
-         voice: PlainReporter) -> tuple[int, float]:
-    """Writes the video. Returns its frames and the seconds that it took."""
+         reporter: PlainReporter) -> tuple[int, float]:
+    """Writes the video. Returns the number of its frames and the seconds that it took."""
     import numpy as np
 
     from gsac.avatar.artifacts import ArtifactError
@@ -68,7 +75,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
     from gsac.avatar.video import Video, VideoError
 
     began = time.monotonic()
-    voice.starts("render", f"{file.name} to {out}")
+    reporter.starts("render", f"{file.name} to {out}")
     try:
         avatar = RiggedAvatar.read(file)
         motion = find_motion(arguments.motion, avatar)
@@ -76,18 +83,18 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
                 else performance(motion, arguments.fps, arguments.seconds))
         with Video(out, *size, arguments.fps) as video:
             for done, frame in enumerate(frames(avatar, plan, *size, np.array(background))):
-                voice.progress("render", done, len(plan), "frames")
+                reporter.progress("render", done, len(plan), "frames")
                 video.add(frame)
     except ArtifactError as e:
         raise BadInput(str(e)) from e
     except VideoError as e:
         raise StageError(str(e)) from e
     seconds = time.monotonic() - began
-    voice.ends("render", Outcome.RAN, seconds)
+    reporter.ends("render", Outcome.RAN, seconds)
     return len(plan), seconds
 
 
-def find_motion(asked: str | None, avatar):
+def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
     """The motion of a file, or of the avatar's own clips by name; None where none is asked for."""
     from gsac.avatar.motion.files import read_motion
     from gsac.avatar.motion.source import Motion
@@ -117,7 +124,7 @@ def find_avatar(path: Path) -> Path:
     raise BadInput(f"{path}: no {FILE} here; give the file, or the folder of a run whose stage export is done")
 
 
-def size(words: str) -> tuple[int, int]:
+def parse_size(words: str) -> tuple[int, int]:
     """Width and height of `WxH`."""
     found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", words)
     numbers = [int(n) for n in found.groups()] if found else []
@@ -126,7 +133,7 @@ def size(words: str) -> tuple[int, int]:
     return numbers[0], numbers[1]
 
 
-def colour(words: str) -> list[float]:
+def parse_colour(words: str) -> list[float]:
     """r, g, b in 0..1 of `rrggbb`."""
     if not re.fullmatch(r"#?[0-9a-fA-F]{6}", words):
         raise BadInput(f"--background {words}: expected six hexadecimal digits, for example ffffff")

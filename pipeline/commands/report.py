@@ -1,4 +1,4 @@
-"""gsac report DIR"""
+"""gsac report DIR: writes report.html of a run's folder again."""
 
 from __future__ import annotations
 

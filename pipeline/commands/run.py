@@ -1,4 +1,4 @@
-"""gsac run CLIP"""
+"""gsac run CLIP: runs a clip through the stages."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import argparse
 from pathlib import Path
 
 from gsac.cache.store import Store
-from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, add_params, open_store
+from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
+from gsac.pipeline.errors import StageFailedError, attach_summary
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.report.refresh import Early, refresh_report
-from gsac.pipeline.reporter import PlainReporter, reporter
-from gsac.pipeline.run import Chain, Options, StageFailedError
+from gsac.pipeline.report.refresh import EarlySections, refresh_report
+from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
 
@@ -36,49 +37,51 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     project = Project.at_hand()
     configs = resolve(project, arguments.params, arguments.set)
     clip = find_clip(arguments.clip)
-    workspace = RunFolder(arguments.out or default_out(clip))
+    run_folder = RunFolder(arguments.out or default_out(clip))
     options = Options(arguments.until, arguments.start, tuple(arguments.force))
-    with reporter(plain=arguments.json) as voice:
-        store = open_store(voice, None if arguments.dry_run else workspace.root / OWN_STORE)
-        chain = Chain(project, configs, store, workspace, voice)
+    with progress_reporter(arguments) as reporter:
+        store = open_store(reporter, None if arguments.dry_run else run_folder.root / OWN_STORE)
+        clip_run = ClipRun(project, configs, store, run_folder, reporter)
         if arguments.dry_run:
-            return foretell(chain, clip, options, voice, arguments.json)
-        chain.selected(options)
-        workspace.prepare(clip, project, configs)
-        return carry_out(chain, clip, options, voice, arguments.json)
+            return dry_run(clip_run, clip, options, reporter, arguments.json)
+        clip_run.select(options)
+        run_folder.prepare(clip, project, configs)
+        return carry_out(clip_run, clip, options, reporter, arguments.json)
 
 
-def carry_out(chain: Chain, clip: Path, options: Options, voice: PlainReporter, json: bool) -> ExitCode:
-    """The run itself; what was done is in the JSON object whether it ends well or not."""
-    early = Early(chain.workspace)
+def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
+    """The run and its report; the JSON object lists the stages done whether it ends well or not."""
+    early = EarlySections(clip_run.folder)
     try:
-        chain.run(clip, options, early.begin)
-        report(chain, voice, early)
+        clip_run.run(clip, options, early.start)
+        write_report(clip_run, reporter, early)
     except BaseException as error:
-        error.summary = chain.summary()
+        attach_summary(error, clip_run.summary())
         if isinstance(error, StageFailedError):
-            report(chain, voice)
+            write_report(clip_run, reporter)
         raise
     if json:
-        emit(chain.summary())
-    voice.note(f"results: {chain.workspace.root}")
+        emit(clip_run.summary())
+    reporter.result(f"results: {clip_run.folder.root}")
     return ExitCode.OK
 
 
-def report(chain: Chain, voice: PlainReporter, early: Early | None = None) -> None:
-    if (warning := refresh_report(chain.workspace, chain.results, early)) is not None:
-        voice.note(f"gsac: warning: {warning}")
+def write_report(clip_run: ClipRun, reporter: PlainReporter, early: EarlySections | None = None) -> None:
+    """Writes report.html if it is due; a failure is only a warning."""
+    if (warning := refresh_report(clip_run.folder, clip_run.results, early)) is not None:
+        reporter.note(f"gsac: warning: {warning}")
 
 
-def foretell(chain: Chain, clip: Path, options: Options, voice: PlainReporter, json: bool) -> ExitCode:
-    verdicts = chain.forecast(clip, options)
+def dry_run(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
+    """Reports what would run and why."""
+    plans = clip_run.forecast(clip, options)
     rows = []
-    for verdict in verdicts:
-        outcome = Outcome.CACHED if verdict.current else Outcome.PLANNED
-        info = verdict.record.info if verdict.record is not None else None
-        voice.ends(verdict.stage, outcome, info.seconds if info else 0.0, f"{verdict.reason.value}: {verdict.sentence}")
-        rows.append({"name": verdict.stage, "status": outcome.value, "seconds": info.seconds if info else None,
-                     "key": verdict.parts.key() if verdict.parts else None, "reason": verdict.reason.value})
+    for plan in plans:
+        outcome = Outcome.CACHED if plan.up_to_date else Outcome.PLANNED
+        info = plan.record.info if plan.record is not None else None
+        reporter.foresees(plan.stage, outcome, info.seconds if info else 0.0, f"{plan.reason.value}: {plan.sentence}")
+        rows.append({"name": plan.stage, "status": outcome.value, "seconds": info.seconds if info else None,
+                     "key": plan.parts.key if plan.parts else None, "reason": plan.reason.value})
     if json:
         emit({"stages": rows, "outputs": {}, "metrics": {}})
     return ExitCode.OK
@@ -92,14 +95,15 @@ def find_clip(path: Path) -> Path:
 
 
 def default_out(clip: Path) -> Path:
+    """`<clip>-avatar` here."""
     return Path.cwd() / f"{clip.stem}-avatar"
 
 
-def run_clip(clip: Path, out: Path, store: Store, voice: PlainReporter) -> RunFolder:
-    """A whole run with the defaults."""
+def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> RunFolder:
+    """All stages with their defaults; returns the folder that shows the results."""
     project = Project.at_hand()
     configs = resolve(project)
-    workspace = RunFolder(out)
-    workspace.prepare(find_clip(clip), project, configs)
-    carry_out(Chain(project, configs, store, workspace, voice), find_clip(clip), Options(), voice, json=False)
-    return workspace
+    run_folder = RunFolder(out)
+    run_folder.prepare(find_clip(clip), project, configs)
+    carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(), reporter, json=False)
+    return run_folder

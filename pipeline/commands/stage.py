@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
 from gsac.cache.store import Store
-from gsac.pipeline.cli import emit
-from gsac.pipeline.commands.options import add_json, add_params, open_store, open_workspace
+from gsac.pipeline.commands.options import add_json, add_params, open_run_folder, open_store, progress_reporter
+from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.graph import CLIP
+from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
-from gsac.pipeline.plan import judge
+from gsac.pipeline.plan import plan_stage
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import PlainReporter, reporter
-from gsac.pipeline.run import StageFailedError, StageResult
-from gsac.pipeline.run_folder import OWN_STORE, link
-from gsac.pipeline.stage_runner import Actor
+from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run import StageResult
+from gsac.pipeline.run_folder import LOGS, OWN_STORE, link
+from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("name", metavar="NAME")
+    command.add_argument("name", metavar="NAME", help="its name in dvc.yaml")
     command.add_argument("--inputs", type=Path, metavar="DIR", help="artifacts: DIR/<input stage>/..., DIR/clip")
     command.add_argument("--out", type=Path, metavar="DIR",
                          help="gets the outputs, with --inputs; `--out DIR/NAME` feeds the next stage")
@@ -34,59 +36,83 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.set_defaults(do=do)
 
 
+@dataclass(frozen=True)
+class Task:
+    """One stage, where its inputs lie and where its outputs are shown."""
+
+    name: str
+    keys: Keys
+    store: Store
+    digests: dict[str, str]
+    """Port -> tree digest of an input."""
+    paths: dict[str, Path]
+    """Port -> path of an input."""
+    out: Path
+    """Folder for the outputs."""
+    logs: Path
+
+
 def do(arguments: argparse.Namespace) -> ExitCode:
     if (arguments.inputs is None) != (arguments.out is None):
         raise BadInput("--inputs and --out go together; without both, the folder of a run is used")
-    with reporter(plain=arguments.json) as voice:
-        if arguments.inputs is None:
-            workspace, project, configs = open_workspace(arguments, Path.cwd(), only=arguments.name)
-            store = open_store(voice, workspace.root / OWN_STORE)
-            step = project.graph.step(arguments.name)
-            digests = {port: workspace.digest(port, store) for port in step.deps}
-            paths = {port: workspace.path(port).resolve() for port in step.deps}
-            out, logs = workspace.root / arguments.name, workspace.root / "logs"
-        else:
-            project = Project.at_hand()
-            store = open_store(voice, arguments.out / OWN_STORE)
-            configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
-            paths = fixture_paths(project, arguments.name, arguments.inputs)
-            digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
-            out, logs = arguments.out.absolute(), arguments.out.absolute() / "logs"
-        keys = Keys(project, configs, store)
+    with progress_reporter(arguments) as reporter:
+        task = task_in_run_folder(arguments, reporter) if arguments.inputs is None else task_on_artifacts(arguments, reporter)
         try:
-            result = do_one(keys, store, voice, arguments.name, digests, paths, out, logs, arguments.force)
+            result = run_task(task, reporter, arguments.force)
         except StageFailedError as error:
-            failed = StageResult(arguments.name, Outcome.FAILED, "", error=str(error.cause))
-            error.summary = {"stages": [failed.to_json()]}
+            failed = StageResult(task.name, Outcome.FAILED, "", error=str(error.cause))
+            attach_summary(error, {"stages": [failed.to_json()]})
             raise
     if arguments.json:
-        ports = {f"{arguments.name}/{o.path}": str(out / o.path) for o in project.stage(arguments.name).outputs}
-        emit({"stages": [result.to_json()], "outputs": ports, "metrics": result.metrics})
+        outputs = task.keys.project.stage(task.name).outputs
+        emit({"stages": [result.to_json()], "outputs": {f"{task.name}/{o.path}": str(task.out / o.path) for o in outputs},
+              "metrics": result.metrics})
     return ExitCode.OK
 
 
-def do_one(keys: Keys, store: Store, voice: PlainReporter, name: str, digests: dict[str, str], paths: dict[str, Path],
-           out: Path, logs: Path, force: bool) -> StageResult:
-    """One stage through the store; its outputs are shown at `out/<output>`."""
-    parts = keys.parts(name, digests)
-    with in_use(store, [parts.key()]):
-        verdict = judge(store, parts, force)
-        outcome, record = Outcome.CACHED, verdict.record
-        if not verdict.current:
+def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
+    """On the inputs that lie in the run's folder here, as DVC calls it."""
+    run_folder, project, configs = open_run_folder(arguments, Path.cwd(), only=arguments.name)
+    store = open_store(reporter, run_folder.root / OWN_STORE)
+    ports = project.graph.step(arguments.name).deps
+    return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
+                {port: run_folder.path(port).resolve() for port in ports},
+                run_folder.root / arguments.name, run_folder.root / LOGS)
+
+
+def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
+    """On the artifacts of --inputs, with outputs into --out."""
+    project = Project.at_hand()
+    store = open_store(reporter, arguments.out / OWN_STORE)
+    configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
+    paths = fixture_paths(project, arguments.name, arguments.inputs)
+    digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
+    out = arguments.out.absolute()
+    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, out, out / LOGS)
+
+
+def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
+    """Runs the stage through the store; links its outputs to `out/<output>`."""
+    store, name = task.store, task.name
+    parts = task.keys.parts(name, task.digests)
+    with in_use(store, [parts.key]):
+        plan = plan_stage(store, parts, force)
+        outcome, record = Outcome.CACHED, plan.cached
+        if record is None:
             try:
-                with Actor(keys, store, voice, logs) as actor:
-                    outcome, record = actor.act(verdict, paths, forced=force)
+                with StageRunner(task.keys, store, reporter, task.logs) as runner:
+                    outcome, record = runner.run(parts, plan.reason, task.paths, forced=force)
             except StageError as error:
-                raise StageFailedError(name, error, logs / f"{name}.log") from error
+                raise StageFailedError(name, error, task.logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:
-            voice.ends(name, outcome, record.info.seconds)
+            reporter.ends(name, outcome, record.info.seconds)
         for output in record.outputs:
-            link(store.path(record, output), out / output)
-    return StageResult.of(verdict, outcome, record, keys.configs[name])
+            link(store.path(record, output), task.out / output)
+    return StageResult.of(plan, outcome, record, task.keys.configs[name])
 
 
 def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:
-    """Port -> path under the folder of artifacts, each checked as its own stage promises it."""
+    """Port -> path under the folder of artifacts, each checked as the stage that makes it declares."""
     graph = project.graph
     paths = {}
     for port in graph.step(name).deps:

@@ -1,4 +1,4 @@
-"""gsac view AVATAR: the viewer page on this machine's own address."""
+"""gsac view AVATAR: serves the viewer page on localhost."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     with tempfile.TemporaryDirectory() as folder, serve(find_page(arguments.avatar, Path(folder)), arguments.port) as server:
         print(address(server), flush=True)
-        with contextlib.suppress(KeyboardInterrupt):  # the way to end it
+        with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how a user ends it
             server.serve_forever()
     return ExitCode.OK
 
@@ -38,12 +38,12 @@ def find_page(path: Path, spare: Path) -> Path:
         if (folder / PAGE).is_file():
             return folder / PAGE
     if path.is_file() and path.suffix.lower() == ".gsac":
-        return made_page(path, spare)
+        return make_page(path, spare)
     raise BadInput(f"{path}: no {PAGE} here; give the folder of a run whose stage export is done")
 
 
-def made_page(path: Path, folder: Path) -> Path:
-    """The page of an avatar file. BadInput where the file is none."""
+def make_page(path: Path, folder: Path) -> Path:
+    """Writes the page of an avatar file into a folder. BadInput where the file is no avatar."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.viewer.page import page_bytes
@@ -57,9 +57,9 @@ def made_page(path: Path, folder: Path) -> Path:
 
 
 class Handler(http.server.SimpleHTTPRequestHandler):
-    """Files of one folder, quietly."""
+    """Serves the files of one folder without logging requests."""
 
-    def log_message(self, *words) -> None:
+    def log_message(self, *words: object) -> None:
         pass
 
 
@@ -73,4 +73,5 @@ def serve(page: Path, port: int) -> http.server.ThreadingHTTPServer:
 
 
 def address(server: http.server.ThreadingHTTPServer) -> str:
+    """URL of the page."""
     return f"http://127.0.0.1:{server.server_address[1]}/{PAGE}"

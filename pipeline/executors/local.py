@@ -1,4 +1,4 @@
-"""A pool of processes on this machine, one process a clip: a clip that kills its process costs no other clip."""
+"""A pool of processes on this machine, one a clip: a clip that kills its process harms no other clip."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
-from gsac.pipeline.executors import ClipJob, ClipResult
+from gsac.pipeline.executors.executor import ClipJob, ClipResult
 from gsac.pipeline.outcomes import ExitCode
 
 THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -20,7 +20,7 @@ THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 class LocalExecutor:
-    """workers: how many clips at once."""
+    """Runs `gsac run` for each clip. workers: how many clips at once."""
 
     def __init__(self, workers: int):
         self._pool = ThreadPoolExecutor(workers)  # the threads only wait for their process
@@ -36,7 +36,7 @@ class LocalExecutor:
         self._pool.shutdown(wait=False, cancel_futures=True)
         for process in list(self._running):
             with contextlib.suppress(ProcessLookupError):
-                process.terminate()  # SIGINT is deaf in what a shell put in the background
+                process.terminate()  # not SIGINT: a shell makes its background processes ignore it
         self._pool.shutdown(wait=True)
 
     def submit(self, job: ClipJob) -> None:

@@ -11,7 +11,7 @@ from markupsafe import Markup, escape
 from gsac.avatar.wholebody import BODY, HANDS
 from gsac.pipeline.report.pictures import SEEN
 from gsac.pipeline.report.results import number
-from gsac.pipeline.report.sheets import seen_part
+from gsac.pipeline.report.sheets import is_part_seen
 
 W, H = 480, 260
 LEFT, RIGHT, TOP, BOTTOM = 54, 14, 26, 40
@@ -33,6 +33,7 @@ class Axis:
         return self.start + (v - a) / (b - a) * (self.end - self.start)
 
     def ticks(self) -> list[float]:
+        """Round values between low and high."""
         if self.log:
             decades = range(math.ceil(math.log10(self.low) - 1e-9), math.floor(math.log10(self.high) + 1e-9) + 1)
             return [m * 10.0**d for d in range(min(decades, default=0) - 1, max(decades, default=0) + 1)
@@ -43,7 +44,7 @@ class Axis:
 
 
 def nice(length: float) -> float:
-    """A round step that cuts the length into about six."""
+    """A round step that divides the length into about six."""
     rough = length / 5
     decade = 10 ** math.floor(math.log10(rough))
     return next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough * 0.7)
@@ -75,11 +76,14 @@ def curve_chart(curve: list, key: str, title: str, unit: str, log: bool = False)
 
 
 def strip_chart(k: dict[str, np.ndarray], face_valid: np.ndarray | None) -> Markup:
-    """Frame by frame: body, hands and face found, filled, missing. k: arrays of keypoints.npz."""
+    """Frame by frame: body, hands and face found, filled, missing.
+
+    k: arrays of keypoints.npz, (T, 133, ...); face_valid: (T,) bool, None where the face's stage left nothing.
+    """
     body = np.where((k["score"][:, BODY] >= SEEN).mean(1) >= 0.5, "found", "missing")
     rows = [("body", body)]
     for side, part in HANDS.items():
-        words = np.where(seen_part(k, part), "found", "missing")
+        words = np.where(is_part_seen(k, part), "found", "missing")
         if "filled" in k:
             words = np.where(k["filled"][:, part].any(1), "filled", words)
         rows.append((f"{side} hand", words))

@@ -1,4 +1,4 @@
-"""Marks over frames: keypoints by side, what was filled or is missing, a shaded body, reprojection errors."""
+"""Draws over frames: keypoints by side, filled and missing ones, a shaded body, reprojection errors."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import numpy as np
 
 from gsac.avatar.wholebody import ARM, BODY, FACE, FEET, HANDS, NAMES
 
+Colour = tuple[int, int, int]
+"""r, g, b in 0..255."""
 SIDE_COLOURS = {"left": (255, 122, 26), "right": (20, 190, 255), "middle": (245, 245, 245)}
 FACE_COLOUR = (190, 255, 120)
 FILLED_COLOUR = (255, 60, 230)
@@ -20,35 +22,39 @@ SUBPIXEL = 4
 
 
 def side_of(point: int) -> str:
+    """left, right or middle."""
     name = NAMES[point]
     return next((side for side in ("left", "right") if name.startswith(side)), "middle")
 
 
 def hand_edges(side: str) -> list[tuple[int, int]]:
+    """Pairs of points along the fingers, from the wrist out."""
     wrist = HANDS[side].start
     return [(wrist if i == 0 else wrist + 4 * finger + i, wrist + 4 * finger + i + 1)
             for finger in range(5) for i in range(4)]
 
 
-def line(image: np.ndarray, a, b, colour, thickness: int = 1) -> None:
-    """a, b: (2,) px; centres of pixels are at +0.5."""
+def draw_line(image: np.ndarray, a: np.ndarray, b: np.ndarray, colour: Colour, thickness: int = 1) -> None:
+    """Draws into image: (H, W, 3) uint8. a, b: (2,) px; centres of pixels are at +0.5."""
     p, q = (tuple(np.round((np.asarray(x) - 0.5) * 2**SUBPIXEL).astype(int).tolist()) for x in (a, b))
     cv2.line(image, p, q, colour, thickness, cv2.LINE_AA, SUBPIXEL)
 
 
-def dot(image: np.ndarray, at, radius: float, colour, thickness: int = -1) -> None:
+def draw_dot(image: np.ndarray, at: np.ndarray, radius: float, colour: Colour, thickness: int = -1) -> None:
+    """Draws into image: (H, W, 3) uint8. at: (2,) px; radius: px; thickness: px of a ring, negative for a disc."""
     centre = tuple(np.round((np.asarray(at) - 0.5) * 2**SUBPIXEL).astype(int).tolist())
     cv2.circle(image, centre, round(radius * 2**SUBPIXEL), colour, thickness, cv2.LINE_AA, SUBPIXEL)
 
 
-def cross(image: np.ndarray, at, radius: float, colour) -> None:
+def draw_cross(image: np.ndarray, at: np.ndarray, radius: float, colour: Colour) -> None:
+    """Draws into image: (H, W, 3) uint8. at: (2,) px; radius: px."""
     for dx, dy in ((1, 1), (1, -1)):
-        line(image, np.asarray(at) - radius * np.array((dx, dy)), np.asarray(at) + radius * np.array((dx, dy)), colour, 2)
+        draw_line(image, np.asarray(at) - radius * np.array((dx, dy)), np.asarray(at) + radius * np.array((dx, dy)), colour, 2)
 
 
 def draw_keypoints(image: np.ndarray, xy: np.ndarray, score: np.ndarray, least: float, filled: np.ndarray | None = None,
                    missing: np.ndarray | None = None) -> None:
-    """Draws into (H, W, 3) uint8. xy: (133, 2) px; score: (133,); filled: (133,) bool; missing: (2,) bool left, right.
+    """Draws into image: (H, W, 3) uint8. xy: (133, 2) px; score: (133,); filled: (133,) bool; missing: (2,) bool left, right.
 
     Left points in one colour, right in another; a filled point is a ring, however unsure; a cross marks the wrist of a hand that is
     missing and was not filled.
@@ -61,30 +67,30 @@ def draw_keypoints(image: np.ndarray, xy: np.ndarray, score: np.ndarray, least: 
     for a, b, width in edges:
         if shown[a] and shown[b]:
             colour = SIDE_COLOURS[side_of(a) if side_of(a) == side_of(b) else "middle"]
-            line(image, xy[a], xy[b], colour, max(1, round(width * unit)))
-    for i in np.flatnonzero(shown):
+            draw_line(image, xy[a], xy[b], colour, max(1, round(width * unit)))
+    for i in np.flatnonzero(shown).tolist():
         if filled[i]:
-            dot(image, xy[i], 2.6 * unit, FILLED_COLOUR, 1)
+            draw_dot(image, xy[i], 2.6 * unit, FILLED_COLOUR, 1)
         elif FACE.start <= i < FACE.stop:
-            dot(image, xy[i], 0.9 * unit, FACE_COLOUR)
+            draw_dot(image, xy[i], 0.9 * unit, FACE_COLOUR)
         else:
-            dot(image, xy[i], (3.2 if i < FEET.stop else 1.6) * unit, SIDE_COLOURS[side_of(i)])
+            draw_dot(image, xy[i], (3.2 if i < FEET.stop else 1.6) * unit, SIDE_COLOURS[side_of(i)])
     for i, side in enumerate(HANDS):
         wrist = ARM[side][2]
         if missing is not None and missing[i] and not filled[HANDS[side]].any() and shown[wrist]:
-            cross(image, xy[wrist], 6 * unit, MISSING_COLOUR)
+            draw_cross(image, xy[wrist], 6 * unit, MISSING_COLOUR)
 
 
 def over_magenta(image: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """image: (H, W, 3) uint8; alpha: (H, W) in 0..1."""
+    """The cut-out on magenta, (H, W, 3) uint8. image: (H, W, 3) uint8; alpha: (H, W) in 0..1."""
     a = alpha[..., None]
-    return np.uint8(np.round(image * a + MAGENTA * (1 - a)))
+    return np.round(image * a + MAGENTA * (1 - a)).astype(np.uint8)
 
 
 def draw_body(image: np.ndarray, vertices: np.ndarray, faces: np.ndarray, face_id: np.ndarray) -> np.ndarray:
-    """Shaded, half transparent body over a frame.
+    """Shaded, half transparent body over a frame, (H, W, 3) uint8.
 
-    image: (H, W, 3) uint8; vertices: (V, 3) m, camera frame; face_id: (H, W), -1 where no face.
+    image: (H, W, 3) uint8; vertices: (V, 3) m, camera frame; faces: (F, 3); face_id: (H, W), -1 where no face.
     """
     corners = vertices[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -95,14 +101,17 @@ def draw_body(image: np.ndarray, vertices: np.ndarray, faces: np.ndarray, face_i
     seen = face_id >= 0
     out = image.astype(np.float32)
     out[seen] = 0.4 * out[seen] + 0.6 * shade[face_id[seen], None] * BODY_COLOUR
-    return np.uint8(np.clip(out, 0, 255))
+    return np.clip(out, 0, 255).astype(np.uint8)
 
 
 def draw_reprojection(image: np.ndarray, detected: np.ndarray, projected: np.ndarray, shown: np.ndarray) -> None:
-    """Detected body and foot points as dots, the body's as rings, a line between. (133, 2) px each; shown: (133,)."""
+    """Draws detected body and foot points as dots, the body's as rings, a line between, into image: (H, W, 3) uint8.
+
+    detected: (133, 2) px; projected: (133, 2) px; shown: (133,) bool.
+    """
     unit = max(image.shape[0] / 640, 0.6)
-    for i in np.flatnonzero(shown[: FEET.stop]):
+    for i in np.flatnonzero(shown[: FEET.stop]).tolist():
         colour = SIDE_COLOURS[side_of(BODY.start + i)]
-        line(image, detected[i], projected[i], (255, 255, 255), max(1, round(unit)))
-        dot(image, detected[i], 2.4 * unit, colour)
-        dot(image, projected[i], 4 * unit, (255, 255, 255), 1)
+        draw_line(image, detected[i], projected[i], (255, 255, 255), max(1, round(unit)))
+        draw_dot(image, detected[i], 2.4 * unit, colour)
+        draw_dot(image, projected[i], 4 * unit, (255, 255, 255), 1)

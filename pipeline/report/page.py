@@ -1,4 +1,4 @@
-"""Puts the page together. A section whose result is absent or unreadable says so; nothing else stops."""
+"""Puts the page together. A section whose result is absent or unreadable says so; the others are shown."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from gsac.pipeline.report.results import AbsentError, Results, number, read_json, tree_size
-from gsac.pipeline.report.tables import foot, parameters, stage_rows, totals
+from gsac.pipeline.report.tables import parameters, provenance, stage_rows, totals
 from gsac.pipeline.run_folder import REPORT, RUN
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 TEMPLATE = "report.html.jinja"
 
@@ -34,17 +38,16 @@ class Section:
 
 
 def draw_sections(out_dir: Path, running: str) -> dict[str, Section]:
-    """By name, those sections that can be drawn while a stage still runs: of what the stages before it made. The template is
-    read as well."""
-    template()
-    drawn = sections_of(Results(out_dir), without=running)
+    """By name, the sections that can be drawn while a stage runs: those of the stages before it. Reads the template as well."""
+    read_template()
+    drawn = make_sections(Results(out_dir), without=running)
     return {section.ident: section for section in drawn if not section.absent}
 
 
 def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path:
-    """Writes `report.html` into a run's folder and returns its path; whole or not at all. drawn: as `draw_sections`, of this run.
+    """Writes `report.html` into a run's folder, whole or not at all, and returns its path. drawn: of this run, by `draw_sections`.
 
-    Needs neither run.json nor any one artifact: what is missing is said on the page. Raises OSError only.
+    Needs neither run.json nor any artifact: the page says what is missing. Raises OSError only.
     """
     results = Results(out_dir)
     page = results.root / REPORT
@@ -56,19 +59,20 @@ def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path
 
 
 def render(results: Results, drawn: dict[str, Section]) -> str:
-    sections = sections_of(results, drawn)
+    """The page's HTML. drawn: as for `make_sections`."""
+    sections = make_sections(results, drawn)
     shown = [section for section in sections if section.sheet]
     facts = {name: value for section in shown for name, value in section.sheet.facts.items()}
-    return template().render(
-        clip=results.clip_name, when=when(results), headline=headline(results, facts), sections=sections,
-        warnings=warnings(results), failed=results.failed, reached=reached(results), stages=stage_rows(results),
-        totals=totals(results), parameters=parameters(results), files=exported(results), foot=foot(results),
-        viewer="export/viewer.html" if exported_viewer(results) else "",
+    return read_template().render(
+        clip=results.clip_name, when=run_date(results), headline=headline(results, facts), sections=sections,
+        warnings=list_warnings(results), failed=results.failed, reached=explain_partial_run(results), stages=stage_rows(results),
+        totals=totals(results), parameters=parameters(results), files=list_exports(results), foot=provenance(results),
+        viewer="export/viewer.html" if has_viewer(results) else "",
     )
 
 
 @functools.cache
-def template():
+def read_template() -> Template:
     """The page's jinja2 template."""
     import jinja2
 
@@ -78,12 +82,14 @@ def template():
     return environment.from_string(Path(__file__).with_name(TEMPLATE).read_text(encoding="utf-8"))
 
 
-def sections_of(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:
-    """Drawn side by side: most of it is reading and writing pictures. drawn: by name, those that are; without: a stage whose
-    results are left out."""
-    draw, one_at_a_time = functools.cache(lambda: Draw(results)), Lock()
+def make_sections(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:
+    """All sections, made in parallel, since most of the time goes into reading and writing pictures.
 
-    def drawing() -> Draw:
+    drawn: by name, those that are made already; without: a stage whose results are left out.
+    """
+    draw, one_at_a_time = functools.cache(lambda: Painter(results)), Lock()
+
+    def drawing() -> Painter:
         with one_at_a_time:
             return draw()
 
@@ -94,8 +100,8 @@ def sections_of(results: Results, drawn: dict[str, Section] | None = None, witho
         return list(pool.map(lambda parts: section(*parts), [parts for parts in SECTIONS if parts[3].split("/")[0] != without]))
 
 
-class Draw:
-    """What draws, imported when there is something to draw."""
+class Painter:
+    """The modules that draw, imported once there is something to draw, and the frames they draw on."""
 
     def __init__(self, results: Results):
         from gsac.pipeline.report import charts, sheets
@@ -104,9 +110,9 @@ class Draw:
         self.results, self.charts, self.sheets, self.footage = results, charts, sheets, Footage(results)
 
 
-def make_section(results: Results, drawing: Callable[[], Draw], ident: str, title: str, lead: str, port: str,
+def make_section(results: Results, drawing: Callable[[], Painter], ident: str, title: str, lead: str, port: str,
                  sheet: Callable | None, charts: Callable | None = None) -> Section:
-    """Draws what lies at a port; whatever keeps it from being drawn becomes the sentence in its place."""
+    """Draws the result at a port; where that fails, the section holds the reason."""
     made = Section(ident, title, lead)
     try:
         results.path(port)
@@ -119,18 +125,19 @@ def make_section(results: Results, drawing: Callable[[], Draw], ident: str, titl
     return made
 
 
-def curves(results: Results, draw) -> list:
+def training_charts(results: Results, charts: ModuleType) -> list:
+    """Held-out quality and loss over the seconds of training. charts: the module, imported late."""
     curve = results.metrics.get("curve") or []
-    charts = [draw.curve_chart(curve, "psnr_fg", "Held-out PSNR on the person", "dB"),
-              draw.curve_chart(curve, "loss", "Loss", "log scale", log=True)]
-    if not any(charts):
+    drawn = [charts.curve_chart(curve, "psnr_fg", "Held-out PSNR on the person", "dB"),
+             charts.curve_chart(curve, "loss", "Loss", "log scale", log=True)]
+    if not any(drawn):
         raise AbsentError("train/metrics.json holds no training curve.")
-    return [chart for chart in charts if chart]
+    return [chart for chart in drawn if chart]
 
 
 def headline(results: Results, facts: dict[str, float]) -> dict[str, Any]:
     """The figures that matter, the verdict and the weak points."""
-    from gsac.pipeline.report.verdict import grade, weaknesses
+    from gsac.pipeline.report.quality import grade, weaknesses
 
     try:
         metrics, absent = results.metrics, ""
@@ -152,11 +159,11 @@ def headline(results: Results, facts: dict[str, float]) -> dict[str, Any]:
     if total["seconds"]:
         figures.append(("Total time", seconds(total["seconds"]),
                         f"of it in this run {seconds(total['ran'])}" if total["cached"] else "all in this run"))
-    return {"figures": figures, "person": person(results, facts), "weak": weaknesses(metrics, facts),
+    return {"figures": figures, "person": describe_person(results, facts), "weak": weaknesses(metrics, facts),
             "grade": grade(metrics) if metrics else "No avatar in this run", "absent": absent}
 
 
-def person(results: Results, facts: dict[str, float]) -> str:
+def describe_person(results: Results, facts: dict[str, float]) -> str:
     """Clip and person in one line, as far as known."""
     words = []
     try:
@@ -174,13 +181,13 @@ def person(results: Results, facts: dict[str, float]) -> str:
     return ", ".join(words)
 
 
-def warnings(results: Results) -> list[tuple[str, str]]:
+def list_warnings(results: Results) -> list[tuple[str, str]]:
     """Stage and sentence, all of them."""
     return [(name, str(text).removeprefix(f"{name}: ")) for name, row in results.rows.items() for text in row.get("warnings") or []]
 
 
-def reached(results: Results) -> str:
-    """A sentence on a run that was not whole and did not fail; empty otherwise."""
+def explain_partial_run(results: Results) -> str:
+    """A sentence on a run that ended early without failing; empty otherwise."""
     if not results.has_run:
         return f"There is no readable {RUN} here: times, warnings and parameters of the run are unknown."
     left = [name for name in results.order if name not in results.rows]
@@ -189,11 +196,12 @@ def reached(results: Results) -> str:
     return ""
 
 
-def exported_viewer(results: Results) -> bool:
-    return any(file["name"] == "viewer.html" for file in exported(results)["files"])
+def has_viewer(results: Results) -> bool:
+    """Whether export made the viewer page."""
+    return any(file["name"] == "viewer.html" for file in list_exports(results)["files"])
 
 
-def exported(results: Results) -> dict[str, Any]:
+def list_exports(results: Results) -> dict[str, Any]:
     """Files of export: name, bytes, relative address; or why there are none."""
     words = {"viewer.html": "the avatar in a page: opens from disk, turns and moves",
              "avatar.gsac": "the avatar: body, gaussians, skinning, motions",
@@ -216,7 +224,7 @@ def exported(results: Results) -> dict[str, Any]:
     return {"files": files, "absent": absent}
 
 
-def when(results: Results) -> str:
+def run_date(results: Results) -> str:
     """Day and time at which run.json was last changed, UTC."""
     path = results.root / RUN
     if not path.is_file():
@@ -251,21 +259,21 @@ def size(value: Any) -> str:
 
 SECTIONS = (
     ("clip", "The clip", "Frames that the stages read, evenly through the clip.", "split/frames",
-     lambda draw: draw.sheets.contact_sheet(draw.footage)),
+     lambda paint: paint.sheets.contact_sheet(paint.footage)),
     ("keypoints", "Keypoints", "What the detector saw. A ring is a point filled by its neighbours in time; "
      "a cross marks the wrist of a hand that is missing.", "keypoints/keypoints.npz",
-     lambda draw: draw.sheets.keypoint_sheet(draw.footage),
-     lambda draw: [draw.charts.strip_chart(draw.footage.keypoints, draw.footage.face_valid)]),
+     lambda paint: paint.sheets.keypoint_sheet(paint.footage),
+     lambda paint: [paint.charts.strip_chart(paint.footage.keypoints, paint.footage.face_valid)]),
     ("alpha", "Cut-out", "The person over magenta: what is pink inside the person, or not pink outside, is "
-     "wrong.", "segment/alpha", lambda draw: draw.sheets.alpha_sheet(draw.footage)),
+     "wrong.", "segment/alpha", lambda paint: paint.sheets.alpha_sheet(paint.footage)),
     ("body", "Fitted body", "The body model over the frames, half transparent. Dots are detected points, "
      "white rings the body's own, lines their distance.", "smplx/body.npz",
-     lambda draw: draw.sheets.body_sheet(draw.footage)),
+     lambda paint: paint.sheets.body_sheet(paint.footage)),
     ("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of "
-     "frames that training never saw.", "train/heldout", lambda draw: draw.sheets.heldout_sheet(draw.results)),
+     "frames that training never saw.", "train/heldout", lambda paint: paint.sheets.heldout_sheet(paint.results)),
     ("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
-     "had.", "train/heldout/views.png", lambda draw: draw.sheets.views_sheet(draw.results)),
+     "had.", "train/heldout/views.png", lambda paint: paint.sheets.views_sheet(paint.results)),
     ("training", "Training", "Loss and held-out quality over the seconds of training, without the time for "
-     "judging.", "train/metrics.json", None, lambda draw: curves(draw.results, draw.charts)),
+     "judging.", "train/metrics.json", None, lambda paint: training_charts(paint.results, paint.charts)),
 )
-"""Name, title, what it shows, port, what draws pictures, and charts."""
+"""Name, title, lead, port, function that draws the pictures, and function that draws the charts."""

@@ -43,7 +43,7 @@ class Picture:
     alt: str
 
 
-def picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTES) -> Picture:
+def make_picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTES) -> Picture:
     """rgb: (H, W, 3) uint8. Quality falls, then size, until the file is at most `most_bytes`."""
     shown = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
     while True:
@@ -55,8 +55,8 @@ def picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTE
         shown = cv2.resize(shown, None, fx=0.6, fy=0.6, interpolation=cv2.INTER_AREA)
 
 
-def fitted(image: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The image made smaller, never larger, to fit into width x height; its aspect stays."""
+def shrink_to_fit(image: np.ndarray, width: int, height: int) -> np.ndarray:
+    """image: (H, W, 3) uint8. Returns it, (h, w, 3), made smaller, never larger, to fit into width x height; its aspect stays."""
     scale = min(width / image.shape[1], height / image.shape[0], 1.0)
     if scale == 1.0:
         return image
@@ -64,8 +64,8 @@ def fitted(image: np.ndarray, width: int, height: int) -> np.ndarray:
     return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
 
 
-def spread(count: int, most: int) -> list[int]:
-    """At most `most` of 0..count-1, evenly, first and last among them."""
+def spread_evenly(count: int, most: int) -> list[int]:
+    """At most `most` of the numbers 0..count-1, evenly spaced, the first and the last among them."""
     return sorted({round(x) for x in np.linspace(0, count - 1, min(most, count))}) if count else []
 
 
@@ -81,14 +81,15 @@ class Crop:
 
     @property
     def size(self) -> tuple[int, int]:
+        """Width and height of the picture, px."""
         return max(1, round((self.x1 - self.x0) * self.scale)), max(1, round((self.y1 - self.y0) * self.scale))
 
     def cut(self, image: np.ndarray) -> np.ndarray:
-        """image: (H, W, ...) of the whole frame."""
+        """image: (H, W, ...), the whole frame. Returns the box, (h, w, ...)."""
         return cv2.resize(image[self.y0:self.y1, self.x0:self.x1], self.size, interpolation=cv2.INTER_AREA)
 
     def points(self, xy: np.ndarray) -> np.ndarray:
-        """xy: (..., 2) px of the frame. Returns px of the crop."""
+        """xy: (..., 2) px of the frame. Returns (..., 2) px of the crop."""
         return (xy - (self.x0, self.y0)) * (np.array(self.size) / (self.x1 - self.x0, self.y1 - self.y0))
 
 
@@ -112,7 +113,8 @@ class Footage:
 
     @cached_property
     def keypoints(self) -> dict[str, np.ndarray]:
-        """Of handgap, with `missing` and `filled`; else those of keypoints without them."""
+        """Arrays of handgap/keypoints.npz: xy (T, 133, 2) px, score (T, 133), missing (T, 2), filled (T, 133); else, without the
+        last two, of keypoints/keypoints.npz."""
         try:
             return check_arrays(self.results.path("handgap/keypoints.npz"), FILLED_SHAPES)
         except AbsentError:
@@ -127,13 +129,13 @@ class Footage:
             return None
 
     def frame(self, t: int) -> np.ndarray:
-        """(H, W, 3) uint8."""
+        """Frame t, (H, W, 3) uint8."""
         if t not in self._frames:
             self._frames[t] = read_frame(self.frames[t])
         return self._frames[t]
 
     def alpha(self, t: int) -> np.ndarray:
-        """(H, W) float32 of frame t."""
+        """Mask of frame t, (H, W) float32 in 0..1."""
         path = self.results.path("segment/alpha") / f"{self.frames[t].stem}.exr"
         if not path.is_file():
             raise AbsentError(f"segment/alpha has no mask for frame {self.frames[t].stem}.")
@@ -145,7 +147,7 @@ class Footage:
         return f"frame {t}" + (f" · {times[t]:.2f} s" if times and t < len(times) else "")
 
     def crop(self, width: int, height: int) -> Crop:
-        """Round the person over the whole clip, so that all pictures of a sheet line up."""
+        """A box round the person in all frames, one for all pictures of a sheet; width, height: px that it is shown in, at most."""
         h, w = self.frame(0).shape[:2]
         box = (0, 0, w, h)
         try:
@@ -159,6 +161,7 @@ class Footage:
             room = MARGIN * (high - low).max()
             low, high = np.clip(low - room, 0, (w - 1, h - 1)), np.clip(high + room, 1, (w, h))
             if (high - low).min() >= 16:
-                box = (*np.floor(low).astype(int).tolist(), *np.ceil(high).astype(int).tolist())
+                (x0, y0), (x1, y1) = np.floor(low).astype(int).tolist(), np.ceil(high).astype(int).tolist()
+                box = (x0, y0, x1, y1)
         scale = min(width / (box[2] - box[0]), height / (box[3] - box[1]), 1.0)
         return Crop(*box, scale)

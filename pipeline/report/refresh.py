@@ -4,48 +4,45 @@ from __future__ import annotations
 
 import contextlib
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.run_folder import REPORT
-
-if TYPE_CHECKING:
-    from gsac.pipeline.run import StageResult
-    from gsac.pipeline.run_folder import RunFolder
+from gsac.pipeline.run import StageResult
+from gsac.pipeline.run_folder import REPORT, RunFolder
 
 
-class Early:
+class EarlySections:
     """Sections of the report that are drawn while the last stage is at work."""
 
-    def __init__(self, workspace: RunFolder):
-        self.workspace, self._pool, self._drawn = workspace, ThreadPoolExecutor(1), None
+    def __init__(self, folder: RunFolder):
+        self.folder, self._pool, self._drawn = folder, ThreadPoolExecutor(1), None
 
-    def begin(self, running: str) -> None:
-        """running: the last stage."""
+    def start(self, running: str) -> None:
+        """running: the stage at work, whose results are not there yet."""
         self._drawn = self._pool.submit(self._draw, running)
 
     def _draw(self, running: str) -> dict[str, Any]:
         from gsac.pipeline.report.page import draw_sections
 
-        return draw_sections(self.workspace.root, running)
+        return draw_sections(self.folder.root, running)
 
     def sections(self) -> dict[str, Any]:
-        """By name; what is not among them is still to be drawn."""
+        """Sections by name; those that are missing are still to be drawn."""
         with contextlib.suppress(Exception):
             return self._drawn.result() if self._drawn else {}
         return {}
 
 
-def refresh_report(workspace: RunFolder, results: list[StageResult], early: Early | None = None) -> str | None:
-    """Writes the report if it is due. A report that fails does not spoil a run: the answer is a warning then."""
-    page = workspace.root / REPORT
+def refresh_report(folder: RunFolder, results: list[StageResult], early: EarlySections | None = None) -> str | None:
+    """Writes the report if it is due. Returns a warning where that failed: it does not fail the run."""
+    page = folder.root / REPORT
     if page.exists() and all(result.outcome is Outcome.CACHED for result in results):
         return None
     try:
         from gsac.pipeline.report.page import write_report
 
-        write_report(workspace.root, early.sections() if early else None)
+        write_report(folder.root, early.sections() if early else None)
     except Exception as error:
         why = f"{type(error).__name__}: {error}"
-        return f"{page} could not be written ({why}); `gsac report {workspace.root}` tries again"
+        return f"{page} could not be written ({why}); `gsac report {folder.root}` tries again"
     return None

@@ -1,4 +1,4 @@
-"""What a run left in its folder, and why something is not there."""
+"""Reads a run's folder: its results, or why one is absent."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ DONE = (Outcome.RAN.value, Outcome.CACHED.value)
 
 
 class AbsentError(Exception):
-    """Something that a section shows is not there. The message is the sentence that the section shows instead."""
+    """A section's result is not there; the message is the sentence shown instead."""
 
 
 class Results:
-    """The folder of one run. Nothing in it is taken for granted: each part may be missing, torn or of an earlier run."""
+    """The folder of one run; any file in it may be missing, torn or of an earlier run."""
 
     def __init__(self, root: Path):
         self.root = Path(root).absolute()
@@ -61,7 +61,7 @@ class Results:
 
     @cached_property
     def clip_name(self) -> str:
-        """File or folder name of the source; its place on the disk is nobody's business."""
+        """File or folder name of the source, without its path, which a report must not give away."""
         named = str(self.run.get("clip") or "")
         link = self.root / CLIP
         return Path(named).name or (link.resolve().name if link.exists() else "") or self.root.name
@@ -76,10 +76,11 @@ class Results:
         return content
 
     def done(self, stage: str) -> bool:
+        """Whether the run has a result of the stage; without run.json it counts as done."""
         return not self.has_run or self.rows.get(stage, {}).get("status") in DONE
 
     def path(self, port: str) -> Path:
-        """File or folder of a port, as this run made it; without run.json whatever lies there. AbsentError says why not."""
+        """File or folder of a port that this run made; without run.json whatever lies there. AbsentError says why not."""
         stage = port.partition("/")[0]
         path = self.root / port
         if self.failed and self.failed[0] == stage:

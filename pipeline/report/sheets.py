@@ -1,4 +1,4 @@
-"""The page's picture sections: each function looks at one result and returns pictures with the figures under them."""
+"""The page's picture sections: each function reads one result and returns pictures and figures."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import frame_paths, read_frame
+from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
 from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
-from gsac.pipeline.report.pictures import SEEN, Footage, Picture, fitted, picture, spread
+from gsac.pipeline.report.pictures import SEEN, Footage, Picture, make_picture, shrink_to_fit, spread_evenly
 from gsac.pipeline.report.results import AbsentError, Results, number
 
 CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT = 12, 8, 8, 8, 8
@@ -23,76 +24,82 @@ VIEWS_BYTES = 160_000
 LEAST_MASK = 1e-4
 """A mask that covers less of the frame is empty."""
 PERSON_WHITE = 250
-"""Darker than this is person on a held-out picture's white ground."""
+"""Least brightness that counts as a held-out picture's white ground."""
 
 
 @dataclass
 class Sheet:
-    """Pictures of one section and what was measured on the way."""
+    """Pictures of one section and the figures measured for it."""
 
     pictures: list[Picture]
     figures: dict[str, str] = field(default_factory=dict)
     """Name -> value, as read by people."""
     facts: dict[str, float] = field(default_factory=dict)
-    """The same for `verdict`."""
+    """The same for `quality`."""
     columns: str = "large"
     """How the page lays the pictures out: small, large, wide, or one."""
 
 
 def contact_sheet(footage: Footage) -> Sheet:
+    """Frames of the clip."""
     pictures = []
-    for t in spread(len(footage.frames), CONTACT):
+    for t in spread_evenly(len(footage.frames), CONTACT):
         image = footage.frame(t)
-        shown = fitted(image, 480 if image.shape[1] > image.shape[0] else 300, 400)
-        pictures.append(picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000))
+        shown = shrink_to_fit(image, 480 if image.shape[1] > image.shape[0] else 300, 400)
+        pictures.append(make_picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000))
     return Sheet(pictures, columns="large" if shown.shape[1] > shown.shape[0] else "small")
 
 
 def keypoint_sheet(footage: Footage) -> Sheet:
+    """Detected, filled and missing points over frames."""
     k = footage.keypoints
     count = min(len(footage.frames), len(k["xy"]))
     crop = footage.crop(WIDE, HIGH)
     pictures = []
-    for t in telling(k, count):
+    for t in choose_frames(k, count):
         image = crop.cut(footage.frame(t)).copy()
         draw_keypoints(image, crop.points(k["xy"][t]), k["score"][t], SEEN, k.get("filled", [None] * count)[t],
                        k.get("missing", [None] * count)[t])
-        hands = ", ".join(f"{side} hand {hand_word(k, t, i, side)}" for i, side in enumerate(HANDS))
-        pictures.append(picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}"))
+        hands = ", ".join(f"{side} hand {hand_state(k, t, i, side)}" for i, side in enumerate(HANDS))
+        pictures.append(make_picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}"))
     figures = {"Detector": str(k["detector"]), "Of stage": "handgap" if "filled" in k else "keypoints",
                "Frames": str(len(k["xy"]))}
     facts = {"person_share": float((k["score"][:, BODY] >= SEEN).any(1).mean())}
-    figures["Person found"] = share(facts["person_share"])
+    figures["Person found"] = percent(facts["person_share"])
     for side, part in HANDS.items():
-        facts[f"{side}_hand_share"] = found = float(seen_part(k, part).mean())
-        figures[f"{side.capitalize()} hand found"] = share(found)
+        facts[f"{side}_hand_share"] = found = float(is_part_seen(k, part).mean())
+        figures[f"{side.capitalize()} hand found"] = percent(found)
         if "filled" in k:
             facts[f"{side}_hand_filled"] = float(k["filled"][:, part].any(1).mean())
-            figures[f"{side.capitalize()} hand filled"] = share(facts[f"{side}_hand_filled"])
-    facts["face_share"] = float(seen_part(k, FACE).mean())
-    figures["Face found"] = share(facts["face_share"])
+            figures[f"{side.capitalize()} hand filled"] = percent(facts[f"{side}_hand_filled"])
+    facts["face_share"] = float(is_part_seen(k, FACE).mean())
+    figures["Face found"] = percent(facts["face_share"])
     if footage.face_valid is not None:
         facts["face_used"] = float(footage.face_valid.mean())
-        figures["Face used for shape and expression"] = share(facts["face_used"])
+        figures["Face used for shape and expression"] = percent(facts["face_used"])
     return Sheet(pictures, figures, facts)
 
 
-def seen_part(k: dict[str, np.ndarray], part: slice) -> np.ndarray:
-    """(T,) bool: the part was found in the image, not filled."""
+def is_part_seen(k: dict[str, np.ndarray], part: slice) -> np.ndarray:
+    """(T,) bool: the part was found in the image, not filled. k: arrays of keypoints.npz, (T, 133, ...)."""
     found = (k["score"][:, part] >= SEEN).mean(1) >= 0.5
     return found & ~k["filled"][:, part].any(1) if "filled" in k else found
 
 
-def hand_word(k: dict[str, np.ndarray], t: int, i: int, side: str) -> str:
+def hand_state(k: dict[str, np.ndarray], t: int, i: int, side: str) -> str:
+    """The word for hand i (0 left, 1 right) in frame t. k: arrays of keypoints.npz, (T, 133, ...)."""
     if "filled" in k and k["filled"][t, HANDS[side]].any():
         return "filled"
     if "missing" in k and k["missing"][t, i]:
         return "missing"
-    return "found" if seen_part(k, HANDS[side])[t] else "not found"
+    return "found" if is_part_seen(k, HANDS[side])[t] else "not found"
 
 
-def telling(k: dict[str, np.ndarray], count: int) -> list[int]:
-    """Frames to show: the middle of where each hand is filled and where it is missing, and even ones."""
+def choose_frames(k: dict[str, np.ndarray], count: int) -> list[int]:
+    """Frames to show: for each hand the middle one of those where it is filled, and of those where it is missing; the rest evenly.
+
+    k: arrays of keypoints.npz, (T, 133, ...); count: frames there are.
+    """
     frames: set[int] = set()
     if "filled" in k:
         for i, part in enumerate(HANDS.values()):
@@ -100,26 +107,27 @@ def telling(k: dict[str, np.ndarray], count: int) -> list[int]:
             for which in (filled, k["missing"][:count, i] & ~filled):
                 hits = np.flatnonzero(which)
                 frames |= {int(hits[len(hits) // 2])} if len(hits) else set()
-    for t in sorted(spread(count, KEYPOINTS), key=lambda t: -min((abs(t - f) for f in frames), default=0)):
+    for t in sorted(spread_evenly(count, KEYPOINTS), key=lambda t: -min((abs(t - f) for f in frames), default=0)):
         if len(frames) < KEYPOINTS:
             frames.add(t)
     return sorted(frames)
 
 
 def alpha_sheet(footage: Footage) -> Sheet:
+    """The person cut out, on magenta."""
     crop = footage.crop(WIDE, HIGH)
     masks = {p.stem for p in frame_paths(footage.results.path("segment/alpha"))}
     pictures, covers, soft = [], [], []
-    for t in spread(len(footage.frames), ALPHA):
+    for t in spread_evenly(len(footage.frames), ALPHA):
         alpha = footage.alpha(t)
         covers.append(float(alpha.mean()))
         soft.append(float(((alpha > 0.02) & (alpha < 0.98)).sum() / max((alpha >= 0.5).sum(), 1)))
-        pictures.append(picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
-                                f"{footage.moment(t)}: covers {share(covers[-1])}", f"Frame {t} cut out, on magenta"))
+        pictures.append(make_picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
+                                f"{footage.moment(t)}: covers {percent(covers[-1])}", f"Frame {t} cut out, on magenta"))
     missing = sum(path.stem not in masks for path in footage.frames)
     facts = {"empty_masks": float(sum(c < LEAST_MASK for c in covers))}
-    figures = {"Frame covered, median": share(float(np.median(covers))),
-               "Soft edge, of the person's area": share(float(np.median(soft)))}
+    figures = {"Frame covered, median": percent(float(np.median(covers))),
+               "Soft edge, of the person's area": percent(float(np.median(soft)))}
     if missing:
         figures["Frames without a mask"] = str(missing)
     if facts["empty_masks"]:
@@ -128,7 +136,7 @@ def alpha_sheet(footage: Footage) -> Sheet:
 
 
 def body_sheet(footage: Footage) -> Sheet:
-    from gsac.avatar.body import Body, BodyParams
+    """The fitted body over frames, with reprojection errors."""
     from gsac.avatar.zbuffer import rasterise
 
     params = BodyParams.read(footage.results.path("smplx/body.npz"))
@@ -141,7 +149,7 @@ def body_sheet(footage: Footage) -> Sheet:
     height, width = footage.frame(0).shape[:2]
     full = params.camera(width, height)
     camera = full.scaled(round(width * crop.scale), round(height * crop.scale))
-    frames = spread(min(len(footage.frames), params.frames, len(k["xy"])), BODIES)
+    frames = spread_evenly(min(len(footage.frames), params.frames, len(k["xy"])), BODIES)
     pictures, overlaps, misses = [], [], []
     for t in frames:
         vertices = body.posed(params, [t])[0][0]
@@ -158,12 +166,12 @@ def body_sheet(footage: Footage) -> Sheet:
             overlaps.append(overlap)
             caption += f": outline IoU {overlap:.2f}"
         x0, y0, x1, y1 = (round(v * crop.scale) for v in (crop.x0, crop.y0, crop.x1, crop.y1))
-        pictures.append(picture(image[y0:y1, x0:x1], caption, f"Fitted body over frame {t}"))
+        pictures.append(make_picture(image[y0:y1, x0:x1], caption, f"Fitted body over frame {t}"))
     return body_figures(Sheet(pictures), body, params, full.focal[0], np.concatenate(misses), overlaps)
 
 
 def silhouette_iou(footage: Footage, t: int, face_id: np.ndarray) -> float | None:
-    """Of the drawn body and the mask at 0.5; None without a mask."""
+    """Intersection over union of the drawn body and the mask at 0.5; None without a mask. face_id: (H, W), -1 where no face."""
     try:
         alpha = footage.alpha(t)
     except AbsentError:
@@ -173,7 +181,8 @@ def silhouette_iou(footage: Footage, t: int, face_id: np.ndarray) -> float | Non
     return float((mask & (face_id >= 0)).sum() / either) if either else None
 
 
-def body_figures(sheet: Sheet, body, params, focal: float, misses: np.ndarray, overlaps: list[float]) -> Sheet:
+def body_figures(sheet: Sheet, body: Body, params: BodyParams, focal: float, misses: np.ndarray, overlaps: list[float]) -> Sheet:
+    """The sheet with its figures. focal: px; misses: (n,) px between detected and projected points; overlaps: silhouette IoUs."""
     rest = body.rest(params.betas)[0]
     sheet.facts = {"turn_degrees": turn_seen(rotation.exp(params.global_orient.astype(float))),
                    "height_m": float(np.ptp(rest[:, 1]))}
@@ -194,23 +203,23 @@ def heldout_sheet(results: Results) -> Sheet:
     frames = sorted(p.stem.removesuffix("_render") for p in folder.glob("*_render.png"))
     if not frames:
         raise AbsentError("No frame was held out, so nothing is compared.")
-    rows = rows_of(results)
-    chosen = {frames[i] for i in spread(len(frames), HELDOUT if len(frames) <= HELDOUT else HELDOUT - 1)}
+    rows = heldout_rows(results)
+    chosen = {frames[i] for i in spread_evenly(len(frames), HELDOUT if len(frames) <= HELDOUT else HELDOUT - 1)}
     judged = [(rows[f]["psnr_fg"], f) for f in frames if number(rows.get(f, {}).get("psnr_fg")) is not None]
     worst = min(judged)[1] if judged else None
     triples = {stem: [read_frame(folder / f"{stem}_{kind}.png") for kind in ("truth", "render", "error")]
-               for stem in sorted(chosen | ({worst} - {None}))}
+               for stem in sorted(chosen | ({worst} if worst else set()))}
     y, x = person_box([image for triple in triples.values() for image in triple[:2]])
     pictures = []
     for stem, triple in triples.items():
-        shown = np.hstack([fitted(image[y, x], 420, 540) for image in triple])
-        pictures.append(picture(shown, caption_of(stem, rows.get(stem, {}), stem == worst),
+        shown = np.hstack([shrink_to_fit(image[y, x], 420, 540) for image in triple])
+        pictures.append(make_picture(shown, heldout_caption(stem, rows.get(stem, {}), stem == worst),
                                 f"Held-out frame {int(stem)}: truth, render, error", 70_000))
-    return Sheet(pictures, judged_on(results), columns="wide")
+    return Sheet(pictures, heldout_figures(results), columns="wide")
 
 
-def judged_on(results: Results) -> dict[str, str]:
-    """How the held-out figures were taken, as far as metrics.json says."""
+def heldout_figures(results: Results) -> dict[str, str]:
+    """How the held-out figures were measured, as far as metrics.json says."""
     try:
         metrics = results.metrics
     except AbsentError:
@@ -225,7 +234,7 @@ def judged_on(results: Results) -> dict[str, str]:
     return {name: f"{value} frames" if isinstance(value, int) else value for name, value in figures.items() if value}
 
 
-def rows_of(results: Results) -> dict[str, dict]:
+def heldout_rows(results: Results) -> dict[str, dict]:
     """`000012` -> its row of metrics.json."""
     try:
         rows = results.metrics.get("heldout") or []
@@ -234,7 +243,8 @@ def rows_of(results: Results) -> dict[str, dict]:
     return {f"{int(row['frame']):06d}": row for row in rows if isinstance(row, dict) and number(row.get("frame")) is not None}
 
 
-def caption_of(stem: str, row: dict, worst: bool) -> str:
+def heldout_caption(stem: str, row: dict, worst: bool) -> str:
+    """stem: `000012`; row: of metrics.json."""
     words = [f"frame {int(stem)}"]
     plain, aligned = number(row.get("psnr_fg")), number(row.get("psnr_fg_ttpo"))
     if plain is not None:
@@ -245,7 +255,7 @@ def caption_of(stem: str, row: dict, worst: bool) -> str:
 
 
 def person_box(images: list[np.ndarray], margin: int = 8) -> tuple[slice, slice]:
-    """Rows and columns round everything that is not white in any image; all where nothing is."""
+    """Rows and columns round all that is not white in any image; all where nothing is. images: (H, W, 3) uint8 each; margin: px."""
     marked = np.any([(image < PERSON_WHITE).any(2) for image in images], 0)
     box = []
     for axis, size in ((1, marked.shape[0]), (0, marked.shape[1])):
@@ -255,11 +265,12 @@ def person_box(images: list[np.ndarray], margin: int = 8) -> tuple[slice, slice]
 
 
 def views_sheet(results: Results) -> Sheet:
+    """The avatar from all sides."""
     image = read_frame(results.path("train/heldout/views.png"))
     words = "front, right side, back; left side, from below, from above"
-    return Sheet([picture(fitted(image, 1440, 960), words, f"The avatar from {words}", VIEWS_BYTES)], columns="one")
+    return Sheet([make_picture(shrink_to_fit(image, 1440, 960), words, f"The avatar from {words}", VIEWS_BYTES)], columns="one")
 
 
-def share(x: float) -> str:
+def percent(x: float) -> str:
     """0.123 -> `12 %`"""
     return f"{100 * x:.0f} %" if x >= 0.095 or x == 0 else f"{100 * x:.1f} %"

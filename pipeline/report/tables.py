@@ -1,13 +1,14 @@
-"""Rows of the page's tables: stages, parameters, and what made the results (models, versions, licences)."""
+"""Rows of the page's tables: stages, parameters, and provenance (models, versions, licences)."""
 
 from __future__ import annotations
 
 import importlib.metadata
 import platform
+from pathlib import Path
 from typing import Any
 
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.params import meanings, plain
+from gsac.pipeline.params import config_values, meanings
 from gsac.pipeline.report.results import Results, number
 
 MB = 1e6
@@ -55,33 +56,35 @@ def parameters(results: Results) -> list[dict[str, Any]]:
         values = row.get("params")
         if not isinstance(values, dict) or not values:
             continue
-        defaults, meaning = declared(results, name)
-        rows = [{"name": key, "value": word(value), "meaning": meaning.get(key, ""),
-                 "default": word(defaults[key]) if key in defaults and defaults[key] != value else None}
+        defaults, meaning = defaults_and_meanings(results, name)
+        rows = [{"name": key, "value": format_value(value), "meaning": meaning.get(key, ""),
+                 "default": format_value(defaults[key]) if key in defaults and defaults[key] != value else None}
                 for key, value in values.items()]
         found.append({"stage": name, "rows": rows, "changed": sum(row["default"] is not None for row in rows)})
     return found
 
 
-def declared(results: Results, stage: str) -> tuple[dict[str, Any], dict[str, str]]:
+def defaults_and_meanings(results: Results, stage: str) -> tuple[dict[str, Any], dict[str, str]]:
     """Defaults and meanings of a stage's parameters; empty where the stage is not at hand."""
     try:
         config = results.project.stage(stage).config
-        return plain(config()), meanings(config)
+        return config_values(config()), meanings(config)
     except Exception:  # a stage of another version: the values alone are shown
         return {}, {}
 
 
-def word(value: Any) -> str:
+def format_value(value: Any) -> str:
+    """A parameter's value as the page shows it."""
     return "none" if value is None else str(value).lower() if isinstance(value, bool) else str(value) or "(empty)"
 
 
-def foot(results: Results) -> dict[str, list]:
-    """What is at hand now: network files, body model, versions. Results from the cache were made with the same ones."""
+def provenance(results: Results) -> dict[str, list]:
+    """Network files, body model and versions at hand now; results from the cache were made with the same ones."""
     return {"models": networks(results), "body": body_model(results), "versions": versions(results)}
 
 
 def networks(results: Results) -> list[dict[str, str]]:
+    """Name, digest and licence of each model file that the run's stages need."""
     from gsac.avatar.network_files import MODELS
     from gsac.stages.contract import make_config
 
@@ -90,7 +93,7 @@ def networks(results: Results) -> list[dict[str, str]]:
         try:
             stage = results.project.stage(name)
             needed = stage.models(make_config(stage, row.get("params") or {}))
-        except Exception:  # a stage of another version: what it needs is not known here
+        except Exception:  # a stage of another version: its needs are unknown here
             continue
         for model in needed:
             known = MODELS.get(model)
@@ -100,6 +103,7 @@ def networks(results: Results) -> list[dict[str, str]]:
 
 
 def body_model(results: Results) -> list[dict[str, str]]:
+    """Name, digest and licence of the body model; empty where no body was fitted."""
     for port in ("train/body.npz", "smplx/body.npz"):
         try:
             digest = body_digest(results.path(port))
@@ -111,13 +115,15 @@ def body_model(results: Results) -> list[dict[str, str]]:
     return []
 
 
-def body_digest(path) -> str:
+def body_digest(path: Path) -> str:
+    """Digest of the body model that a body.npz was made with."""
     from gsac.avatar.artifacts import read_arrays
 
     return str(read_arrays(path)["model"])
 
 
 def own_body_digest() -> str:
+    """Digest of the open body."""
     import hashlib
 
     from gsac.avatar.body import OPEN_BODY

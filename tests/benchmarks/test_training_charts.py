@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from gsac.benchmarks import training
+from gsac.benchmarks.command import names
 from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart
 from gsac.benchmarks.speed_accuracy import chart, novel, table
 from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto_front, seconds_to
-from gsac.pipeline.commands.bench import names
 from gsac.stages.contract import BadInput
 
 

@@ -138,6 +138,16 @@ def test_modules_and_files_that_nothing_reaches_are_not_code(tree):
     assert parts(tree) == before
 
 
+def test_a_file_whose_name_begins_like_a_module_is_a_file(tree):
+    """As the viewer's `gsac.js`."""
+    edit(tree / "avatar/body.py", "MODEL = 'smplx.npz'", "PAGE = 'gsac.js'")
+    (tree / "avatar/gsac.js").write_text("draw()")
+    before = parts(tree)
+    assert "gsac.avatar.body/gsac.js" in before
+    edit(tree / "avatar/gsac.js", "draw", "paint")
+    assert {name for name, digest in parts(tree).items() if before[name] != digest} == {"gsac.avatar.body/gsac.js"}
+
+
 def test_extra_modules_bring_their_own_closure(tree):
     assert set(parts(tree, "gsac.stages.other")) - set(parts(tree)) == {"gsac.stages.other"}
 

@@ -8,8 +8,8 @@ from gsac.cache.verify import verify
 
 DAY = 86400.0
 USE = """
-with in_use(store, [parts_of(fps=5).key()]) as lease:
-    lease.add(parts_of(fps=6).key())
+with in_use(store, [parts_of(fps=5).key]) as lease:
+    lease.add(parts_of(fps=6).key)
     print("using", flush=True)
     sys.stdin.readline()
 """
@@ -37,11 +37,11 @@ RUN_ON = """
 for number in range(25):
     parts = parts_of(number=number % 5)
     with in_use(store) as lease:
-        lease.add(parts.key())
-        with single_flight(store, parts.key()) as record:
+        lease.add(parts.key)
+        with single_flight(store, parts.key) as record:
             record = record or make(parts, f"text {number % 5}")
         time.sleep(0.002)
-        assert store.lookup(parts.key(), deep=True) is not None
+        assert store.lookup(parts.key, deep=True) is not None
         assert store.path(record, "frames").joinpath("000002.png").read_bytes() == f"text {number % 5} 2".encode() * 100
 """
 
@@ -159,15 +159,15 @@ def test_quarantine_is_kept_for_a_while_and_then_goes(store, make, parts_of, mon
 
 def test_what_a_stopped_run_left_stays_a_day_for_the_next_and_then_goes(store, make, parts_of, monkeypatch):
     waiting, done = parts_of(fps=5), make(parts_of(fps=6))
-    for key in (waiting.key(), done.key):
+    for key in (waiting.key, done.key):
         store.partial(key).mkdir()
         (store.partial(key) / "half").write_text("half")
     assert collect(store).partial == [done.key], "who is done needs it no more"
     monkeypatch.setattr(gc, "PARTIAL_S", -1.0)
-    with in_use(store, [waiting.key()]):
+    with in_use(store, [waiting.key]):
         assert collect(store).partial == []
     report = collect(store)
-    assert report.partial == [waiting.key()] and report.freed_bytes == 4
+    assert report.partial == [waiting.key] and report.freed_bytes == 4
     assert list((store.root / "partial").iterdir()) == []
 
 

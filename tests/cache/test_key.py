@@ -21,13 +21,13 @@ PARTS = KeyParts(
 
 
 def test_the_key_of_known_parts_never_changes_without_a_new_key_version():
-    assert PARTS.key() == "8d709e9b9a769611dc6c594b929b1bda6d51bb138230d7b9e32953625b050d13"
+    assert PARTS.key == "8d709e9b9a769611dc6c594b929b1bda6d51bb138230d7b9e32953625b050d13"
 
 
 def test_swapped_inputs_are_not_the_same_inputs():
     first, second = PARTS.inputs.items()
     swapped = dataclasses.replace(PARTS, inputs={first[0]: second[1], second[0]: first[1]})
-    assert swapped.key() != PARTS.key()
+    assert swapped.key != PARTS.key
     assert [change.kind for change in PARTS.diff(swapped)] == [ChangeKind.INPUT] * 2
 
 
@@ -66,7 +66,7 @@ def test_swapped_inputs_are_not_the_same_inputs():
 )
 def test_every_part_is_in_the_key_and_a_change_says_what_it_is(change, kind, sentence):
     changed = dataclasses.replace(PARTS, **change)
-    assert changed.key() != PARTS.key()
+    assert changed.key != PARTS.key
     if kind is not ChangeKind.STAGE:
         [found] = PARTS.diff(changed)
         assert (found.kind, found.sentence) == (kind, sentence)
@@ -76,7 +76,7 @@ def test_every_part_is_in_the_key_and_a_change_says_what_it_is(change, kind, sen
 
 def test_the_order_in_which_parts_are_named_does_not_matter():
     turned = {f.name: dict(reversed(v.items())) for f in dataclasses.fields(PARTS) if isinstance(v := getattr(PARTS, f.name), dict)}
-    assert dataclasses.replace(PARTS, **turned).key() == PARTS.key()
+    assert dataclasses.replace(PARTS, **turned).key == PARTS.key
     assert PARTS.diff(dataclasses.replace(PARTS, **turned)) == []
 
 
@@ -85,7 +85,7 @@ def test_clip_name_and_paths_are_not_in_the_key_so_equal_content_is_shared(store
     (tmp_path / "deep").mkdir()
     shutil.copy(tmp_path / "anna.mp4", tmp_path / "deep" / "bert.mov")
     keys = {
-        KeyParts("split", {"clip": tree_digest(clip)[0]}).key() for clip in (tmp_path / "anna.mp4", tmp_path / "deep" / "bert.mov")
+        KeyParts("split", {"clip": tree_digest(clip)[0]}).key for clip in (tmp_path / "anna.mp4", tmp_path / "deep" / "bert.mov")
     }
     assert len(keys) == 1
 
@@ -93,7 +93,7 @@ def test_clip_name_and_paths_are_not_in_the_key_so_equal_content_is_shared(store
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), {1, 2}])
 def test_a_parameter_without_one_plain_value_is_named(value):
     with pytest.raises(CacheError, match="fill.sigma"):
-        dataclasses.replace(PARTS, params={"method": "gp", "sigma": value}).key()
+        _ = dataclasses.replace(PARTS, params={"method": "gp", "sigma": value}).key
 
 
 plain = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text("xyz", max_size=3)
@@ -104,4 +104,4 @@ several = st.builds(KeyParts, st.sampled_from("xy"), st.dictionaries(names, name
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(several, several)
 def test_keys_are_equal_exactly_when_nothing_differs(first, second):
-    assert (first.key() == second.key()) == (first.diff(second) == [])
+    assert (first.key == second.key) == (first.diff(second) == [])

@@ -3,10 +3,10 @@ import threading
 import time
 
 from gsac.cache.lease import in_use, live_keys, single_flight
-from gsac.cache.lock import common
+from gsac.cache.lock import shared
 
 COMPUTE_ONCE = """
-with single_flight(store, parts_of().key()) as found:
+with single_flight(store, parts_of().key) as found:
     if found is None:
         print("computed")
         time.sleep(0.3)
@@ -57,7 +57,7 @@ def test_threads_of_one_process_take_turns_too(store, make, parts_of):
     computed = []
 
     def compute():
-        with single_flight(store, parts_of().key()) as found:
+        with single_flight(store, parts_of().key) as found:
             if found is None:
                 computed.append(1)
                 time.sleep(0.05)
@@ -119,7 +119,7 @@ def test_a_key_cannot_be_claimed_while_gc_sweeps(store):
     claimed = threading.Event()
     with in_use(store) as lease:
         claim = threading.Thread(target=lambda: (lease.add("k" * 64), claimed.set()))
-        with common(store.root / "lock", alone=True):
+        with shared(store.root / "lock", alone=True):
             claim.start()
             assert not claimed.wait(0.2)
         assert claimed.wait(5)

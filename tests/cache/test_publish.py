@@ -10,7 +10,7 @@ import pytest
 
 from gsac.cache.errors import CacheFullError
 from gsac.cache.gc import collect
-from gsac.cache.publish import STEPS
+from gsac.cache.publish import STEPS, publish
 from gsac.cache.record import RunInfo
 from gsac.cache.store import Store
 from gsac.cache.verify import verify
@@ -49,9 +49,9 @@ def test_sigkill_at_any_step_never_leaves_a_torn_artifact_that_counts_as_done(st
     process = child(DIE_AFTER, step, count)
     process.communicate()
     assert process.returncode == -signal.SIGKILL
-    found = store.lookup(parts_of().key())
+    found = store.lookup(parts_of().key)
     assert (found is not None) == (STEPS.index(step) >= RECORDED)
-    assert found == store.lookup(parts_of().key(), deep=True)
+    assert found == store.lookup(parts_of().key, deep=True)
     assert verify(store).sound
     collect(store)
     assert list((store.root / "tmp").iterdir()) == []
@@ -93,7 +93,7 @@ WRITE_OWN = "print(make(parts_of(), sys.argv[2]).outputs['clip.json'])"
 def test_many_writers_make_one_result(store, parts_of, child):
     children = [child(WRITE_OWN, f"writer {number}") for number in range(6)]
     told = {process.communicate()[0].strip() for process in children}
-    record = store.lookup(parts_of().key(), deep=True)
+    record = store.lookup(parts_of().key, deep=True)
     assert told == {record.outputs["clip.json"]}
     assert len(store.record_files()) == 1
     collect(store)
@@ -105,7 +105,7 @@ def test_many_writers_of_equal_content_under_their_own_keys_all_count(store, par
     for process in [child(code, number) for number in range(6)]:
         process.communicate()
         assert process.returncode == 0
-    assert all(store.lookup(parts_of(number=number).key(), deep=True) for number in range(6))
+    assert all(store.lookup(parts_of(number=number).key, deep=True) for number in range(6))
     assert len(list((store.root / "objects").glob("*/*"))) == 2
 
 
@@ -120,7 +120,7 @@ def test_a_disk_that_is_full_at_any_step_loses_nothing_and_is_named(store, make,
     assert "nothing that was kept before is lost" in str(error.value)
     assert ("2,110 bytes" in str(error.value)) == (step != "started")
     assert store.lookup(before.key, deep=True) == before
-    assert (store.lookup(parts_of(fps=6).key()) is not None) == (STEPS.index(step) >= RECORDED)
+    assert (store.lookup(parts_of(fps=6).key) is not None) == (STEPS.index(step) >= RECORDED)
     assert list((store.root / "tmp").iterdir()) == []
     record = make(parts_of(fps=6), "hello")
     assert store.lookup(record.key, deep=True) == record
@@ -148,9 +148,9 @@ def test_a_real_disk_that_fills_up_while_publishing_loses_nothing(small_disk, ma
                 os.write(other, b"\0" * 4096)
         os.close(other)
         with pytest.raises(CacheFullError, match="2,110 bytes"):
-            small.publish(parts_of(fps=6), folder, outputs, RunInfo())
+            publish(small, parts_of(fps=6), folder, outputs, RunInfo())
     assert small.lookup(before.key, deep=True) == before
-    assert small.lookup(parts_of(fps=6).key()) is None
+    assert small.lookup(parts_of(fps=6).key) is None
     (small_disk / "other people's data").unlink()
     assert small.lookup(make(parts_of(fps=6), "hello", store=small).key, deep=True) is not None
 
@@ -162,9 +162,9 @@ from gsac.cache.errors import CacheReadOnlyError
 from gsac.cache.gc import collect
 store = Store(store.root)
 assert not store.writable
-record = store.lookup(parts_of(fps=5).key())
+record = store.lookup(parts_of(fps=5).key)
 print(store.path(record, "clip.json").read_text())
-print(store.lookup(parts_of(fps=6).key()))
+print(store.lookup(parts_of(fps=6).key))
 with in_use(store, [record.key]), single_flight(store, record.key) as found:
     print(found == record)
 for act in (lambda: make(parts_of(fps=6)), lambda: collect(store)):

@@ -7,6 +7,7 @@ import pytest
 
 from gsac.cache.errors import CacheError
 from gsac.cache.listing import ls
+from gsac.cache.publish import publish
 from gsac.cache.record import RunInfo
 from gsac.cache.store import Store
 from gsac.cache.verify import verify
@@ -14,7 +15,7 @@ from gsac.cache.verify import verify
 
 def test_a_published_result_is_found_again_with_all_its_content(store, make, parts_of, contents):
     record = make(parts_of(fps=5), "hello")
-    found = Store(store.root).lookup(parts_of(fps=5).key())
+    found = Store(store.root).lookup(parts_of(fps=5).key)
     assert found == record
     assert contents(store.path(found, "clip.json")) == {"": b"hello"}
     assert contents(store.path(found, "frames")) == {
@@ -25,7 +26,7 @@ def test_a_published_result_is_found_again_with_all_its_content(store, make, par
 
 def test_a_key_that_nobody_published_is_a_miss(store, make, parts_of):
     make(parts_of(fps=5))
-    assert store.lookup(parts_of(fps=6).key()) is None
+    assert store.lookup(parts_of(fps=6).key) is None
 
 
 def test_an_output_keeps_the_suffix_of_its_name(store, make, parts_of):
@@ -37,8 +38,8 @@ def test_an_output_keeps_the_suffix_of_its_name(store, make, parts_of):
 def test_a_cached_stage_reports_the_time_and_memory_of_the_run_that_made_it(store, fill, parts_of):
     info = RunInfo("2026-01-02T03:04:05Z", 61.5, 118.0, 940.0, "cpu", {"psnr_fg": 25.5}, ["hand 3 not seen"], "done\n")
     with store.private("train") as folder:
-        store.publish(parts_of("train"), folder, fill(folder), info)
-    assert Store(store.root).lookup(parts_of("train").key()).info == info
+        publish(store, parts_of("train"), folder, fill(folder), info)
+    assert Store(store.root).lookup(parts_of("train").key).info == info
 
 
 def test_an_equal_output_of_another_key_is_stored_once(store, make, parts_of):
@@ -71,11 +72,11 @@ def test_the_first_of_two_results_of_one_key_stays_and_a_forced_one_replaces_it(
 def test_an_output_that_was_not_written_or_is_a_link_is_not_published(store, fill, parts_of, tmp_path):
     with store.private("split") as folder:
         with pytest.raises(CacheError, match="metrics.json was not written"):
-            store.publish(parts_of(), folder, (*fill(folder), "metrics.json"), RunInfo())
+            publish(store, parts_of(), folder, (*fill(folder), "metrics.json"), RunInfo())
         (folder / "frames" / "inner" / "away").symlink_to(tmp_path)
         with pytest.raises(CacheError, match="frames holds the link away"):
-            store.publish(parts_of(), folder, ("frames",), RunInfo())
-    assert store.lookup(parts_of().key()) is None
+            publish(store, parts_of(), folder, ("frames",), RunInfo())
+    assert store.lookup(parts_of().key) is None
 
 
 def flip(path, keep_time):

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from gsac.cache.digest import tree_digest
+from gsac.cache.publish import publish
 from gsac.cache.record import RunInfo
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP
@@ -32,5 +33,5 @@ for name, step in project.graph.steps.items():
                 path.mkdir()
                 for i in range(FRAMES):
                     (path / f"{i:06d}.png").write_text(f"{name} {i}")
-        record = store.publish(parts, folder, tuple(o.path for o in project.stage(name).outputs), RunInfo(seconds=1.0))
+        record = publish(store, parts, folder, tuple(o.path for o in project.stage(name).outputs), RunInfo(seconds=1.0))
     digests |= {f"{name}/{output}": digest for output, digest in record.outputs.items()}

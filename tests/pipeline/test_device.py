@@ -24,13 +24,13 @@ def parts(tmp_path, monkeypatch):
 
 def test_auto_is_the_gpu_where_there_is_one_and_the_two_results_have_keys_of_their_own(parts):
     assert (parts(gpu=True).device, parts(gpu=False).device) == ("cuda", "cpu")
-    assert parts(gpu=True).key() != parts(gpu=False).key()
-    assert parts(gpu=True, name="split").key() == parts(gpu=False, name="split").key()
+    assert parts(gpu=True).key != parts(gpu=False).key
+    assert parts(gpu=True, name="split").key == parts(gpu=False, name="split").key
 
 
 def test_a_device_asked_for_and_the_same_device_found_share_one_result(parts):
-    assert parts(gpu=True, device="cuda").key() == parts(gpu=True).key()
-    assert parts(gpu=True, device="cpu").key() == parts(gpu=False).key()
+    assert parts(gpu=True, device="cuda").key == parts(gpu=True).key
+    assert parts(gpu=True, device="cpu").key == parts(gpu=False).key
 
 
 def test_cuda_without_a_gpu_is_refused_with_what_is_missing(parts, monkeypatch):

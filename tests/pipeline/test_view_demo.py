@@ -4,7 +4,7 @@ import urllib.request
 
 import pytest
 
-from gsac.pipeline.commands.demo import truth_clip
+from gsac.pipeline.commands.demo import make_truth_clip
 from gsac.pipeline.commands.view import address, find_page, serve
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
@@ -74,8 +74,8 @@ def test_the_demo_clip_is_made_once_and_whole_or_not_at_all(tmp_path, monkeypatc
 
     monkeypatch.setattr(turntable, "make_clip", make_clip)
     with pytest.raises(KeyboardInterrupt):
-        truth_clip(tmp_path / "clip", PlainReporter())
+        make_truth_clip(tmp_path / "clip", PlainReporter())
     assert not (tmp_path / "clip").exists()
     for _ in range(2):
-        assert truth_clip(tmp_path / "clip", PlainReporter()).read_text() == "whole"
+        assert make_truth_clip(tmp_path / "clip", PlainReporter()).read_text() == "whole"
     assert len(made) == 2

@@ -17,20 +17,19 @@ pytestmark = pytest.mark.slow
 
 STOPPED_AT = """
 import errno, os, signal, sys
-from gsac.cache.store import Store
-from gsac.pipeline import cli
+from gsac.pipeline import cli, stage_runner
 
-publish = Store.publish
+publish = stage_runner.publish
 
-def watched(self, parts, *rest, **more):
+def watched(store, parts, *rest, **more):
     def step(name):
         if parts.stage == "join" and name == sys.argv[2]:
             if sys.argv[1] == "killed":
                 os.kill(os.getpid(), signal.SIGKILL)
             raise OSError(errno.ENOSPC, "No space left on device")
-    return publish(self, parts, *rest, step=step, **more)
+    return publish(store, parts, *rest, step=step, **more)
 
-Store.publish = watched
+stage_runner.publish = watched
 sys.exit(int(cli.execute(sys.argv[3:])))
 """
 

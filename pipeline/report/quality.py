@@ -1,4 +1,4 @@
-"""The words of the headline: how good the avatar is by its figures, and what is weak, in order of weight."""
+"""The words of the headline: a grade by the figures, and the weak points of input, fit and avatar."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ GRADES = ((30.0, "Very close to the frames"), (27.0, "Good"), (24.0, "Fair: fine
 BAD = "Bad: it does not look like the person"
 OVERFIT_DB, POSE_DB, WORST_DB = 2.0, 1.0, 3.0
 UNSEEN, TURN, OUTLINE, ALPHA_IOU, HAND, PERSON = 0.2, 270.0, 0.85, 0.95, 0.5, 0.95
+"""Bounds beyond which a figure is a weakness: shares and IoUs in 0..1, TURN in degrees."""
 
 
 def grade(metrics: dict[str, Any]) -> str:
@@ -23,11 +24,12 @@ def grade(metrics: dict[str, Any]) -> str:
 
 
 def weaknesses(metrics: dict[str, Any], facts: dict[str, float]) -> list[str]:
-    """Sentences. metrics: train's metrics.json, {} without; facts: of the sheets, those that were measured."""
-    return [*of_input(facts), *of_fit(facts), *(of_avatar(metrics) if metrics else [])]
+    """Sentences. metrics: train's metrics.json, {} without one; facts: figures of the sheets, as far as measured."""
+    return [*input_weaknesses(facts), *fit_weaknesses(facts), *(avatar_weaknesses(metrics) if metrics else [])]
 
 
-def of_input(facts: dict[str, float]) -> list[str]:
+def input_weaknesses(facts: dict[str, float]) -> list[str]:
+    """Of the clip: person, hands, face, masks."""
     found = []
     if facts.get("person_share", 1) < PERSON:
         found.append(f"A person was found in only {facts['person_share']:.0%} of the frames.")
@@ -47,7 +49,8 @@ def of_input(facts: dict[str, float]) -> list[str]:
     return found
 
 
-def of_fit(facts: dict[str, float]) -> list[str]:
+def fit_weaknesses(facts: dict[str, float]) -> list[str]:
+    """Of the body fit."""
     found = []
     if facts.get("turn_degrees", 360) < TURN:
         found.append(f"Only {facts['turn_degrees']:.0f} of 360 degrees of the turn were seen; the rest of the person is made up.")
@@ -57,7 +60,8 @@ def of_fit(facts: dict[str, float]) -> list[str]:
     return found
 
 
-def of_avatar(metrics: dict[str, Any]) -> list[str]:
+def avatar_weaknesses(metrics: dict[str, Any]) -> list[str]:
+    """Of the trained avatar."""
     found = []
     psnr, train, aligned = (number(metrics.get(k)) for k in ("psnr_fg", "psnr_fg_train", "psnr_fg_ttpo"))
     if psnr is not None and train is not None and train - psnr > OVERFIT_DB:

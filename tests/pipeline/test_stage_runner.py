@@ -3,6 +3,8 @@
 import signal
 from pathlib import Path
 
+from gsac.pipeline.child import LogReader
+
 NOTES = """
 import os
 
@@ -84,7 +86,7 @@ def test_the_stage_after_the_next_is_loaded_as_well_and_each_runs_in_its_own_pro
     for name in ("left", "right"):
         toy.edit(f"{name}/stage.py", "from gsac.toy", NOTES + "from gsac.toy")
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=3")
-    toy.wait_for(lambda: loaded(toy) == 2)
+    toy.wait_for(lambda: loaded(toy) == 2 and toy.runs)
     assert toy.runs == ["cut"]
     assert process.wait(60) == 0 and toy.runs == ["cut", "left", "right", "join"]
     assert loaded(toy) == 2
@@ -97,3 +99,14 @@ def test_libraries_in_a_stages_process_have_one_thread_unless_the_user_says_othe
     assert (toy.out / "logs" / "left.log").read_text().startswith("1\n")
     assert toy.run("--force", "left", OPENCV_FOR_THREADS_NUM="2").code == 0
     assert (toy.out / "logs" / "left.log").read_text().startswith("2\n")
+
+
+def test_a_growing_log_is_read_line_by_line_and_each_line_once(tmp_path):
+    log = tmp_path / "cut.log"
+    reader = LogReader(log)
+    assert reader.new_lines() == [], "the file is not there yet"
+    log.write_text("first\nsec")
+    assert reader.new_lines() == ["first"]
+    log.write_text("first\nsecond\nno end")
+    assert reader.new_lines() == ["second"]
+    assert reader.new_lines(ended=True) == ["no end"] and reader.new_lines(ended=True) == []

@@ -1,0 +1,66 @@
+"""Errors that end a command: the sentence and the exit code of each."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.errors import CacheError, CacheReadOnlyError, IntegrityError
+from gsac.pipeline.outcomes import ExitCode
+from gsac.stages.contract import BadInput, StageError
+
+PATH_ERRORS = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
+"""errno of a path from the user that cannot be read or written as it should."""
+NO_ROOM = {errno.ENOSPC: "no room left on the disk", errno.EDQUOT: "the disk quota is used up"}
+
+
+class NotUpToDateError(Exception):
+    """Something that should be there already is not (exit code 3)."""
+
+
+class StageFailedError(Exception):
+    """A stage failed with the error `cause`; stages that were finished before it are kept."""
+
+    def __init__(self, stage: str, cause: Exception, log: Path):
+        seen = f" (log: {log})" if log.is_file() and log.stat().st_size else ""
+        super().__init__(f"stage {stage} failed: {cause}{seen}")
+        self.stage = stage
+        self.cause = cause
+
+
+def attach_summary(error: BaseException, summary: dict[str, Any]) -> None:
+    """Adds to an error the object of --json on the stages before it."""
+    vars(error)["summary"] = summary
+
+
+def attached_summary(error: BaseException) -> dict[str, Any]:
+    """The object that `attach_summary` added, {} without one."""
+    return vars(error).get("summary", {})
+
+
+def exit_code(error: BaseException) -> ExitCode | None:
+    """The exit code for an exception; None for a bug of ours."""
+    if isinstance(error, StageFailedError):
+        return exit_code(error.cause) or ExitCode.FAILED
+    if isinstance(error, NotUpToDateError):
+        return ExitCode.STALE
+    if isinstance(error, (BadInput, CacheReadOnlyError)):
+        return ExitCode.USAGE
+    if isinstance(error, IntegrityError):
+        return ExitCode.INTEGRITY
+    if isinstance(error, (StageError, CacheError)):
+        return ExitCode.FAILED
+    if isinstance(error, OSError) and error.errno in NO_ROOM:
+        return ExitCode.FAILED
+    if isinstance(error, OSError) and error.errno in PATH_ERRORS:
+        return ExitCode.USAGE
+    return None
+
+
+def sentence(error: Exception) -> str:
+    """The line that the user reads."""
+    if isinstance(error, OSError):
+        reason = NO_ROOM.get(error.errno or 0, error.strerror)
+        return f"{error.filename}: {reason}" if error.filename else str(reason)
+    return str(error)

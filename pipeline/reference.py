@@ -1,0 +1,171 @@
+"""Writes the reference pages from the code: docs/cli.md of all commands, docs/stages/<name>.md of each stage."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import inspect
+import types
+import typing
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from gsac.pipeline import commands
+from gsac.pipeline.cli import make_parser
+from gsac.pipeline.graph import CLIP
+from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.params import config_values, meanings
+from gsac.pipeline.plan import Reason
+from gsac.pipeline.project import Project
+from gsac.stages.contract import BadInput, Stage
+
+WRITTEN = "<!-- Written by `make docs` from the code; edit the docstrings there. -->\n"
+
+
+def pages(project: Project) -> dict[str, str]:
+    """Path below docs/ -> text, of every page."""
+    return {"cli.md": cli_page(), **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
+
+
+def cli_page() -> str:
+    """The command line: global options, every command, exit codes, and the words of --json."""
+    added = commands.load_added()
+    if missing := commands.not_installed(added):
+        raise BadInput(f"{', '.join(sorted(missing))}: {commands.SETUP}")
+    helps = commands.COMMANDS | {name: module.HELP for name, module in added.items()}
+    blocks = ["# Command line", WRITTEN.strip(), "`gsac COMMAND ...`, with these options before the command's name or after it:",
+              _argument_table(_arguments(make_parser([]))),
+              _table(("command", ""), ((f"[{name}](#gsac-{name})", text) for name, text in helps.items()))]
+    for name, text in helps.items():
+        parser = argparse.ArgumentParser(prog=f"gsac {name}", add_help=False)
+        (added.get(name) or commands.load(name)).declare(parser)
+        blocks += [f"## gsac {name}", f"{text[0].upper()}{text[1:]}.", *_command(parser)]
+    blocks += ["## Exit codes", _table(("code", ""), ((str(int(code)), code.sentence) for code in ExitCode)),
+               "## Words of `--json`", "`status` of a stage:", _words(Outcome),
+               "`reason`, why a stage has to run or need not:", _words(Reason)]
+    return "\n\n".join(blocks) + "\n"
+
+
+def stage_page(project: Project, name: str) -> str:
+    """One stage: its module's docstring, ports, parameters, and the rest of its key."""
+    stage = project.stage(name)
+    lead, *rest = (inspect.getdoc(importlib.import_module(f"{project.package}.{name}")) or f"{name}: no docstring").split("\n\n")
+    title, _, sentence = lead.partition(": ")
+    blocks = [f"# {title}", WRITTEN.strip(), f"{sentence[0].upper()}{sentence[1:]}"]
+    blocks += [f"```text\n{part}\n```" if part.startswith("takes") else part for part in rest]
+    blocks += ["## Takes", _table(("port", "made by"), ((f"`{port}`", _maker(project, port)) for port in stage.inputs)),
+               "## Gives", _table(("output", "read by"), ((f"`{output.path}`", _readers(project, f"{name}/{output.path}"))
+                                                          for output in stage.outputs)),
+               "## Parameters", _parameters(stage)]
+    return "\n\n".join([*blocks, "## Also part of its key", _dependencies(stage)]) + "\n"
+
+
+def _maker(project: Project, port: str) -> str:
+    return "the user" if port == CLIP else _link(project.graph.producer[port])
+
+
+def _readers(project: Project, port: str) -> str:
+    return ", ".join(_link(step.name) for step in project.graph.steps.values() if port in step.deps) or "the user"
+
+
+def _link(stage: str) -> str:
+    return f"[{stage}]({stage}.md)"
+
+
+def _parameters(stage: Stage) -> str:
+    config = stage.config()
+    if not config_values(config):
+        return "None."
+    meaning, kinds = meanings(stage.config), typing.get_type_hints(stage.config)
+    return _table(("parameter", "type", "default", "meaning"),
+                  ((f"`{stage.name}.{name}`", _kind(kinds[name]), f"`{_value(value)}`", meaning[name])
+                   for name, value in config_values(config).items()))
+
+
+def _kind(hint: Any) -> str:
+    """`float or null`"""
+    kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    return " or ".join("null" if kind is type(None) else getattr(kind, "__name__", str(kind)) for kind in kinds)
+
+
+def _value(value: Any) -> str:
+    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value) or '""'
+
+
+def _dependencies(stage: Stage) -> str:
+    config = stage.config()
+    rows = {"model files, with the defaults": stage.models(config),
+            "model files, where the user has added them": stage.wishes(config),
+            "versions of packages": stage.packages, "device class": ("cpu or cuda",) if stage.uses_device else ()}
+    return "\n".join(["- its code", *(f"- {what}: {', '.join(names)}" for what, names in rows.items() if names)])
+
+
+def _command(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """Synopsis and arguments of a command, then those of its sub-commands."""
+    below = next((action for action in parser._actions if isinstance(action, argparse._SubParsersAction)), None)
+    if below is None:
+        arguments = _arguments(parser)
+        yield f"```\n{' '.join([parser.prog, *map(_synopsis, arguments)])}\n```"
+        if arguments:
+            yield _argument_table(arguments)
+        return
+    helps = {action.dest: action.help or action.dest for action in below._choices_actions}
+    for name, one in below.choices.items():
+        yield f"### {parser.prog} {name}"
+        yield f"{helps[name][0].upper()}{helps[name][1:]}."
+        one.prog = f"{parser.prog} {name}"
+        yield from _command(one)
+
+
+def _arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    return [action for action in parser._actions if not isinstance(action, (argparse._HelpAction, argparse._SubParsersAction))]
+
+
+def _synopsis(action: argparse.Action) -> str:
+    """`[--out DIR]`, `CLIP`, `[NAME ...]`"""
+    words = " ".join(filter(None, [*action.option_strings[-1:], _operand(action)]))
+    return f"[{words}]" if action.option_strings or action.nargs in ("?", "*") else words
+
+
+def _operand(action: argparse.Action) -> str:
+    if action.nargs == 0:
+        return ""
+    name = str(action.metavar or action.dest.upper())
+    return f"{name} ..." if action.nargs in ("*", "+", argparse.REMAINDER) else name
+
+
+def _argument_table(arguments: Iterable[argparse.Action]) -> str:
+    rows = ((", ".join(f"`{' '.join(filter(None, [option, _operand(action)]))}`" for option in action.option_strings)
+             or f"`{_operand(action)}`", action.help or "") for action in arguments)
+    return _table(("argument", "meaning"), rows)
+
+
+def _words(words: type[Outcome] | type[Reason]) -> str:
+    return _table(("word", ""), ((f"`{word.value}`", word.sentence) for word in words))
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *(tuple(map(_cell, row)) for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _cell(text: str) -> str:
+    """Escapes what Markdown would take for a table's border, and outside of `code` for a tag."""
+    pieces = text.replace("|", "\\|").split("`")
+    return "`".join(piece if at % 2 else piece.replace("<", "&lt;") for at, piece in enumerate(pieces))
+
+
+def main() -> None:
+    """Writes the pages into docs/ beside the checkout's dvc.yaml; removes pages of stages that are gone."""
+    project = Project.at_hand()
+    docs = project.dag.with_name("docs")
+    written = {docs / path: text for path, text in pages(project).items()}
+    for path, text in written.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    for old in set((docs / "stages").glob("*.md")) - written.keys():
+        old.unlink()
+
+
+if __name__ == "__main__":
+    main()
