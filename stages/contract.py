@@ -22,7 +22,7 @@ class Output:
 
     path: str
     """Relative path, e.g. `keypoints.npz` or `frames`."""
-    check: Callable[[Path], None]
+    check: Callable[[Path], object]
     """Raises `avatar.artifacts.ArtifactError` when the file or folder is not what the port promises."""
 
 

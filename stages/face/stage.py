@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_arrays
+from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS, FaceMesh
 from gsac.avatar.threads import available
 from gsac.avatar.wholebody import INDEX
@@ -25,7 +25,7 @@ MOST = 8
 def run(job: Job) -> None:
     clip = Clip.read(job.inputs["split/clip.json"])
     paths = frame_paths(job.inputs["split/frames"])
-    keypoints = read_arrays(job.inputs["keypoints/keypoints.npz"])
+    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     if len(keypoints["score"]) != len(paths):
         raise StageError(f"keypoints.npz has {len(keypoints['score'])} frames but split has {len(paths)}; "
                          "run keypoints again")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, write_arrays
+from gsac.avatar.artifacts import Clip, check_keypoints, write_arrays
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import Job, StageError
 from gsac.stages.handgap.fill import fill_gaps
@@ -17,7 +17,7 @@ FILLED_SCORE = 0.5
 
 
 def run(job: Job) -> None:
-    keypoints = check_arrays(job.inputs["keypoints/keypoints.npz"], KEYPOINT_SHAPES)
+    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     clip = Clip.read(job.inputs["split/clip.json"])
     xy = keypoints["xy"].astype(np.float64)
     score = keypoints["score"].astype(np.float64)

@@ -28,13 +28,12 @@ class Frame:
     """BlazePose x, y px and visibility; zeros from detectors that have none."""
     face_mesh: np.ndarray = _nan(468, 3)
     """px."""
-    person2: np.ndarray = _nan(4)
-    """Box x0 y0 x1 y1 px of a second person."""
-    person2_score: float = 0.0
+    second_person: bool = False
+    """Whether somebody else is seen beside the followed person; not part of the file."""
 
     @property
     def seen(self) -> bool:
         return bool(self.score.any())
 
 
-ARRAYS = ("xy", "score", "world", "pose33", "face_mesh", "person2", "person2_score")
+ARRAYS = ("xy", "score", "world", "pose33", "face_mesh")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
+from gsac.avatar.artifacts import frame_paths, read_frame, write_arrays
 from gsac.avatar.threads import ahead, available
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
@@ -28,7 +28,6 @@ EDGE = 0.004
 
 
 def run(job: Job) -> None:
-    clip = Clip.read(job.inputs["split/clip.json"])
     paths = frame_paths(job.inputs["split/frames"])
     detector = DETECTORS[job.config.detector](job.models, job.config)
     frames, at_edge = [], []
@@ -39,7 +38,7 @@ def run(job: Job) -> None:
             frames.append(frame)
             at_edge.append(edge)
             job.progress(len(frames), len(paths), "frames")
-    say(job, clip, frames, at_edge)
+    report(job, frames, at_edge)
     arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in ARRAYS}
     write_arrays(job.out / "keypoints.npz", detector=np.array(job.config.detector), **arrays)
 
@@ -67,15 +66,15 @@ def touches_edge(frame: Frame, width: int, height: int) -> bool:
     return bool((xy < rim).any() or (xy[:, 0] > width - rim).any() or (xy[:, 1] > height - rim).any())
 
 
-def say(job: Job, clip: Clip, frames: list[Frame], at_edge: list[bool]) -> None:
+def report(job: Job, frames: list[Frame], at_edge: list[bool]) -> None:
     """Warns of what the later stages have to do without; nobody anywhere is an error."""
     seen = np.array([f.seen for f in frames])
     if not seen.any():
-        raise BadInput(f"{clip.source_name or 'the clip'}: no person was found in any of its {len(frames)} frames; "
+        raise BadInput(f"No person was found in any of the clip's {len(frames)} frames; "
                        "film one whole person, upright, at least a third of the frame high, in good light")
     if not seen.all():
         job.warn(f"No person was found in {name_frames(~seen)}; these frames carry no points.")
-    second = np.array([f.person2_score > 0 for f in frames])
+    second = np.array([f.second_person for f in frames])
     if second.any():
         job.warn(f"A second person was seen in {name_frames(second)}; only the first one is followed. "
                  "Keep others out of the picture or cut these frames.")

@@ -56,7 +56,7 @@ class Follower:
         return None
 
     def _second(self, image: np.ndarray, persons: list[Person], pose: Pose, frame: Frame) -> None:
-        """Writes the surest person who is not the followed one."""
+        """Notes in the frame whether somebody else is seen."""
         for person in persons:
             if apart(person.region, pose.region) < 0.4:
                 continue
@@ -64,10 +64,7 @@ class Follower:
             score = min(person.score, other.score)
             middles = [points[[11, 12, 23, 24]].mean(axis=0) for points in (other.points, pose.points)]
             far = np.hypot(*(middles[0] - middles[1])) > 0.15 * min(other.region.side, pose.region.side)
-            if far and score >= SECOND_SCORE and score > frame.person2_score:
-                low, high = other.points.min(axis=0), other.points.max(axis=0)
-                frame.person2 = np.concatenate([low, high])
-                frame.person2_score = score
+            frame.second_person |= bool(far and score >= SECOND_SCORE)
 
 
 def prominence(region: Region, width: int, height: int) -> float:

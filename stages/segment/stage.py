@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
+from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha
 from gsac.avatar.threads import ahead, available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
@@ -29,7 +29,7 @@ WIDE = 0.25
 def run(job: Job) -> None:
     frames = job.inputs["split/frames"]
     paths = frame_paths(frames)
-    keypoints = check_arrays(job.inputs["keypoints/keypoints.npz"], KEYPOINT_SHAPES)
+    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     if len(paths) != len(keypoints["xy"]):
         raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
     network = METHODS[job.config.method](job.models)

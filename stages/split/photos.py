@@ -42,7 +42,7 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
 
 def split_photos(photos: list[Path], plate: Path | None, frames: Path, config, warn: Callable[[str], None],
                  progress: Callable[[int, int, str], None]) -> dict:
-    """Writes frames/%06d.png and frames/plate.png. Returns the Clip fields width, height, focal_px, plate, notes."""
+    """Writes frames/%06d.png and frames/plate.png. Returns the Clip fields width, height, focal_px, notes."""
     picks = [photos[i] for i in pick_evenly(len(photos), config.count)]
     if len(picks) < len(photos):
         warn(f"{len(photos)} photos given, {len(picks)} kept evenly (split.count is {config.count}).")
@@ -68,7 +68,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config, w
         warn(f"the photos' focal lengths differ ({min(known):.0f} to {max(known):.0f} px): was the zoom moved? "
              "Their median is used.")
     return {"width": width, "height": height, "focal_px": float(np.median(known)) if known else None,
-            "plate": plate is not None, "notes": sorted(notes)}
+            "notes": sorted(notes)}
 
 
 def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
