@@ -92,8 +92,12 @@ def make_config(stage: Stage, values: dict[str, Any]) -> Any:
 
 
 def _typed(name: str, value: Any, hint: Any) -> Any:
-    """The value as the field's type; 1 becomes 1.0 for a float, and YAML 1.1's text `4e-4` a number."""
+    """The value as the field's type, or one of its `Literal`'s; 1 becomes 1.0 for a float, YAML 1.1's text `4e-4` a number."""
     kinds = typing.get_args(hint) or (hint,)
+    if typing.get_origin(hint) is typing.Literal:
+        if value not in kinds:
+            raise BadInput(f"{name} is {value!r}; choices: {', '.join(map(str, kinds))}")
+        return value
     if float in kinds and isinstance(value, (int, str)) and not isinstance(value, bool):
         try:
             value = float(value)

@@ -1,9 +1,9 @@
-"""The arm as a chain of small rotations about its usual pose, in the frame of the turning body; one Gaussian process for all of it.
+"""A whole arm as one Gaussian process: small rotations of its joints about the arm's usual pose, in the frame of the turning body.
 
-A point at r from a joint that turns by the small w moves by w x r, so the elbow says where the hidden palm has gone: every joint
-of trunk, shoulder, elbow and wrist turns as a process of its own in time, and carries what hangs below it. The usual pose is
-read off all seen frames: sideways a point (x, z) of the body lies at x cos y + z sin y for the turn y. What is seen is linear in
-all of that, so the answer is in closed form; where nothing turns it is that of an arm in the picture's plane.
+A point at r from a joint that turns by a small w moves by w x r. Trunk, shoulder, elbow and wrist each turn as a process of their
+own over time and carry what hangs below them, so a seen elbow tells where the hidden palm has gone. The usual pose is fitted to
+all seen frames: a point (x, z) of the body appears at x cos y + z sin y sideways when the body has turned by y. The image
+coordinates are linear in all of this, so the posterior has a closed form; without a turn it is that of an arm in the image plane.
 """
 
 from __future__ import annotations
@@ -14,49 +14,54 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from gsac.avatar.wholebody import ARM, HANDS
-from gsac.stages.handgap import turning_body
-from gsac.stages.handgap.gp import noise_px
+from gsac.stages.handgap.config import HandgapConfig
+from gsac.stages.handgap.method import Detections, Filled, HiddenArm
+from gsac.stages.handgap.methods.gp import noise_px
 from gsac.stages.handgap.missing_hands import runs
+from gsac.stages.handgap.turning_body import TurningBody, predict_about_palm, within_reach
 
 LENGTHS_S = (0.3, 0.45, 0.65, 1.0)
-"""Grid of the rotations' time constant."""
+"""Grid of the rotations' time constant, s."""
 SIZES = (0.03, 0.06, 0.12, 0.25, 0.5)
 """Grid of their standard deviation, rad."""
 SHARES = (0.4, 1.0, 1.0, 1.0)
-"""Of it that trunk, shoulder, elbow and wrist take."""
+"""Factors on it for trunk, shoulder, elbow and wrist."""
 LOOSE, LOOSE_SHARE = 0.01, 0.1
-"""Torso lengths that each point stirs by itself; and for each rad of the rotations, which are not always small."""
+"""Standard deviation of each point's own motion, torso lengths, and what is added to it a rad of rotation: large rotations are not
+linear."""
 LINKS = np.array((0.45, 0.6, 0.55, 0.25))
-"""Torso lengths to the shoulder from the body's centre, and of upper arm, forearm and palm: nothing else is known beforehand."""
+"""Prior lengths, in torsos: body's centre to shoulder, upper arm, forearm, palm."""
 TILT, BEND, OFFSET = np.array((0.05, 0.07, 0.1, 0.1)), 0.05, 0.02
-"""Torso lengths: what perspective adds up and down with the turn, both ways with twice the turn, and what keeps to the image."""
-HABIT = np.array((0.02, 0.02, 0.02, 0.01))
-"""Torso lengths that the detector errs by, smoothly in the view."""
+"""Standard deviations of what perspective adds, in torsos: up and down with the turn, on both axes with twice the turn, and
+constant in the image."""
+SYSTEMATIC = np.array((0.02, 0.02, 0.02, 0.01))
+"""Standard deviation of the detector's systematic error, in torsos; it changes smoothly with the turn."""
 LEAST_NOISE = 0.002
+"""Least standard deviation of the detector's noise, in torsos."""
 RIDGE = 0.3
-"""Frames' worth of doubt about a point's place along a line of sight that hardly turns."""
+"""Regularises the usual pose where the body hardly turns, in frames."""
 HIPS = np.array((0, 0.5, 0))
-"""What the trunk turns about: torso lengths below the body's centre."""
+"""Pivot of the trunk, in torsos from the body's centre."""
 LIKELY = 4.0
-"""Log likelihood below the best of the grid from which on a process has no say."""
+"""Grid entries this far below the best log likelihood get no weight."""
 MOST_FRAMES, NEAR_S = 100, 1.5
-"""Of a longer clip each gap is told from the seen frames this close to it and every n-th of the others."""
+"""In a clip of more frames, a gap is filled from the seen frames within NEAR_S seconds and every n-th of the others."""
 
 
 @dataclass
-class Sights:
-    """n coordinates of chain points in the image, one row each."""
+class Coordinates:
+    """n image coordinates of arm points, one row each."""
 
     point: np.ndarray  # (n,) 0 shoulder, 1 elbow, 2 wrist, 3 palm
     axis: np.ndarray  # (n,) 0 sideways, 1 up and down
     frame: np.ndarray  # (n,)
-    ray: np.ndarray  # (n, 3) what the coordinate is of the body's x, y, z
+    ray: np.ndarray  # (n, 3) the coordinate's derivative by the body's x, y, z
     turn: np.ndarray  # (n,) rad
     time: np.ndarray  # (n,) s
 
     @classmethod
-    def of(cls, shown: np.ndarray, body: turning_body.Turner) -> Sights:
-        """shown: (4, T) bool."""
+    def of(cls, shown: np.ndarray, body: TurningBody) -> Coordinates:
+        """Both coordinates of every point and frame in shown (4, T) bool."""
         point, frame = (np.tile(i, 2) for i in np.nonzero(shown))
         axis = np.repeat([0, 1], len(point) // 2)
         turn = body.turn[frame]
@@ -65,10 +70,10 @@ class Sights:
 
 
 class Covariance:
-    """Of two sets of sights, (n, m), torso lengths squared, as a function of the rotations' time constant and size."""
+    """Of n and m coordinates, torsos squared; all but what the rotations' time constant and size change is computed once."""
 
-    def __init__(self, a: Sights, b: Sights, usual: np.ndarray):
-        """usual: (4, 3) torso lengths, the arm's usual pose."""
+    def __init__(self, a: Coordinates, b: Coordinates, usual: np.ndarray):
+        """usual: (4, 3) torsos, the arm's usual pose."""
         same, along = a.point[:, None] == b.point, a.ray @ b.ray.T
         apart = a.turn[:, None] - b.turn
         wave = np.cos(apart)
@@ -77,7 +82,7 @@ class Covariance:
         reach = np.cumsum(LINKS**2)[np.minimum(a.point[:, None], b.point)]
         tilt = np.where(a.axis == 1, TILT[a.point] ** 2, 0)[:, None]
         self.fixed = reach * along + alike * (tilt * wave + BEND**2 * twice + OFFSET**2)
-        self.habit = alike * (HABIT**2)[a.point, None] * (wave + twice + wave * (4 * wave**2 - 3)) / 3
+        self.systematic = alike * (SYSTEMATIC**2)[a.point, None] * (wave + twice + wave * (4 * wave**2 - 3)) / 3
         self.carried = np.zeros_like(along)
         for joint, pivot in enumerate((HIPS, *usual[:3])):
             below = (a.point[:, None] >= joint) & (b.point >= joint)
@@ -87,43 +92,41 @@ class Covariance:
         self.squared_s = (a.time[:, None] - b.time) ** 2
 
     def at(self, length: float, size: float) -> np.ndarray:
-        """Of where the points are, the detector's habits left out."""
+        """length: s; size: rad. Returns (n, m): of the true places, without the detector's systematic error."""
         stir = size**2 * self.carried + (LOOSE**2 + (LOOSE_SHARE * size) ** 2) * self.loose
         return self.fixed + np.exp(-0.5 / length**2 * self.squared_s) * stir
 
 
-def fill_arm(xy, filled, drift, side: str, lost, unsure, body: turning_body.Turner, config) -> None:
-    """xy (T, 133, 2), filled (T, 133) and drift (T, 133) in place.
-
-    lost: (3, T) bool, frames of elbow, wrist and hand to fill; unsure: (3, T) bool, frames not to learn from.
-    """
-    measured, chain = xy.copy(), ARM[side]
-    shown = np.stack([body.shown[:, chain[0]], *~unsure])
+def fill_arm(out: Filled, arm: HiddenArm, detections: Detections, config: HandgapConfig) -> None:
+    """The method `turning`, a `FillArm`."""
+    body, (elbow, wrist, hand), chain = detections.body, arm.lost, ARM[arm.side]
+    measured = out.xy.copy()
+    shown = np.stack([body.shown[:, chain[0]], *~arm.unsure])
     asked = np.zeros_like(shown)
-    for part in range(3):
-        asked[part + 1] = lost[part] & turning_body.within(lost[part], ~unsure[part], body.times, config) & shown[part + 1].any()
+    for part, lost in enumerate((elbow, wrist, hand)):
+        asked[part + 1] = lost & within_reach(lost, ~arm.unsure[part], body.times, config) & shown[part + 1].any()
     if not asked.any():
         return
     place, spread = predict(measured[:, chain] - body.centre[:, None], shown, asked, body)
-    for part, points in enumerate(([chain[1]], [chain[2]], np.arange(133)[HANDS[side]])):
+    for part, points in enumerate(([chain[1]], [chain[2]], np.arange(133)[HANDS[arm.side]])):
         here = asked[part + 1]
         if not here.any():
             continue
         fill = body.centre[here, None] + place[here, part + 1, None]
         if part == 2:  # the other points lie about the palm, and turn with the body
             about = measured[:, points] - measured[:, chain[3], None]
-            fill = fill + turning_body.predict(about, 0, shown[3], here, body)
-        xy[np.ix_(here, points)], filled[np.ix_(here, points)] = fill, True
-        drift[np.ix_(here, points)] = np.sqrt((spread[here, part + 1] ** 2).mean(1))[:, None]
+            fill = fill + predict_about_palm(about, 0, shown[3], here, body)
+        out.xy[np.ix_(here, points)], out.filled[np.ix_(here, points)] = fill, True
+        out.drift[np.ix_(here, points)] = np.sqrt((spread[here, part + 1] ** 2).mean(1))[:, None]
 
 
-def predict(tracks: np.ndarray, shown: np.ndarray, asked: np.ndarray, body: turning_body.Turner) -> tuple[np.ndarray, np.ndarray]:
+def predict(tracks: np.ndarray, shown: np.ndarray, asked: np.ndarray, body: TurningBody) -> tuple[np.ndarray, np.ndarray]:
     """tracks: (T, 4, 2) px of shoulder, elbow, wrist and palm from the body's centre; shown, asked: (4, T) bool.
 
-    Returns places (T, 4, 2) px and their standard deviation, where asked.
+    Returns places (T, 4, 2) px and their standard deviation (T, 4, 2) px; zeros where not asked.
     """
     tracks = tracks / body.torso
-    usual = np.stack([usual_place(tracks[:, i], shown[i], body.turn) for i in range(4)])
+    usual = np.stack([fit_usual_place(tracks[:, i], shown[i], body.turn) for i in range(4)])
     noise = np.array([max(noise_px(tracks[:, i], shown[i]), LEAST_NOISE) for i in range(4)])
     place, spread = np.zeros_like(tracks), np.zeros_like(tracks)
     gaps = [asked]
@@ -131,13 +134,18 @@ def predict(tracks: np.ndarray, shown: np.ndarray, asked: np.ndarray, body: turn
         gaps = [asked & (np.arange(len(tracks)) >= a) & (np.arange(len(tracks)) < b)
                 for a, b in runs(asked.any(0)) if asked[:, a].any()]
     for gap in gaps:
-        answer(tracks, shown & near(gap.any(0), shown.any(0), body.times), gap, usual, noise, body, place, spread)
+        use = pick_frames(gap.any(0), shown.any(0), body.times)
+        _predict_gap(tracks, shown & use, gap, usual, noise, body, place, spread)
     return place * body.torso, spread * body.torso
 
 
-def answer(tracks, shown, asked, usual, noise, body, place, spread) -> None:
-    """Fills place and spread (T, 4, 2), torso lengths, where asked: the processes of the grid, averaged by their likelihood."""
-    told, wanted = Sights.of(shown, body), Sights.of(asked, body)
+def _predict_gap(tracks: np.ndarray, shown: np.ndarray, asked: np.ndarray, usual: np.ndarray, noise: np.ndarray, body: TurningBody,
+                 place: np.ndarray, spread: np.ndarray) -> None:
+    """Writes place and spread (T, 4, 2), in torsos, where asked (4, T): the grid's processes, averaged by their likelihood.
+
+    usual: (4, 3) torsos; noise: (4,) torsos; the rest as for `predict`, in torsos.
+    """
+    told, wanted = Coordinates.of(shown, body), Coordinates.of(asked, body)
     middle = np.where(told.axis == 1, usual[told.point, 1], 0)
     said = tracks[told.frame, told.point, told.axis] - middle
     between, cross = Covariance(told, told, usual), Covariance(wanted, told, usual)
@@ -145,7 +153,7 @@ def answer(tracks, shown, asked, usual, noise, body, place, spread) -> None:
     for length in LENGTHS_S:
         fits = []
         for size in SIZES:
-            total = between.at(length, size) + between.habit
+            total = between.at(length, size) + between.systematic
             total[np.diag_indices_from(total)] += noise[told.point] ** 2
             factor = cholesky(total, lower=True, overwrite_a=True, check_finite=False)
             white = solve_triangular(factor, said, lower=True, check_finite=False)
@@ -169,8 +177,11 @@ def answer(tracks, shown, asked, usual, noise, body, place, spread) -> None:
     spread[at] = np.sqrt(variance)
 
 
-def usual_place(track: np.ndarray, shown: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """track: (T, 2) torso lengths. (3,) in the body's frame, by least squares; at the centre where never shown."""
+def fit_usual_place(track: np.ndarray, shown: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """track: (T, 2) torsos from the body's centre; shown: (T,) bool; turn: (T,) rad.
+
+    Returns (3,) torsos in the body's frame, by least squares; 0 where never shown.
+    """
     if not shown.any():
         return np.zeros(3)
     waves = np.stack([np.cos(turn), np.sin(turn)], 1)[shown]
@@ -178,8 +189,8 @@ def usual_place(track: np.ndarray, shown: np.ndarray, turn: np.ndarray) -> np.nd
     return np.array([x, track[shown, 1].mean(), z])
 
 
-def near(asked: np.ndarray, shown: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """(T,) bool: the frames to learn from."""
+def pick_frames(asked: np.ndarray, shown: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """asked, shown: (T,) bool; times: (T,) s. Returns (T,) bool: the frames to learn from."""
     out = np.zeros(len(times), bool)
     known = np.flatnonzero(shown | asked)
     if len(times) <= MOST_FRAMES:
