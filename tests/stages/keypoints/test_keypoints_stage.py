@@ -1,6 +1,7 @@
 import json
 import os
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,11 +10,11 @@ from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.benchmarks.perception import run_keypoints, run_stage, score_squats, score_truth, video_frames, write_split
-from gsac.stages.contract import BadInput, Job
+from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.keypoints import STAGE
-from gsac.stages.keypoints.config import KeypointsConfig
+from gsac.stages.keypoints.config import MODELS, DetectorName, KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
-from gsac.stages.keypoints.stage import report, run, touches_edge
+from gsac.stages.keypoints.stage import DETECTORS, report, run, touches_edge
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
 SQUATS, TRUTH = FOOTAGE / "squats" / "pose_squats.mp4", FOOTAGE / "truth-a" / "clip.mp4"
@@ -48,9 +49,13 @@ def stage_on(frames: list[np.ndarray], folder: Path, store: Path) -> tuple[dict,
 
 def test_a_wrong_parameter_is_named_with_its_choices():
     with pytest.raises(BadInput, match="keypoints.detector is 'alphapose'; choices: mediapipe, onnx-wholebody"):
-        KeypointsConfig(detector="alphapose").check()
+        make_config(STAGE, {"detector": "alphapose"})
     with pytest.raises(BadInput, match="keypoints.hand_threshold is 1.5"):
         KeypointsConfig(hand_threshold=1.5).check()
+
+
+def test_every_detector_that_can_be_named_has_its_class_and_its_model_files():
+    assert tuple(DETECTORS) == tuple(MODELS) == get_args(DetectorName)
 
 
 def test_a_clip_without_a_person_is_refused(tmp_path, store):
