@@ -1,4 +1,4 @@
-"""What clip.json promises."""
+"""The check of clip.json."""
 
 from __future__ import annotations
 
