@@ -23,7 +23,7 @@ from gsac.avatar.wholebody import INDEX
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.benchmarks.face_drawing import SMALLEST, Head, Look
 from gsac.benchmarks.perception import video_frames
-from gsac.stages.face.landmarks import look
+from gsac.stages.face.landmarks import read_averaged
 from gsac.turntable.clip import Video, develop, make_studio, make_view, place, posed, studio_rng
 from gsac.turntable.motion import make_motion
 from gsac.turntable.options import TurntableOptions
@@ -102,7 +102,7 @@ class Reader:
 
     def _look(self, image: np.ndarray, face: Face) -> np.ndarray:
         """(468, 3) px, NaN where the network does not believe in it."""
-        seen = look(self.mesh, image, face.points, self.mirror)
+        seen = read_averaged(self.mesh, image, face.points, self.mirror)
         return seen.points if seen.presence >= 0.5 else np.full((POINTS, 3), np.nan)
 
     def _find(self, images: list[np.ndarray], scene: Scene, t: int) -> Face | None:
