@@ -147,8 +147,8 @@ def solve(points: np.ndarray, direction: np.ndarray, actions: Actions, sparsity:
     if times is not None and pause > 0:
         brows = [k for k in free if actions.names[k].startswith("brow")]
         near = np.exp(-0.5 * ((times[:, None] - times) / pause) ** 2)
-        looks = near.sum(axis=1, keepdims=True)
-        near *= (1 + FRESH * (looks - 1)) / looks
+        count = near.sum(axis=1, keepdims=True)
+        near *= (1 + FRESH * (count - 1)) / count
         left = seen - rest - np.einsum("te,tec->tc", np.delete(c, brows, 1), np.delete(answer, brows, 1))
         pull = near @ np.einsum("tec,tc->te", answer[:, brows], left) - sparsity
         among = np.ix_(range(T), brows, brows)

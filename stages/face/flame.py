@@ -71,7 +71,7 @@ class FlameHead:
         """
         flame = self.flame
         arm = head - flame.J_regressor[JAW] @ head
-        turned = np.stack([hat(axis) for axis in np.eye(3)])  # what a small turn about each axis does
+        turned = np.stack([hat(axis) for axis in np.eye(3)])  # derivative of the rotation by a small turn about each axis
         jaw = flame.weights[:, JAW, None, None] * np.einsum("xab,vb->vax", turned, arm)
         jaw = jaw + np.einsum("vak,xk->vax", flame.posedirs[:, :, 9 * (JAW - 1): 9 * JAW], turned.reshape(3, 9))
         directions = self.points.on(flame, np.concatenate([flame.exprdirs[:, :, :EXPRESSIONS], jaw], 2)).astype(float)

@@ -53,7 +53,7 @@ def run(job: Job) -> None:
 
 
 def warm(device: str) -> None:
-    """Called while a stage before is at work: importing what reads a body takes longest."""
+    """Called while a stage before is at work: importing the body model's modules takes longest."""
     HeadModel.of_open_body(Actions.load())
 
 

@@ -58,8 +58,8 @@ class HandNetworks:
     def find(self, image: np.ndarray, arms: dict[str, Arm], threshold: float, reach: float) -> dict[str, Hand]:
         """image: (H, W, 3) uint8; arms: by side, `left` and `right`; reach: see `assign`. Returns the hands found, by side."""
         rough = {side: rough_region(arm.wrist, arm.pinky, arm.index) for side, arm in arms.items()}
-        looks = [look for region in rough.values() for look in (self.recrop(image, region), *self.palms(image, region))]
-        seen = [hand for hand in (self.read(image, look) for look in drop_alike(looks)) if hand.presence >= threshold]
+        regions = [each for region in rough.values() for each in (self.recrop(image, region), *self.palms(image, region))]
+        seen = [hand for hand in (self.read(image, each) for each in drop_alike(regions)) if hand.presence >= threshold]
         given = assign(merge(seen), arms, reach)
         for side in rough.keys() - given.keys():
             hand = self.read(image, rough[side].scaled(0.7))

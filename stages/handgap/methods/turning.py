@@ -27,8 +27,7 @@ SIZES = (0.03, 0.06, 0.12, 0.25, 0.5)
 SHARES = (0.4, 1.0, 1.0, 1.0)
 """Factors on it for trunk, shoulder, elbow and wrist."""
 LOOSE, LOOSE_SHARE = 0.01, 0.1
-"""Standard deviation of each point's own motion, torso lengths, and what is added to it a rad of rotation: large rotations are not
-linear."""
+"""Standard deviation of each point's own motion, in torsos, and its growth with the rotations' size: large rotations are not linear."""
 LINKS = np.array((0.45, 0.6, 0.55, 0.25))
 """Prior lengths, in torsos: body's centre to shoulder, upper arm, forearm, palm."""
 TILT, BEND, OFFSET = np.array((0.05, 0.07, 0.1, 0.1)), 0.05, 0.02
@@ -70,7 +69,7 @@ class Coordinates:
 
 
 class Covariance:
-    """Of n and m coordinates, torsos squared; all but what the rotations' time constant and size change is computed once."""
+    """Of n and m coordinates, torsos squared; computed once but for what depends on the rotations' time constant and size."""
 
     def __init__(self, a: Coordinates, b: Coordinates, usual: np.ndarray):
         """usual: (4, 3) torsos, the arm's usual pose."""
@@ -93,8 +92,8 @@ class Covariance:
 
     def at(self, length: float, size: float) -> np.ndarray:
         """length: s; size: rad. Returns (n, m): of the true places, without the detector's systematic error."""
-        stir = size**2 * self.carried + (LOOSE**2 + (LOOSE_SHARE * size) ** 2) * self.loose
-        return self.fixed + np.exp(-0.5 / length**2 * self.squared_s) * stir
+        motion = size**2 * self.carried + (LOOSE**2 + (LOOSE_SHARE * size) ** 2) * self.loose
+        return self.fixed + np.exp(-0.5 / length**2 * self.squared_s) * motion
 
 
 def fill_arm(out: Filled, arm: HiddenArm, detections: Detections, config: HandgapConfig) -> None:
@@ -145,18 +144,18 @@ def _predict_gap(tracks: np.ndarray, shown: np.ndarray, asked: np.ndarray, usual
 
     usual: (4, 3) torsos; noise: (4,) torsos; the rest as for `predict`, in torsos.
     """
-    told, wanted = Coordinates.of(shown, body), Coordinates.of(asked, body)
-    middle = np.where(told.axis == 1, usual[told.point, 1], 0)
-    said = tracks[told.frame, told.point, told.axis] - middle
-    between, cross = Covariance(told, told, usual), Covariance(wanted, told, usual)
+    given, wanted = Coordinates.of(shown, body), Coordinates.of(asked, body)
+    middle = np.where(given.axis == 1, usual[given.point, 1], 0)
+    values = tracks[given.frame, given.point, given.axis] - middle
+    between, cross = Covariance(given, given, usual), Covariance(wanted, given, usual)
     tried = []
     for length in LENGTHS_S:
         fits = []
         for size in SIZES:
             total = between.at(length, size) + between.systematic
-            total[np.diag_indices_from(total)] += noise[told.point] ** 2
+            total[np.diag_indices_from(total)] += noise[given.point] ** 2
             factor = cholesky(total, lower=True, overwrite_a=True, check_finite=False)
-            white = solve_triangular(factor, said, lower=True, check_finite=False)
+            white = solve_triangular(factor, values, lower=True, check_finite=False)
             fits.append((-0.5 * white @ white - np.log(np.diag(factor)).sum(), length, size, factor, white))
             if fits[-1][0] < max(fit[0] for fit in fits) - LIKELY:
                 break  # larger ones are less likely still
