@@ -1,13 +1,14 @@
-"""Artifact files: the one place that knows their names, arrays and shapes.
+"""Artifact files: the one place that knows their names, arrays and shapes; docs/artifacts.md gives units and meanings.
 
 Readers return plain arrays; writers are byte-deterministic; checks raise `ArtifactError` and import nothing heavy.
-T kept frames, J = 55 joints, E expression size, N gaussians.
+A letter in a shape is one length throughout a file: T kept frames, B betas, E expression size, N gaussians or vertices, F faces.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,17 +33,23 @@ class Clip:
     focal_px: float | None
     """From the file's metadata, else None."""
     source_sha256: str
-    source_name: str = ""
-    plate: bool = False
-    """Whether `frames/plate.png`-like empty scene came with the photos (written as `plate.png` beside `frames`)."""
+    """Of the video file, or of the photos in order."""
     notes: list[str] = field(default_factory=list)
+    """What was changed on the way, for people: `transparency composited over black`."""
 
     def write(self, path: Path) -> None:
         path.write_text(json.dumps(asdict(self), indent=1, sort_keys=True) + "\n")
 
     @classmethod
     def read(cls, path: Path) -> Clip:
-        return cls(**json.loads(Path(path).read_text()))
+        """Raises ArtifactError that names the field which is missing."""
+        values = _read_json(path)
+        if not isinstance(values, dict):
+            raise ArtifactError(f"{path}: expected a JSON object, not a {type(values).__name__}")
+        for each in fields(cls):
+            if each.name not in values and each.default_factory is MISSING:
+                raise ArtifactError(f"{path}: field {each.name} is missing (has {', '.join(sorted(values))})")
+        return cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
 
 
 def frame_paths(frames: Path) -> list[Path]:
@@ -87,7 +94,7 @@ def write_alpha(path: Path, alpha: np.ndarray) -> None:
 
 
 def write_arrays(path: Path, **arrays: np.ndarray) -> None:
-    """Compressed npz, no pickle, byte-deterministic."""
+    """Compressed npz, no pickle, byte-deterministic. arrays: (...) of any shape, by name."""
     import numpy as np
 
     with open(path, "wb") as f:
@@ -95,7 +102,7 @@ def write_arrays(path: Path, **arrays: np.ndarray) -> None:
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """All arrays of an npz; objects are refused."""
+    """All arrays (...) of an npz by name, unchecked; objects are refused."""
     import zipfile
     import zlib
 
@@ -108,12 +115,19 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise ArtifactError(f"{path}: not a readable npz ({e})") from e
 
 
-def check_arrays(path: Path, shapes: dict[str, tuple]) -> dict[str, np.ndarray]:
-    """Reads an npz and asserts names and shapes.
+Shapes = Mapping[str, tuple[int | str, ...]]
+"""Array -> its shape; a letter stands for one length, the same wherever it appears in the file."""
 
-    shapes: name -> tuple of int or letter; a letter stands for one length, the same wherever it appears in the file.
+
+def check_arrays(path: Path, shapes: Shapes, *groups: Shapes) -> dict[str, np.ndarray]:
+    """Reads an npz and checks names and shapes. Returns its arrays (...) by name, those that nobody asked for among them.
+
+    groups: arrays of which a file has all or none.
     """
     arrays = read_arrays(path)
+    shapes = dict(shapes)
+    for group in groups:
+        shapes |= group if group.keys() & arrays.keys() else {}
     sizes: dict[str, int] = {}
     for name, shape in shapes.items():
         if name not in arrays:
@@ -132,63 +146,63 @@ def _finite(array: np.ndarray) -> bool:
     return array.dtype.kind != "f" or bool(np.isfinite(array).all())
 
 
-KEYPOINT_SHAPES = {"xy": ("T", 133, 2), "score": ("T", 133), "world": ("T", 133, 3), "detector": ()}
-FILLED_SHAPES = KEYPOINT_SHAPES | {"missing": ("T", 2), "filled": ("T", 133), "sigma": ("T", 133)}
-FACE_SHAPES = {"valid": ("T",), "expression": ("T", "E"), "jaw": ("T", 3), "shape": ("S",), "landmarks": ("T", "L", 3)}
-HEAD_SHAPES = {"head_template": ("N", 3), "head_vertices": ("N", 3), "head_faces": ("F", 3), "head_eyes": (2, 3)}
-"""What face.npz holds besides where a face was seen: the person's resting head, m."""
-FLAME_SHAPES = {"flame_expression": ("T", "X"), "flame_jaw": ("T", 3), "valid": ("T",)}
-"""And where a FLAME file was given: how FLAME's face moves."""
-BODY_SHAPES = {
+POINT_SHAPES: Shapes = {"xy": ("T", 133, 2), "score": ("T", 133), "world": ("T", 133, 3), "detector": ()}
+KEYPOINT_SHAPES: Shapes = {**POINT_SHAPES, "pose33": ("T", 33, 3), "face_mesh": ("T", 468, 3)}
+FILLED_SHAPES: Shapes = {**POINT_SHAPES, "missing": ("T", 2), "filled": ("T", 133), "sigma": ("T", 133)}
+FACE_SHAPES: Shapes = {"valid": ("T",), "expression": ("T", "E"), "jaw": ("T", 3), "shape": ("S",), "landmarks": ("T", "L", 3)}
+HEAD_SHAPES: Shapes = {"head_template": ("N", 3), "head_vertices": ("N", 3), "head_faces": ("F", 3), "head_eyes": (2, 3)}
+"""Of face.npz where a face was seen: the person's resting head."""
+FLAME_SHAPES: Shapes = {"flame_expression": ("T", "X"), "flame_jaw": ("T", 3)}
+"""Of face.npz where a FLAME file was given: how FLAME's face moves."""
+BODY_SHAPES: Shapes = {
     "betas": ("B",), "expression": ("T", "E"), "global_orient": ("T", 3), "body_pose": ("T", 63),
     "left_hand_pose": ("T", 45), "right_hand_pose": ("T", 45), "jaw_pose": ("T", 3), "leye_pose": ("T", 3),
     "reye_pose": ("T", 3), "transl": ("T", 3), "joint_offset": (55, 3), "joints": ("T", 55, 3), "focal": (2,),
     "center": (2,), "sigma_joints": ("T", 55), "model": (),
 }
-LIGHT_SHAPE = {"light": (4, 3)}
-AVATAR_SHAPES = {"face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": ("N", 3), "rgb": ("N", 3), "opacity": ("N",)}
-LEVEL_SHAPES = {"levels": ("L",), **{f"coarser_{name}": ("M", *shape[1:]) for name, shape in AVATAR_SHAPES.items()}}
-"""Of avatar.npz where it has coarser levels of detail: how many gaussians each has, then those of all of them, level by level."""
+LIGHT_SHAPE: Shapes = {"light": (4, 3)}
+AVATAR_SHAPES: Shapes = {
+    "face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": ("N", 3), "rgb": ("N", 3), "opacity": ("N",),
+}
+LEVEL_SHAPES: Shapes = {"levels": ("L",), **{f"coarser_{name}": ("M", *shape[1:]) for name, shape in AVATAR_SHAPES.items()}}
+"""Of avatar.npz where it has coarser levels of detail: the gaussians in each, then their arrays, joined level by level."""
 
 
-def check_keypoints(path: Path) -> None:
+def check_keypoints(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of `keypoints/keypoints.npz` by name: `KEYPOINT_SHAPES`, as xy (T, 133, 2)."""
     arrays = check_arrays(path, KEYPOINT_SHAPES)
     score = arrays["score"]
     if not (_finite(score) and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
         raise ArtifactError(f"{path}: score must lie in 0..1")
+    return arrays
 
 
-def check_filled_keypoints(path: Path) -> None:
-    check_arrays(path, FILLED_SHAPES)
+def check_filled_keypoints(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of `handgap/keypoints.npz` by name: `FILLED_SHAPES`, as xy (T, 133, 2)."""
+    return check_arrays(path, FILLED_SHAPES)
 
 
-def check_face(path: Path) -> None:
-    arrays = check_arrays(path, FACE_SHAPES)
-    if "head_vertices" in arrays:
-        check_arrays(path, HEAD_SHAPES)
-    if "flame_expression" in arrays:
-        check_arrays(path, FLAME_SHAPES)
+def check_face(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of face.npz by name: `FACE_SHAPES`, as valid (T,); all of `HEAD_SHAPES` and of `FLAME_SHAPES`, or none."""
+    return check_arrays(path, FACE_SHAPES, HEAD_SHAPES, FLAME_SHAPES)
 
 
-def check_body(path: Path) -> None:
+def check_body(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3)."""
     arrays = check_arrays(path, BODY_SHAPES)
     for name, a in arrays.items():
         if not _finite(a):
             raise ArtifactError(f"{path}: array {name} is not finite")
+    return arrays
 
 
 def check_avatar(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of avatar.npz; `light` and coarser levels may be among them."""
-    arrays = check_arrays(path, AVATAR_SHAPES)
-    shapes = dict(AVATAR_SHAPES)
-    for more in (LIGHT_SHAPE, LEVEL_SHAPES):
-        if next(iter(more)) in arrays:
-            check_arrays(path, more)
-            shapes |= more
-    for name in shapes:
-        if not _finite(arrays[name]):
+    """The arrays of avatar.npz by name: `AVATAR_SHAPES`, as mu (N, 3); light (4, 3) or not; all of `LEVEL_SHAPES` or none."""
+    arrays = check_arrays(path, AVATAR_SHAPES, LIGHT_SHAPE, LEVEL_SHAPES)
+    for name in {**AVATAR_SHAPES, **LIGHT_SHAPE, **LEVEL_SHAPES}:
+        if name in arrays and not _finite(arrays[name]):
             raise ArtifactError(f"{path}: array {name} is not finite")
-    if "levels" in shapes:
+    if "levels" in arrays:
         counts = [len(arrays["face"]), *arrays["levels"].tolist()]
         if sum(counts[1:]) != len(arrays["coarser_face"]) or any(b >= a or b < 1 for a, b in zip(counts, counts[1:], strict=False)):
             raise ArtifactError(f"{path}: array levels is {counts[1:]}; each level must have fewer gaussians than the one before "
@@ -197,8 +211,12 @@ def check_avatar(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_json(path: Path) -> None:
+    _read_json(path)
+
+
+def _read_json(path: Path) -> object:
     try:
-        json.loads(Path(path).read_text())
+        return json.loads(Path(path).read_text())
     except (OSError, ValueError) as e:
         raise ArtifactError(f"{path}: not readable JSON ({e})") from e
 

@@ -73,16 +73,11 @@ BROUGHT = ("lpips-vgg", "lpips-alex")
 """Networks that `train` judges by where the user has brought their weights (`avatar.lpips`); nothing needs them."""
 
 
-def store_path(name: str, store_root: Path) -> Path:
-    """Where the file of this name lies in a store, present or not."""
-    return Path(store_root) / "models" / MODELS[name].sha256 / name
-
-
 def model_path(name: str, store_root: Path) -> Path:
     """The file of this name. An unknown name raises `KeyError`, an absent file `ModelMissingError`."""
     if name not in MODELS:
         raise KeyError(f"unknown model file {name}; known: {', '.join(sorted(MODELS))}")
-    path = store_path(name, store_root)
+    path = Path(store_root) / "models" / MODELS[name].sha256 / name
     if not path.is_file():
         raise ModelMissingError(f"model file {name} is missing in {store_root}; run `gsac models pull`")
     return path

@@ -40,14 +40,14 @@ def video_frames(path: Path) -> Iterator[np.ndarray]:
         yield np.frombuffer(data, np.uint8).reshape(height, width, 3)
 
 
-def write_split(frames: Iterator[np.ndarray], folder: Path, name: str) -> dict[str, Path]:
+def write_split(frames: Iterator[np.ndarray], folder: Path) -> dict[str, Path]:
     """Writes frames and clip.json as `split` does. frames: (H, W, 3) uint8 RGB each. Returns port -> path."""
     (folder / "frames").mkdir(parents=True)
     n = 0
     for n, image in enumerate(frames, 1):
         write_frame(folder / "frames" / f"{n - 1:06d}.png", image)
     clip = Clip(fps=5.0, timestamps_s=[t / 5 for t in range(n)], width=image.shape[1], height=image.shape[0],
-                focal_px=None, source_sha256="", source_name=name)
+                focal_px=None, source_sha256="")
     clip.write(folder / "clip.json")
     return {"split/frames": folder / "frames", "split/clip.json": folder / "clip.json"}
 
@@ -69,12 +69,12 @@ def run_stage(stage: Stage, run: Callable[[Job], None], inputs: dict[str, Path],
     return {"warnings": warnings, "cpu_ms_a_frame": round(cpu * 1e3, 1), "wall_ms_a_frame": round(wall * 1e3, 1)}
 
 
-def run_keypoints(frames: Iterator[np.ndarray], name: str, folder: Path, store: Path) -> tuple[dict, dict, dict]:
+def run_keypoints(frames: Iterator[np.ndarray], folder: Path, store: Path) -> tuple[dict, dict, dict]:
     """Runs `keypoints` on frames (H, W, 3) uint8 RGB. Returns arrays of keypoints.npz, what `run_stage` gives, and all ports."""
     from gsac.stages.keypoints import STAGE
     from gsac.stages.keypoints.stage import run
 
-    ports = write_split(frames, folder / "split", name)
+    ports = write_split(frames, folder / "split")
     notes = run_stage(STAGE, run, ports, folder / "keypoints", store)
     ports["keypoints/keypoints.npz"] = folder / "keypoints" / "keypoints.npz"
     return read_arrays(ports["keypoints/keypoints.npz"]), notes, ports
@@ -191,7 +191,7 @@ def main() -> None:
     }
     for name, (frames, score) in clips.items():
         with tempfile.TemporaryDirectory() as folder:
-            arrays, notes, ports = run_keypoints(frames, name, Path(folder), arguments.store)
+            arrays, notes, ports = run_keypoints(frames, Path(folder), arguments.store)
             print(json.dumps({"clip": name, **score(arrays), **notes}))
             face, notes = run_face(ports, Path(folder), arguments.store)
             fit = score_expression(face, truth) if name == "truth-a" else {"face_valid": int(face["valid"].sum())}

@@ -1,7 +1,7 @@
 """The code that a stage's result depends on: every first-party module reachable from it by imports in the source.
 
 Nothing is imported to find out. Imports inside functions count, and so do the `__init__` of every package on the way,
-strings that are the full name of a first-party module (`"gsac.stages.handgap.gp"` in a table of methods), and files
+strings that are the full name of a first-party module (`"gsac.stages.handgap.methods.gp"` in a table of methods), and files
 beside or below a module that it names by a string or by a path of strings: a CUDA kernel, a page template, an `.npz`
 table. Files that do not ship with the package are declared by the stage as model files. Imports whose names are put
 together at run time are not seen: `extra` names them.

@@ -1,26 +1,31 @@
-"""Which body model a stage works with: the embedded open one, or an official file that the user brought.
+"""Loads the body model that a stage works with: the embedded open one, or an official file that the user brought.
 
-Light, so that configurations can ask it too. `smplx`, `train` and `export` have a parameter `body_model` each, because each is
-replayed alone; a body that was fitted with another model is refused.
+Imports nothing heavy, so that configurations can use it too. `smplx`, `train` and `export` have a parameter `body_model` each,
+because each can be replayed alone; a body that was fitted with another model is refused.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from gsac.stages.contract import BadInput, Job
+
+if TYPE_CHECKING:
+    from gsac.avatar.body import Body
 
 OPEN = "open"
 
 
-def brought(body_model: str) -> tuple[str, ...]:
+def brought_files(body_model: str) -> tuple[str, ...]:
     """Names of the model files that a parameter `body_model` needs."""
     return () if body_model == OPEN else (body_model,)
 
 
-def load_body(job: Job, stage: str, fitted: str | None = None):
-    """The `avatar.body.Body` of `job.config.body_model`.
+def load_body(job: Job, stage: str, fitted: str | None = None) -> Body:
+    """The body of `job.config.body_model`.
 
-    fitted: digest of the model that body.npz was fitted with, where there is one. Raises BadInput where they differ, or where
-    the file is not a body model.
+    stage: its name, for messages; fitted: digest of the model that body.npz was fitted with, where there is one. Raises BadInput
+    where the digests differ, or where the file is not a body model.
     """
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.body import Body

@@ -1,9 +1,9 @@
-"""What a stage declares and what it is handed.
+"""The contract of a stage: what it declares, what it is handed, and how it fails.
 
-A stage folder holds `__init__.py` with one `STAGE = Stage(...)` (light: no heavy import) and `stage.py` with one
-`run(job: Job) -> None`. The engine reads `STAGE`, builds the key, and calls `run` with read-only inputs and a private
-output folder. A stage never imports another stage, the engine or the cache. `stage.py` may hold `warm(device: str) -> None` too:
-what can be made ready before the inputs are there; it is called in the process that will run, and whether it was must not matter.
+A stage folder holds `__init__.py` with one `STAGE = Stage(...)` and no heavy import, and `stage.py` with one
+`run(job: Job) -> None`. The engine reads `STAGE`, builds the cache key, and calls `run` with read-only inputs and a private
+output folder. A stage never imports another stage, the engine or the cache. `stage.py` may also hold `warm(device: str) -> None`,
+which prepares what does not depend on the inputs; it is called in the process that will run, and results must not depend on it.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ class Output:
 
     path: str
     """Relative path, e.g. `keypoints.npz` or `frames`."""
-    check: Callable[[Path], None]
+    check: Callable[[Path], object]
     """Raises `avatar.artifacts.ArtifactError` when the file or folder is not what the port promises."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """The declaration of one step; `dvc.yaml` says the same and a test holds the two together."""
+    """The declaration of one step; `dvc.yaml` declares the same, and a test compares the two."""
 
     name: str
     inputs: tuple[str, ...]
-    """Ports it reads, `<stage>/<output path>`; the source clip is the port `clip`."""
+    """Ports that it reads, `<stage>/<output path>`; the source clip is the port `clip`."""
     outputs: tuple[Output, ...]
     config: type
     """Dataclass; its fields are the parameters `<stage>.<field>`, its defaults are params.yaml's."""
@@ -41,16 +41,16 @@ class Stage:
     models: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
     wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()
-    """Names of model files that are used where the user has brought them; then they are part of the key as well."""
+    """Names of model files that are used if the user has brought them; then their digests are part of the key too."""
     uses_device: bool = False
     """Whether the device class (cpu, cuda) is part of the key."""
     code: tuple[str, ...] = ()
-    """Extra first-party modules in the code closure that static imports do not show."""
+    """First-party modules that its result depends on beside those found from its imports."""
 
 
 @dataclass
 class Job:
-    """What `run` is handed."""
+    """All that `run` is handed."""
 
     inputs: dict[str, Path]
     """Port -> read-only file or folder."""
@@ -61,17 +61,17 @@ class Job:
     models: dict[str, Path] = field(default_factory=dict)
     """Model name -> file; a wish that the user has not brought is not among them."""
     scratch: Path | None = None
-    """A folder that outlives a run that was killed or stopped, for the next run of the very same key; the stage makes it when it
-    has something to keep there. None: nothing outlives."""
+    """Folder that is kept when a run is killed or stopped, for the next run of the same key; the stage makes it when it has
+    something to keep. None: nothing is kept."""
     device: str = "cpu"
     progress: Callable[[int, int, str], None] = lambda done, total, what: None
-    """Called as work goes on: done, total, unit (`frames`, `steps`)."""
+    """Reports progress: done, total, unit (`frames`, `steps`)."""
     warn: Callable[[str], None] = lambda message: None
-    """A sentence for the user that names the frame, file or parameter; kept in the action record and the report."""
+    """Warns the user: a sentence that names the frame, file or parameter; kept in the cache record and the report."""
 
 
 class StageError(Exception):
-    """A stage cannot give a right result. The message names what, where and what to do (exit code 1)."""
+    """A stage cannot give a right result. The message says what failed, where, and what to do (exit code 1)."""
 
 
 class BadInput(StageError):  # noqa: N818, reads as what the user did
@@ -79,7 +79,7 @@ class BadInput(StageError):  # noqa: N818, reads as what the user did
 
 
 def make_config(stage: Stage, values: dict[str, Any]) -> Any:
-    """Config instance from parameter values; unknown names and wrong types raise `BadInput` that names them."""
+    """The stage's config from parameter values; raises `BadInput` that names an unknown parameter or a wrong value."""
     known = typing.get_type_hints(stage.config)
     for name in values:
         if name not in known:
@@ -101,8 +101,12 @@ def did_you_mean(word: str, known: Iterable[str], before: str = "") -> str:
 
 
 def _typed(name: str, value: Any, hint: Any) -> Any:
-    """The value as the field's type; 1 becomes 1.0 for a float, and YAML 1.1's text `4e-4` a number."""
+    """The value as the field's type, or one of its `Literal`'s; 1 becomes 1.0 for a float, YAML 1.1's text `4e-4` a number."""
     kinds = typing.get_args(hint) or (hint,)
+    if typing.get_origin(hint) is typing.Literal:
+        if value not in kinds:
+            raise BadInput(f"{name} is {value!r}; choices: {', '.join(map(str, kinds))}")
+        return value
     if float in kinds and isinstance(value, (int, str)) and not isinstance(value, bool):
         try:
             value = float(value)

@@ -1,15 +1,15 @@
-"""How warnings name frames."""
+"""Names frames in warnings."""
 
 from __future__ import annotations
 
 import numpy as np
 
 MOST = 8
-"""Runs of frames that are named before a list is cut."""
+"""Most runs of frames that are named."""
 
 
 def name_frames(mask: np.ndarray) -> str:
-    """mask: (T,) bool. `frame 3`, or `12 of 60 frames (0-3, 17, 40-46)`."""
+    """mask: (T,) bool. Returns `frame 3`, or `12 of 60 frames (0-3, 17, 40-46)`."""
     index = np.flatnonzero(mask)
     if len(index) == 1:
         return f"frame {index[0]}"

@@ -25,8 +25,8 @@ from gsac.avatar.artifacts import write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.facemesh import POINTS, Face
 from gsac.benchmarks.face.people import find_mirror, read_people
-from gsac.stages.face.actions import TABLE, spread_of, turns, view_terms
-from gsac.stages.face.head import AXES, similarity
+from gsac.stages.face.actions import TABLE, prior_sigma, view_terms, yaw_terms
+from gsac.stages.face.head import AXES, fit_similarity
 from gsac.stages.face.landmarks import align
 from gsac.stages.smplx.paper.head import find_closest, find_incident_faces, select_head
 
@@ -76,7 +76,7 @@ def fit_model(looks: Looks, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     Returns `rest` (1404,), `view` (10, 1404), `response` (3, E, 1404), `own` (P, 1404) of P people, and residuals `left` (N, 1404).
     """
     N, E, people = len(looks.points), len(names), looks.person.max() + 1
-    acts = (turns(looks.direction)[:, :, None] * looks.expression[:, None]).reshape(N, -1)
+    acts = (yaw_terms(looks.direction)[:, :, None] * looks.expression[:, None]).reshape(N, -1)
     design = np.hstack([np.ones((N, 1)), view_terms(looks.direction), np.eye(people)[looks.person], acts])
     pull = np.repeat([1e-6, PULL_VIEW, PULL_PERSON, PULL_FRONT, PULL_TURNED], [1, 10, people, E, 2 * E])
     found = np.linalg.solve(design.T @ design + np.diag(pull), design.T @ looks.points)
@@ -92,7 +92,7 @@ def find_channels(fit: dict[str, np.ndarray], looks: Looks, names: tuple[str, ..
     """
     people = looks.person.max() + 1
     # refit each person's rest and its change with yaw, now that the actions are known: neither counts as wavering
-    rest, terms = fit["left"] + fit["own"][looks.person], turns(looks.direction)
+    rest, terms = fit["left"] + fit["own"][looks.person], yaw_terms(looks.direction)
     own, left, spent = np.empty((people, 3, rest.shape[1])), np.empty_like(rest), 0.0
     for k in range(people):
         mine = looks.person == k
@@ -105,7 +105,7 @@ def find_channels(fit: dict[str, np.ndarray], looks: Looks, names: tuple[str, ..
     covariance = (1 - OWN_WAVERING) * covariance + np.diag(OWN_WAVERING * wavering + LEAST_WAVERING**2)
     lower = np.linalg.cholesky(covariance)
     loud = solve_triangular(lower, fit["response"].reshape(-1, len(lower)).T, lower=True).T
-    loud = loud.reshape(3, len(names), -1) * spread_of(names)[:, None]
+    loud = loud.reshape(3, len(names), -1) * prior_sigma(names)[:, None]
     _, _, ways = np.linalg.svd(loud.reshape(-1, len(lower)), full_matrices=False)
     channels = solve_triangular(lower, ways[:CHANNELS].T, lower=True, trans="T").T.astype(np.float16).astype(float)
     told = (own - own.mean(0)) @ channels.T  # (people, 3, C)
@@ -142,7 +142,7 @@ def start_neutral(people: list[dict[str, np.ndarray]], places: np.ndarray, mirro
     faces, moved = person["landmarks"][seen].astype(float), person["expression"][seen].sum(1)
     calm = np.argmin([abs(Face(points, 1.0).yaw) + 0.1 * much for points, much in zip(faces, moved, strict=True)])
     points = faces[calm] * [1, -1, -1]
-    turn, size, shift = similarity(points, places)
+    turn, size, shift = fit_similarity(points, places)
     points = size * points @ turn.T
     points = (points + points[mirror] * [-1, 1, 1]) / 2
     return points - points[168]

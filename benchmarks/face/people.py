@@ -23,7 +23,7 @@ from gsac.avatar.wholebody import INDEX
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.benchmarks.face.drawing import SMALLEST, Head, Portrait
 from gsac.benchmarks.perception import video_frames
-from gsac.stages.face.landmarks import look
+from gsac.stages.face.landmarks import read_averaged
 from gsac.turntable.clip import FEET, VideoWriter, develop, make_studio, make_view, place_person, pose_person, studio_rng
 from gsac.turntable.motion import make_motion
 from gsac.turntable.options import TurntableOptions
@@ -106,7 +106,7 @@ class Reader:
 
     def _look(self, image: np.ndarray, face: Face) -> np.ndarray:
         """Landmarks (468, 3) px, NaN where the network finds no face. image: (H, W, 3) uint8."""
-        seen = look(self.mesh, image, face.points, self.mirror)
+        seen = read_averaged(self.mesh, image, face.points, self.mirror)
         return seen.points if seen.presence >= 0.5 else np.full((POINTS, 3), np.nan)
 
     def _find(self, images: list[np.ndarray], scene: Scene, t: int) -> Face | None:

@@ -10,9 +10,9 @@ import numpy as np
 
 from gsac.avatar.wholebody import ARM, HANDS, PALM
 from gsac.benchmarks.handgap.clips import HandClip
-from gsac.stages.handgap.config import METHODS, HandgapConfig
-from gsac.stages.handgap.fill import fill_gaps
-from gsac.stages.handgap.missing_hands import SIDES, Found, find_missing
+from gsac.stages.handgap.config import HandgapConfig
+from gsac.stages.handgap.fill import METHODS, fill_gaps
+from gsac.stages.handgap.missing_hands import SIDES, MissingHands, find_missing
 from gsac.stages.handgap.sigma import detection_sigma, person_height
 
 GAPS = (2, 4, 8, 16, 24, 32, 40)
@@ -57,7 +57,7 @@ def fill_window(clip: HandClip, window: Window, method: str) -> tuple[np.ndarray
         gone = [*range(133)[HANDS[side]], *ARM[side][1 if window.lost == "arm" else 2:3]]
         xy[inside, gone] = score[inside, gone] = 0
     world = np.where(score[..., None] > 0, clip.world, np.nan)
-    out, _, drift = fill_gaps(xy, score, world, Found(hand, wrist, elbow, found.misplaced), clip.times, config)
+    out, _, drift = fill_gaps(xy, score, world, MissingHands(hand, wrist, elbow, found.misplaced), clip.times, config)
     full = detection_sigma(np.ones_like(score), person_height(xy, score))
     return out, np.hypot(full, drift)
 

@@ -8,7 +8,7 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.stages.export.animations import add_motion
-from gsac.stages.export.stage import rigged
+from gsac.stages.export.stage import rig_avatar
 
 SEED = 1
 WRIST = 20
@@ -29,6 +29,6 @@ def make_avatar(count: int) -> RiggedAvatar:
     rgb = np.where(centre[:, :1] > joints[WRIST, 0], (.9, .05, .05), rgb)
     gaussians.rgb = np.clip(rgb + rng.normal(size=(count, 3)) * .03, 0, 1).astype(np.float32)
     gaussians.opacity = rng.uniform(.5, 1, count).astype(np.float32)
-    avatar = rigged(body, params, gaussians)
+    avatar = rig_avatar(body, params, gaussians)
     add_motion(avatar, ("walk", "wave"))
     return avatar

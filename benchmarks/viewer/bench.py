@@ -69,13 +69,13 @@ def prepare(options: argparse.Namespace) -> RiggedAvatar:
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.benchmarks.viewer.avatar import make_avatar
     from gsac.stages.export.ply import ply_bytes
-    from gsac.stages.export.stage import posed_gaussians
+    from gsac.stages.export.stage import pose_gaussians
     from gsac.viewer.page import page_bytes
 
     avatar = make_avatar(options.gaussians) if options.avatar is None else RiggedAvatar.read(options.avatar)
     if "walk" not in avatar.clips:
         raise BadInput(f"{options.avatar}: it carries no clip walk; export it with export.animations=walk")
-    splats = posed_gaussians(avatar, avatar.pose("A"))
+    splats = pose_gaussians(avatar, avatar.pose("A"))
     (options.out / "viewer.html").write_bytes(page_bytes(avatar.to_bytes()))
     (options.out / "avatar.ply").write_bytes(ply_bytes(*splats, avatar.gaussians["rgb"], avatar.gaussians["opacity"]))
     shutil.copy(PAGE, options.out)

@@ -2,11 +2,11 @@
 
 takes  split/clip.json, train/avatar.npz, train/body.npz
 gives  avatar.gsac: everything in one container (docs/gsac-format.md)
-       avatar.ply: standard 3DGS, posed, metres, 3DGS axes
-       avatar.spz: the same, packed
+       avatar.ply: the gaussians in one pose as a standard 3DGS file
+       avatar.spz: the same, compressed
        avatar.glb: skinned animated mesh, and the gaussians with KHR_gaussian_splatting
        avatar.fbx: skinned animated mesh with expressions, without gaussians
-       viewer.html: one page that opens from disk
+       viewer.html: a page that opens from disk
        unity: the Unity package with this person, as a folder, a tarball and a .unitypackage
 """
 

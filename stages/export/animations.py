@@ -1,15 +1,18 @@
-"""Poses and clips that every avatar carries: T-pose, A-pose, a wave, a walk on the spot.
+"""Poses and animations that an avatar carries: T-pose, A-pose, a wave, a walk on the spot.
 
-Authored here as axis-angle keys, radians, in SMPL-X's canonical axes: +x bends the spine and the knees forward-down
-and swings a leg back; the left arm lies along +x, so -z lowers it and +z lowers the right one.
+Keys are axis-angle, rad, in SMPL-X's canonical axes: +x bends the spine forward and the knees, and swings a leg back; the left arm
+lies along +x, so -z lowers it and +z lowers the right one.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.rigged import Clip, RiggedAvatar
+from gsac.stages.export.config import Animation
 
 FPS = 20.0
 WAVE_S = 3.2
@@ -19,7 +22,7 @@ FINGERS = ("index", "middle", "ring", "pinky")
 
 
 def still_poses() -> dict[str, dict[str, list[float]]]:
-    """`T`: zero rotation; `A`: arms 50 degrees down, fingers a little bent."""
+    """Pose -> joint -> axis-angle, rad. `T`: zero rotation; `A`: arms 50 degrees down, fingers slightly bent."""
     a = {"left_shoulder": [0.0, 0.0, -0.87], "right_shoulder": [0.0, 0.0, 0.87]}
     for finger in FINGERS:
         for k in (1, 2, 3):
@@ -29,20 +32,20 @@ def still_poses() -> dict[str, dict[str, list[float]]]:
 
 
 def add_motion(avatar: RiggedAvatar, names: tuple[str, ...]) -> None:
-    """Gives the avatar its still poses and the named clips, with joints that it has."""
+    """Gives the avatar the still poses and the named animations, restricted to the joints that it has."""
     avatar.poses = {name: {j: r for j, r in pose.items() if j in avatar.joint_names}
                     for name, pose in still_poses().items()}
     avatar.clips = {name: CLIPS[name](avatar) for name in names}
 
 
 def wave(avatar: RiggedAvatar) -> Clip:
-    """The right hand greets; the rest breathes and leans a little."""
+    """The right hand waves; the body breathes and leans slightly."""
     t = np.arange(round(WAVE_S * FPS)) / (WAVE_S * FPS)
     turn = 2 * np.pi * t
     swing = np.sin(4 * turn)
     breath = np.sin(turn)
-    raised = -1.45 + 0.05 * breath  # the upper arm's twist, half of it at either end: skin tears where all of it is in one joint
-    tracks = _relaxed(t)
+    raised = -1.45 + 0.05 * breath  # the upper arm's twist, split between both ends: all of it in one joint would tear the skin
+    tracks = _hang_arms(t)
     tracks |= {
         "spine1": _about(t, x=0.02 + 0.01 * breath, z=0.02 * np.sin(turn + 0.5)),
         "spine2": _about(t, x=0.015 * breath, y=0.03 * np.sin(turn)),
@@ -57,13 +60,13 @@ def wave(avatar: RiggedAvatar) -> Clip:
         tracks[f"right_{finger}1"] = _about(t, y=spread, z=0.06)
         for k in (2, 3):
             tracks[f"right_{finger}{k}"] = _about(t, z=0.08)
-    return _grounded(avatar, tracks)
+    return _ground(avatar, tracks)
 
 
 def walk(avatar: RiggedAvatar) -> Clip:
-    """One double step on the spot; the pelvis rides so that the lower foot stays on the floor."""
+    """One double step on the spot; the pelvis rises and sinks so that the lower foot stays on the floor."""
     t = np.arange(round(WALK_S * FPS)) / round(WALK_S * FPS)
-    tracks = _relaxed(t)
+    tracks = _hang_arms(t)
     turn = 2 * np.pi * t
     for side, phase, out in (("left", 0.0, 1.0), ("right", 0.5, -1.0)):
         p = (t + phase) % 1
@@ -83,13 +86,13 @@ def walk(avatar: RiggedAvatar) -> Clip:
         "neck": _about(t, y=-0.04 * np.cos(turn)),
         "head": _about(t, x=-0.03, y=-0.04 * np.cos(turn)),
     }
-    return _grounded(avatar, tracks)
+    return _ground(avatar, tracks)
 
 
-CLIPS = {"wave": wave, "walk": walk}
+CLIPS: dict[Animation, Callable[[RiggedAvatar], Clip]] = {"wave": wave, "walk": walk}
 
 HIP = ((0.0, 0.40), (0.12, 0.32), (0.3, 0.02), (0.5, -0.26), (0.58, -0.16), (0.72, 0.28), (0.86, 0.47))
-"""Angle in rad over the cycle, 0 = this heel strikes; the leg forward is positive."""
+"""(time in the cycle, angle in rad); at 0 this heel strikes; a leg forward is positive."""
 KNEE = ((0.0, 0.05), (0.13, 0.22), (0.35, 0.04), (0.5, 0.28), (0.62, 0.84), (0.73, 0.98), (0.88, 0.34))
 """Bent is positive."""
 ANKLE = ((0.0, 0.0), (0.08, -0.10), (0.25, 0.08), (0.44, 0.19), (0.58, -0.30), (0.70, -0.04), (0.85, 0.04))
@@ -98,8 +101,8 @@ TOES = ((0.0, 0.05), (0.15, 0.0), (0.4, 0.0), (0.54, 0.42), (0.63, 0.05), (0.8, 
 """Toes up is positive."""
 
 
-def _relaxed(t: np.ndarray) -> dict[str, np.ndarray]:
-    """Both arms hang, elbows and fingers a little bent."""
+def _hang_arms(t: np.ndarray) -> dict[str, np.ndarray]:
+    """Both arms hang, elbows and fingers slightly bent; (K, 3) axis-angle by joint."""
     tracks = {}
     breath = 0.012 * np.sin(2 * np.pi * t)
     for side, out in (("left", 1.0), ("right", -1.0)):
@@ -122,15 +125,15 @@ def _about(t: np.ndarray, x: Angle = 0, y: Angle = 0, z: Angle = 0) -> np.ndarra
 
 
 def _periodic(t: np.ndarray, keys: tuple[tuple[float, float], ...]) -> np.ndarray:
-    """Smooth closed curve through (time in 0..1, value) keys."""
+    """Smooth periodic curve through keys (time in 0..1, value)."""
     from scipy.interpolate import CubicSpline
 
     times, values = np.array([*keys, (keys[0][0] + 1, keys[0][1])]).T
     return CubicSpline(times, values, bc_type="periodic")(t % 1)
 
 
-def _grounded(avatar: RiggedAvatar, tracks: dict[str, np.ndarray]) -> Clip:
-    """A looping clip whose transl keeps the lowest vertex of each key on the floor."""
+def _ground(avatar: RiggedAvatar, tracks: dict[str, np.ndarray]) -> Clip:
+    """A looping clip; its transl puts the lowest vertex of each key on the floor. tracks: (K, 3) axis-angle by joint."""
     joints = [name for name in avatar.joint_names if name in tracks]
     rotation = np.stack([tracks[name] for name in joints], axis=1).astype(np.float32)
     clip = Clip(FPS, True, joints, rotation, np.zeros((len(rotation), 3), np.float32))

@@ -3,37 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
-from gsac.stages.body_choice import OPEN, brought
+from gsac.stages.body_choice import OPEN, brought_files
 from gsac.stages.contract import BadInput
 
-POSES = ("a", "t")
-ANIMATIONS = ("wave", "walk")
+Pose = Literal["a", "t"]
+Animation = Literal["wave", "walk"]
 
 
 @dataclass
 class ExportConfig:
     body_model: str = OPEN
-    """Which body; the same as smplx.body_model."""
-    ply_pose: str = "a"
+    """Body model; the same as smplx.body_model."""
+    ply_pose: Pose = "a"
     """Pose of avatar.ply and avatar.spz: a (arms half down) or t (arms out)."""
     ply_pad_sh: bool = False
-    """Write the 45 zero f_rest values that older PLY importers ask for (248 bytes a gaussian instead of 68)."""
+    """Whether avatar.ply has the 45 zero f_rest values that older importers need (248 bytes a gaussian instead of 68)."""
     animations: str = "wave,walk"
-    """Clips that avatar.gsac, avatar.glb and viewer.html carry, by name with commas between; the first plays first."""
+    """Animations of avatar.gsac, avatar.glb, avatar.fbx and viewer.html: names with commas between; the first one plays first."""
     licence: str = "All rights stay with the person shown"
-    """Words about the use of this person's likeness, kept in the files."""
+    """Terms of use of this person's likeness, written into the files."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
-        return brought(self.body_model)
+        return brought_files(self.body_model)
 
     def check(self) -> None:
-        if self.ply_pose not in POSES:
-            raise BadInput(f"export.ply_pose is {self.ply_pose!r}; choose one of: {', '.join(POSES)}")
         for name in self.clip_names():
-            if name not in ANIMATIONS:
-                raise BadInput(f"export.animations names {name!r}; choose among: {', '.join(ANIMATIONS)}")
+            if name not in get_args(Animation):
+                raise BadInput(f"export.animations names {name!r}; choices: {', '.join(get_args(Animation))}")
 
     def clip_names(self) -> tuple[str, ...]:
         """Names in `animations`, each once, in order."""

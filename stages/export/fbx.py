@@ -1,7 +1,7 @@
-"""`avatar.fbx`: the rig for tools that take no glTF: skinned, vertex-coloured mesh, 55 joints, expressions, animations.
+"""`avatar.fbx`, for tools that read no glTF: skinned, vertex-coloured mesh, 55 joints, expressions, animations.
 
 Metres, y up, facing +z, feet at y = 0; joints rest without rotation, so a joint's rotation is SMPL-X's. Expressions are
-blend shapes by their ARKit names; each clip is a take. No gaussians: FBX has no place for them.
+blend shapes by their ARKit names; each animation is a take. FBX cannot hold gaussians.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gsac.stages.export.fbx_file import CREATED, FILE_ID, Long, Node, fbx_bytes
 from gsac.stages.export.glb import vertex_colours
 
 SECOND = 46186158000
-"""FBX counts time in these."""
+"""Ticks of FBX's time in a second."""
 LEAST_WEIGHT = 1e-6
 LINEAR_KEYS = 0x00006004
 """Interpolation of a curve's keys."""
@@ -25,7 +25,7 @@ ROTATION, TRANSLATION = ("Lcl Rotation", "R"), ("Lcl Translation", "T")
 
 
 def avatar_fbx(avatar: RiggedAvatar, means: np.ndarray) -> bytes:
-    """The file's bytes; means: (N, 3) m, the gaussians in T-pose with feet at y = 0, which colour the mesh."""
+    """The file's bytes. means: (N, 3) m, the gaussians in T-pose, feet at y = 0; the mesh takes its colours from them."""
     return _Scene(avatar, means).bytes()
 
 
@@ -55,7 +55,7 @@ class _Scene:
             self.take(name, clip)
 
     def object(self, kind: str, name: str, what: str, under: str | None = None) -> Node:
-        """A new object; under: its class in the file's `name::class`, where that is not its kind."""
+        """Adds an object; under: its class in the file's `name::class`, where that differs from its kind."""
         return self.objects.add(kind, Long(next(self.ids)), f"{name}\0\x01{under or kind}", what)
 
     def connect(self, child: Node, parent: Node | int, at: str | None = None) -> None:
@@ -106,7 +106,7 @@ class _Scene:
         return material
 
     def joint(self, j: int) -> Node:
-        """A bone without rotation; parents come first."""
+        """Adds a bone without rotation; its parent must be there."""
         parent = int(self.avatar.parents[j])
         place = self.places[j] - (self.places[parent] if parent >= 0 else 0)
         bone = self.object("Model", self.avatar.joint_names[j], "LimbNode")
@@ -133,8 +133,8 @@ class _Scene:
             if len(moved):
                 cluster.add("Indexes", moved)
                 cluster.add("Weights", total[moved].astype(np.float64))
-            cluster.add("Transform", _moved(-self.places[j]))
-            cluster.add("TransformLink", _moved(self.places[j]))
+            cluster.add("Transform", _translation(-self.places[j]))
+            cluster.add("TransformLink", _translation(self.places[j]))
             self.connect(cluster, skin)
             self.connect(bone, cluster)
 
@@ -146,7 +146,7 @@ class _Scene:
         for node, place in [(mesh, np.zeros(3)), *zip(self.joints, self.places, strict=True)]:
             entry = pose.add("PoseNode")
             entry.add("Node", node.values[0])
-            entry.add("Matrix", _moved(place))
+            entry.add("Matrix", _translation(place))
 
     def expressions(self) -> None:
         shapes = self.object("Deformer", "expressions", "BlendShape")
@@ -168,7 +168,7 @@ class _Scene:
             self.connect(shape, channel)
 
     def take(self, name: str, clip: Clip) -> None:
-        """A looping clip ends with its first key."""
+        """Adds an animation; a looping one ends with its first key."""
         closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]
         times = np.rint(np.arange(len(closed)) / clip.fps * SECOND).astype(np.int64)
         stack = self.object("AnimationStack", name, "", "AnimStack")
@@ -183,7 +183,7 @@ class _Scene:
         self.curves(layer, root, TRANSLATION, times, clip.transl[closed] + self.places[root])
 
     def curves(self, layer: Node, j: int, track: tuple[str, str], times: np.ndarray, values: np.ndarray) -> None:
-        """values: (K, 3)."""
+        """Adds the curves of one joint. times: (K,) ticks; values: (K, 3) degrees or m."""
         node = self.object("AnimationCurveNode", track[1], "", "AnimCurveNode")
         node.properties(*((f"d|{axis}", "Number", "", "A", float(v)) for axis, v in zip("XYZ", values[0], strict=True)))
         self.connect(node, layer)
@@ -219,7 +219,7 @@ class _Scene:
                           documents, Node("References"), definitions, self.objects, self.connections])
 
 
-def _moved(place: np.ndarray) -> np.ndarray:
+def _translation(place: np.ndarray) -> np.ndarray:
     """(16,) float64: a translation, column by column."""
     matrix = np.eye(4)
     matrix[3, :3] = place

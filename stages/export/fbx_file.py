@@ -1,4 +1,4 @@
-"""The bytes of a binary FBX file, version 7.4: a tree of named nodes with typed properties. What they mean is fbx.py's affair."""
+"""Writes a binary FBX file, version 7.4: a tree of named nodes with typed properties; `fbx.py` gives them their meaning."""
 
 from __future__ import annotations
 
@@ -13,33 +13,35 @@ MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
 FILE_ID = bytes.fromhex("28b32aebb624ccc2bfc8b02aa92bfcf1")
 CREATED = "1970-01-01 10:00:00:000"
 FOOT = bytes.fromhex("fabcab09d0c8d466b176fb831cf7267e"), bytes.fromhex("f85a8c6adef5d97eece90ce3758f290b")
-"""Id, time and foot belong together: readers that check one against the other take this triple."""
+"""Id, time and foot belong together: some readers check them against each other and accept this triple."""
 EMPTY = b"\0" * 13
 ARRAYS = {np.dtype(kind): code for kind, code in (("<f8", b"d"), ("<f4", b"f"), ("<i4", b"i"), ("<i8", b"l"))}
 OPEN = ("AnimationStack", "AnimationLayer")
-"""Nodes whose list of children readers expect, be it empty."""
+"""Nodes that readers expect to have a list of children, even an empty one."""
 PACKED = 128
-"""Bytes from which an array is compressed."""
+"""Least size, bytes, of an array that is compressed."""
 
 
 class Long(int):
-    """An integer of 64 bits: ids and times."""
+    """A 64-bit integer: an id or a time."""
 
 
 @dataclass
 class Node:
+    """A named node with its properties and children."""
+
     name: str
     values: list = field(default_factory=list)
     """bool, int, Long, float, str, bytes, or a numpy array of float32, float64, int32, int64."""
     children: list[Node] = field(default_factory=list)
 
-    def add(self, name: str, *values) -> Node:
-        """A new child, which is returned."""
+    def add(self, name: str, *values: object) -> Node:
+        """Adds a child and returns it."""
         self.children.append(Node(name, list(values)))
         return self.children[-1]
 
     def properties(self, *rows: tuple) -> Node:
-        """The child `Properties70`; rows: (name, type, label, flags, values...)."""
+        """Adds the child `Properties70` and returns it; rows: (name, type, label, flags, values...)."""
         node = self.add("Properties70")
         for row in rows:
             node.add("P", *row)

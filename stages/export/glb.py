@@ -1,4 +1,4 @@
-"""`avatar.glb`: a skinned, vertex-coloured, animated mesh for any glTF tool, with the gaussians beside it.
+"""`avatar.glb`: a skinned, vertex-coloured, animated mesh for any glTF tool, and the gaussians.
 
 Mesh: 55 joints with identity rest rotations, at most 4 weights a vertex, y up, facing +z, feet at y = 0; expressions are
 morph targets by their ARKit names.
@@ -26,14 +26,13 @@ ARRAY_BUFFER, ELEMENT_BUFFER = 34962, 34963
 POINTS, TRIANGLES = 0, 4
 SPLATS = "KHR_gaussian_splatting"
 NEAREST = 8
-"""How many gaussians give a vertex of the mesh its colour."""
+"""Number of gaussians that a vertex takes its colour from."""
 BLUR_M = 0.004
-"""m: gaussians nearer than this to the vertex count alike."""
+"""Distance, m, below which gaussians count alike."""
 
 
 def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales: np.ndarray) -> bytes:
-    """The file's bytes. means (N, 3) m, quats (N, 4) wxyz, scales (N, 3) m: the gaussians in
-    T-pose, feet at y = 0."""
+    """The file's bytes. means: (N, 3) m, quats: (N, 4) wxyz, scales: (N, 3) m, of the gaussians in T-pose, feet at y = 0."""
     file = _Buffer()
     J, g = len(avatar.joints), avatar.gaussians
     ground = np.array([0, avatar.ground, 0], np.float32)
@@ -91,9 +90,10 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
 
 
 def vertex_colours(vertices: np.ndarray, means: np.ndarray, rgb: np.ndarray, opacity: np.ndarray) -> np.ndarray:
-    """(V, 3) float32 sRGB of vertices (V, 3): mean of the nearest gaussians by opacity and nearness, in one pose.
+    """vertices: (V, 3) m; means: (N, 3) m in the same pose; rgb: (N, 3) sRGB; opacity: (N,).
 
-    Nearness and not the binding, because training moves gaussians away from the face that carries them.
+    Returns (V, 3) float32 sRGB: the mean over the nearest gaussians, weighted by opacity and nearness. The binding does not serve:
+    training moves gaussians away from the face that carries them.
     """
     distance, near = cKDTree(means).query(vertices, k=min(NEAREST, len(means)))
     distance, near = distance.reshape(len(vertices), -1), near.reshape(len(vertices), -1)
@@ -102,19 +102,19 @@ def vertex_colours(vertices: np.ndarray, means: np.ndarray, rgb: np.ndarray, opa
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
-    """glTF's COLOR_0 is linear light."""
+    """sRGB to linear light, which glTF's COLOR_0 holds."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def _skin_attributes(file: _Buffer, index: np.ndarray, weight: np.ndarray) -> dict[str, int]:
-    """index, weight: (n, 4). Joints without weight are 0, as the glTF validator asks."""
+    """index, weight: (n, 4). Joints without weight become 0, as the glTF validator demands."""
     weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
     return {"JOINTS_0": file.add(np.where(weight > 0, index, 0).astype("u1"), ARRAY_BUFFER),
             "WEIGHTS_0": file.add(weight, ARRAY_BUFFER)}
 
 
 def _point_skin(avatar: RiggedAvatar, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """corners: (N, 3) vertices of each gaussian's face. Returns index, weight (N, 4): their mean, four largest kept."""
+    """corners: (N, 3) vertices of each gaussian's face. Returns index and weight (N, 4): the four largest of their mean weights."""
     dense = np.zeros((len(corners), len(avatar.joints)))
     rows = np.arange(len(corners))[:, None]
     for corner in corners.T:
@@ -124,14 +124,14 @@ def _point_skin(avatar: RiggedAvatar, corners: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _targets(file: _Buffer, avatar: RiggedAvatar) -> list[dict[str, int]]:
-    """One morph target an expression: only the vertices that it moves."""
+    """One sparse morph target for each expression."""
     spans = [slice(a, b) for a, b in zip(avatar.expression_start, avatar.expression_start[1:], strict=False)]
     return [{"POSITION": file.add_sparse(len(avatar.vertices), avatar.expression_vertex[span], avatar.expression_delta[span])}
             for span in spans]
 
 
 def _animation(file: _Buffer, name: str, clip: Clip, avatar: RiggedAvatar, rest: list[float], root: int) -> dict:
-    """glTF animation; a looping clip ends with its first key."""
+    """A glTF animation; a looping one ends with its first key."""
     closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]
     times = file.add((np.arange(len(closed)) / clip.fps).astype("<f4"), bounds=True)
     samplers, channels = [], []

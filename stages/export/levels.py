@@ -1,4 +1,9 @@
-"""Coarser levels of detail for an avatar that was trained without: neighbours on the same bone become one with their moments."""
+"""Coarser levels of detail for an avatar that was trained without: clusters on one bone become one gaussian with their moments.
+
+This is not the merge of `train` (`stages/train/gaussians/merge.py`), which weighs colours by the pixels that frames show and is
+trained further afterwards. Here are neither frames nor training: a merged gaussian must look right at once, so it takes the
+members' moments and the colour of the outermost ones.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +14,24 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 
 MEMBERS = (3, 9)
-"""How many gaussians become one, level by level."""
+"""Number of gaussians that become one, level by level."""
 FACING = 0.05
-"""m: how far apart two gaussians with opposite normals count, halved, so that front and back do not become one."""
+"""Half the distance, m, that opposite normals add between two gaussians: front and back must not become one."""
 UNDER = 0.01
-"""m: a gaussian this far under its cluster's outermost one counts a third: others cover it."""
+"""Depth, m, under the cluster's outermost gaussian at which a colour counts a third: others cover it."""
 LEAST_SCALE = 1e-4
-"""m: no axis of a merged gaussian is thinner."""
+"""Least standard deviation along an axis of a merged gaussian, m."""
 
 
-def coarser(avatar: RiggedAvatar, members: int) -> dict[str, np.ndarray]:
-    """Arrays as `avatar.gaussians`, about one for each `members` of them.
+def merge_level(avatar: RiggedAvatar, members: int) -> dict[str, np.ndarray]:
+    """Arrays named as in `avatar.gaussians`, as mu (M, 3): about one gaussian for each `members` of them.
 
-    Place, spread, colour and covered area are those of the members together, in the rest pose.
+    Mean, covariance, colour and covered area are those of the members together, in the rest pose.
     """
     g = avatar.gaussians
     frames = face_frames(avatar.vertices.astype(np.float64), avatar.faces)
     bound = bind(frames, *(g[name] for name in ("face", "mu", "quat", "log_scale")))
-    cluster, count = _clusters(avatar, bound.means, frames.R[g["face"], :, 1], members)
+    cluster, count = _cluster(avatar, bound.means, frames.R[g["face"], :, 1], members)
 
     area = np.sort(bound.scales, axis=1)[:, 1:].prod(1)
     height = g["mu"][:, 1] * frames.k[g["face"]]
@@ -64,8 +69,11 @@ def coarser(avatar: RiggedAvatar, members: int) -> dict[str, np.ndarray]:
     }
 
 
-def _clusters(avatar: RiggedAvatar, means: np.ndarray, normals: np.ndarray, members: int) -> tuple[np.ndarray, int]:
-    """Cluster of each gaussian, 0..count - 1, and the count: halves of halves along the widest axis, bone by bone."""
+def _cluster(avatar: RiggedAvatar, means: np.ndarray, normals: np.ndarray, members: int) -> tuple[np.ndarray, int]:
+    """means, normals: (N, 3). Returns the cluster (N,) of each gaussian, 0..count - 1, and the count.
+
+    The gaussians of each bone are halved along their widest axis until a cluster has at most `members`.
+    """
     corners = avatar.faces[avatar.gaussians["face"]]
     load = np.zeros((len(corners), len(avatar.joints)))
     for corner in corners.T:

@@ -1,4 +1,4 @@
-"""`avatar.ply`: the posed gaussians as a standard 3DGS PLY, which any splat viewer opens.
+"""`avatar.ply`: the posed gaussians as a standard 3DGS PLY, which every splat viewer opens.
 
 3DGS axes (x right, y down, z forward: the canonical axes turned by 180 degrees about x), metres, feet at y = 0; scales
 as natural logarithm, colour as the degree-0 spherical harmonic, opacity as logit, rotation wxyz.
@@ -12,7 +12,7 @@ SH0 = 0.28209479177387814
 """Value of the degree-0 real spherical harmonic: rgb = 0.5 + SH0 * f_dc."""
 MAX_LOGIT = 16.0
 MIN_SCALE = 1e-7
-"""m; a gaussian on a face without area has none."""
+"""m; a gaussian on a face without area has scale 0, which has no logarithm."""
 
 
 def ply_bytes(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, rgb: np.ndarray, opacity: np.ndarray,
@@ -27,7 +27,7 @@ def ply_bytes(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, rgb: np.
              "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
     columns = {
         "x": (means * (1, -1, -1)).T, "f_dc_0": ((rgb - 0.5) / SH0).T, "opacity": logit(opacity)[None],
-        "scale_0": np.log(np.maximum(scales, MIN_SCALE)).T, "rot_0": turned_about_x(quats).T,
+        "scale_0": np.log(np.maximum(scales, MIN_SCALE)).T, "rot_0": turn_about_x(quats).T,
     }
     table = np.zeros((len(means), len(names)), "<f4")
     for first, values in columns.items():
@@ -38,15 +38,15 @@ def ply_bytes(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, rgb: np.
     return "\n".join(head).encode() + table.tobytes()
 
 
-def turned_about_x(quats: np.ndarray) -> np.ndarray:
-    """(N, 4) wxyz after a turn of 180 degrees about x; unit length, w >= 0."""
+def turn_about_x(quats: np.ndarray) -> np.ndarray:
+    """quats: (N, 4) wxyz. Returns (N, 4) after a turn of 180 degrees about x; unit length, w >= 0."""
     w, x, y, z = (quats / np.linalg.norm(quats, axis=1, keepdims=True)).T
     out = np.stack([-x, w, -z, y], axis=1)
     return np.where(out[:, :1] < 0, -out, out)
 
 
 def logit(opacity: np.ndarray) -> np.ndarray:
-    """Inverse of the sigmoid; 0 and 1 become -16 and 16."""
+    """opacity: (N,) in 0..1. Returns (N,), the inverse of the sigmoid; 0 and 1 become -16 and 16."""
     with np.errstate(divide="ignore"):
         value = np.log(opacity.astype(np.float64)) - np.log1p(-opacity.astype(np.float64))
     return np.clip(value, -MAX_LOGIT, MAX_LOGIT)

@@ -1,9 +1,9 @@
 """`avatar.spz`: the posed gaussians in Niantic's compressed splat format, version 3, a sixth of the PLY.
 
-Right, up, back axes, which are the canonical ones: y up, the person faces +z. A gzipped header of 16 bytes, then one array
-after the other: positions as 24-bit fixed point, opacity, colour, logarithm of the scale in steps of 1/16, and the rotation's
-three smaller components with 9 bits and a sign each (format: github.com/nianticlabs/spz, MIT). Version 3 and not 4, because
-more programs read it; PlayCanvas' own parser wants 4, which splat-transform makes of it.
+Axes are right, up, back, which are the canonical ones: y up, the person faces +z. Gzipped: a header of 16 bytes, then one array
+after the other: positions in 24-bit fixed point, opacity, colour, logarithm of the scale in steps of 1/16, and the rotation's
+three smaller components with 9 bits and a sign each (format: github.com/nianticlabs/spz, MIT). Version 3, because more programs
+read it than version 4; PlayCanvas' own parser needs 4, into which splat-transform converts it.
 """
 
 from __future__ import annotations
@@ -35,14 +35,15 @@ def spz_bytes(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, rgb: np.
         _byte(opacity * 255),
         _byte((rgb - 0.5) / SH0 * (COLOUR * 255) + 127.5),
         _byte((np.log(np.maximum(scales, MIN_SCALE)) + 10) * 16),
-        smallest_three(quats),
+        pack_smallest_three(quats),
     ]
     head = HEADER.pack(MAGIC, VERSION, len(means), 0, FRACTION_BITS, 0, 0)
     return gzip.compress(head + b"".join(np.ascontiguousarray(part).tobytes() for part in parts), 9, mtime=0)
 
 
-def smallest_three(quats: np.ndarray) -> np.ndarray:
-    """quats: (N, 4) wxyz. Returns (N,) little-endian 32-bit: which of x, y, z, w is largest, then the others in order."""
+def pack_smallest_three(quats: np.ndarray) -> np.ndarray:
+    """quats: (N, 4) wxyz. Returns (N,) little-endian 32-bit words: the index of the largest of x, y, z, w, then the others in
+    order."""
     xyzw = quats[:, [1, 2, 3, 0]].astype(np.float64)
     xyzw /= np.linalg.norm(xyzw, axis=1, keepdims=True)
     rows, largest = np.arange(len(xyzw)), np.abs(xyzw).argmax(1)

@@ -1,4 +1,4 @@
-"""Runs `export`: body and gaussians -> one avatar in memory -> each file from that."""
+"""Entry of export: makes one avatar of body and gaussians, and writes each file from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.animations import add_motion
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.glb import glb_bytes
-from gsac.stages.export.levels import MEMBERS, coarser
+from gsac.stages.export.levels import MEMBERS, merge_level
 from gsac.stages.export.ply import ply_bytes
 from gsac.stages.export.spz import spz_bytes
 from gsac.stages.export.warmup import rehearse
@@ -26,7 +26,7 @@ from gsac.unity.package import write_unity
 from gsac.viewer.page import page_bytes
 
 MOVED = 1e-4
-"""m: a vertex that an expression moves less than this is left out."""
+"""Least way, m, of a vertex for it to be part of an expression."""
 
 BODY_LICENCE = "the body model's own terms; the embedded open body is CC0-1.0"
 
@@ -40,16 +40,16 @@ def run(job: Job) -> None:
             raise BadInput(f"{job.inputs['train/avatar.npz']}: its {len(level)} gaussians must be at least one and "
                            f"lie on the faces 0..{len(body.faces) - 1} of the body; run again from the stage train")
     clip = Clip.read(job.inputs["split/clip.json"])
-    avatar = rigged(body, params, gaussians)
+    avatar = rig_avatar(body, params, gaussians)
     avatar.licence = {"avatar": job.config.licence, "body": BODY_LICENCE}
     avatar.provenance = {"gsac": version("gsac"), "body_model": body.digest, "clip_sha256": clip.source_sha256}
     add_motion(avatar, job.config.clip_names())
-    avatar.coarser = [arrays(level) for level in trained] or [coarser(avatar, members) for members in MEMBERS]
+    avatar.coarser = [arrays_of(level) for level in trained] or [merge_level(avatar, members) for members in MEMBERS]
 
     container = avatar.to_bytes()
     pose = avatar.pose(job.config.ply_pose.upper())
-    splats = (*posed_gaussians(avatar, pose), avatar.gaussians["rgb"], avatar.gaussians["opacity"])
-    rest = posed_gaussians(avatar, avatar.pose("T"))
+    splats = (*pose_gaussians(avatar, pose), avatar.gaussians["rgb"], avatar.gaussians["opacity"])
+    rest = pose_gaussians(avatar, avatar.pose("T"))
     files = {
         "avatar.gsac": lambda: container,
         "avatar.ply": lambda: ply_bytes(*splats, job.config.ply_pad_sh),
@@ -66,7 +66,7 @@ def run(job: Job) -> None:
         (job.out / "unity").mkdir()
         write_unity(job.out / "unity", container, version("gsac"))
 
-    with ThreadPoolExecutor() as pool:  # what takes long is zlib, which lets go of Python
+    with ThreadPoolExecutor() as pool:  # zlib takes longest, and releases the interpreter's lock
         tasks = [pool.submit(write_package), *(pool.submit(write, name) for name in files)]
         for done, task in enumerate(tasks):
             job.progress(done, len(tasks), "files")
@@ -79,8 +79,8 @@ def warm(device: str) -> None:
     rehearse(run)
 
 
-def rigged(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar:
-    """The avatar at rest: betas and joint offsets applied, no expression."""
+def rig_avatar(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar:
+    """The avatar at rest, with betas and joint offsets applied and no expression."""
     vertices, joints = body.rest(params.betas, None, params.joint_offset)
     moves = [np.flatnonzero(np.linalg.norm(body.exprdirs[:, :, e], axis=1) > MOVED)
              for e in range(len(body.expression_names))]
@@ -92,17 +92,18 @@ def rigged(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar
         expression_vertex=np.concatenate([*moves, []]).astype(np.int32),
         expression_delta=np.concatenate([*(body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
         jaw_actions=body.jaw_actions.astype(np.float32),
-        gaussians=arrays(gaussians),
+        gaussians=arrays_of(gaussians),
         light=gaussians.light,
     )
 
 
-def arrays(gaussians: Gaussians) -> dict[str, np.ndarray]:
+def arrays_of(gaussians: Gaussians) -> dict[str, np.ndarray]:
+    """The arrays of N gaussians by name, as mu (N, 3)."""
     return {name: getattr(gaussians, name) for name in EACH}
 
 
-def posed_gaussians(avatar: RiggedAvatar, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """pose: (J, 3). Returns means (N, 3) m, quats (N, 4) wxyz, scales (N, 3) m in canonical axes, feet at y = 0."""
+def pose_gaussians(avatar: RiggedAvatar, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """pose: (J, 3) axis-angle. Returns means (N, 3) m, quats (N, 4) wxyz, scales (N, 3) m in canonical axes, feet at y = 0."""
     vertices = avatar.posed(pose)
     vertices = vertices - np.array([0, avatar.ground, 0], np.float32)
     g = avatar.gaussians

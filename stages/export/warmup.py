@@ -1,4 +1,4 @@
-"""An export in miniature: kernels are compiled or loaded, and libraries imported, before there is an avatar."""
+"""Exports a small avatar, so that kernels are compiled or loaded and libraries imported before the real one is there."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GAUSSIANS = 300
 
 
 def rehearse(run: Callable[[Job], None]) -> None:
-    """run: the stage's."""
+    """run: the stage's own."""
     body = Body.load()
     with TemporaryDirectory() as name:
         folder = Path(name)

@@ -12,32 +12,32 @@ NONE = "none"
 @dataclass
 class FaceConfig:
     angle: float = 125.0
-    """A face counts as seen where it looks at least this far, degrees, away from the camera's own direction of view:
-    180 looks straight into the camera, 90 is a profile."""
+    """Least angle, degrees, between the camera's viewing direction and the face's for the face to count as seen: at 180 it looks
+    into the camera, 90 is a profile."""
     threshold: float = 0.5
     """Least confidence of the face network, 0..1."""
     sparsity: float = 0.3
-    """Price of each action, against one for the square of each number that tells actions apart: larger uses fewer actions."""
+    """Weight of the L1 penalty on the actions, against squared residuals in units of the network's noise; larger uses fewer
+    actions."""
     doubt: float = 1.0
-    """How far the network wavers, as a multiple of what was measured: larger is calmer."""
+    """Factor on the network's measured noise; larger gives calmer faces."""
     smooth: float = 0.04
-    """Standard deviation, s, of the smoothing over time of jaw and mouth, at least the time between frames; 0 is none. Photos have
-    no time and are not smoothed."""
+    """Standard deviation, s, of the smoothing over time of jaw and mouth, at least the time between frames; 0: none. Photos are not
+    smoothed."""
     smooth_slow: float = 0.1
-    """The same of what moves slowly: smiles, cheeks and nose."""
+    """The same for slow actions: smiles, cheeks and nose."""
     smooth_lids: float = 0.02
-    """The same of lids, however far frames are apart: a blink may be one frame."""
+    """The same for lids, however far frames are apart: a blink may last one frame."""
     smooth_brow: float = 0.35
-    """Standard deviation, s, of the weights in time of the looks that each frame's brows are found from: one look alone says little
-    of them; 0 is that one look."""
+    """Standard deviation, s, of the Gaussian over time by which frames are weighted when a frame's brows are found: one frame alone
+    shows them poorly; 0: that frame alone."""
     rest_time: float = 0.2
-    """Time, s, in which an unseen face falls back to rest by a factor e."""
-
+    """Time, s, in which the expression of an unseen face falls by a factor e."""
     flame: str = NONE
-    """The name under which `gsac models add NAME FLAME.npz` keeps your FLAME head, or none: smplx.method paper holds the body's
-    head to it instead of the open body's own head, and an SMPL-X body takes its expression from it."""
+    """Name under which `gsac models add NAME FLAME.npz` keeps your FLAME head, or none. With it, smplx.method paper fits the body's
+    head to FLAME's instead of the open body's, and an SMPL-X body takes its expression from it."""
     flame_points: str = "flame-points"
-    """The same of FLAME's own mediapipe_landmark_embedding.npz; only with a FLAME head."""
+    """Name of FLAME's own mediapipe_landmark_embedding.npz; used only with a FLAME head."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""

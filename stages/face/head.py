@@ -1,6 +1,6 @@
-"""The person's head at rest as a mesh, whichever head it is: the open body's own, or one that the user brings (`flame.py`).
+"""The person's head at rest as a mesh: the open body's head, or one that the user brings (`flame.py`).
 
-The network's points have no size of their own, so a head's shape is found up to a similarity, and the head keeps its own metres.
+The network's points have no scale, so the shape is fitted up to a similarity; the scale stays that of the mesh.
 """
 
 from __future__ import annotations
@@ -13,30 +13,31 @@ from gsac.avatar.body import Body
 from gsac.stages.face.actions import Actions
 
 POINT_NOISE = 0.002
-"""m: how well a resting point is known."""
+"""Standard deviation of a resting point, m."""
 AXES = np.array([1.0, 1.0, 0.3])
-"""How far the network's x, y and z are trusted."""
+"""Weights of the network's x, y and z."""
 ROUNDS = 10
+"""Alternations between shape and similarity."""
 HEAD_JOINTS = ("head", "jaw", "left_eye_smplhf", "right_eye_smplhf")
 EYE_JOINTS = [23, 24]
 
 
 @dataclass
 class HeadModel:
-    """A head mesh of N vertices and how people's differ from it."""
+    """A head mesh of N vertices with S directions in which people's heads differ from it, and L of the network's points on it."""
 
     template: np.ndarray  # (N, 3) m, y up, z out of the face
     faces: np.ndarray  # (F, 3)
-    shapedirs: np.ndarray  # (N, 3, S) m at one spread
+    shapedirs: np.ndarray  # (N, 3, S) m at one standard deviation
     eyes: np.ndarray  # (2, 3) m of the template, left and right
     index: np.ndarray  # (L,) the network's points that lie on it
-    corners: np.ndarray  # (L, 3) the vertices among which each lies
-    share: np.ndarray  # (L, 3) and how near to each
-    neutral: np.ndarray | None = None  # (468, 3) m, where the network puts them on the template; None: where they lie
+    corners: np.ndarray  # (L, 3) the vertices of the face on which each lies
+    share: np.ndarray  # (L, 3) its barycentric coordinates there
+    neutral: np.ndarray | None = None  # (468, 3) m, where the network puts them on the template; None: on the mesh
 
     @classmethod
     def of_open_body(cls, actions: Actions) -> HeadModel:
-        """The open body's head; of its shape directions those that shape the figure."""
+        """The open body's head, with the shape directions of the figure, without those of the clothes."""
         body = Body.load()
         on = body.weights[:, [body.joint_names.index(name) for name in HEAD_JOINTS]].sum(1) > 0.5
         on[np.unique(actions.corner)] = True
@@ -46,35 +47,35 @@ class HeadModel:
                    body.J_regressor[EYE_JOINTS] @ body.v_template, np.arange(len(actions.corner)), place[actions.corner],
                    actions.share, actions.neutral)
 
-    def on(self, vertices: np.ndarray) -> np.ndarray:
-        """vertices: (N, ...). Returns (L, ...) the same of the points."""
-        return np.einsum("lk,lk...->l...", self.share, vertices[self.corners])
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        """values: (N, ...) of the vertices. Returns them interpolated at the points (L, ...)."""
+        return np.einsum("lk,lk...->l...", self.share, values[self.corners])
 
-    def shape_of(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """rest: (468, 3) m, y up, z out of the face, the person's points. Returns the likeliest shape (S,) and turn (3, 3) and size
-        that bring the head's points onto these."""
+    def fit_shape(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """rest: (468, 3) m, y up, z out of the face, the person's points. Returns the likeliest shape (S,), and the turn (3, 3) and
+        size that bring the head's points onto these."""
         target = rest[self.index]
-        mean, ways = self.on(self.template).astype(float), self.on(self.shapedirs).astype(float)
-        if self.neutral is not None:  # how the network's points differ from the skin's is the same for all
-            turn, size, shift = similarity(mean, self.neutral[self.index])
+        mean, directions = self.at_points(self.template).astype(float), self.at_points(self.shapedirs).astype(float)
+        if self.neutral is not None:  # the network's points differ from the skin by the same in all people
+            turn, size, shift = fit_similarity(mean, self.neutral[self.index])
             target = target - self.neutral[self.index] + size * mean @ turn.T + shift
-        shape = np.zeros(ways.shape[2])
+        shape = np.zeros(directions.shape[2])
         for _ in range(ROUNDS):
-            turn, size, shift = similarity(mean + ways @ shape, target)
-            columns = (size * np.einsum("ab,lbs->las", turn, ways) * AXES[:, None]).reshape(-1, len(shape))
+            turn, size, shift = fit_similarity(mean + directions @ shape, target)
+            columns = (size * np.einsum("ab,lbs->las", turn, directions) * AXES[:, None]).reshape(-1, len(shape))
             missing = ((target - shift - size * mean @ turn.T) * AXES).ravel()
             shape = np.linalg.solve(columns.T @ columns + POINT_NOISE**2 * np.eye(len(shape)), columns.T @ missing)
         return shape, turn, size
 
     def arrays(self, shape: np.ndarray) -> dict[str, np.ndarray]:
-        """What face.npz holds of a head of this shape (S,)."""
+        """shape: (S,). Returns the arrays of face.npz that `HEAD_SHAPES` names."""
         return {"head_template": self.template.astype(np.float32), "head_faces": self.faces.astype(np.int32),
                 "head_vertices": (self.template + self.shapedirs @ shape).astype(np.float32),
                 "head_eyes": self.eyes.astype(np.float32)}
 
 
-def similarity(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-    """(n, 3) both. Turn (3, 3), size and shift (3,) that bring source nearest to target (Umeyama)."""
+def fit_similarity(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """source, target: (n, 3). Returns the turn (3, 3), size and shift (3,) that bring source nearest to target (Umeyama)."""
     a, b = source - source.mean(0), target - target.mean(0)
     u, spread, vt = np.linalg.svd(b.T @ a)
     signs = np.array([1, 1, np.sign(np.linalg.det(u @ vt))])

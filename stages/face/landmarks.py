@@ -1,4 +1,4 @@
-"""The face's 468 points in its own frame: many looks averaged, and the head's motion taken out."""
+"""The face's 468 points: averaged over several crops, and aligned to remove the head's motion."""
 
 from __future__ import annotations
 
@@ -10,26 +10,27 @@ from gsac.avatar.facemesh import LEFT_EYE, LEFT_SIDE, RIGHT_EYE, RIGHT_SIDE, Fac
 
 STABLE = np.array([168, 6, 197, 195, 5, 10, 151, 9, 8, RIGHT_EYE, 133, 362, LEFT_EYE, RIGHT_SIDE, LEFT_SIDE, 127, 356,
                    162, 389, 21, 251, 54, 284, 103, 332, 67, 297, 109, 338])
-"""Points that no facial action moves much: nose bridge, forehead, corners of the eyes, temples."""
+"""Points that facial actions hardly move: nose bridge, forehead, corners of the eyes, temples."""
 TURNS = np.radians((-6.0, 0.0, 6.0))
+"""Turns of the crops, rad."""
 
 
-def look(mesh: FaceMesh, image: np.ndarray, points: np.ndarray, mirror: np.ndarray) -> Face:
-    """image: (H, W, 3) uint8; points: (468, 2 or 3) px, roughly right; mirror: (468,).
+def read_averaged(mesh: FaceMesh, image: np.ndarray, points: np.ndarray, mirror: np.ndarray) -> Face:
+    """image: (H, W, 3) uint8; points: (468, 2 or 3) px, roughly right; mirror: (468,) each point's mirror image.
 
-    The mean of looks at slightly turned and mirrored crops: the network's own noise is larger than a small action.
+    The mean over slightly turned and mirrored crops: on one crop the network's noise exceeds a small action.
     """
     region = mesh.region_of(points)
-    looks = [mesh.read(image, type(region)(region.center, region.side, region.angle + turn), flip)
+    faces = [mesh.read(image, type(region)(region.center, region.side, region.angle + turn), flip)
              for turn, flip in itertools.product(TURNS, (None, mirror))]
-    return Face(np.mean([face.points for face in looks], axis=0), float(np.mean([face.presence for face in looks])))
+    return Face(np.mean([face.points for face in faces], axis=0), float(np.mean([face.presence for face in faces])))
 
 
 def align(points: np.ndarray, neutral: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """points: (468, 3) px with y down, z away; neutral: (468, 3) m, y up, z out of the face; weight: (468,).
 
-    Returns the points (468, 3) m under the similarity that best lays their `STABLE` ones on the neutral's (Umeyama),
-    and where the face looks (3,) with y up and z toward the camera, unit length.
+    Returns the points (468, 3) m under the similarity that brings their `STABLE` ones nearest to the neutral's (Umeyama), and the
+    direction (3,) in which the face looks, y up, z toward the camera, unit length.
     """
     points = points * [1, -1, -1]
     source, target, w = points[STABLE], neutral[STABLE], weight[STABLE] / weight[STABLE].sum()

@@ -1,31 +1,33 @@
-"""Looks again at every face that keypoints found, closely, and fits the facial actions; writes face.npz."""
+"""Reads every face that keypoints found again, more closely, fits the facial actions and writes face.npz."""
 
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_arrays
+from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS, FaceMesh
 from gsac.avatar.threads import available
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.contract import Job, StageError
-from gsac.stages.face.actions import Actions, fill, pace, smooth, solve
+from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sigma, solve
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.head import HeadModel
-from gsac.stages.face.landmarks import align, look
+from gsac.stages.face.landmarks import align, read_averaged
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
 DOUBT = 0.1
-MOST = 8
-"""Frames looked at side by side: each thread holds networks of its own."""
+"""Cosine by which the body's head points may be wrong."""
+MOST_THREADS = 8
+"""Each holds networks of its own."""
 
 
 def run(job: Job) -> None:
     clip = Clip.read(job.inputs["split/clip.json"])
     paths = frame_paths(job.inputs["split/frames"])
-    keypoints = read_arrays(job.inputs["keypoints/keypoints.npz"])
+    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     if len(keypoints["score"]) != len(paths):
         raise StageError(f"keypoints.npz has {len(keypoints['score'])} frames but split has {len(paths)}; "
                          "run keypoints again")
@@ -39,34 +41,40 @@ def run(job: Job) -> None:
         c, own = solve(points[valid], direction[valid], actions, config.sparsity, config.doubt, seen, config.smooth_brow)
         if seen is not None:
             apart = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-            c = smooth(c, seen, pace(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, apart))
+            c = smooth(c, seen, smoothing_sigma(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, apart))
     else:
         c, own = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
         job.warn("The face was never seen from the front; the avatar's face stays at rest.")
-    expression = fill(c, valid, times, config.rest_time)
-    head = head_of(actions, flame, own, expression) if valid.any() else {}
+    expression = fill_unseen(c, valid, times, config.rest_time)
+    head = fit_head(actions, flame, own, expression) if valid.any() else {}
     write_arrays(job.out / "face.npz", valid=valid, expression=expression.astype(np.float32),
                  jaw=np.zeros((len(paths), 3), np.float32), shape=own.ravel().astype(np.float32),
                  landmarks=landmarks.astype(np.float32), **head)
 
 
 def warm(device: str) -> None:
-    """Called while a stage before is at work: what reads a body takes longest to import."""
+    """Called while a stage before is at work: importing the body model's modules takes longest."""
     HeadModel.of_open_body(Actions.load())
 
 
-def head_of(actions: Actions, flame: FlameHead | None, own: np.ndarray, expression: np.ndarray) -> dict[str, np.ndarray]:
-    """own: (468, 3) m, the person's resting points less everybody's. What face.npz holds of the person's head."""
+def fit_head(actions: Actions, flame: FlameHead | None, own: np.ndarray, expression: np.ndarray) -> dict[str, np.ndarray]:
+    """own: (468, 3) m, the person's resting points less the average ones; expression: (T, E).
+
+    Returns the arrays of face.npz for the person's head.
+    """
     rest = actions.neutral + own
     if flame:
         return flame.arrays(rest, actions, expression)
     model = HeadModel.of_open_body(actions)
-    return model.arrays(model.shape_of(rest)[0])
+    return model.arrays(model.fit_shape(rest)[0])
 
 
-def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple[np.ndarray, ...]:
-    """Returns landmarks (T, 468, 3) px, NaN where the face is turned away or not believed, and of those frames, aligned
-    points (T, 468, 3) m and where the face looks (T, 3); zeros elsewhere."""
+def read_clip(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], actions: Actions) -> tuple[np.ndarray, ...]:
+    """keypoints: arrays of keypoints.npz by name, face_mesh (T, 468, 3) and world (T, 133, 3) among them.
+
+    Returns landmarks (T, 468, 3) px, NaN where the face is turned away or too uncertain, and for the other frames the aligned
+    points (T, 468, 3) m and where the face looks (T, 3); zeros elsewhere.
+    """
     mesh = FaceMesh(job.models, threads=1)
     T = len(paths)
     landmarks = np.full((T, POINTS, 3), np.nan)
@@ -76,20 +84,23 @@ def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple
     def frame(t: int) -> None:
         seen = keypoints["face_mesh"][t]
         if np.isfinite(seen[0, 0]) and not turned_away(keypoints["world"][t], least):
-            face = look(mesh, read_frame(paths[t]), seen, actions.mirror)
-            aligned, looks = align(face.points, actions.neutral, face.facing())
-            if face.presence >= job.config.threshold and looks[2] >= least:
-                landmarks[t], points[t], direction[t] = face.points, aligned, looks
+            face = read_averaged(mesh, read_frame(paths[t]), seen, actions.mirror)
+            aligned, toward = align(face.points, actions.neutral, face.facing())
+            if face.presence >= job.config.threshold and toward[2] >= least:
+                landmarks[t], points[t], direction[t] = face.points, aligned, toward
 
-    with ThreadPoolExecutor(min(available(), MOST)) as pool:
+    with ThreadPoolExecutor(min(available(), MOST_THREADS)) as pool:
         for done, _ in enumerate(pool.map(frame, range(T)), 1):
             job.progress(done, T, "frames")
     return landmarks, points, direction
 
 
 def turned_away(world: np.ndarray, least: float) -> bool:
-    """world: (133, 3) m or NaN. Whether the body's own head points say that the face looks away from the camera: the face
-    network alone sees frontal faces in profiles. `DOUBT` allows for what those points are worth."""
+    """world: (133, 3) m or NaN; least: cosine between the face's direction and the way to the camera.
+
+    Whether the face looks away from the camera by the body's head points, by more than their error `DOUBT`: the face network finds
+    frontal faces in profiles too.
+    """
     forward = world[NOSE] - world[EARS].mean(axis=0)
     toward = -forward[2] / max(np.hypot(forward[0], forward[2]), 1e-9)
     return bool(np.isfinite(toward) and toward < least - DOUBT)

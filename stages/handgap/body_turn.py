@@ -1,9 +1,9 @@
-"""How far the body has turned in each frame, from points that no arm hides.
+"""Estimates how far the body has turned in each frame, from points that no arm hides.
 
-A point fixed to a turning body moves sideways as a sum of the cosine and the sine of the turn. The 3D points of the detector
-say the turn to about 5 degrees a frame; regressed onto where torso, head and feet lie in the image, and smoothed, it is
-known to 1 degree from frame to frame. Without 3D points the two strongest sideways motions of the body stand for cosine and
-sine. Only differences of the turn matter here: its zero and its sign are free.
+A point fixed to a turning body moves sideways as a sum of the cosine and the sine of the turn. The detector's 3D points give the
+turn to about 5 degrees a frame; regressed on the image places of torso, head and feet, and smoothed, it is known to 1 degree
+from frame to frame. Without 3D points, the two strongest sideways motions of the body stand for cosine and sine. Only differences
+of the turn matter here: its zero and its sign are free.
 """
 
 from __future__ import annotations
@@ -18,20 +18,22 @@ TORSO = [INDEX[f"{side}_{part}"] for part in ("shoulder", "hip") for side in ("l
 BODY_FIXED = [INDEX[name] for name in ("nose", "left_eye", "right_eye", "left_ear", "right_ear")] + TORSO + [
     INDEX[f"{side}_{part}"] for part in ("knee", "ankle", "big_toe", "heel") for side in ("left", "right")]
 SEEN_SCORE, SEEN_SHARE = 0.3, 0.9
+"""Score from which on a point is seen, and the share of frames in which it must be to be used."""
 RIDGE = 0.01
-"""Torso lengths, squared: keeps the detector's noise out of the regression."""
+"""Torsos squared: regularises the regression against the detector's noise."""
 FULL_ENOUGH = np.radians(270)
-"""Without 3D points the turn is only read where the clip shows at least this much of it."""
+"""Without 3D points, a clip in which the body turns less than this gives no turn."""
 SMOOTH_S, SMOOTH_NOISE, WANDER = (0.2, 0.35, 0.6, 1.0), (0.01, 0.02, 0.04, 0.08), (0.2,)
-"""Grid of time constants (s) and noise (rad) for the turn about its straight line, and its spread (rad)."""
+"""Grids of the turn's Gaussian process about a straight line: time constant (s), noise (rad), standard deviation (rad)."""
 SHAKES, DRIFTS = (0.002, 0.004, 0.008, 0.016), (0.05, 0.3)
-"""The same for the body's centre, torso lengths."""
+"""Grids of noise and standard deviation for the body's centre, in torsos."""
 JUMP = 5.0
-"""Times the usual shaking."""
+"""Multiple of the median deviation from the smooth path from which on the centre did move."""
 
 
-def body_centre(xy: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """(T, 2) px: middle of those shoulders and hips that the clip shows; a point unseen for a while is bridged in time."""
+def locate_centre(xy: np.ndarray, score: np.ndarray) -> np.ndarray:
+    """xy: (T, 133, 2) px; score: (T, 133). Returns (T, 2) px: the middle of those shoulders and hips that most frames show,
+    interpolated where one is not seen."""
     seen = score[:, TORSO] > SEEN_SCORE
     kept = [i for i in range(len(TORSO)) if seen[:, i].mean() >= SEEN_SHARE] or [int(seen.sum(0).argmax())]
     frames = np.arange(len(xy))
@@ -42,15 +44,15 @@ def body_centre(xy: np.ndarray, score: np.ndarray) -> np.ndarray:
     return np.mean(points, 0)
 
 
-def body_turn(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.ndarray, torso: float) -> np.ndarray:
-    """xy: (T, 133, 2) px; world: (T, 133, 3) m, NaN or zero where unknown; torso: px.
+def estimate_turn(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.ndarray, torso: float) -> np.ndarray:
+    """xy: (T, 133, 2) px; score: (T, 133); world: (T, 133, 3) m, NaN or zero where unknown; times: (T,) s; torso: px.
 
-    Returns (T,) rad, unwrapped; zeros where the turn cannot be told.
+    Returns (T,) rad, unwrapped; zeros where the turn cannot be estimated.
     """
     points = [p for p in BODY_FIXED if (score[:, p] > SEEN_SCORE).mean() >= SEEN_SHARE]
     if len(points) < 3 or len(xy) < 6 or not np.isfinite(torso):
         return np.zeros(len(xy))
-    sideways = (xy[:, points, 0] - body_centre(xy, score)[:, None, 0]) / torso
+    sideways = (xy[:, points, 0] - locate_centre(xy, score)[:, None, 0]) / torso
     across = world[:, TORSO[0]] - world[:, TORSO[1]] + world[:, TORSO[2]] - world[:, TORSO[3]]
     known = np.isfinite(across).all(1) & (np.abs(np.nan_to_num(across)).sum(1) > 1e-6)
     if known.mean() >= SEEN_SHARE:
@@ -64,23 +66,26 @@ def body_turn(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.nd
         cosine, sine = modes[:, :2].T
         if sizes[1] < 0.15 * sizes[0] or np.ptp(np.unwrap(np.arctan2(sine, cosine))) < FULL_ENOUGH:
             return np.zeros(len(xy))
-    return smoothed(np.unwrap(np.arctan2(sine, cosine)), times)
+    return smooth(np.unwrap(np.arctan2(sine, cosine)), times)
 
 
-def settled(centre: np.ndarray, times: np.ndarray, torso: float) -> np.ndarray:
-    """(T, 2) px of the body's centre without the detector's shaking: a filled arm hangs from it. Frames that leave the smooth way
-    by far more than others did move, and stay."""
+def smooth_centre(centre: np.ndarray, times: np.ndarray, torso: float) -> np.ndarray:
+    """centre: (T, 2) px; times: (T,) s; torso: px. Returns (T, 2) px without the detector's noise: filled arms hang from it.
+
+    A frame that lies off the smooth path by far more than others (`JUMP`) did move and is kept.
+    """
     if len(times) < 3:
         return centre
-    calm = np.stack([smoothed(c / torso, times, DRIFTS, SHAKES) for c in centre.T], 1) * torso
+    calm = np.stack([smooth(c / torso, times, DRIFTS, SHAKES) for c in centre.T], 1) * torso
     off = np.linalg.norm(centre - calm, axis=1)
     return np.where((off > JUMP * max(np.median(off), SHAKES[0] * torso))[:, None], centre, calm)
 
 
-def smoothed(angle: np.ndarray, times: np.ndarray, wanders: tuple = WANDER, noises: tuple = SMOOTH_NOISE) -> np.ndarray:
-    """(T,) a straight line and a Gaussian process about it, its time constant and noise the likeliest of a grid."""
-    line = np.polyval(np.polyfit(times, angle, 1), times)
-    rest = angle - line
+def smooth(values: np.ndarray, times: np.ndarray, wanders: tuple[float, ...] = WANDER,
+           noises: tuple[float, ...] = SMOOTH_NOISE) -> np.ndarray:
+    """values: (T,); times: (T,) s. Returns (T,): a line and a Gaussian process about it, the likeliest of the grid."""
+    line = np.polyval(np.polyfit(times, values, 1), times)
+    rest = values - line
     best = None
     for wander, length, noise in itertools.product(wanders, SMOOTH_S, noises):
         kernel = wander**2 * np.exp(-0.5 * ((times[:, None] - times) / length) ** 2)

@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from gsac.stages.contract import BadInput
 
-METHODS = ("turning", "gp", "hermite", "paper", "paper-literal")
+Method = Literal["turning", "gp", "hermite", "paper", "paper-literal"]
 
 
 @dataclass
 class HandgapConfig:
-    method: str = "turning"
-    """How the arm moves through a gap: turning (small rotations of the arm's joints, one Gaussian process in the frame of the
-    turning body), gp (Gaussian process in the image), hermite (cubic with the speeds at both ends), paper (constant rate of
-    each segment's angle), paper-literal (the same as printed)."""
+    method: Method = "turning"
+    """How the arm moves through a gap. turning: one Gaussian process of the arm's joint rotations in the frame of the turning body;
+    gp: a Gaussian process of each segment in the image; hermite: a cubic with the speeds at both ends; paper: each segment turns at
+    a constant rate; paper-literal: the paper's equations exactly as printed."""
     seen_score: float = 0.5
-    """A hand counts as seen again from this score on."""
+    """Score from which on a lost hand counts as seen again."""
     lost_score: float = 0.3
-    """A hand that was seen counts as lost below this score."""
+    """Score below which a seen hand counts as lost."""
     min_seen: int = 3
-    """Frames that a hand must be seen in a row inside a longer gap to be believed."""
+    """Fewest frames in a row that a hand must be seen inside a longer gap; shorter runs are false detections."""
     max_gap_s: float = 5.0
-    """Longer gaps stay missing."""
+    """Longest gap, s, that is filled; longer ones stay missing."""
     max_hold_s: float = 4.5
-    """At the clip's start and end, how far from the nearest seen arm one is still put: carried on by the turning body, or
-    held, by the other methods; what is further away stays missing."""
+    """Longest time, s, from the nearest seen arm that is filled at the clip's start and end: method turning carries the arm on with
+    the body, the others hold it still; beyond it the hand stays missing."""
 
     def check(self) -> None:
-        if self.method not in METHODS:
-            raise BadInput(f"handgap.method is {self.method!r}; expected one of {', '.join(METHODS)}")
         if not 0 <= self.lost_score <= self.seen_score <= 1:
             raise BadInput(f"handgap.lost_score is {self.lost_score} and handgap.seen_score is {self.seen_score}; "
                            "expected 0 <= lost_score <= seen_score <= 1")

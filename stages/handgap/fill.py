@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from gsac.stages.handgap import arm_gp, segments, turning_body
-from gsac.stages.handgap.missing_hands import SIDES, Found, torso_length
+from gsac.stages.handgap.config import HandgapConfig, Method
+from gsac.stages.handgap.method import Detections, FillArm, Filled, HiddenArm
+from gsac.stages.handgap.methods import gp, hermite, paper, paper_literal, turning
+from gsac.stages.handgap.missing_hands import SIDES, MissingHands
+from gsac.stages.handgap.segments import fill_by_segments
+
+METHODS: dict[Method, FillArm] = {
+    "turning": turning.fill_arm,
+    "gp": partial(fill_by_segments, gp.interpolate),
+    "hermite": partial(fill_by_segments, hermite.interpolate),
+    "paper": partial(fill_by_segments, paper.interpolate),
+    "paper-literal": partial(fill_by_segments, paper_literal.interpolate),
+}
+"""handgap.method -> the function that fills an arm."""
 
 
-def fill_gaps(xy: np.ndarray, score: np.ndarray, world: np.ndarray, found: Found, times: np.ndarray, config,
+def fill_gaps(xy: np.ndarray, score: np.ndarray, world: np.ndarray, found: MissingHands, times: np.ndarray, config: HandgapConfig,
               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """xy: (T, 133, 2) px; score: (T, 133); world: (T, 133, 3) m or NaN; times: (T,) s.
 
-    Returns xy with the gaps filled, filled (T, 133) bool, and drift (T, 133) px: standard deviation along each axis of
-    the truth about the filled point, over that of a detection.
+    Returns xy with the gaps filled, filled (T, 133) bool, and drift (T, 133) px: the standard deviation of a filled point along
+    each axis, on top of a detection's own.
     """
-    xy, filled = xy.copy(), np.zeros(xy.shape[:2], bool)
-    drift = np.zeros(filled.shape)
-    body = turning_body.watch(xy, score, world, times, torso_length(xy, score)) if config.method == "turning" else None
+    out = Filled(xy.copy(), np.zeros(xy.shape[:2], bool), np.zeros(xy.shape[:2]))
+    detections = Detections(xy, score, world, times)
     for i, side in enumerate(SIDES):
-        hand = found.hand[:, i]
-        lost = np.stack([hand & found.elbow[:, i], hand & found.wrist[:, i], hand])
-        if not hand.any():
-            continue
-        if body:
-            unsure = np.stack([found.elbow[:, i], found.wrist[:, i], hand])
-            arm_gp.fill_arm(xy, filled, drift, side, lost, unsure, body, config)
-        else:
-            segments.fill_arm(xy, filled, drift, side, lost, times, config)
-    return xy, filled, drift
+        hand, wrist, elbow = found.hand[:, i], found.wrist[:, i], found.elbow[:, i]
+        if hand.any():
+            arm = HiddenArm(side, lost=np.stack([hand & elbow, hand & wrist, hand]), unsure=np.stack([elbow, wrist, hand]))
+            METHODS[config.method](out, arm, detections, config)
+    return out.xy, out.filled, out.drift

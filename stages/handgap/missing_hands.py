@@ -1,47 +1,49 @@
-"""Which hands were not seen, or were seen where they are not.
+"""Finds the hands that were not seen, or were detected in a wrong place.
 
-A detector that loses a hand either says so or puts its points on the other hand with a good score, so the score alone
-does not tell. Lengths are measured in torsos (middle of the shoulders to middle of the hips, about half a metre).
+A detector that loses a hand gives it a low score, or puts its points on the other hand with a good one: the score alone does not
+tell. Lengths are measured in torsos (middle of the shoulders to middle of the hips, about half a metre).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gsac.avatar.wholebody import ARM, HANDS, INDEX
+from gsac.stages.handgap.config import HandgapConfig
 
 SIDES = ("left", "right")
 WRIST_APART = 0.25
 """Torsos between the body's wrist and the hand's own wrist above which the hand is not at the end of its arm."""
 LONGEST = {"forearm": 0.8, "palm": 0.35}
-"""Torsos; anatomy says 0.5 and 0.2, a limb near the lens looks up to half as long again."""
+"""Torsos; anatomy gives 0.5 and 0.2, and a limb near the lens looks up to half as long again."""
 ON_OTHER = {"wrist": 0.12, "hand": 0.12}
 """Torsos between like points of both arms below which they lie on each other."""
 STEP = 0.25
-"""Torsos that a point may move between frames in any case before it counts as a jump."""
+"""Torsos; a point that moves less than this between frames has not jumped."""
 FAST = 6.0
 """Torsos a second, about 3 m/s; an arm that leaves faster and is back within RETURN frames was never there."""
 RETURN = 3
 SWAY = 0.12
-"""Torsos; with three times its usual speed, how far a hand may have come when it meets the other one."""
+"""Torsos that a hand may move, besides three times its usual speed, on its way to the other hand."""
 
 
 @dataclass
-class Found:
+class MissingHands:
     hand: np.ndarray
     """(T, 2) bool, left and right: the hand is missing."""
     wrist: np.ndarray
-    """(T, 2) bool: the body's wrist cannot be believed."""
+    """(T, 2) bool: the body's wrist is not seen, or wrong."""
     elbow: np.ndarray
-    """(T, 2) bool: the elbow cannot be believed."""
+    """(T, 2) bool: the elbow is not seen."""
     misplaced: np.ndarray
-    """(T, 2) bool: the hand was given with a good score, in a wrong place."""
+    """(T, 2) bool: the hand was detected with a good score in a wrong place."""
 
 
-def find_missing(xy: np.ndarray, score: np.ndarray, times: np.ndarray | None, config) -> Found:
-    """xy: (T, 133, 2) px; score: (T, 133); times: (T,) s, or None for photos, which have no before and after."""
+def find_missing(xy: np.ndarray, score: np.ndarray, times: np.ndarray | None, config: HandgapConfig) -> MissingHands:
+    """xy: (T, 133, 2) px; score: (T, 133); times: (T,) s, None for photos, which have no before and after."""
     torso = torso_length(xy, score)
     misplaced = np.zeros((len(xy), 2), bool)
     wrist_wrong = np.zeros_like(misplaced)
@@ -58,12 +60,12 @@ def find_missing(xy: np.ndarray, score: np.ndarray, times: np.ndarray | None, co
         misplaced[:, i] |= too_long(xy[:, palm] - root, torso, "palm")
         misplaced[:, i] |= too_long(root - xy[:, e], torso, "forearm") & ~elbow[:, i]
         if times is not None:
-            wrist_wrong[:, i] |= excursions(xy[:, w] - xy[:, s], wrist_given, times, torso)
-            misplaced[:, i] |= excursions(xy[:, palm] - xy[:, s], given[:, i], times, torso)
+            wrist_wrong[:, i] |= find_excursions(xy[:, w] - xy[:, s], wrist_given, times, torso)
+            misplaced[:, i] |= find_excursions(xy[:, palm] - xy[:, s], given[:, i], times, torso)
     if times is not None:
         wrists = np.stack([score[:, ARM[s][2]] >= config.lost_score for s in SIDES], axis=1)
-        wrist_wrong |= on_other_arm(xy, wrists, [[ARM[s][2]] for s in SIDES], times, torso, ON_OTHER["wrist"])
-        misplaced |= on_other_arm(xy, given, [np.arange(133)[HANDS[s]] for s in SIDES], times, torso, ON_OTHER["hand"])
+        wrist_wrong |= find_on_other_arm(xy, wrists, [[ARM[s][2]] for s in SIDES], times, torso, ON_OTHER["wrist"])
+        misplaced |= find_on_other_arm(xy, given, [np.arange(133)[HANDS[s]] for s in SIDES], times, torso, ON_OTHER["hand"])
     misplaced &= given
 
     wrist = wrist_wrong | np.stack([score[:, ARM[s][2]] < config.seen_score for s in SIDES], axis=1)
@@ -72,15 +74,13 @@ def find_missing(xy: np.ndarray, score: np.ndarray, times: np.ndarray | None, co
         if times is None:
             hand[:, i] = (hand_score[:, i] < config.seen_score) | misplaced[:, i]
         else:
-            hand[:, i] = without_islands(hysteresis(hand_score[:, i], misplaced[:, i], config), config.min_seen)
-    return Found(hand, wrist, elbow, misplaced)
+            hand[:, i] = drop_islands(hysteresis(hand_score[:, i], misplaced[:, i], config), config.min_seen)
+    return MissingHands(hand, wrist, elbow, misplaced)
 
 
 def torso_length(xy: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """(T,) px: of the frame, but no less than the clip's upper quartile, for a bent torso looks short.
-
-    inf, which no length exceeds, where shoulders and hips are never seen together.
-    """
+    """xy: (T, 133, 2) px; score: (T, 133). Returns (T,) px: the frame's, but no less than the clip's upper quartile, as a bent
+    torso looks short; inf, which no length exceeds, where shoulders and hips are never seen together."""
     shoulders, hips = ([INDEX[f"{s}_{part}"] for s in SIDES] for part in ("shoulder", "hip"))
     length = np.linalg.norm(xy[:, shoulders].mean(1) - xy[:, hips].mean(1), axis=-1)
     seen = score[:, shoulders + hips].min(axis=1) > 0.3
@@ -90,14 +90,14 @@ def torso_length(xy: np.ndarray, score: np.ndarray) -> np.ndarray:
 
 
 def too_long(bone: np.ndarray, torso: np.ndarray, name: str) -> np.ndarray:
-    """bone: (T, 2) px. Foreshortening makes a bone short, nothing makes it longer than it is."""
+    """bone: (T, 2) px; torso: (T,) px. Returns (T,) bool: foreshortening makes a bone short, nothing makes it this long."""
     return np.linalg.norm(bone, axis=1) > LONGEST[name] * torso
 
 
-def excursions(track: np.ndarray, given: np.ndarray, times: np.ndarray, torso: np.ndarray) -> np.ndarray:
-    """(T,) bool: up to RETURN frames away from the track, left and returned to faster than an arm moves.
+def find_excursions(track: np.ndarray, given: np.ndarray, times: np.ndarray, torso: np.ndarray) -> np.ndarray:
+    """track: (T, 2) px from the shoulder; given: (T,) bool, detected; times: (T,) s; torso: (T,) px.
 
-    track: (T, 2) px relative to the shoulder.
+    Returns (T,) bool: stays of up to RETURN frames off the track, left and returned to faster than an arm moves.
     """
     frames = np.flatnonzero(given)
     away = np.zeros(len(track), bool)
@@ -119,11 +119,13 @@ def excursions(track: np.ndarray, given: np.ndarray, times: np.ndarray, torso: n
     return away
 
 
-def on_other_arm(xy: np.ndarray, given: np.ndarray, points: list, times: np.ndarray, torso: np.ndarray,
-                 near: float) -> np.ndarray:
-    """(T, 2) bool: the side whose points jumped onto the other side's points, for as long as they stay there.
+def find_on_other_arm(xy: np.ndarray, given: np.ndarray, points: list[Sequence[int]], times: np.ndarray, torso: np.ndarray,
+                      near: float) -> np.ndarray:
+    """xy: (T, 133, 2) px; given: (T, 2) bool, detected; times: (T,) s; torso: (T,) px; near: torsos.
 
-    points: indices of the left and of the right side, like by like. Hands that meet without a jump are let be.
+    points: indices of the left and of the right side, in the same order.
+    Returns (T, 2) bool: the side whose points jumped onto the other side's, for as long as they stay there. Hands that meet without
+    a jump are left alone.
     """
     apart = np.median(np.linalg.norm(xy[:, points[0]] - xy[:, points[1]], axis=2), axis=1)
     together = given.all(axis=1) & (apart < near * torso)
@@ -136,8 +138,11 @@ def on_other_arm(xy: np.ndarray, given: np.ndarray, points: list, times: np.ndar
     return forward | backward
 
 
-def _jumped(tracks, given, together, times, torso) -> np.ndarray:
-    """One pass in time: while both lie together, the one further from where it was last believed is wrong."""
+def _jumped(tracks: np.ndarray, given: np.ndarray, together: np.ndarray, times: np.ndarray, torso: np.ndarray) -> np.ndarray:
+    """(T, 2) bool, one pass in time: while both lie together, the one further from its last right place is wrong.
+
+    tracks: (T, 2, 2) px; given: (T, 2) bool; together: (T,) bool; times: (T,) s; torso: (T,) px.
+    """
     wrong = np.zeros_like(given)
     last = [None, None]
     usual = [_usual_speed(tracks[:, i], given[:, i] & ~together, times) for i in range(2)]
@@ -158,15 +163,17 @@ def _jumped(tracks, given, together, times, torso) -> np.ndarray:
     return wrong
 
 
-def _usual_speed(track, given, times) -> float:
+def _usual_speed(track: np.ndarray, given: np.ndarray, times: np.ndarray) -> float:
+    """px/s, median over the detected frames."""
     frames = np.flatnonzero(given)
     if len(frames) < 2:
         return 0.0
     return float(np.median(np.linalg.norm(np.diff(track[frames], axis=0), axis=1) / np.diff(times[frames])))
 
 
-def hysteresis(hand_score: np.ndarray, misplaced: np.ndarray, config) -> np.ndarray:
-    """(T,) bool missing: lost below lost_score or misplaced, seen again from seen_score on."""
+def hysteresis(hand_score: np.ndarray, misplaced: np.ndarray, config: HandgapConfig) -> np.ndarray:
+    """hand_score: (T,); misplaced: (T,) bool. Returns (T,) bool, missing: lost below `lost_score` or misplaced, seen again from
+    `seen_score` on."""
     missing = np.zeros(len(hand_score), bool)
     lost = hand_score[0] < config.seen_score if len(hand_score) else True
     for t, value in enumerate(hand_score):
@@ -175,9 +182,11 @@ def hysteresis(hand_score: np.ndarray, misplaced: np.ndarray, config) -> np.ndar
     return missing
 
 
-def without_islands(missing: np.ndarray, min_seen: int) -> np.ndarray:
-    """Seen runs shorter than min_seen, between missing runs no shorter and together over twice as long, become missing: a
-    lost hand's false finds."""
+def drop_islands(missing: np.ndarray, min_seen: int) -> np.ndarray:
+    """missing: (T,) bool. Returns (T,) bool in which short seen runs are missing too: they are false detections of a lost hand.
+
+    Such a run is shorter than min_seen; the missing runs on both sides are no shorter and together over twice as long.
+    """
     missing = missing.copy()
     edges = runs(missing)
     for (a0, a1), (s0, s1), (b0, b1) in zip(edges, edges[1:], edges[2:], strict=False):
@@ -189,7 +198,7 @@ def without_islands(missing: np.ndarray, min_seen: int) -> np.ndarray:
 
 
 def runs(values: np.ndarray) -> list[tuple[int, int]]:
-    """[start, end) of each run of equal values, in order."""
+    """values: (T,) bool. Returns [start, end) of each run of equal values, in order."""
     if len(values) == 0:
         return []
     cuts = np.flatnonzero(np.diff(values.astype(np.int8))) + 1

@@ -7,14 +7,16 @@ import numpy as np
 from gsac.avatar.wholebody import BODY, FACE, FEET, LEFT_HAND, RIGHT_HAND
 
 BY_GROUP = ((BODY, 0.010), (FEET, 0.010), (FACE, 0.005), (LEFT_HAND, 0.005), (RIGHT_HAND, 0.005))
-"""Fraction of the person's height at full score, as measured for the embedded detectors on rendered truth."""
+"""Standard deviation at full score, as a fraction of the person's height; measured for the embedded detectors on rendered truth."""
 LEAST_SCORE = 0.1
+"""Lower scores give no larger sigma."""
 BODY_SPAN = 0.9
 """Eyes to ankles, as a part of the height."""
 
 
 def person_height(xy: np.ndarray, score: np.ndarray) -> float:
-    """px, upper quartile over the frames of the body points' extent; 0 where no frame shows two of them."""
+    """xy: (T, 133, 2) px; score: (T, 133). Returns px, the upper quartile over the frames of the body points' extent; 0 where no
+    frame shows two of them."""
     heights = []
     for points, good in zip(xy[:, BODY], score[:, BODY] > 0.3, strict=True):
         if good.sum() >= 2:
@@ -23,7 +25,7 @@ def person_height(xy: np.ndarray, score: np.ndarray) -> float:
 
 
 def detection_sigma(score: np.ndarray, height: float) -> np.ndarray:
-    """score: (T, 133). Returns (T, 133) px; the whole height where nothing was seen."""
+    """score: (T, 133); height: px, the person's. Returns (T, 133) px; the whole height where a point was not seen."""
     sigma = np.empty(score.shape, np.float64)
     for group, fraction in BY_GROUP:
         sigma[:, group] = fraction * height / np.maximum(score[:, group], LEAST_SCORE)

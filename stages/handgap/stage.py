@@ -1,23 +1,23 @@
-"""Entry of handgap: find, fill, say how sure each point is."""
+"""Entry of handgap: finds missing hands, fills the gaps, gives each point its standard deviation."""
 
 from __future__ import annotations
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, write_arrays
+from gsac.avatar.artifacts import Clip, check_keypoints, write_arrays
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import Job, StageError
 from gsac.stages.handgap.fill import fill_gaps
-from gsac.stages.handgap.missing_hands import SIDES, find_missing, runs
+from gsac.stages.handgap.missing_hands import SIDES, MissingHands, find_missing, runs
 from gsac.stages.handgap.sigma import detection_sigma, person_height
 
 FILLED_SCORE = 0.5
-"""Score of a filled point that is as sure as a detection; it falls as sigma grows."""
+"""Score of a filled point whose sigma is a detection's; it falls as sigma grows."""
 
 
 def run(job: Job) -> None:
-    keypoints = check_arrays(job.inputs["keypoints/keypoints.npz"], KEYPOINT_SHAPES)
+    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     clip = Clip.read(job.inputs["split/clip.json"])
     xy = keypoints["xy"].astype(np.float64)
     score = keypoints["score"].astype(np.float64)
@@ -48,7 +48,7 @@ def run(job: Job) -> None:
                  sigma=sigma.astype(np.float32))
 
 
-def _report(job: Job, found, filled: np.ndarray) -> None:
+def _report(job: Job, found: MissingHands, filled: np.ndarray) -> None:
     """Warns of what the user should know: hands never seen, taken for the other one, or left missing."""
     for i, side in enumerate(SIDES):
         missing, name = found.hand[:, i], f"the {side} hand"

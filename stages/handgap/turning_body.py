@@ -1,9 +1,9 @@
-"""What is known of the turning body around the arms, and a Gaussian process in its frame for a hand's points about the palm.
+"""The turning body around the arms, and a Gaussian process in its frame for a hand's points about the palm.
 
-Seen sideways a point of the body at (x, z) in the body's frame lies at x cos y + z sin y for the turn y, so constant x and z
-of spread c have the covariance c^2 cos(y - y'), and x and z that stir in time that times a squared exponential of time.
-Up and down the point stays, but for the perspective that lets it sink and rise with the turn. Linear, so in closed form: where
-nothing turns an ordinary Gaussian process is left.
+A point (x, z) of the body appears at x cos y + z sin y sideways when the body has turned by y. Constant x and z with standard
+deviation c thus have the covariance c^2 cos(y - y'); where x and z move over time, it is multiplied by a squared exponential of
+time. Up and down a point stays, except that perspective lets it sink and rise with the turn. All of it is linear, so the
+posterior has a closed form; without a turn it is that of an ordinary Gaussian process.
 """
 
 from __future__ import annotations
@@ -13,61 +13,64 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gsac.stages.handgap.body_turn import SEEN_SCORE, body_centre, body_turn, settled
+from gsac.stages.handgap.body_turn import SEEN_SCORE, estimate_turn, locate_centre, smooth_centre
+from gsac.stages.handgap.config import HandgapConfig
 from gsac.stages.handgap.missing_hands import runs
 
 LENGTHS_S = (0.25, 0.4, 0.6, 0.9, 1.4)
-"""Grid of the stirring's time constant."""
-STIRS = (0.015, 0.03, 0.06, 0.12, 0.24)
-"""Grid of its size, torso lengths."""
+"""Grid of the time constant of a point's motion in the body's frame, s."""
+MOTIONS = (0.015, 0.03, 0.06, 0.12, 0.24)
+"""Grid of the standard deviation of that motion, in torsos."""
 NOISES = (0.002, 0.004, 0.008, 0.016)
-"""Grid of the detector's noise, torso lengths."""
+"""Grid of the detector's noise, in torsos."""
 REACH, OFFSET = 0.8, 0.2
-"""Torso lengths from the body's axis, and of the middle of the seen torso from that axis."""
+"""Prior standard deviation of a point's distance from the body's axis, and of the seen torso's middle from that axis, in torsos."""
 TILT, BEND = 0.1, 0.05
-"""Torso lengths: perspective's share up and down, and its second harmonic of the turn."""
+"""Standard deviations of what perspective adds up and down with the turn, and with twice the turn, in torsos."""
 LIKELY = 4.0
-"""Log likelihood below the best of the grid from which on a process has no say."""
+"""Grid entries this far below the best log likelihood get no weight."""
 BIAS_SHARE = 0.3
-"""Of the stirring, what keeps to the image and not to the body: the detector's habits."""
+"""Share of the motion that belongs to the image and not to the body: the detector's systematic error."""
 MOST_FRAMES, NEAR_S = 200, 1.5
-"""Of a long clip, all seen frames this close to a gap are used, and every n-th of the others."""
+"""With more seen frames, a gap is filled from those within NEAR_S seconds and every n-th of the others."""
 
 
 @dataclass
-class Turner:
-    """What is known of the body around the arms."""
+class TurningBody:
+    """The body around the arms, over T frames."""
 
     centre: np.ndarray  # (T, 2) px
     turn: np.ndarray  # (T,) rad
-    torso: float  # px
+    torso: float
+    """px"""
     times: np.ndarray  # (T,) s
     shown: np.ndarray  # (T, 133) bool
     spectra: dict = field(default_factory=dict)
-    """(axis, seen frames) -> eigenvalues and vectors of each process of the grid; parts of one arm share their frames."""
+    """Computed spectra by axis and known frames; the parts of one arm share theirs."""
 
     def spectrum(self, axis: int, known: np.ndarray) -> list[tuple[float, float, np.ndarray, np.ndarray]]:
-        """known: (K,) frames. Returns length s, stir, eigenvalues (K,), vectors (K, K) of each process."""
+        """known: (K,) frames. Returns of each process of the grid its time constant s, motion, eigenvalues (K,), vectors (K, K)."""
         key = axis, known.tobytes()
         if key not in self.spectra:
             turn, times = self.turn[known], self.times[known]
-            self.spectra[key] = [(length, stir, *np.linalg.eigh(covariance(axis, turn, turn, times, times, length, stir)))
-                                 for length, stir in itertools.product(LENGTHS_S, STIRS)]
+            self.spectra[key] = [(length, motion, *np.linalg.eigh(covariance(axis, turn, turn, times, times, length, motion)))
+                                 for length, motion in itertools.product(LENGTHS_S, MOTIONS)]
         return self.spectra[key]
 
 
-def watch(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.ndarray, torso: np.ndarray) -> Turner:
-    """torso: (T,) px, inf where it is not seen."""
+def observe_body(xy: np.ndarray, score: np.ndarray, world: np.ndarray, times: np.ndarray, torso: np.ndarray) -> TurningBody:
+    """xy: (T, 133, 2) px; score: (T, 133); world: (T, 133, 3) m or NaN; times: (T,) s; torso: (T,) px, inf where not seen."""
     size = float(np.median(torso))
     if not np.isfinite(size):
         seen = xy[score > 0]
         size = max(float(np.ptp(seen, axis=0).max()) / 3, 1.0) if len(seen) else 1.0
-    centre = settled(body_centre(xy, score), times, size)
-    return Turner(centre, body_turn(xy, score, world, times, size), size, times, score > SEEN_SCORE)
+    centre = smooth_centre(locate_centre(xy, score), times, size)
+    return TurningBody(centre, estimate_turn(xy, score, world, times, size), size, times, score > SEEN_SCORE)
 
 
-def within(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config) -> np.ndarray:
-    """(T,) bool: gone, in a gap that is short enough or near enough to the seen end of the clip."""
+def within_reach(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config: HandgapConfig) -> np.ndarray:
+    """gone, seen: (T,) bool; times: (T,) s. Returns (T,) bool: gone, in a gap of at most `max_gap_s`, or within `max_hold_s` of the
+    only seen side."""
     out = np.zeros(len(gone), bool)
     for first, last in runs(gone):
         earlier, later = times[:first][seen[:first]], times[last:][seen[last:]]
@@ -79,48 +82,51 @@ def within(gone: np.ndarray, seen: np.ndarray, times: np.ndarray, config) -> np.
     return out & gone
 
 
-def predict(tracks: np.ndarray, lead: int, seen: np.ndarray, asked: np.ndarray, body: Turner,
-            ) -> np.ndarray:
-    """tracks: (T, P, 2) px from the palm; lead: the one of the P that the grid is judged by; seen, asked: (T,) bool.
+def predict_about_palm(tracks: np.ndarray, lead: int, seen: np.ndarray, asked: np.ndarray, body: TurningBody) -> np.ndarray:
+    """tracks: (T, P, 2) px from the palm; lead: index of the point whose likelihood weighs the grid; seen, asked: (T,) bool.
 
-    Returns places (A, P, 2) px of the asked frames.
+    Returns places (A, P, 2) px from the palm, in the A asked frames.
     """
-    known = chosen(seen, asked, body.times)
+    known = pick_frames(seen, asked, body.times)
     places = [_along(axis, tracks[known][:, :, axis] / body.torso, lead, known, asked, body) for axis in range(2)]
     return np.stack(places, 2) * body.torso
 
 
-def _along(axis: int, values, lead: int, known, asked, body: Turner) -> np.ndarray:
-    """(A, P) along one axis: the processes of the grid, averaged by how likely they make the lead."""
+def _along(axis: int, values: np.ndarray, lead: int, known: np.ndarray, asked: np.ndarray, body: TurningBody) -> np.ndarray:
+    """(A, P) along one axis: the processes of the grid, averaged by the likelihood that they give the lead."""
     middle = values.mean(0) if axis else 0.0
     tried = []
-    for length, stir, size, basis in body.spectrum(axis, known):
+    for length, motion, size, basis in body.spectrum(axis, known):
         along = basis.T @ (values - middle)
         for noise in NOISES:
             total = np.maximum(size, 0) + noise**2
-            tried.append((-0.5 * (along[:, lead] ** 2 / total + np.log(total)).sum(), length, stir, total, basis, along))
+            tried.append((-0.5 * (along[:, lead] ** 2 / total + np.log(total)).sum(), length, motion, total, basis, along))
     best = max(entry[0] for entry in tried)
     likely = [entry for entry in tried if entry[0] > best - LIKELY]
     weights = np.exp([entry[0] - best for entry in likely])
     means = []
-    for _, length, stir, total, basis, along in likely:
-        cross = covariance(axis, body.turn[asked], body.turn[known], body.times[asked], body.times[known], length, stir) @ basis
+    for _, length, motion, total, basis, along in likely:
+        cross = covariance(axis, body.turn[asked], body.turn[known], body.times[asked], body.times[known], length, motion) @ basis
         means.append(middle + cross / total @ along)
     return np.average(means, 0, weights)
 
 
-def covariance(axis: int, turn, turn2, time, time2, length: float, stir: float) -> np.ndarray:
-    """(n, m) of the places sideways (axis 0) or up and down (axis 1), torso lengths squared."""
-    apart = turn[:, None] - turn2
-    near = np.exp(-0.5 * ((time[:, None] - time2) / length) ** 2)
+def covariance(axis: int, turn: np.ndarray, other_turn: np.ndarray, time: np.ndarray, other_time: np.ndarray, length: float,
+               motion: float) -> np.ndarray:
+    """turn: (n,) rad, other_turn: (m,) rad; time: (n,) s, other_time: (m,) s; length: s; motion: torsos.
+
+    Returns (n, m) torsos squared, of the places sideways (axis 0) or up and down (axis 1).
+    """
+    apart = turn[:, None] - other_turn
+    near = np.exp(-0.5 * ((time[:, None] - other_time) / length) ** 2)
     if axis == 0:
         fixed = REACH**2 * np.cos(apart) + OFFSET**2 + BEND**2 * np.cos(2 * apart)
-        return fixed + stir**2 * near * (np.cos(apart) + BIAS_SHARE**2)
-    return REACH**2 + TILT**2 * np.cos(apart) + BEND**2 * np.cos(2 * apart) + stir**2 * near
+        return fixed + motion**2 * near * (np.cos(apart) + BIAS_SHARE**2)
+    return REACH**2 + TILT**2 * np.cos(apart) + BEND**2 * np.cos(2 * apart) + motion**2 * near
 
 
-def chosen(seen: np.ndarray, asked: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Indices of the seen frames to learn from."""
+def pick_frames(seen: np.ndarray, asked: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """seen, asked: (T,) bool; times: (T,) s. Returns (K,) indices of the seen frames to learn from."""
     known = np.flatnonzero(seen)
     if len(known) <= MOST_FRAMES:
         return known

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from gsac.stages.contract import BadInput
 
-MODELS = {
+DetectorName = Literal["mediapipe", "onnx-wholebody"]
+
+MODELS: dict[DetectorName, tuple[str, ...]] = {
     "mediapipe": ("pose_detection", "pose_landmark_full", "hand_recrop", "palm_detection_full", "hand_landmark_full",
                   "face_detection_short_range", "face_landmark"),
     "onnx-wholebody": ("pose_detection", "pose_landmark_full", "onnx-wholebody", "face_detection_short_range",
@@ -17,9 +20,9 @@ MODELS = {
 
 @dataclass
 class KeypointsConfig:
-    detector: str = "mediapipe"
-    """Which networks look: `mediapipe`, or `onnx-wholebody`: a SimCC whole-body network (RTMW, DWPose) that you bring by
-    `gsac models add onnx-wholebody FILE`."""
+    detector: DetectorName = "mediapipe"
+    """Networks that find the points. mediapipe: the embedded ones; onnx-wholebody: a SimCC whole-body network (RTMW, DWPose) that
+    you bring by `gsac models add onnx-wholebody FILE`."""
     person_threshold: float = 0.5
     """Least confidence, 0..1, for a person to count as seen."""
     hand_threshold: float = 0.5
@@ -27,11 +30,9 @@ class KeypointsConfig:
     face_threshold: float = 0.5
     """Least confidence, 0..1, for a face to count as seen."""
     hand_reach: float = 0.5
-    """Farthest a hand's wrist may lie from the body's wrist, in forearm lengths; beyond it the hand was not seen."""
+    """Farthest that a hand's wrist may lie from the body's wrist, in forearm lengths; a hand beyond it is not taken."""
 
     def check(self) -> None:
-        if self.detector not in MODELS:
-            raise BadInput(f"keypoints.detector is {self.detector!r}; choices: {', '.join(MODELS)}")
         for name in ("person_threshold", "hand_threshold", "face_threshold"):
             value = getattr(self, name)
             if not 0 < value < 1:

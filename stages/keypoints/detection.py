@@ -1,4 +1,4 @@
-"""What a detector says of one frame."""
+"""What a detector finds in one frame."""
 
 from __future__ import annotations
 
@@ -20,21 +20,18 @@ class Frame:
     """Starts as a frame in which nobody is seen. A point whose score is 0 was not seen and its place means nothing."""
 
     xy: np.ndarray = _zero(133, 2)
-    """px, COCO-WholeBody order."""
+    """(133, 2) px, COCO-WholeBody order."""
     score: np.ndarray = _zero(133)
+    """(133,) in 0..1."""
     world: np.ndarray = _nan(133, 3)
-    """m, hips at 0, OpenCV axes."""
+    """(133, 3) m, hips at 0, OpenCV axes; NaN where unknown."""
     pose33: np.ndarray = _zero(33, 3)
-    """BlazePose x, y px and visibility; zeros from detectors that have none."""
+    """(33, 3) BlazePose's x, y px and visibility; zeros where nobody is seen."""
     face_mesh: np.ndarray = _nan(468, 3)
-    """px."""
-    person2: np.ndarray = _nan(4)
-    """Box x0 y0 x1 y1 px of a second person."""
-    person2_score: float = 0.0
+    """(468, 3) px; NaN where no face is found."""
+    second_person: bool = False
+    """Whether somebody else is seen beside the followed person; not part of the file."""
 
     @property
     def seen(self) -> bool:
         return bool(self.score.any())
-
-
-ARRAYS = ("xy", "score", "world", "pose33", "face_mesh", "person2", "person2_score")

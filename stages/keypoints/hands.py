@@ -1,7 +1,7 @@
-"""The two hands of a known body: looks at each arm's end, 21 points a hand, and whose hand a find is.
+"""Detects the two hands of a known body, 21 points each, and decides whose hand a detection is.
 
-Two ways lead to a crop: the network that corrects the arm's rough crop, and the palm detector on a wider one. The finds
-of both arms are pooled, and each is given to one arm at most: a hidden hand must not get the points of the other.
+Crops come from two networks: one corrects the rough crop at the arm's end, the palm detector searches a wider one. The
+detections of both arms are pooled and each is given to at most one arm: a hidden hand must not get the points of the other.
 """
 
 from __future__ import annotations
@@ -19,17 +19,19 @@ from gsac.avatar.tflite import Network
 POINTS = 21
 PALM_SCORE = 0.5
 SIDE_WEIGHT = 0.3
-"""What a find of the other side's hand costs, in forearm lengths of wrist distance."""
+"""Cost of a detection that the network takes for the other side's hand, in forearm lengths of wrist distance."""
 
 
 @dataclass(frozen=True)
 class Arm:
     wrist: np.ndarray
-    """(2,) px, from the body's points; so are the knuckles."""
+    """(2,) px, the body's point."""
     pinky: np.ndarray
+    """(2,) px, the body's point of the knuckle."""
     index: np.ndarray
+    """(2,) px, the body's point of the knuckle."""
     forearm: float
-    """Its length in pixels as if seen from the side."""
+    """px, its length without foreshortening."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Hand:
     presence: float
     """0..1 that this is a hand."""
     right: float
-    """0..1 that it is the person's right hand, in the network's eyes; a weak witness when the hand is seen edge-on."""
+    """0..1, the network's probability that it is a right hand; unreliable when the hand is seen edge-on."""
 
 
 class HandNetworks:
@@ -54,25 +56,25 @@ class HandNetworks:
         self._anchors = anchor_centers(self._palm.width, (8, 16, 16, 16))
 
     def find(self, image: np.ndarray, arms: dict[str, Arm], threshold: float, reach: float) -> dict[str, Hand]:
-        """image: (H, W, 3) uint8; arms: `left` and `right`; reach: see `assign`. Returns the sides that were seen."""
+        """image: (H, W, 3) uint8; arms: by side, `left` and `right`; reach: see `assign`. Returns the hands found, by side."""
         rough = {side: rough_region(arm.wrist, arm.pinky, arm.index) for side, arm in arms.items()}
-        looks = [look for region in rough.values() for look in (self.recrop(image, region), *self.palms(image, region))]
-        seen = [hand for hand in (self.read(image, look) for look in distinct(looks)) if hand.presence >= threshold]
-        given = assign(merged(seen), arms, reach)
+        regions = [each for region in rough.values() for each in (self.recrop(image, region), *self.palms(image, region))]
+        seen = [hand for hand in (self.read(image, each) for each in drop_alike(regions)) if hand.presence >= threshold]
+        given = assign(merge(seen), arms, reach)
         for side in rough.keys() - given.keys():
             hand = self.read(image, rough[side].scaled(0.7))
             if hand.presence >= threshold:
-                given = assign(merged([*seen, hand]), arms, reach)
+                given = assign(merge([*seen, hand]), arms, reach)
         return given
 
     def recrop(self, image: np.ndarray, rough: Region) -> Region:
-        """A better region from a rough one."""
+        """image: (H, W, 3) uint8. Corrects a rough region."""
         size = self._recrop.width
         out = self._recrop(crop(image, rough, size))[0].reshape(2, 2).astype(np.float64) / size
         return around_circle(*rough.to_frame(out), target=-np.pi / 2).moved(0.0, -0.1)
 
     def palms(self, image: np.ndarray, rough: Region) -> list[Region]:
-        """Regions of all palms about a rough region."""
+        """image: (H, W, 3) uint8. Regions of the hands whose palms are detected in and around a rough region."""
         size, wide = self._palm.width, rough.scaled(1.5)
         raw, logits = self._palm(crop(image, wide, size, outside="black"))
         found = suppress(decode(raw, logits, self._anchors, size, PALM_SCORE))
@@ -85,7 +87,7 @@ class HandNetworks:
         return regions
 
     def read(self, image: np.ndarray, region: Region) -> Hand:
-        """One look of the landmark network."""
+        """image: (H, W, 3) uint8. The landmark network on one region."""
         size = self._landmark.width
         points, presence, right, world = self._landmark(crop(image, region, size))
         points = points.reshape(POINTS, 3).astype(np.float64) / size
@@ -94,14 +96,14 @@ class HandNetworks:
 
 
 def rough_region(wrist: np.ndarray, pinky: np.ndarray, index: np.ndarray) -> Region:
-    """Body points (2,) px of one hand. About twice the hand, fingers up."""
+    """wrist, pinky, index: (2,) px, body points of one hand. Returns a region about twice the hand's size, fingers up."""
     middle = (2 * index + pinky) / 3
     side = max(2 * float(np.hypot(*(middle - wrist))), 1.0)
     return Region(tuple(middle), side, upright_angle(wrist, middle, np.pi / 2)).scaled(2.7).moved(0.0, -0.1)
 
 
-def distinct(regions: list[Region]) -> list[Region]:
-    """Without those that look at nearly the same square as an earlier one."""
+def drop_alike(regions: list[Region]) -> list[Region]:
+    """Drops each region that is nearly the same square as an earlier one."""
     kept: list[Region] = []
     for region in regions:
         if not any(_alike(region, other) for other in kept):
@@ -116,13 +118,13 @@ def _alike(a: Region, b: Region) -> bool:
 
 
 def same_hand(a: Hand, b: Hand) -> bool:
-    """Whether two finds are one hand of the picture: a typical point moves by less than a quarter of the hand."""
+    """Whether two detections are of one hand in the image: their points' median distance is less than a quarter of the hand."""
     size = min(np.ptp(a.points, axis=0).max(), np.ptp(b.points, axis=0).max())
     return bool(np.median(np.linalg.norm(a.points - b.points, axis=1)) < size / 4)
 
 
-def merged(seen: list[Hand]) -> list[Hand]:
-    """One find for each hand of the picture: the surest, its points averaged with the looks that agree with it."""
+def merge(seen: list[Hand]) -> list[Hand]:
+    """One detection for each hand in the image: the most certain, its points averaged with those that agree with it."""
     rest = sorted(seen, key=lambda hand: -hand.presence)
     out = []
     while rest:
@@ -136,11 +138,10 @@ def merged(seen: list[Hand]) -> list[Hand]:
 
 
 def assign(hands: list[Hand], arms: dict[str, Arm], reach: float) -> dict[str, Hand]:
-    """Gives each arm one of the finds or none, no find twice, so that as many arms as can be have one and the wrists
-    then lie closest.
+    """Gives each arm one of the hands or none, no hand twice: as many arms as possible, then the least distance of the wrists.
 
-    reach: farthest that a find's wrist may be from the body's, in forearm lengths; a find the network takes for the
-    other side's hand counts as `SIDE_WEIGHT` farther.
+    reach: farthest that a hand's wrist may lie from the arm's, in forearm lengths; a hand that the network takes for the other
+    side's counts as `SIDE_WEIGHT` farther.
     """
     def cost(hand: Hand, side: str) -> float:
         arm = arms[side]

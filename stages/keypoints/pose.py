@@ -16,7 +16,7 @@ from gsac.avatar.tflite import Network, sigmoid
 
 POINTS = 33
 HIPS, RIM = 33, 34
-"""Auxiliary outputs: the hips' middle and a point on the circle that holds the body, straight above the head."""
+"""Auxiliary outputs: the middle of the hips, and a point above the head on the circle around the body."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class PoseNetworks:
         self._anchors = anchor_centers(self._detector.width, (8, 16, 32, 32, 32))
 
     def persons(self, image: np.ndarray, threshold: float) -> list[Person]:
-        """image: (H, W, 3) uint8. Best first."""
+        """image: (H, W, 3) uint8. Persons of at least this score, best first."""
         size = self._detector.width
         frame = full_frame(image.shape[1], image.shape[0])
         raw, logits = self._detector(crop(image, frame, size, outside="black") * 2 - 1)
@@ -61,7 +61,7 @@ class PoseNetworks:
                 for circle, score in zip(circles, found.score, strict=True)]
 
     def pose(self, image: np.ndarray, region: Region) -> Pose:
-        """One look of the landmark network."""
+        """image: (H, W, 3) uint8. The landmark network on one region."""
         size = self._landmark.width
         raw, score, _mask, heat, world = self._landmark(crop(image, region, size))
         raw = raw.reshape(-1, 5).astype(np.float64)
@@ -72,8 +72,8 @@ class PoseNetworks:
 
 
 def refine(points: np.ndarray, heat: np.ndarray, reach: int = 3, least: float = 0.5) -> np.ndarray:
-    """points: (n, 2) in 0..1; heat: (h, w, n) logits. Returns (n, 2): the heat's centre of mass in the window of
-    +-reach cells about each point where its peak is at least `least`, else the point."""
+    """points: (n, 2) in 0..1; heat: (h, w, n) logits. Returns (n, 2): the heat's centre of mass within `reach` cells of each point,
+    or the point itself where the heat's peak there is below `least`."""
     height, width, n = heat.shape
     out = points.copy()
     for i in range(n):

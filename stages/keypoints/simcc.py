@@ -1,33 +1,32 @@
 """A whole-body network with SimCC outputs (RTMPose, RTMW, DWPose; 133 points), brought by the user as an ONNX file.
 
-Its input is 3 x H x W, RGB less ImageNet's mean; its outputs are a score for each half pixel along x and along y.
-BlazePose finds the person and gives the metres, the face mesh network what `face` needs.
+Its input is 3 x H x W, RGB normalised by ImageNet's mean and deviation; its outputs are a score for each half pixel along x and
+along y. BlazePose finds the person and gives the points in metres; the face mesh network gives what `face` reads.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.facemesh import FaceMesh, head_yaw, region_of_head
+from gsac.avatar.facemesh import Face
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
-from gsac.stages.keypoints.mediapipe import write_body
+from gsac.stages.keypoints.detector import Detector
 from gsac.stages.keypoints.pose import Pose
-from gsac.stages.keypoints.tracking import Follower
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)
 DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)
 PADDING = 1.25
+"""Side of the crop, in sides of the box of BlazePose's points."""
 POINTS = 133
 
 
 class SimccNetwork:
-    """path: the ONNX file. One that is no such network raises `BadInput`."""
+    """path: the ONNX file; raises `BadInput` where it is no such network."""
 
     def __init__(self, path: Path):
         import onnxruntime
@@ -61,36 +60,21 @@ class SimccNetwork:
         return xy @ to_frame[:, :2].T + to_frame[:, 2], np.clip(score, 0, 1)
 
 
-class Wholebody:
-    """models: name -> file, those of `config.models()`."""
-
+class Wholebody(Detector):
     def __init__(self, models: dict[str, Path], config: KeypointsConfig):
-        self._config = config
         self._network = SimccNetwork(models["onnx-wholebody"])
-        self._follower = Follower(models, config)
-        self._face = FaceMesh(models, threads=1)
+        super().__init__(models, config)
 
-    def follow(self, image: np.ndarray) -> Callable[[], Frame]:
-        """As `Mediapipe.follow`."""
-        frame = Frame()
-        pose = self._follower.look(image, frame)
-        return lambda: frame if pose is None else self._filled(frame, image, pose)
-
-    def _filled(self, frame: Frame, image: np.ndarray, pose: Pose) -> Frame:
-        write_body(frame, pose)
-        head = region_of_head(pose.points[:11])
-        face = self._face.find(image, head, head_yaw(pose.world), self._config.face_threshold)
-        if face is not None:
-            frame.face_mesh[:] = face.points
+    def write_points(self, frame: Frame, image: np.ndarray, pose: Pose, face: Face | None) -> None:
+        """image: (H, W, 3) uint8 RGB. All 133 points; those in metres stay BlazePose's."""
         network = self._network
         frame.xy[:], frame.score[:] = network.read(image, crop_matrix(pose.points, network.width, network.height))
         drop_doubled_hand(frame)
-        return frame
 
 
 def crop_matrix(points: np.ndarray, width: int, height: int) -> np.ndarray:
-    """points: (n, 2) px that span the person. Returns (2, 3): crop pixels to frame pixels, the padded box of the
-    points at the crop's aspect, upright."""
+    """points: (n, 2) px that span the person. Returns (2, 3), crop pixels to frame pixels: the upright padded box of the points,
+    widened to the crop's aspect."""
     low, high = points.min(axis=0), points.max(axis=0)
     scale = float(((high - low) * PADDING / [width, height]).max())
     middle = (low + high) / 2
@@ -98,14 +82,14 @@ def crop_matrix(points: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def decode(x: np.ndarray, y: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """x: (n, bins), y: (n, bins) scores along the axes of a width x height crop. Returns the places (n, 2) px of the
-    crop and their scores (n,), the lesser of the two axes' peaks (Li et al. 2022)."""
+    """x: (n, bins), y: (n, bins) scores along the axes of a width x height crop. Returns places (n, 2) px of the crop and scores
+    (n,), the lesser of both axes' peaks (Li et al. 2022)."""
     at = np.stack([x.argmax(axis=1) * width / x.shape[1], y.argmax(axis=1) * height / y.shape[1]], axis=1)
     return at + 0.5, np.minimum(x.max(axis=1), y.max(axis=1))
 
 
 def drop_doubled_hand(frame: Frame) -> None:
-    """Takes the score of the less sure hand where both hands' points lie on one hand of the picture."""
+    """Where both hands' points lie on one hand of the image, sets the score of the less certain one to 0."""
     left, right = HANDS["left"], HANDS["right"]
     size = min(np.ptp(frame.xy[left], axis=0).max(), np.ptp(frame.xy[right], axis=0).max())
     if np.median(np.linalg.norm(frame.xy[left] - frame.xy[right], axis=1)) < size / 4:

@@ -1,64 +1,59 @@
-"""Runs the detector over the clip, writes keypoints.npz and says what was not seen.
+"""Runs the detector over the clip, writes keypoints.npz and warns of what was not seen.
 
-The person is followed from frame to frame; what is left of a frame is looked for beside that, some frames at a time.
+The person is followed frame by frame; the rest of a frame is found in threads, several frames at a time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, read_frame, write_arrays
 from gsac.avatar.threads import ahead, available
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.frame_names import name_frames
-from gsac.stages.keypoints.detection import ARRAYS, Frame
+from gsac.stages.keypoints.config import DetectorName
+from gsac.stages.keypoints.detection import Frame
+from gsac.stages.keypoints.detector import Detector
 from gsac.stages.keypoints.mediapipe import Mediapipe
 from gsac.stages.keypoints.simcc import Wholebody
 
-DETECTORS = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody}
-MOST = 8
-"""Frames looked at side by side: each thread holds networks of its own, some 40 MB."""
+DETECTORS: dict[DetectorName, type[Detector]] = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody}
+"""keypoints.detector -> its class."""
+MOST_THREADS = 8
+"""Each holds networks of its own, some 40 MB."""
 EDGE = 0.004
 """Width of the rim of the frame, as a part of its longer side, that counts as touching it."""
 
 
 def run(job: Job) -> None:
-    clip = Clip.read(job.inputs["split/clip.json"])
     paths = frame_paths(job.inputs["split/frames"])
     detector = DETECTORS[job.config.detector](job.models, job.config)
     frames, at_edge = [], []
-    many = min(available(), MOST)
-    with ThreadPoolExecutor(many + 1) as pool:
-        looks = (Look(detector.follow(image), *image.shape[:2]) for image in ahead(pool, read_frame, paths, 2))
-        for frame, edge in ahead(pool, look, looks, many):
+    threads = min(available(), MOST_THREADS)
+    with ThreadPoolExecutor(threads + 1) as pool:
+        started = ((detector.start(image), *image.shape[:2]) for image in ahead(pool, read_frame, paths, 2))
+        for frame, edge in ahead(pool, _finish, started, threads):
             frames.append(frame)
             at_edge.append(edge)
             job.progress(len(frames), len(paths), "frames")
-    say(job, clip, frames, at_edge)
-    arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in ARRAYS}
+    report(job, frames, at_edge)
+    arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in KEYPOINT_SHAPES if name != "detector"}
     write_arrays(job.out / "keypoints.npz", detector=np.array(job.config.detector), **arrays)
 
 
-class Look(NamedTuple):
-    rest: Callable[[], Frame]
-    """Finds what is left to find of the frame."""
-    height: int
-    width: int
-
-
-def look(one: Look) -> tuple[Frame, bool]:
-    """A frame, and whether the person touches its edge."""
-    frame = one.rest()
-    return frame, frame.seen and touches_edge(frame, one.width, one.height)
+def _finish(started: tuple[Callable[[], Frame], int, int]) -> tuple[Frame, bool]:
+    """started: what `Detector.start` returned, height and width px. Returns the frame, and whether the person touches its edge."""
+    finish, height, width = started
+    frame = finish()
+    return frame, frame.seen and touches_edge(frame, width, height)
 
 
 def touches_edge(frame: Frame, width: int, height: int) -> bool:
-    """Whether a point of the body, or the crown above the eyes, lies on the frame's rim or outside of it."""
+    """Whether a body point, or the crown extrapolated above the eyes, lies on the frame's rim or outside of it. Sizes in px."""
     xy = frame.pose33[:, :2] if frame.pose33.any() else frame.xy[:23][frame.score[:23] > 0]
     if frame.pose33.any():
         eyes, mouth = xy[[2, 5]].mean(axis=0), xy[[9, 10]].mean(axis=0)
@@ -67,15 +62,15 @@ def touches_edge(frame: Frame, width: int, height: int) -> bool:
     return bool((xy < rim).any() or (xy[:, 0] > width - rim).any() or (xy[:, 1] > height - rim).any())
 
 
-def say(job: Job, clip: Clip, frames: list[Frame], at_edge: list[bool]) -> None:
-    """Warns of what the later stages have to do without; nobody anywhere is an error."""
+def report(job: Job, frames: list[Frame], at_edge: list[bool]) -> None:
+    """Warns of what was not seen; that nobody was seen in any frame is an error. at_edge: one for each frame."""
     seen = np.array([f.seen for f in frames])
     if not seen.any():
-        raise BadInput(f"{clip.source_name or 'the clip'}: no person was found in any of its {len(frames)} frames; "
+        raise BadInput(f"No person was found in any of the clip's {len(frames)} frames; "
                        "film one whole person, upright, at least a third of the frame high, in good light")
     if not seen.all():
         job.warn(f"No person was found in {name_frames(~seen)}; these frames carry no points.")
-    second = np.array([f.person2_score > 0 for f in frames])
+    second = np.array([f.second_person for f in frames])
     if second.any():
         job.warn(f"A second person was seen in {name_frames(second)}; only the first one is followed. "
                  "Keep others out of the picture or cut these frames.")

@@ -1,4 +1,4 @@
-"""Whom to look at: one person, from frame to frame, and whether there is a second."""
+"""Follows one person from frame to frame, and notices a second."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.pose import Person, Pose, PoseNetworks
 
 SECOND_SCORE = 0.7
-"""A second person is reported when detector and landmark network together are this sure."""
+"""Least score, of detector and landmark network alike, for a second person to be reported."""
 
 
-class Follower:
-    """Follows the largest and most central person at first, then the nearest to where it was.
+class Tracker:
+    """Starts with the largest and most central person, then takes the one nearest to the last place.
 
     models: name -> file, `pose_detection` and `pose_landmark_full`.
     """
@@ -27,9 +27,9 @@ class Follower:
         self._pose = PoseNetworks(models, threads=max(1, min(4, available() // 4)))  # the other cores have other frames
         self._last: Region | None = None
 
-    def look(self, image: np.ndarray, frame: Frame) -> Pose | None:
-        """image: (H, W, 3) uint8, the next frame. The followed person's pose, None when it is not seen; a second person
-        is written into the frame."""
+    def track(self, image: np.ndarray, frame: Frame) -> Pose | None:
+        """image: (H, W, 3) uint8, the next frame. Returns the followed person's pose, None when not seen; sets
+        `frame.second_person`."""
         persons = self._pose.persons(image, self._least)
         pose = self._follow(image, persons)
         if pose is not None:
@@ -38,14 +38,14 @@ class Follower:
         return pose
 
     def _follow(self, image: np.ndarray, persons: list[Person]) -> Pose | None:
-        """The followed person's pose, which is anybody's after it was lost."""
+        """The followed person's pose; where that person is lost, the nearest other one's."""
         if self._last is None:
             order = sorted(persons, key=lambda p: -prominence(p.region, image.shape[1], image.shape[0]))
         else:
             last = self._last
             order = sorted(persons, key=lambda p: apart(p.region, last))
             if not order or apart(order[0].region, last) > 0.5:
-                # The detector may have missed the person whom the landmark network still sees where it was.
+                # The detector may miss a person whom the landmark network still finds at the last place.
                 pose = self._pose.pose(image, last)
                 if pose.score >= self._least:
                     return pose
@@ -56,7 +56,7 @@ class Follower:
         return None
 
     def _second(self, image: np.ndarray, persons: list[Person], pose: Pose, frame: Frame) -> None:
-        """Writes the surest person who is not the followed one."""
+        """Notes in the frame whether somebody else is seen."""
         for person in persons:
             if apart(person.region, pose.region) < 0.4:
                 continue
@@ -64,19 +64,16 @@ class Follower:
             score = min(person.score, other.score)
             middles = [points[[11, 12, 23, 24]].mean(axis=0) for points in (other.points, pose.points)]
             far = np.hypot(*(middles[0] - middles[1])) > 0.15 * min(other.region.side, pose.region.side)
-            if far and score >= SECOND_SCORE and score > frame.person2_score:
-                low, high = other.points.min(axis=0), other.points.max(axis=0)
-                frame.person2 = np.concatenate([low, high])
-                frame.person2_score = score
+            frame.second_person |= bool(far and score >= SECOND_SCORE)
 
 
 def prominence(region: Region, width: int, height: int) -> float:
-    """Size in the frame, less what lies off the middle."""
+    """Size in the frame, reduced by the distance from its middle."""
     off = np.hypot(region.center[0] / width - 0.5, region.center[1] / height - 0.5)
     return region.side / max(width, height) * (1 - off)
 
 
 def apart(a: Region, b: Region) -> float:
-    """Distance of two persons' regions in sizes, plus how much their sizes differ."""
+    """Distance between two persons' regions in units of the larger one, plus half the difference of the logs of their sizes."""
     away = np.hypot(a.center[0] - b.center[0], a.center[1] - b.center[1]) / max(a.side, b.side)
     return float(away + 0.5 * abs(np.log(a.side / b.side)))

@@ -1,11 +1,11 @@
-"""segment: which part of each pixel is the person.
+"""segment: how much of each pixel is the person.
 
 takes  split/frames (frames/plate.png where photos came with the empty scene), split/clip.json, keypoints/keypoints.npz
 gives  alpha/%06d.exr (H, W) half, 0..1
 
-A person network says roughly where (`network.py`), GrabCut at half size finds the outline (`grabcut.py`), the colours
-on both sides of the outline give the soft edge (`edge.py`). A plate joins in at each step (`plate.py`);
-a still camera's video teaches its own (`still.py`).
+A person network finds the rough region (`network.py`), GrabCut at half size its outline (`grabcut.py`), of which the parts that
+are no person are dropped (`components.py`); the colours on both sides of it give the soft edge (`matting.py`). Each step uses a
+plate, the empty scene, where there is one (`plate.py`); from a video of a still camera it is computed (`plate_from_video.py`).
 """
 
 from gsac.avatar.artifacts import check_image_folder

@@ -1,4 +1,4 @@
-"""Which connected parts of a mask are the person."""
+"""Drops the connected parts of a mask that are not the person."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 
 LEAST = 0.002
-"""Parts smaller than this share of the largest one are dropped unless they hold a point."""
+"""Parts smaller than this share of the largest one are dropped."""
 BODY_AND_HANDS = (*range(17), *range(91, 133))
 
 
 def keep_person(outline: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """outline: (H, W) 0..1; xy: (133, 2) px; score: (133,). Returns it without the parts that hold no seen point.
+    """outline: (H, W) 0..1; xy: (133, 2) px; score: (133,). Returns the outline (H, W) without the parts that hold no seen point.
 
     Where no part holds one, the largest is kept.
     """

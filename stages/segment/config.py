@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from gsac.stages.contract import BadInput
 
-MODELS = {"pose": ("pose_landmark_full",), "selfie": ("selfie_segmentation",)}
-"""Method -> the network files it needs."""
+Method = Literal["pose", "selfie"]
+
+MODELS: dict[Method, tuple[str, ...]] = {"pose": ("pose_landmark_full",), "selfie": ("selfie_segmentation",)}
+"""segment.method -> the network files it needs."""
 
 
 @dataclass
 class SegmentConfig:
-    method: str = "pose"
-    """Which network says where the person is: pose (the body network's own mask) or selfie."""
+    method: Method = "pose"
+    """Network that finds the person's rough region. pose: the body network's own mask; selfie: the selfie network."""
     iterations: int = 1
-    """Rounds of GrabCut; 0 keeps the network's outline."""
+    """Iterations of GrabCut; 0 keeps the network's outline."""
     use_plate: bool = True
-    """Whether the empty scene joins in: the one that photos came with, or the one that a still camera's video shows
-    where the person is not."""
+    """Whether the empty scene is used: the plate that photos came with, or for a video of a still camera the median of its
+    frames."""
 
     def check(self) -> None:
-        if self.method not in MODELS:
-            raise BadInput(f"segment.method is {self.method!r}; expected one of {', '.join(MODELS)}")
         if not 0 <= self.iterations <= 20:
             raise BadInput(f"segment.iterations is {self.iterations}; expected 0 to 20")
 

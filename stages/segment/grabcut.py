@@ -1,4 +1,4 @@
-"""The outline by GrabCut at half size (Rother et al. 2004), told by the network, the hands' points and a plate."""
+"""The outline by GrabCut at half size (Rother et al. 2004), seeded by the network, the hands' points and a plate."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from gsac.avatar.wholebody import HANDS
 from gsac.stages.segment.plate import HALF, Difference
 
 SURE, NEVER = 0.95, 0.15
-"""Network probabilities that are taken as said."""
+"""Network probabilities above which a pixel is seeded as person, and below which as background, for good."""
 FINGERS = ([0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20])
 PALM_HULL = (0, 1, 5, 9, 13, 17)
 FINGER_WIDTH = 0.16
-"""Of wrist -> root of the middle finger."""
+"""As a share of the length from the wrist to the root of the middle finger."""
 HAND_SEEN = 0.3
+"""Least median score of a hand's points for them to be used."""
 
 
 def cut_out(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray, iterations: int,
             difference: Difference | None = None) -> np.ndarray:
     """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).
 
-    difference: what a plate says of this part of the frame.
-    Returns (H, W) float32, 0..1, sharp but for the step from half size.
+    difference: of this part of the frame from the plate.
+    Returns (H, W) float32 in 0..1, sharp except for the interpolation from half size.
     """
     height, width = probability.shape
     size = (max(1, width // HALF), max(1, height // HALF))
@@ -42,7 +43,10 @@ def cut_out(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: n
 
 
 def seed(rough: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """(h, w) uint8 GrabCut labels from the network's probability; around seen hands from their fingers."""
+    """rough: (h, w) network probability; xy: (133, 2) px; score: (133,).
+
+    Returns (h, w) uint8 GrabCut labels: from the probability, around seen hands from their fingers.
+    """
     sure = cv2.erode((rough > SURE).astype(np.uint8), np.ones((3, 3), np.uint8))
     never = cv2.dilate((rough > NEVER).astype(np.uint8), np.ones((3, 3), np.uint8)) == 0
     labels = np.where(rough > 0.5, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
@@ -55,7 +59,10 @@ def seed(rough: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.ndarray:
 
 
 def seed_hand(labels: np.ndarray, rough: np.ndarray, hand: np.ndarray) -> None:
-    """hand: (21, 2) px. The network fills the gaps between fingers and loses thin ones: here the bones tell."""
+    """Labels the surroundings of one hand by its bones: the network fills the gaps between fingers and loses thin ones.
+
+    labels: (h, w) uint8, changed in place; rough: (h, w) network probability; hand: (21, 2) px.
+    """
     length = float(np.linalg.norm(hand[9] - hand[0]))
     if not 2 <= length <= max(labels.shape):
         return
@@ -63,7 +70,7 @@ def seed_hand(labels: np.ndarray, rough: np.ndarray, hand: np.ndarray) -> None:
     zone = np.zeros_like(labels)
     cv2.fillConvexPoly(zone, whole, 1)
     cv2.polylines(zone, [whole], True, 1, max(1, int(0.5 * length)))
-    # Deep inside the body, where the hand lies before it, the network is right.
+    # Where the hand lies in front of the body, the network is right deep inside it.
     reach = int(0.5 * length) | 1
     zone[cv2.erode((rough > SURE).astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0] = 0
 

@@ -1,4 +1,4 @@
-"""The soft edge: how much of each pixel near the outline is person, from the mean colours on both sides of it."""
+"""The soft edge: the alpha of each pixel near the outline, from the mean colours on both sides of it."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 from gsac.stages.segment.plate import Plate
 
 BAND = 2
-"""Pixels on each side of the outline that are mixed anew."""
+"""Pixels on each side of the outline whose alpha is computed."""
 REACH = 5
 """Half width, px, of the window in which the colours of both sides are averaged."""
 CONTRAST = 0.1
-"""Distance of both colours (RGB, 0..1) from which on they are believed half; below, the outline itself is."""
+"""Distance of both colours (RGB, 0..1) at which alpha is half theirs, half the smoothed outline's; less distance, more outline."""
 
 
 def soften(image: np.ndarray, outline: np.ndarray, plate: Plate | None = None, band: int = BAND) -> np.ndarray:
     """image: (H, W, 3) uint8; outline: (H, W) 0..1; plate: the empty scene in the frame's exposure.
 
-    Returns (H, W) float32 alpha: 1 inside, 0 outside, in the band the share a of colour = a F + (1 - a) B.
+    Returns (H, W) float32 alpha: 1 inside, 0 outside, in the band the a of colour = a F + (1 - a) B.
     """
     hard = (outline > 0.5).astype(np.uint8)
     around = np.ones((2 * band + 1, 2 * band + 1), np.uint8)
@@ -36,7 +36,7 @@ def soften(image: np.ndarray, outline: np.ndarray, plate: Plate | None = None, b
     front, front_seen = _mean(colour, inside, at)
     back, back_seen = _mean(colour, beyond, at)
     if plate is not None:
-        # The plate knows the scene's own texture; the ratio of the means brings it into this place's shadow.
+        # The plate has the scene's own texture; the ratio of the means gives it the shadow of this place.
         scene, known = plate.image[window].astype(np.float32) / 255, plate.known[window][at]
         mean, _ = _mean(scene, beyond, at)
         shade = np.where(back_seen[:, None], np.clip((back + 0.02) / (mean + 0.02), 0.5, 2), 1)

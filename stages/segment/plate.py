@@ -1,6 +1,6 @@
-"""What the empty scene of a still camera tells about a frame: where nothing changed, and where something must have.
+"""Compares a frame with the plate, the empty scene of a still camera: where the bare scene shows, and where it certainly does not.
 
-A cast shadow changes a pixel too, but like a dimmer: darker, hardly another hue. Such pixels are left to the network.
+A cast shadow changes a pixel too, but it darkens it and hardly changes its hue. Such pixels are left to the network.
 """
 
 from __future__ import annotations
@@ -11,23 +11,25 @@ import cv2
 import numpy as np
 
 HALF = 2
-"""All is done at half size: a plate decides areas, not outlines."""
+"""The comparison is done at half size: a plate decides areas, not outlines."""
 BARE, ALIKE, CHANGED = 2.5, 4.0, 6.0
-"""Noise widths below which a pixel is bare scene, is so where the network doubts, and above which it is not."""
+"""Deviations from the plate, in units of the noise: below BARE a pixel is bare scene, below ALIKE it is where the network is not
+sure, above CHANGED it is not."""
 LEAST_NOISE, MOST_NOISE = 1.0, 4.0
-"""CIE Lab units, of L* and of a* b*; with more the plate shows another scene."""
+"""Bounds of the noise of L* and of a* b*, in CIE Lab units; above the upper one the plate shows another scene."""
 SHADOW = 45.0
-"""L* units by which a shadow may darken a pixel."""
+"""Most by which a shadow darkens a pixel, in L*."""
 SHADE, DIM = 20.0, 8.0
-"""L* units up to which a smooth darkening, and any, without another hue is taken for bare scene in shade."""
+"""Most by which a pixel of unchanged hue may be darker and still be bare scene in shade, in L*: in a smooth area, and elsewhere."""
 SURE = 0.9
-"""Network probability from which on the plate must show more to overrule it."""
+"""Network probability from which on only the stricter of both limits overrules it."""
 OPENING = 5, 3
-"""px; bare scene narrower than this is a chance likeness, where the network is sure and where it doubts."""
+"""px; bare scene narrower than this is taken for chance, where the network is sure and where it is not."""
 CAMOUFLAGE = 0.06
-"""Share of the sure person that may look like the plate; gaps between the limbs are less."""
+"""Largest share of the sure person that may look like the plate: more than that is clothing, gaps between limbs are less."""
 STRUCTURE, WINDOW = 4.0, 3.0
-"""A shadow darkens its surroundings alike: a difference that varies more (L*) about its mean (Gaussian, px) is a thing."""
+"""A shadow darkens evenly: where the difference varies by more than STRUCTURE (L*) about its mean over WINDOW (px), it is an
+object."""
 
 
 @dataclass
@@ -42,32 +44,35 @@ class Plate:
     """Share of the background that may differ before the plate counts as one of another scene."""
 
     def part(self, box: tuple[int, int, int, int]) -> Plate:
+        """box: x0, y0, x1, y1 px."""
         x0, y0, x1, y1 = box
         return Plate(self.image[y0:y1, x0:x1], self.known[y0:y1, x0:x1], self.most_changed)
 
 
 @dataclass
 class Difference:
+    """Of a frame from the plate."""
+
     gain: np.ndarray
-    """(3,) float: the plate times this has the frame's exposure."""
+    """(3,) float: factor that gives the plate the frame's exposure."""
     empty: np.ndarray
     """(H // 2, W // 2) bool: certainly bare scene."""
     changed: np.ndarray
     """(H // 2, W // 2) bool: certainly not the bare scene, and no shadow."""
 
     def part(self, box: tuple[int, int, int, int]) -> Difference:
-        """The same of a box (x0, y0, x1, y1) in full-size pixels, even but at the frame's end."""
+        """box: x0, y0, x1, y1 px at full size, even numbers except at the frame's end."""
         x0, y0, x1, y1 = box
         half = np.s_[y0 // HALF: y1 // HALF, x0 // HALF: x1 // HALF]
         return Difference(self.gain, self.empty[half], self.changed[half])
 
     def scene(self, plate: Plate) -> Plate:
         """The plate, or a part of it, in the frame's exposure."""
-        return Plate(exposed(plate.image, self.gain), plate.known)
+        return Plate(expose(plate.image, self.gain), plate.known)
 
 
-def halved(image: np.ndarray) -> np.ndarray:
-    """Averaged down by two; an odd last row or column is left out."""
+def halve(image: np.ndarray) -> np.ndarray:
+    """image: (H, W) or (H, W, 3). Returns it averaged down by two, (H // 2, W // 2, ...); an odd last row or column is left out."""
     height, width = (n // HALF for n in image.shape[:2])
     return cv2.resize(image[: height * HALF, : width * HALF], (width, height), interpolation=cv2.INTER_AREA)
 
@@ -75,16 +80,16 @@ def halved(image: np.ndarray) -> np.ndarray:
 def compare(image: np.ndarray, plate: Plate, person: np.ndarray) -> Difference | None:
     """image: (H, W, 3) uint8, like the plate; person: (H, W) network probability.
 
-    None where the plate does not show this frame's scene (most of the background differs).
+    None where the plate does not show this frame's scene: too much of the background differs.
     """
-    known = halved(plate.known.astype(np.float32)) > 0.99
+    known = halve(plate.known.astype(np.float32)) > 0.99
     most_changed = plate.most_changed
-    image, plate, person = halved(image), halved(plate.image), halved(person)
+    image, plate, person = halve(image), halve(plate.image), halve(person)
     outside = known & (cv2.dilate((person > 0.05).astype(np.uint8), np.ones((15, 15), np.uint8)) == 0)
     if outside.mean() < 0.05:
         return None
-    gain = exposure(plate, image, outside)
-    light, hue = _difference(image, exposed(plate, gain))
+    gain = measure_gain(plate, image, outside)
+    light, hue = _difference(image, expose(plate, gain))
     light_noise = max(LEAST_NOISE, 1.4826 * float(np.median(np.abs(light[outside]))))
     hue_noise = max(LEAST_NOISE, 1.4826 * float(np.median(hue[outside])))
     away = np.hypot(hue / hue_noise, light / light_noise)
@@ -102,10 +107,10 @@ def compare(image: np.ndarray, plate: Plate, person: np.ndarray) -> Difference |
 
 
 def bare_scene(alike: np.ndarray, person: np.ndarray) -> np.ndarray:
-    """alike: (h, w) bool, looks like the plate; person: (h, w) probability. Returns (h, w) bool, its wide parts.
+    """alike: (h, w) bool, looks like the plate; person: (h, w) probability. Returns (h, w) bool, the wide parts of alike.
 
-    The network fills the gaps between arms and trunk, so the plate may overrule it; but where much of the person looks
-    like the plate it is the clothing that does, and only what reaches the person's outside is believed.
+    The network fills the gaps between arms and trunk, so the plate may overrule it. Where much of the person looks like the plate,
+    it is the clothing; then only parts that reach the outside of the person count.
     """
     alike, inside = alike.astype(np.uint8), person >= SURE
     wide = np.where(inside, *(cv2.morphologyEx(alike, cv2.MORPH_OPEN, np.ones((n, n), np.uint8)) for n in OPENING))
@@ -116,15 +121,16 @@ def bare_scene(alike: np.ndarray, person: np.ndarray) -> np.ndarray:
     return (wide > 0) & np.isin(labels, np.unique(labels[(person < 0.5) & (wide > 0)]))
 
 
-def exposed(plate: np.ndarray, gain: np.ndarray) -> np.ndarray:
+def expose(plate: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """plate: (h, w, 3) uint8; gain: (3,). Returns their product, (h, w, 3) uint8."""
     table = np.clip(np.arange(256)[:, None] * gain + 0.5, 0, 255).astype(np.uint8)
     return cv2.LUT(plate, table[None])
 
 
-def exposure(plate: np.ndarray, image: np.ndarray, outside: np.ndarray) -> np.ndarray:
-    """(3,) gain a channel, plate to image: the median over the pixels outside of the person."""
-    # Every second pixel tells the median as well.
+def measure_gain(plate: np.ndarray, image: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """plate, image: (h, w, 3) uint8; outside: (h, w) bool, not the person. Returns (3,) the gain of each channel, plate to image: a
+    median."""
+    # Every second pixel is enough for a median.
     plate, image = plate[::2, ::2][outside[::2, ::2]], image[::2, ::2][outside[::2, ::2]]
     usable = (plate > 12).all(axis=1) & (plate < 245).all(axis=1) & (image < 245).all(axis=1)
     if usable.sum() < 100:
@@ -133,7 +139,7 @@ def exposure(plate: np.ndarray, image: np.ndarray, outside: np.ndarray) -> np.nd
 
 
 def _difference(image: np.ndarray, plate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """L* difference, and distance in a* b*, both (h, w), of the lightly smoothed pictures."""
+    """Difference of L*, and distance in a* b*, both (h, w), of the lightly smoothed images."""
     lab = [cv2.cvtColor(cv2.GaussianBlur(x, (0, 0), 0.8).astype(np.float32) / 255, cv2.COLOR_RGB2Lab)
            for x in (image, plate)]
     step = lab[0] - lab[1]

@@ -1,9 +1,8 @@
-"""The empty scene of a video from a still camera: each pixel's median over the frames in which the person is elsewhere."""
+"""Computes the plate of a video from a still camera: each pixel's median over the frames in which the person is elsewhere."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -12,22 +11,22 @@ import numpy as np
 
 from gsac.avatar.artifacts import read_frame
 from gsac.avatar.threads import ahead, available
-from gsac.stages.segment.network import person_region
+from gsac.stages.segment.network import PersonMask, person_region
 from gsac.stages.segment.plate import Plate
 
 SAMPLES = 24
-"""Frames that are looked at, evenly over the clip."""
+"""Frames that the median is taken over, evenly spread over the clip."""
 LEAST_SEEN = 3
-"""Of them, in how many a pixel must be free."""
+"""Fewest of them in which a pixel must be free of the person."""
 CLEAR = 0.01
-"""Of the frame's height: the distance kept from what may be person."""
+"""Distance kept from what may be the person, as a share of the frame's height."""
 BAND = 64
 """Rows that one thread sorts at a time."""
 MOST_CHANGED = 0.03
 """Share of the background that may differ from the median; with more the camera moved."""
 
 
-def learn_plate(paths: list[Path], xy: np.ndarray, score: np.ndarray, network: Callable) -> Plate | None:
+def learn_plate(paths: list[Path], xy: np.ndarray, score: np.ndarray, network: PersonMask) -> Plate | None:
     """paths: T frames; xy: (T, 133, 2) px; score: (T, 133). None where too few frames show the person."""
     regions = {t: person_region(np.nan_to_num(xy[t]), score[t])
                for t in np.unique(np.linspace(0, len(paths) - 1, SAMPLES).astype(int)).tolist()}

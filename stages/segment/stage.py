@@ -1,56 +1,55 @@
-"""Entry of segment: network, GrabCut, parts, soft edge, frame by frame."""
+"""Entry of segment: network, GrabCut, components and soft edge, frame by frame."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
+from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha
 from gsac.avatar.threads import ahead, available
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.segment.components import keep_person
+from gsac.stages.segment.config import Method
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.matting import soften
-from gsac.stages.segment.network import PoseMask, SelfieMask, person_region
+from gsac.stages.segment.network import PersonMask, PoseMask, SelfieMask, person_region
 from gsac.stages.segment.plate import HALF, Plate, compare
 from gsac.stages.segment.plate_from_video import learn_plate
 
-METHODS = {"pose": PoseMask, "selfie": SelfieMask}
-"""Each: (models) -> ((image (H, W, 3), region) -> (H, W) probability)."""
-
-
+METHODS: dict[Method, Callable[[dict[str, Path]], PersonMask]] = {"pose": PoseMask, "selfie": SelfieMask}
+"""segment.method -> its class, made from the model files."""
 WIDE = 0.25
-"""Of the person's height: how far around it the scene is compared with the plate."""
+"""Margin around the person in which the scene is compared with the plate, as a share of the person's height."""
 
 
 def run(job: Job) -> None:
     frames = job.inputs["split/frames"]
     paths = frame_paths(frames)
-    keypoints = check_arrays(job.inputs["keypoints/keypoints.npz"], KEYPOINT_SHAPES)
+    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     if len(paths) != len(keypoints["xy"]):
         raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
     network = METHODS[job.config.method](job.models)
-    plate = None
-    if job.config.use_plate and (frames / "plate.png").exists():
+    plate, given = None, (frames / "plate.png").exists()
+    if job.config.use_plate and given:
         image = read_frame(frames / "plate.png")
         plate = Plate(image, np.ones(image.shape[:2], bool))
     elif job.config.use_plate and Clip.read(job.inputs["split/clip.json"]).timestamps_s is not None:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
-    given = (frames / "plate.png").exists()
     (job.out / "alpha").mkdir()
     absent, other_scene = np.zeros((2, len(paths)), bool)
 
-    def looks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
-        """Frames, and what the network says of them: it has threads of its own, so all are put to it by one."""
+    def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
+        """Index, image and probability of each frame; the network has threads of its own, so one thread feeds it."""
         for t, image in enumerate(ahead(pool, read_frame, paths, 2)):
             region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
             yield t, image, None if region is None else network(image, region)
 
-    def cut(look: tuple[int, np.ndarray, np.ndarray | None]) -> None:
-        t, image, probability = look
+    def cut(masked: tuple[int, np.ndarray, np.ndarray | None]) -> None:
+        t, image, probability = masked
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
         if probability is None:
             absent[t] = True
@@ -65,7 +64,7 @@ def run(job: Job) -> None:
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
     with ThreadPoolExecutor(available()) as pool:
-        for done, _ in enumerate(ahead(pool, cut, looks(pool), available()), 1):
+        for done, _ in enumerate(ahead(pool, cut, masks(pool), available()), 1):
             job.progress(done, len(paths), "frames")
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
@@ -101,7 +100,10 @@ def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, sc
 
 
 def around(probability: np.ndarray, least: float = 0.05, margin: float = 0.04) -> tuple[int, int, int, int] | None:
-    """x0, y0, x1, y1 px (even but at the frame's end) of what may be person, with some scene around it; None if nothing."""
+    """probability: (H, W). Returns x0, y0, x1, y1 px of what may be the person, with a margin of its height; None if nothing may.
+
+    The numbers are even except at the frame's end.
+    """
     rows, columns = np.flatnonzero((probability > least).any(axis=1)), np.flatnonzero((probability > least).any(axis=0))
     if len(rows) == 0:
         return None

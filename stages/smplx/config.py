@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gsac.stages.body_choice import OPEN, brought
+from gsac.stages.body_choice import OPEN, brought_files
 from gsac.stages.contract import BadInput
 
 METHODS = ("lm", "paper")
@@ -40,7 +40,7 @@ class SmplxConfig:
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
-        return brought(self.body_model)
+        return brought_files(self.body_model)
 
     def check(self) -> None:
         """Raises BadInput where a value is out of range."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
+from gsac.avatar.artifacts import Clip, check_face, check_filled_keypoints, frame_paths
 from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
@@ -36,8 +36,8 @@ METHODS = {"lm": fit_clip, "paper": fit_as_published}
 def run(job: Job) -> None:
     """Writes body.npz."""
     clip = Clip.read(job.inputs["split/clip.json"])
-    points = read_arrays(job.inputs["handgap/keypoints.npz"])
-    face = read_arrays(job.inputs["face/face.npz"])
+    points = check_filled_keypoints(job.inputs["handgap/keypoints.npz"])
+    face = check_face(job.inputs["face/face.npz"])
     body = load_body(job, "smplx")
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,

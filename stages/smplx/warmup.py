@@ -48,9 +48,11 @@ def write_inputs(body: Body, folder: Path) -> dict[str, Path]:
     Clip(FPS, [t / FPS for t in range(FRAMES)], WIDTH, HEIGHT, None, "").write(inputs["split/clip.json"])
     write_arrays(inputs["handgap/keypoints.npz"], xy=np.nan_to_num(camera.project(points)).astype(np.float32), score=score,
                  world=(points - points[:, HIPS].mean(1, keepdims=True)).astype(np.float32), detector=np.array("mediapipe"),
+                 missing=np.zeros((FRAMES, 2), bool), filled=np.zeros(score.shape, bool),
                  sigma=np.full(score.shape, SIGMA, np.float32))
     write_arrays(inputs["face/face.npz"], valid=np.ones(FRAMES, bool), jaw=np.zeros((FRAMES, 3), np.float32),
-                 expression=np.zeros((FRAMES, body.exprdirs.shape[2]), np.float32))
+                 expression=np.zeros((FRAMES, body.exprdirs.shape[2]), np.float32), shape=np.zeros(1404, np.float32),
+                 landmarks=np.full((FRAMES, 468, 3), np.nan, np.float32))
     inputs["segment/alpha"].mkdir()
     for t in range(FRAMES):
         write_alpha(inputs["segment/alpha"] / f"{t:06d}.exr", silhouette(vertices[t], body.faces, camera).astype(np.float32))

@@ -1,10 +1,10 @@
 """split: a clip becomes frames with true timestamps.
 
 takes  clip: a video file, or a folder of photos (optional plate.jpg or plate.png: the empty scene)
-gives  frames/%06d.png (8-bit RGB; frames/plate.png for a plate), clip.json (artifacts.Clip)
+gives  frames/%06d.png (8-bit RGB), frames/plate.png where there is a plate, clip.json (artifacts.Clip)
 
-The picture is turned as its rotation tag says, HDR is tone-mapped to SDR BT.709, transparency is composited over black,
-pixels are made square, and the aspect is never changed. The same input gives the same bytes.
+The rotation tag is applied, HDR is tone-mapped to SDR BT.709, transparency is composited over black and pixels are made square;
+the aspect is kept. The same input gives the same bytes.
 """
 
 from gsac.avatar.artifacts import check_image_folder

@@ -10,11 +10,11 @@ from gsac.stages.contract import BadInput
 @dataclass
 class SplitConfig:
     fps: float | None = None
-    """Frames kept a second of video, at most; null sets no rate."""
+    """Most frames kept a second of video; null: no limit."""
     count: int | None = 120
-    """Frames kept in all, at most, spread evenly over the clip; null sets no limit."""
+    """Most frames kept in all, spread evenly over the clip; null: no limit."""
     max_height: int | None = 1280
-    """Frames taller than this (px) are scaled down, aspect kept; null keeps the size."""
+    """Largest height of a frame, px; taller ones are scaled down with their aspect; null keeps the size."""
 
     def check(self) -> None:
         if self.fps is not None and not 0 < self.fps < float("inf"):

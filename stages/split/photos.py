@@ -1,4 +1,4 @@
-"""A folder of photos becomes frames, with the empty scene beside them where it was taken."""
+"""Turns a folder of photos into frames, and its plate, the empty scene, where there is one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 from gsac.avatar.artifacts import write_frame
 from gsac.stages.contract import BadInput
 from gsac.stages.split import focal
-from gsac.stages.split.pick import fitted_size, pick_evenly
+from gsac.stages.split.config import SplitConfig
+from gsac.stages.split.pick import fit_size, pick_evenly
 
 SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"}
 UNSUPPORTED = {".heic", ".heif", ".dng", ".raw", ".cr2", ".nef"}
@@ -22,7 +23,7 @@ PLATE = "plate"
 
 
 def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
-    """Photos in natural order (2 before 10), and the plate if there is one; hidden and other files are passed over."""
+    """Photos in natural order (2 before 10), and the plate if there is one; hidden files and those of other types are skipped."""
     files = sorted((p for p in folder.iterdir() if p.is_file() and not p.name.startswith(".")), key=_natural)
     refused = [p.name for p in files if p.suffix.lower() in UNSUPPORTED]
     if refused:
@@ -40,9 +41,9 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
     return photos, plates[0] if plates else None
 
 
-def split_photos(photos: list[Path], plate: Path | None, frames: Path, config, warn: Callable[[str], None],
+def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: SplitConfig, warn: Callable[[str], None],
                  progress: Callable[[int, int, str], None]) -> dict:
-    """Writes frames/%06d.png and frames/plate.png. Returns the Clip fields width, height, focal_px, plate, notes."""
+    """Writes frames/%06d.png and frames/plate.png. Returns the Clip fields width, height, focal_px, notes."""
     picks = [photos[i] for i in pick_evenly(len(photos), config.count)]
     if len(picks) < len(photos):
         warn(f"{len(photos)} photos given, {len(picks)} kept evenly (split.count is {config.count}).")
@@ -56,19 +57,19 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config, w
                            "; expected photos of one size, from one camera that stands still.")
         if had_alpha:
             notes.add("transparency composited over black")
-        width, height = fitted_size(*size, config.max_height)
+        width, height = fit_size(*size, config.max_height)
         if path == plate:
-            write_frame(frames / "plate.png", _resized(rgb, width, height))
+            write_frame(frames / "plate.png", _resize(rgb, width, height))
             continue
         focals.append(focal.from_exif(exif, width, height))
-        write_frame(frames / f"{i:06d}.png", _resized(rgb, width, height))
+        write_frame(frames / f"{i:06d}.png", _resize(rgb, width, height))
         progress(i + 1, len(picks), "frames")
     known = [f for f in focals if f is not None]
     if known and max(known) > 1.02 * min(known):
         warn(f"the photos' focal lengths differ ({min(known):.0f} to {max(known):.0f} px): was the zoom moved? "
              "Their median is used.")
     return {"width": width, "height": height, "focal_px": float(np.median(known)) if known else None,
-            "plate": plate is not None, "notes": sorted(notes)}
+            "notes": sorted(notes)}
 
 
 def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
@@ -90,7 +91,7 @@ def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
 
 
 def _to_srgb(image: Image.Image, profile: bytes | None) -> Image.Image:
-    """Phones store Display P3: read as sRGB it would look pale."""
+    """Converts by the photo's profile: phones store Display P3, which looks pale when read as sRGB."""
     if profile is None:
         return image
     try:
@@ -98,10 +99,10 @@ def _to_srgb(image: Image.Image, profile: bytes | None) -> Image.Image:
         mode = "RGBA" if image.mode == "RGBA" else "RGB"
         return ImageCms.profileToProfile(image, source, ImageCms.createProfile("sRGB"), outputMode=mode) or image
     except (ImageCms.PyCMSError, OSError):
-        return image  # a profile for another colour model, or a broken one: browsers pass it over too
+        return image  # a profile for another colour model, or a broken one: browsers ignore it too
 
 
-def _resized(rgb: np.ndarray, width: int, height: int) -> np.ndarray:
+def _resize(rgb: np.ndarray, width: int, height: int) -> np.ndarray:
     import cv2
 
     if rgb.shape[:2] == (height, width):

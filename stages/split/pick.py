@@ -1,4 +1,4 @@
-"""Which frames of a clip are kept."""
+"""Picks the frames of a clip that are kept, and their size."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 
 def pick_by_time(times: np.ndarray, fps: float | None, count: int | None) -> np.ndarray:
-    """times: (N,) s, rising. Returns rising indices of the kept frames.
+    """times: (N,) s, rising. Returns (K,) rising indices of the kept frames.
 
-    The frames nearest to an even grid in time: `fps` a second, or `count` from first to last where that is fewer.
+    They are nearest to an even grid in time: `fps` a second, or `count` from first to last where that is fewer.
     """
     span = float(times[-1] - times[0])
     wanted = len(times) if fps is None else int(np.floor(span * fps + 1e-6)) + 1
@@ -27,14 +27,14 @@ def pick_by_time(times: np.ndarray, fps: float | None, count: int | None) -> np.
 
 
 def pick_evenly(n: int, count: int | None) -> np.ndarray:
-    """Indices of at most `count` of n photos, first and last kept."""
+    """Returns (K,) indices of at most `count` of n photos; the first and the last are among them."""
     if count is None or n <= count:
         return np.arange(n)
     return np.unique(np.round(np.linspace(0, n - 1, count)).astype(int))
 
 
-def fitted_size(width: int, height: int, max_height: int | None) -> tuple[int, int]:
-    """Size with the height at most max_height and the aspect kept to the nearest pixel."""
+def fit_size(width: int, height: int, max_height: int | None) -> tuple[int, int]:
+    """Width and height, px, with the height at most max_height and the aspect kept to the nearest pixel."""
     if max_height is None or height <= max_height:
         return width, height
     return max(1, round(width * max_height / height)), max_height

@@ -1,4 +1,4 @@
-"""What a video file holds, without decoding more than its first picture."""
+"""Reads what a video file holds, decoding no more than its first picture."""
 
 from __future__ import annotations
 
@@ -17,30 +17,32 @@ HLG, PQ, BT2020_PRIMARIES, BT2020_MATRIX, UNSPECIFIED = 18, 16, 9, 9, 2
 
 @dataclass
 class Video:
+    """A video file's video stream."""
+
     stream: int
     """Index of the video stream in the file."""
     ticks: np.ndarray
-    """(N,) int64 presentation times, rising, in time_base; empty where the container does not say."""
+    """(N,) int64 presentation times, rising, in time_base; empty where the container has none."""
     time_base: Fraction
     declared_frames: int
-    """Frames the header promises; 0 where it does not say."""
+    """Number of frames by the header; 0 where it has none."""
     width: int
     height: int
-    """Displayed size: turned by the rotation tag, pixels square."""
+    """Displayed size, px: after the rotation tag, with square pixels."""
     transfer: int
     primaries: int
     matrix: int
     has_alpha: bool
     decoder: str | None
-    """The ffmpeg decoder to ask for, where its first choice would lose something."""
+    """The ffmpeg decoder to use where its default would lose the alpha channel."""
     rate: float | None
-    """Frames a second that the header claims."""
+    """Frames a second by the header."""
     tags: dict[str, str]
     """Metadata of container and stream; keys in lower case."""
 
 
 def probe(path: Path) -> Video:
-    """Raises BadInput for a file without a decodable picture."""
+    """Raises BadInput where no picture of the file can be decoded."""
     try:
         with av.open(str(path), metadata_errors="ignore") as container:
             return _probe(container, path)
@@ -78,7 +80,7 @@ def _probe(container: av.container.InputContainer, path: Path) -> Video:
         rate=float(rate) if rate else None, tags=tags)
 
 
-def _first_picture(container, stream, path: Path) -> av.VideoFrame:
+def _first_picture(container: av.container.InputContainer, stream: av.VideoStream, path: Path) -> av.VideoFrame:
     error = "no packet of it decodes"
     for packet in container.demux(stream):
         try:
@@ -91,7 +93,7 @@ def _first_picture(container, stream, path: Path) -> av.VideoFrame:
 
 
 def _packet_times(path: Path, index: int) -> np.ndarray:
-    """(N,) rising ticks of the whole packets of one stream; empty if any lacks its time."""
+    """(N,) rising ticks of the intact packets of one stream; empty if any has no time."""
     ticks = []
     with av.open(str(path), metadata_errors="ignore") as container:
         try:

@@ -1,4 +1,4 @@
-"""Entry of split: a video file or a folder of photos, then one check that frames and clip.json agree."""
+"""Entry of split: turns a video file or photos into frames, and checks that frames and clip.json agree."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def run(job: Job) -> None:
     else:
         fields = split_video(source, frames, job.config, job.warn, job.progress)
 
-    # The file's name is left out: equal content must give equal bytes.
+    # clip.json holds no file name: equal content must give equal bytes.
     clip = Clip(source_sha256=_digest(photos + [plate] * (plate is not None) if photos else [source]), **fields)
     kept = len(frame_paths(frames))
     if clip.timestamps_s is not None and len(clip.timestamps_s) != kept:

@@ -1,4 +1,4 @@
-"""A video file becomes PNG frames: imageio-ffmpeg's program decodes, turns, tone-maps and scales."""
+"""Turns a video file into PNG frames: imageio-ffmpeg's program decodes, rotates, tone-maps and scales."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.split import focal
-from gsac.stages.split.pick import fitted_size, pick_by_time
+from gsac.stages.split.config import SplitConfig
+from gsac.stages.split.pick import fit_size, pick_by_time
 from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, PQ, UNSPECIFIED, Video, probe
 
 TRANSFER_NAMES = {HLG: "arib-std-b67", PQ: "smpte2084"}
@@ -22,7 +23,7 @@ TIME_BASE = re.compile(r"config in time_base: (\d+)/(\d+)")
 SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
 
 
-def split_video(path: Path, frames: Path, config, warn: Callable[[str], None],
+def split_video(path: Path, frames: Path, config: SplitConfig, warn: Callable[[str], None],
                 progress: Callable[[int, int, str], None]) -> dict:
     """Writes frames/%06d.png. Returns the Clip fields fps, timestamps_s, width, height, focal_px, notes."""
     video = probe(path)
@@ -36,7 +37,7 @@ def split_video(path: Path, frames: Path, config, warn: Callable[[str], None],
         warn(f"{path.name} is truncated: its header promises {video.declared_frames} frames and {len(video.ticks)} are "
              "there. Those are used.")
 
-    width, height = fitted_size(video.width, video.height, config.max_height)
+    width, height = fit_size(video.width, video.height, config.max_height)
     times = (video.ticks - video.ticks[0]) * float(base)
     picks = pick_by_time(times, config.fps, config.count)
     graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, width, height))
@@ -71,7 +72,7 @@ def split_video(path: Path, frames: Path, config, warn: Callable[[str], None],
 
 
 def _select(ticks: np.ndarray, picks: np.ndarray) -> list[str]:
-    """Filter that keeps the picked presentation times; nothing where all are kept."""
+    """The filter that keeps the picked presentation times; no filter where all are kept."""
     if len(picks) == len(ticks):
         return []
 

@@ -16,9 +16,9 @@ from gsac.benchmarks.face import people as face_people
 from gsac.benchmarks.face.drawing import Head, Portrait
 from gsac.benchmarks.face.people import DRAWN, Reader, sample_expression
 from gsac.benchmarks.perception import ACTIONS
-from gsac.stages.face.actions import TABLE, Actions, pace, smooth, solve
+from gsac.stages.face.actions import TABLE, Actions, smooth, smoothing_sigma, solve
 from gsac.stages.face.config import FaceConfig
-from gsac.stages.face.landmarks import align, look
+from gsac.stages.face.landmarks import align, read_averaged
 from gsac.turntable.motion import make_expressions
 from gsac.turntable.options import TurntableOptions
 from support.scripts import script
@@ -64,7 +64,7 @@ def drawn_clip(mesh: FaceMesh, mirror: np.ndarray, seed: int) -> dict[str, np.nd
         image = head.draw(turn[t], expression[t], share, rng)
         face = mesh.find(image, Region((len(image) / 2,) * 2, float(len(image))))
         if face is not None:
-            landmarks[t] = look(mesh, image, face.points, mirror).points
+            landmarks[t] = read_averaged(mesh, image, face.points, mirror).points
     return {"landmarks": landmarks, "expression": expression}
 
 
@@ -109,7 +109,8 @@ def test_faces_of_another_renderer_are_read_as_well(store):
         times = np.flatnonzero(seen) / RATE
         points, looks = aligned(clip["landmarks"][seen], actions)
         found, _ = solve(points, looks, actions, config.sparsity, config.doubt, times, config.smooth_brow)
-        found = smooth(found, times, pace(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, 1 / RATE))
+        sigma = smoothing_sigma(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, 1 / RATE)
+        found = smooth(found, times, sigma)
         said.append(found - found.mean(axis=0))
         true.append(clip["expression"][seen] - clip["expression"][seen].mean(axis=0))
     said, true = np.concatenate(said), np.concatenate(true)

@@ -63,7 +63,8 @@ def write_artifacts(out):
     xy = camera.project(body.keypoints(vertices)).astype(np.float32)
     score = np.isfinite(xy).all(2).astype(np.float32)
     keypoints = {"xy": np.nan_to_num(xy), "world": np.full((T, 133, 3), np.nan, np.float32), "detector": np.array("toy")}
-    write_arrays(out / "keypoints/keypoints.npz", score=score, **keypoints)
+    write_arrays(out / "keypoints/keypoints.npz", score=score, pose33=np.zeros((T, 33, 3), np.float32),
+                 face_mesh=np.full((T, 468, 3), np.nan, np.float32), **keypoints)
     filled, missing = np.zeros((T, 133), bool), np.zeros((T, 2), bool)
     filled[FILLED_FRAME, HANDS["left"]] = True
     missing[[FILLED_FRAME, MISSING_FRAME], 0] = True

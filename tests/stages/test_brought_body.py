@@ -53,6 +53,7 @@ def inputs(mine, tmp_path_factory) -> dict[str, Path]:
     Clip(10.0, [t / 10 for t in range(FRAMES)], WIDTH, HEIGHT, FOCAL, "0" * 64).write(root / "clip.json")
     xy, world = np.nan_to_num(camera.project(points)), points - points[:, 11:13].mean(1, keepdims=True)
     write_arrays(root / "keypoints.npz", xy=xy.astype(np.float32), score=known.astype(np.float32),
+                 missing=np.zeros((FRAMES, 2), bool), filled=np.zeros(known.shape, bool),
                  sigma=np.ones(known.shape, np.float32), world=world.astype(np.float32), detector=np.array("exact"))
     expression = np.zeros((FRAMES, 52), np.float32)
     expression[:, JAW_OPEN] = 1

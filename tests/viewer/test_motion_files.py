@@ -14,7 +14,7 @@ from gsac.avatar.motion.retarget import retarget
 from gsac.avatar.motion.source import Motion
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.glb import glb_bytes
-from gsac.stages.export.stage import posed_gaussians
+from gsac.stages.export.stage import pose_gaussians
 from gsac.viewer.page import page_bytes
 from support import dances
 from support.page_modules import expose
@@ -135,7 +135,7 @@ def test_the_camera_goes_along_with_a_motion_that_walks_away(page, figure, skele
 
 
 def test_our_own_glb_dropped_gives_its_clips_back(page, figure, tmp_path):
-    (tmp_path / "own.glb").write_bytes(glb_bytes(figure, *posed_gaussians(figure, figure.pose("T"))))
+    (tmp_path / "own.glb").write_bytes(glb_bytes(figure, *pose_gaussians(figure, figure.pose("T"))))
     assert drop(page, tmp_path / "own.glb") == "wave 2, walk 2: put on this avatar"
     for name in ("wave", "walk"):
         got, clip = clip_of(page, f"{name} 2"), figure.clips[name]

@@ -12,7 +12,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.animations import add_motion
-from gsac.stages.export.stage import rigged
+from gsac.stages.export.stage import rig_avatar
 from gsac.viewer.page import page_bytes
 from support.page_modules import expose
 
@@ -43,7 +43,7 @@ def page(request, browser, exported):
 @pytest.fixture(scope="module")
 def trained(person):
     """The avatar before it was quantised for the container."""
-    avatar = rigged(Body.load(), BodyParams.read(person["train/body.npz"]), Gaussians.read(person["train/avatar.npz"]))
+    avatar = rig_avatar(Body.load(), BodyParams.read(person["train/body.npz"]), Gaussians.read(person["train/avatar.npz"]))
     add_motion(avatar, ("wave", "walk"))
     return avatar
 

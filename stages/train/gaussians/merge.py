@@ -2,6 +2,9 @@
 
 A pair costs what its mean colour differs from the two (Ward's criterion, weighted with the pixels that each shows), and its
 distance. Nothing is left out: a merged gaussian covers what its two did, so that parts no frame shows keep their coverage.
+
+The result is trained further. `stages/export/levels.py` merges by place alone, for avatars that were trained without levels: it has
+neither frames to weigh colours with nor training afterwards.
 """
 
 from __future__ import annotations

@@ -1,7 +1,11 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from gsac.avatar.skinning import joint_transforms
+from gsac.stages.export.animations import CLIPS
+from gsac.stages.export.config import Animation
 
 
 def poses(figure, name):
@@ -60,3 +64,7 @@ def test_a_pose_lowers_both_arms_alike(figure):
     assert vertices[left, 0].min() > 0.2 and vertices[right, 0].max() < -0.2
     assert vertices[left, 1].mean() == pytest.approx(vertices[right, 1].mean(), abs=0.02)
     assert vertices[left, 1].mean() < figure.joints[figure.joint_names.index("left_shoulder"), 1] - 0.3
+
+
+def test_every_animation_that_can_be_named_exists():
+    assert tuple(CLIPS) == get_args(Animation)

@@ -15,7 +15,7 @@ from gsac.cache.code import code_parts
 from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.export import STAGE
 from gsac.stages.export.config import ExportConfig
-from gsac.stages.export.stage import rigged, run
+from gsac.stages.export.stage import rig_avatar, run
 from gsac.viewer import page
 
 
@@ -65,7 +65,7 @@ def test_the_light_of_the_clip_is_carried_on_and_left_out_where_there_is_none(pe
     assert RiggedAvatar.read(exported / "avatar.gsac").light is None
     gaussians, params = Gaussians.read(person["train/avatar.npz"]), BodyParams.read(person["train/body.npz"])
     gaussians.light = np.float32([[.9, .8, .7], [.1, 0, 0], [0, -.2, 0], [0, 0, -.3]])
-    np.testing.assert_array_equal(rigged(Body.load(), params, gaussians).light, gaussians.light)
+    np.testing.assert_array_equal(rig_avatar(Body.load(), params, gaussians).light, gaussians.light)
 
 
 def test_the_viewer_page_is_at_most_2_mb_for_6000_gaussians_and_names_no_other_address(exported):

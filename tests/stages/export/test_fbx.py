@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gsac.stages.export.fbx import avatar_fbx
-from gsac.stages.export.stage import posed_gaussians
+from gsac.stages.export.stage import pose_gaussians
 
 UFBX = """
 import json, sys
@@ -73,7 +73,7 @@ KEYS = (0, 4, 9)
 
 @pytest.fixture(scope="module")
 def fbx(figure):
-    return avatar_fbx(figure, posed_gaussians(figure, figure.pose("T"))[0])
+    return avatar_fbx(figure, pose_gaussians(figure, figure.pose("T"))[0])
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +175,7 @@ def test_threes_loader_poses_it_as_the_avatar(figure, fbx, node_package):
 
 def test_same_input_same_bytes_and_no_expression_no_clip_is_a_file_too(figure, fbx, tmp_path):
     from dataclasses import replace
-    means = posed_gaussians(figure, figure.pose("T"))[0]
+    means = pose_gaussians(figure, figure.pose("T"))[0]
     assert avatar_fbx(figure, means) == fbx
     bare = replace(figure, expression_names=[], expression_start=np.zeros(1, np.int32), expression_vertex=np.empty(0, np.int32),
                    expression_delta=np.empty((0, 3), np.float32), jaw_actions=np.empty((0, 3), np.float32), clips={})

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.stages.export.glb import glb_bytes
-from gsac.stages.export.stage import posed_gaussians
+from gsac.stages.export.stage import pose_gaussians
 
 VALIDATOR = "gltf-validator@2.0.0-dev.3.10"
 KNOWN_FALSE = {f"/meshes/1/primitives/0/attributes/KHR_gaussian_splatting:{n}"
@@ -24,7 +24,7 @@ WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @pytest.fixture(scope="module")
 def glb(figure):
-    return glb_bytes(figure, *posed_gaussians(figure, figure.pose("T")))
+    return glb_bytes(figure, *pose_gaussians(figure, figure.pose("T")))
 
 
 class Gltf:

@@ -11,7 +11,7 @@ from gsac.avatar.light import shade
 from gsac.avatar.raster import render
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.config import ExportConfig
-from gsac.stages.export.levels import MEMBERS, coarser
+from gsac.stages.export.levels import MEMBERS, merge_level
 from gsac.stages.export.stage import run
 
 TALL = 120
@@ -68,7 +68,7 @@ def test_a_coarser_level_is_as_near_to_the_fine_picture_in_a_strong_light_as_in_
 
 
 def test_merging_one_by_one_changes_nothing(avatar):
-    assert error(avatar, coarser(avatar, 1), "A") < 1e-5
+    assert error(avatar, merge_level(avatar, 1), "A") < 1e-5
 
 
 def test_the_left_hand_stays_red(avatar):
@@ -84,7 +84,7 @@ def test_gaussians_on_faces_without_area_and_a_single_gaussian_are_merged_withou
     vertices = figure.vertices.copy()
     vertices[figure.faces[0]] = vertices[figure.faces[0, 0]]
     for g in (figure.gaussians, {name: array[:1] for name, array in figure.gaussians.items()}):
-        level = coarser(replace(figure, vertices=vertices, gaussians=g), 3)
+        level = merge_level(replace(figure, vertices=vertices, gaussians=g), 3)
         assert len(level["face"]) >= 1
         assert all(np.isfinite(array).all() for array in level.values())
         np.testing.assert_allclose((level["quat"] ** 2).sum(1), 1, atol=1e-5)

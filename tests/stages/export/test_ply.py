@@ -9,14 +9,14 @@ from scipy.spatial.transform import Rotation
 from gsac.avatar.camera import Camera
 from gsac.avatar.raster import render
 from gsac.stages.export.ply import SH0, ply_bytes
-from gsac.stages.export.stage import posed_gaussians
+from gsac.stages.export.stage import pose_gaussians
 
 FLIP = np.array([1, -1, -1])
 
 
 @pytest.fixture(scope="module")
 def posed(figure):
-    return posed_gaussians(figure, figure.pose("A"))
+    return pose_gaussians(figure, figure.pose("A"))
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gsac.stages.export.ply import SH0, ply_bytes
-from gsac.stages.export.spz import smallest_three, spz_bytes
-from gsac.stages.export.stage import posed_gaussians
+from gsac.stages.export.spz import pack_smallest_three, spz_bytes
+from gsac.stages.export.stage import pose_gaussians
 
 SPLAT_TRANSFORM = "@playcanvas/splat-transform@2.7.1"
 
 
 @pytest.fixture(scope="module")
 def posed(figure):
-    return posed_gaussians(figure, figure.pose("A"))
+    return pose_gaussians(figure, figure.pose("A"))
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_the_left_hand_is_on_the_left_upright_and_facing_us(figure, read):
 @pytest.mark.parametrize("wxyz", [
     (1, 0, 0, 0), (0, 1, 0, 0), (-1, 0, 0, 0), (.5, -.5, .5, -.5), (0, 0, -.6, .8), (.1, -.7, .7, -.1)])
 def test_a_rotation_keeps_its_sense_whatever_its_largest_part(wxyz):
-    word = int(smallest_three(np.array([wxyz], float))[0])
+    word = int(pack_smallest_three(np.array([wxyz], float))[0])
     largest, parts = word >> 30, []
     for shift in (20, 10, 0):
         bits = word >> shift & 1023

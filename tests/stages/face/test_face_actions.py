@@ -4,7 +4,7 @@ import pytest
 from gsac.avatar.body import Body
 from gsac.avatar.facemesh import IBUG68
 from gsac.stages.contract import BadInput
-from gsac.stages.face.actions import Actions, fill, pace, smooth, solve, turns, view_terms
+from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sigma, solve, view_terms, yaw_terms
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.landmarks import align
 
@@ -28,7 +28,7 @@ def clip_of(actions: Actions, c: np.ndarray, own: np.ndarray, noise: float = 2e-
     """Aligned points and directions of a turning head with these actions, own rest (468, 3) m and noise, m."""
     direction = looking(np.linspace(-0.8, 0.8, len(c)))
     view = np.tensordot(view_terms(direction), actions.view, axes=1)
-    shown = np.einsum("tk,te,kelc->tlc", turns(direction), c, actions.response)
+    shown = np.einsum("tk,te,kelc->tlc", yaw_terms(direction), c, actions.response)
     points = actions.neutral + own + (shown + view) / 1e3
     return points + np.random.default_rng(0).normal(0, noise, points.shape), direction
 
@@ -131,7 +131,7 @@ def test_more_doubt_moves_less(actions):
 
 def test_each_action_is_smoothed_at_its_own_pace(actions):
     brow, smile, blink, jaw = (actions.names.index(name) for name in ("browInnerUp", "mouthSmileLeft", "eyeBlinkLeft", "jawOpen"))
-    sigma = pace(actions.names, 0.02, 0.04, 0.15)
+    sigma = smoothing_sigma(actions.names, 0.02, 0.04, 0.15)
     assert sigma[[brow, smile, blink, jaw]].tolist() == [0, 0.15, 0.02, 0.04]
     spike = np.zeros((21, len(sigma)))
     spike[10] = 1
@@ -141,8 +141,8 @@ def test_each_action_is_smoothed_at_its_own_pace(actions):
 
 def test_smoothing_reaches_the_next_frame_but_spares_lids_and_what_is_not_smoothed(actions):
     smile, blink, jaw = (actions.names.index(name) for name in ("mouthSmileLeft", "eyeBlinkLeft", "jawOpen"))
-    assert pace(actions.names, 0.02, 0.04, 0.15, apart=0.1)[[smile, blink, jaw]].tolist() == [0.15, 0.02, 0.1]
-    assert pace(actions.names, 0.02, 0.0, 0.15, apart=0.2)[[smile, blink, jaw]].tolist() == [0.2, 0.02, 0.0]
+    assert smoothing_sigma(actions.names, 0.02, 0.04, 0.15, apart=0.1)[[smile, blink, jaw]].tolist() == [0.15, 0.02, 0.1]
+    assert smoothing_sigma(actions.names, 0.02, 0.0, 0.15, apart=0.2)[[smile, blink, jaw]].tolist() == [0.2, 0.02, 0.0]
 
 
 def test_align_undoes_a_heads_turn_size_and_place(actions):
@@ -157,9 +157,9 @@ def test_align_undoes_a_heads_turn_size_and_place(actions):
 
 def test_unseen_frames_fall_back_to_rest():
     valid = np.array([True, True, False, False, False])
-    out = fill(np.array([[0.2], [0.8]]), valid, np.arange(5) / 5, 0.2)
+    out = fill_unseen(np.array([[0.2], [0.8]]), valid, np.arange(5) / 5, 0.2)
     np.testing.assert_allclose(out[:, 0], [0.2, 0.8, 0.8 / np.e, 0.8 / np.e**2, 0.8 / np.e**3])
-    assert fill(np.array([[0.2], [0.8]]), valid, None, 0.2)[2:].max() == 0
+    assert fill_unseen(np.array([[0.2], [0.8]]), valid, None, 0.2)[2:].max() == 0
 
 
 def test_smoothing_keeps_a_constant_and_calms_a_flicker():

@@ -10,7 +10,7 @@ from gsac.stages.face import STAGE
 from gsac.stages.face.actions import Actions
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.flame import EXPRESSIONS, FlameHead
-from gsac.stages.face.head import similarity
+from gsac.stages.face.head import fit_similarity
 
 
 @pytest.fixture(scope="module")
@@ -33,13 +33,13 @@ def as_seen(head: FlameHead, vertices: np.ndarray) -> np.ndarray:
 
 def apart(a: np.ndarray, b: np.ndarray) -> float:
     """Mean distance, m, of two heads laid on each other: place, turn and size cannot be known."""
-    turn, size, shift = similarity(a, b)
+    turn, size, shift = fit_similarity(a, b)
     return float(np.linalg.norm(size * a @ turn.T + shift - b, axis=1).mean())
 
 
 def test_the_head_of_known_points_is_found_whatever_their_place_and_size(head):
     true = head.flame.rest(np.random.default_rng(1).normal(0, 5, 16))
-    shape, turn, size = head.model.shape_of(as_seen(head, true))
+    shape, turn, size = head.model.fit_shape(as_seen(head, true))
     used = np.unique(head.flame.faces[head.points.face])
     off, alone = (apart(vertices[used], true[used]) for vertices in (head.flame.rest(shape), head.flame.v_template))
     assert off < 0.3 * alone
@@ -53,7 +53,7 @@ def test_expression_and_jaw_that_move_the_points_are_found_again(head):
     response = np.zeros((EXPRESSIONS + 1, 468, 3))
     moves = np.concatenate([flame.exprdirs[:, :, :EXPRESSIONS], nod[:, :, None]], 2)
     response[:, head.points.index] = head.points.on(flame, moves).transpose(2, 0, 1)
-    found = head.mimicry(flame.v_template, response, np.eye(3), 1.0)
+    found = head.response(flame.v_template, response, np.eye(3), 1.0)
     told = head.points.on(flame, np.concatenate([flame.exprdirs[:, :, :EXPRESSIONS]], 2))
     again = np.einsum("lck,ak->alc", told, found[:EXPRESSIONS, :EXPRESSIONS])
     wanted = told.transpose(2, 0, 1)

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, read_arrays, write_arrays
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, read_arrays, write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.benchmarks.perception import run_face, run_keypoints, score_expression, video_frames, write_split
@@ -12,6 +12,7 @@ from gsac.stages.contract import Job, StageError
 from gsac.stages.face import STAGE
 from gsac.stages.face.config import FaceConfig
 from gsac.stages.face.stage import run
+from support.artifacts import blank
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
 
@@ -35,10 +36,10 @@ def need(path: Path) -> Path:
 
 def unseen(folder: Path, frames: int, said: int) -> dict[str, Path]:
     """Ports of a clip of grey frames whose keypoints, of `said` frames, saw no face."""
-    ports = write_split(iter([np.full((64, 48, 3), 120, np.uint8)] * frames), folder / "split", "back.mp4")
+    ports = write_split(iter([np.full((64, 48, 3), 120, np.uint8)] * frames), folder / "split")
     ports["keypoints/keypoints.npz"] = folder / "keypoints.npz"
-    write_arrays(folder / "keypoints.npz", score=np.zeros((said, 133)), world=np.full((said, 133, 3), np.nan),
-                 face_mesh=np.full((said, 468, 3), np.nan))
+    write_arrays(folder / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=said) | {
+        "world": np.full((said, 133, 3), np.nan), "face_mesh": np.full((said, 468, 3), np.nan)})
     return ports
 
 
@@ -61,7 +62,7 @@ def test_actions_of_the_rendered_clip_are_read_from_its_small_face(tmp_path, sto
     assert tuple(str(n) for n in truth["expr_names"]) == Body.load().expression_names
     frames = list(video_frames(need(FOOTAGE / "truth-a" / "clip.mp4")))
     near = [t for t in range(60) if min(t, 60 - t) <= 13]
-    _, _, ports = run_keypoints(iter([frames[t] for t in near]), "truth-a", tmp_path, store)
+    _, _, ports = run_keypoints(iter([frames[t] for t in near]), tmp_path, store)
     face, _ = run_face(ports, tmp_path, store)
     figures = score_expression(face, {**truth, "exprs": truth["exprs"][near]})
     assert figures["face_valid"] >= 13
@@ -72,7 +73,7 @@ def test_actions_of_the_rendered_clip_are_read_from_its_small_face(tmp_path, sto
 @pytest.mark.footage
 def test_photos_have_no_time_so_an_unseen_face_rests_at_once(tmp_path, store):
     frames = list(video_frames(need(FOOTAGE / "truth-a" / "clip.mp4")))
-    _, _, ports = run_keypoints(iter([frames[3], frames[30]]), "photos", tmp_path, store)
+    _, _, ports = run_keypoints(iter([frames[3], frames[30]]), tmp_path, store)
     clip = Clip.read(ports["split/clip.json"])
     clip.timestamps_s = clip.fps = None
     clip.write(ports["split/clip.json"])
@@ -88,7 +89,7 @@ def test_photos_have_no_time_so_an_unseen_face_rests_at_once(tmp_path, store):
 def test_a_brought_flame_head_joins_the_face(tmp_path, store, flame_file, flame_points_file):
     """Its own files lie in the store under names without suffix, as the user's do."""
     frames = list(video_frames(need(FOOTAGE / "truth-a" / "clip.mp4")))
-    _, _, ports = run_keypoints(iter([frames[3], frames[30]]), "flame", tmp_path, store)
+    _, _, ports = run_keypoints(iter([frames[3], frames[30]]), tmp_path, store)
     for name, file in (("mine", flame_file), ("flame-points", flame_points_file)):
         (tmp_path / name).write_bytes(file.read_bytes())
     models = {name: model_path(name, store) for name in STAGE.models(FaceConfig())}

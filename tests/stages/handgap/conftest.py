@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, check_filled_keypoints, read_arrays, write_arrays
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_filled_keypoints, read_arrays, write_arrays
 from gsac.avatar.wholebody import ARM, HANDS, INDEX
 from gsac.stages.contract import Job
 from gsac.stages.handgap.config import HandgapConfig
 from gsac.stages.handgap.stage import run
+from support.artifacts import blank
 
 FOCAL, CENTRE, DISTANCE = 1200.0, (360.0, 640.0), 3.2
 HAND = np.random.default_rng(7).normal(0, 0.03, (21, 3)) + np.linspace(0, 0.1, 21)[:, None] * [0, 1, 0]
@@ -94,8 +95,9 @@ def through_stage(person: Person, folder, photos=False, **config):
     folder.mkdir(exist_ok=True)
     source, out = folder / "keypoints.npz", folder / "out"
     out.mkdir()
-    write_arrays(source, xy=person.xy.astype(np.float32), score=person.score.astype(np.float32),
-                 world=person.world.astype(np.float32), detector=np.array("synthetic"))
+    write_arrays(source, **blank(KEYPOINT_SHAPES, T=len(person.xy)) | {
+        "xy": person.xy.astype(np.float32), "score": person.score.astype(np.float32), "world": person.world.astype(np.float32),
+        "detector": np.array("synthetic")})
     times = None if photos else person.times.tolist()
     Clip(None if photos else 10.0, times, 720, 1280, None, "0").write(folder / "clip.json")
     warnings = []

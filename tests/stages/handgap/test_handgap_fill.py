@@ -1,17 +1,20 @@
 """Gaps are filled near the truth, with a sigma that says how near."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from gsac.avatar.wholebody import ARM, HANDS, PALM
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.handgap import STAGE
-from gsac.stages.handgap.config import METHODS as NAMES
-from gsac.stages.handgap.fill import fill_gaps
-from gsac.stages.handgap.missing_hands import Found
-from gsac.stages.handgap.segments import METHODS, carried
+from gsac.stages.handgap.config import Method
+from gsac.stages.handgap.fill import METHODS, fill_gaps
+from gsac.stages.handgap.methods import gp, hermite, paper, paper_literal
+from gsac.stages.handgap.missing_hands import MissingHands
+from gsac.stages.handgap.segments import turn_with_palm
 
-SEGMENTWISE = ("paper", "hermite", "gp")
+SEGMENTWISE = {"paper": paper.interpolate, "hermite": hermite.interpolate, "gp": gp.interpolate}
 GOOD = ("turning", *SEGMENTWISE)
 
 
@@ -54,26 +57,26 @@ def test_the_shorter_arc_is_taken_across_plus_minus_pi(method):
     segment = 80 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     seen = np.ones(30, bool)
     seen[12:19] = False
-    filled = METHODS[method](segment, seen, 11, 19, times)
+    filled = SEGMENTWISE[method](segment, seen, 11, 19, times)
     assert np.linalg.norm(filled - segment[12:19], axis=1).max() < 2
 
 
 def test_the_paper_turns_at_a_constant_rate_with_the_length_of_the_last_seen_frame():
     segment = np.array([[10.0, 0], [0, 0], [0, 0], [0, 20.0]])
-    filled = METHODS["paper"](segment, np.array([1, 0, 0, 1], bool), 0, 3, np.arange(4) / 10)
+    filled = paper.interpolate(segment, np.array([1, 0, 0, 1], bool), 0, 3, np.arange(4) / 10)
     assert filled == pytest.approx(10 * np.array([[np.cos(a), np.sin(a)] for a in np.deg2rad([30, 60])]))
 
 
 def test_the_printed_update_multiplies_elapsed_frames_onto_the_previous_angle():
     segment = np.array([[10.0, 0], [0, 0], [0, 0], [0, 10.0]])
-    filled = METHODS["paper-literal"](segment, np.array([1, 0, 0, 1], bool), 0, 3, np.arange(4) / 10)
+    filled = paper_literal.interpolate(segment, np.array([1, 0, 0, 1], bool), 0, 3, np.arange(4) / 10)
     assert filled == pytest.approx(10 * np.array([[np.cos(a), np.sin(a)] for a in np.deg2rad([30, 90])]))
 
 
 def test_uneven_timestamps_set_the_rate():
     times = np.array([0, 0.1, 0.9, 1.0])
     segment = np.array([[10.0, 0], [0, 0], [0, 0], [0, 10.0]])
-    filled = METHODS["paper"](segment, np.array([1, 0, 0, 1], bool), 0, 3, times)
+    filled = paper.interpolate(segment, np.array([1, 0, 0, 1], bool), 0, 3, times)
     assert np.rad2deg(np.arctan2(filled[:, 1], filled[:, 0])) == pytest.approx([9, 81])
 
 
@@ -98,9 +101,9 @@ def test_a_wrist_that_is_seen_is_kept_and_carries_the_hand(synthetic, tmp_path):
 
 def test_fingers_turn_and_scale_with_the_palm():
     points = np.array([[10.0, 0], [10, 5], [20, -5]])
-    turned = carried(points, np.array([10.0, 0]), np.array([0, 15.0]))
+    turned = turn_with_palm(points, np.array([10.0, 0]), np.array([0, 15.0]))
     assert turned == pytest.approx(1.5 * np.array([[0, 10.0], [-5, 10], [5, 20]]))
-    assert carried(points, np.array([0.1, 0]), np.array([0, 15.0])) == pytest.approx(points)
+    assert turn_with_palm(points, np.array([0.1, 0]), np.array([0, 15.0])) == pytest.approx(points)
 
 
 def test_both_hands_at_once(synthetic, tmp_path):
@@ -168,7 +171,7 @@ def test_seen_points_are_untouched(synthetic, tmp_path):
 
 
 def test_every_named_method_exists_and_others_are_refused():
-    assert {"turning", *METHODS} == set(NAMES)
+    assert tuple(METHODS) == get_args(Method)
     with pytest.raises(BadInput, match="handgap.method.*'spline'.*hermite"):
         make_config(STAGE, {"method": "spline"})
     with pytest.raises(BadInput, match="handgap.max_gap_s"):
@@ -185,6 +188,6 @@ def test_nothing_breaks_when_little_is_seen(synthetic, method):
         hand = np.ones((4, 2), bool)
         hand[seen] = False
         config = make_config(STAGE, {"method": method})
-        xy, filled, drift = fill_gaps(person.xy, person.score, np.full((4, 133, 3), np.nan), Found(hand, hand, hand, nothing),
-                                         person.times, config)
+        missing, world = MissingHands(hand, hand, hand, nothing), np.full((4, 133, 3), np.nan)
+        xy, filled, drift = fill_gaps(person.xy, person.score, world, missing, person.times, config)
         assert np.isfinite(xy).all() and np.isfinite(drift).all() and filled.any() == bool(seen)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar.region import Region
-from gsac.stages.keypoints.hands import Arm, Hand, assign, distinct, merged, rough_region, same_hand
+from gsac.stages.keypoints.hands import Arm, Hand, assign, drop_alike, merge, rough_region, same_hand
+from support.regions import to_region
 
 SHAPE = np.random.default_rng(1).uniform(0, 60, (21, 2)) - [30, 0]
 SHAPE[0] = 0
@@ -46,7 +47,7 @@ def test_a_hand_far_from_both_wrists_is_nobodys():
 def test_two_finds_of_one_hand_are_one_and_two_hands_stay_two():
     near, surer = hand(100, 200, presence=0.6), hand(104, 200, presence=0.9)
     assert same_hand(near, surer)
-    one, other = merged([near, surer, hand(160, 200, presence=0.7)])
+    one, other = merge([near, surer, hand(160, 200, presence=0.7)])
     assert one.presence == 0.9 and one.points[0, 0] == pytest.approx((0.6 * 100 + 0.9 * 104) / 1.5)
     assert other.points[0, 0] == pytest.approx(160)
 
@@ -54,11 +55,11 @@ def test_two_finds_of_one_hand_are_one_and_two_hands_stay_two():
 def test_looks_at_nearly_the_same_square_are_made_once():
     a = Region((100.0, 100.0), 80.0, 3.1)
     again = dataclasses.replace(a, center=(101.0, 100.0), angle=-3.12)
-    assert distinct([a, again, dataclasses.replace(a, side=120.0)]) == [a, dataclasses.replace(a, side=120.0)]
+    assert drop_alike([a, again, dataclasses.replace(a, side=120.0)]) == [a, dataclasses.replace(a, side=120.0)]
 
 
 def test_rough_region_has_the_fingers_up_and_survives_points_that_coincide():
     region = rough_region(np.array([100.0, 100]), np.array([140.0, 95]), np.array([140.0, 105]))
-    knuckle, wrist = region.to_region(np.array([[140.0, 100], [100.0, 100]]))
+    knuckle, wrist = to_region(region, np.array([[140.0, 100], [100.0, 100]]))
     assert knuckle[1] < wrist[1] and abs(knuckle[0] - wrist[0]) < 0.05
     assert rough_region(*np.full((3, 2), 50.0)).side > 0

@@ -1,5 +1,7 @@
 """The steps of segment on painted pictures whose truth is known."""
 
+from typing import get_args
+
 import cv2
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from gsac.avatar.wholebody import LEFT_HAND
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.segment import STAGE
 from gsac.stages.segment.components import keep_person
+from gsac.stages.segment.config import MODELS, Method
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.matting import soften
 from gsac.stages.segment.network import onto_frame, person_region
@@ -253,9 +256,7 @@ def test_the_box_is_even_and_inside_the_frame():
 
 
 def test_every_named_method_exists_and_bad_parameters_are_named():
-    from gsac.stages.segment.config import MODELS
-
-    assert set(METHODS) == set(MODELS)
+    assert tuple(METHODS) == tuple(MODELS) == get_args(Method)
     with pytest.raises(BadInput, match="segment.method.*'magic'.*pose"):
         make_config(STAGE, {"method": "magic"})
     with pytest.raises(BadInput, match="segment.iterations"):

@@ -7,11 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_alpha, write_arrays, write_frame
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.stages.contract import Job, StageError
 from gsac.stages.segment import stage
 from gsac.stages.segment.config import SegmentConfig
+from support.artifacts import blank
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
 SIZE = (120, 80)
@@ -39,8 +40,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def segment(folder, xy, score):
-    write_arrays(folder / "keypoints.npz", xy=xy, score=score, detector=np.array("none"),
-                 world=np.zeros((*score.shape, 3), np.float32))
+    write_arrays(folder / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=len(xy)) | {"xy": xy, "score": score})
     Clip(None, None, SIZE[1], SIZE[0], None, "0").write(folder / "clip.json")
     warnings, seen = [], []
     (folder / "out").mkdir()

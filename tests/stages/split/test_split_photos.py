@@ -42,15 +42,15 @@ def test_photos_come_in_natural_order_without_timestamps(folder, tmp_path):
     (folder / "._img9.png").write_bytes(b"resource fork")
     clip, frames, _ = split(folder, tmp_path / "out")
     assert [int(f[0, 0, 0]) for f in frames] == [9, 10, 100]
-    assert clip.timestamps_s is None and clip.fps is None and not clip.plate and clip.focal_px is None
+    assert clip.timestamps_s is None and clip.fps is None and clip.focal_px is None
 
 
 def test_the_plate_is_no_frame(folder, tmp_path):
     photo(folder / "0.png")
     photo(folder / "1.png")
     photo(folder / "Plate.PNG", (1, 2, 3))
-    clip, frames, _ = split(folder, tmp_path / "out")
-    assert clip.plate and len(frames) == 2
+    _, frames, _ = split(folder, tmp_path / "out")
+    assert len(frames) == 2
     assert tuple(read_frame(tmp_path / "out/frames/plate.png")[0, 0]) == (1, 2, 3)
 
 
@@ -146,5 +146,5 @@ def test_the_turn_photos_and_their_plate_keep_their_aspect(tmp_path):
     if not source.exists():
         pytest.skip("footage turn-photos is not here")
     clip, frames, _ = split(source, tmp_path / "out")
-    assert (clip.width, clip.height, len(frames), clip.plate) == (1707, 1280, 7, True)
+    assert (clip.width, clip.height, len(frames)) == (1707, 1280, 7)
     assert read_frame(tmp_path / "out/frames/plate.png").shape == frames[0].shape

@@ -9,7 +9,7 @@ from gsac.avatar.artifacts import ArtifactError, Clip
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.split import STAGE
 from gsac.stages.split.check import check_clip
-from gsac.stages.split.pick import fitted_size, pick_by_time
+from gsac.stages.split.pick import fit_size, pick_by_time
 
 steps = st.lists(st.floats(1e-3, 0.5), min_size=0, max_size=60)
 
@@ -31,8 +31,8 @@ def test_a_variable_rate_is_sampled_evenly_in_time_not_in_frames():
 
 
 def test_a_tall_frame_is_scaled_with_its_aspect():
-    assert fitted_size(2160, 3840, 1280) == (720, 1280)
-    assert fitted_size(1920, 1080, 1280) == (1920, 1080)
+    assert fit_size(2160, 3840, 1280) == (720, 1280)
+    assert fit_size(1920, 1080, 1280) == (1920, 1080)
 
 
 @pytest.mark.parametrize(("values", "name"), [({"fps": 0}, "split.fps"), ({"count": 0}, "split.count"),

@@ -1,6 +1,6 @@
-"""Gaussian process with a squared exponential kernel over the seen frames around a gap, in closed form.
+"""A segment through a gap as a Gaussian process in the image: squared exponential kernel, over the seen frames around the gap.
 
-The kernel's length and the noise are those of a small grid that make the seen frames likeliest.
+Of a small grid of kernel lengths, amplitudes and noises it takes those that make the seen frames likeliest.
 """
 
 from __future__ import annotations
@@ -10,17 +10,21 @@ import itertools
 import numpy as np
 
 LENGTHS_FRAMES = (3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0)
+"""Grid of the kernel's length."""
 NOISE_SHARES = (1.0, 0.5, 0.25)
-"""Of the noise read from second differences, which fast motion makes too large."""
+"""Grid of factors on the noise read from second differences: fast motion makes that too large."""
 SWELLS = (1.0, 3.0)
-"""Of the amplitude, which a short look at a slow motion makes too small."""
+"""Grid of factors on the amplitude of the seen frames: a slow motion seen for a short time makes that too small."""
 REACH_FRAMES = 40
-"""Seen frames beside the gap that are looked at: what is further has no say."""
+"""Farthest seen frames, before and after the gap, that are learned from."""
 LEAST_NOISE_PX = 0.3
 
 
-def fill(segment: np.ndarray, seen: np.ndarray, before: int, after: int, times: np.ndarray) -> np.ndarray:
-    """segment: (T, 2) px, joint minus its parent; returns (after - before - 1, 2) for the frames between."""
+def interpolate(segment: np.ndarray, seen: np.ndarray, before: int, after: int, times: np.ndarray) -> np.ndarray:
+    """segment: (T, 2) px, a joint less its parent; seen: (T,) bool; times: (T,) s.
+
+    Returns the segment (after - before - 1, 2) px in the frames between the seen frames `before` and `after`.
+    """
     asked = times[before + 1: after]
     known = np.flatnonzero(seen)
     known = known[(known >= before - REACH_FRAMES) & (known <= after + REACH_FRAMES)]
@@ -44,7 +48,10 @@ def fill(segment: np.ndarray, seen: np.ndarray, before: int, after: int, times: 
 
 
 def noise_px(segment: np.ndarray, seen: np.ndarray) -> float:
-    """Robust noise from second differences of unbroken seen triples, whose variance is 6 times one point's."""
+    """segment: (T, 2) px; seen: (T,) bool. Returns the noise of one coordinate, in the segment's unit, robust.
+
+    From second differences over three seen frames in a row, whose variance is 6 times that of one point.
+    """
     triples = seen[:-2] & seen[1:-1] & seen[2:]
     if not triples.any():
         return 0.0

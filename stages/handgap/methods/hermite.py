@@ -1,14 +1,18 @@
-"""Cubic Hermite curve through a gap, its end speeds from a straight line through the seen frames beside it."""
+"""A segment through a gap as a cubic Hermite curve; the speed at each end is that of a line fitted to the seen frames there."""
 
 from __future__ import annotations
 
 import numpy as np
 
 LINE_FRAMES = 6
+"""Seen frames that the line is fitted to, at most."""
 
 
-def fill(segment: np.ndarray, seen: np.ndarray, before: int, after: int, times: np.ndarray) -> np.ndarray:
-    """segment: (T, 2) px, joint minus its parent; returns (after - before - 1, 2) for the frames between."""
+def interpolate(segment: np.ndarray, seen: np.ndarray, before: int, after: int, times: np.ndarray) -> np.ndarray:
+    """segment: (T, 2) px, a joint less its parent; seen: (T,) bool; times: (T,) s.
+
+    Returns the segment (after - before - 1, 2) px in the frames between the seen frames `before` and `after`.
+    """
     p0, v0 = _end(segment, seen, times, np.arange(before, max(before - LINE_FRAMES, -1), -1))
     p1, v1 = _end(segment, seen, times, np.arange(after, min(after + LINE_FRAMES, len(times))))
     span = times[after] - times[before]
@@ -17,8 +21,8 @@ def fill(segment: np.ndarray, seen: np.ndarray, before: int, after: int, times: 
             + u ** 2 * (3 - 2 * u) * p1 + u ** 2 * (u - 1) * span * v1)
 
 
-def _end(segment, seen, times, frames) -> tuple[np.ndarray, np.ndarray]:
-    """Position at frames[0] and velocity (px/s): least squares over unbroken seen frames, zero from fewer than 3."""
+def _end(segment: np.ndarray, seen: np.ndarray, times: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Place (2,) px at frames[0] and velocity (2,) px/s: least squares over frames seen without a break, 0 from fewer than 3."""
     broken = np.flatnonzero(~seen[frames])
     frames = frames[: broken[0]] if len(broken) else frames
     position = segment[frames[0]]

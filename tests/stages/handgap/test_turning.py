@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from gsac.stages.handgap.arm_gp import MOST_FRAMES, near, predict, usual_place
-from gsac.stages.handgap.turning_body import Turner
+from gsac.stages.handgap.methods.turning import MOST_FRAMES, fit_usual_place, pick_frames, predict
+from gsac.stages.handgap.turning_body import TurningBody
 
 TORSO = 200.0
 
 
-def watched(times: np.ndarray, turn: np.ndarray) -> Turner:
-    return Turner(np.zeros((len(times), 2)), turn, TORSO, times, np.ones((len(times), 133), bool))
+def watched(times: np.ndarray, turn: np.ndarray) -> TurningBody:
+    return TurningBody(np.zeros((len(times), 2)), turn, TORSO, times, np.ones((len(times), 133), bool))
 
 
 def arm(swing: np.ndarray, turn: np.ndarray, seed: int = 0) -> np.ndarray:
@@ -53,15 +53,15 @@ def test_the_usual_place_is_read_off_the_turn():
     turn = np.linspace(0, 2 * np.pi, 50)
     place = np.array([0.3, -0.2, 0.1])
     track = np.stack([place[0] * np.cos(turn) + place[2] * np.sin(turn), np.full(50, place[1])], 1)
-    np.testing.assert_allclose(usual_place(track, np.ones(50, bool), turn), place, atol=0.01)
-    assert not usual_place(track, np.zeros(50, bool), turn).any()
+    np.testing.assert_allclose(fit_usual_place(track, np.ones(50, bool), turn), place, atol=0.01)
+    assert not fit_usual_place(track, np.zeros(50, bool), turn).any()
 
 
 def test_a_long_clip_is_told_from_the_frames_around_each_gap():
     times = np.arange(400) / 10
     asked = np.zeros(400, bool)
     asked[200:210] = True
-    used = near(asked, ~asked, times)
+    used = pick_frames(asked, ~asked, times)
     assert used.sum() <= 1.3 * MOST_FRAMES and used[190:200].all() and used[:150].any() and used[300:].any()
     swing = 0.5 + 0.1 * np.sin(2 * np.pi * 0.5 * times)
     turn = 2 * np.pi * times / 10

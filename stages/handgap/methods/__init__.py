@@ -1,0 +1,1 @@
+"""What fills a hidden hand: one file a method, named as `handgap.method` names it; `fill.METHODS` is the list."""
