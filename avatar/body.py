@@ -16,19 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.artifacts import BODY_SHAPES, ArtifactError, check_arrays, write_arrays
+from gsac.avatar.body_file import read_body_file
 from gsac.avatar.camera import Camera
+from gsac.avatar.joints import POSE_PARTS, J
 from gsac.avatar.skinning import joint_transforms, skin
 
 OPEN_BODY = Path(__file__).parent / "open_body" / "open_body.npz"
-J = 55
-SMPLX_JOINTS = (
-    "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 left_foot right_foot neck "
-    "left_collar right_collar head left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist jaw "
-    "left_eye_smplhf right_eye_smplhf"
-).split() + [f"{side}_{finger}{i}" for side in ("left", "right")
-             for finger in ("index", "middle", "pinky", "ring", "thumb") for i in (1, 2, 3)]
-SMPLX_EXPRESSIONS = 100
-"""How many of an official file's last shape directions are expressions (v1.1: 300 + 100; older files: 10 + 10)."""
 LOST = 0.5
 """Joint spread, m, of a frame that could not be fitted: far more than any fitted frame's."""
 
@@ -64,15 +57,17 @@ class BodyParams:
         write_arrays(path, **arrays, model=np.array(self.model))
 
     @classmethod
-    def from_pose(cls, pose: np.ndarray, transl: np.ndarray, betas: np.ndarray, expression: np.ndarray, focal, center,
-                  joint_offset: np.ndarray | None = None, model: str = "") -> BodyParams:
-        """pose: (T, 55, 3) axis-angle; transl: (T, 3); expression: (T, E). `joints` is left zero: see `Body.posed`."""
+    def from_pose(cls, pose: np.ndarray, transl: np.ndarray, betas: np.ndarray, expression: np.ndarray,
+                  focal: float | np.ndarray, center: tuple[float, float] | np.ndarray, joint_offset: np.ndarray | None = None,
+                  model: str = "") -> BodyParams:
+        """A body in T poses, its `joints` zero (`Body.posed` gives them) and every frame taken as fitted.
+
+        pose: (T, 55, 3) axis-angle; transl: (T, 3) m; betas: (B,); expression: (T, E); focal: px, scalar or (2,);
+        center: (2,) px; joint_offset: (55, 3) m, zero unless given.
+        """
         t = len(pose)
-        flat = np.asarray(pose, np.float32).reshape(t, J * 3)
         return cls(
-            betas=np.asarray(betas, np.float32), expression=np.asarray(expression, np.float32),
-            global_orient=flat[:, :3], body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69], leye_pose=flat[:, 69:72],
-            reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120], right_hand_pose=flat[:, 120:165],
+            betas=np.asarray(betas, np.float32), expression=np.asarray(expression, np.float32), **split_pose(pose),
             transl=np.asarray(transl, np.float32),
             joint_offset=np.zeros((J, 3), np.float32) if joint_offset is None else np.asarray(joint_offset, np.float32),
             joints=np.zeros((t, J, 3), np.float32), focal=np.broadcast_to(np.asarray(focal, np.float32), (2,)).copy(),
@@ -91,12 +86,16 @@ class BodyParams:
     @property
     def pose(self) -> np.ndarray:
         """(T, 55, 3) axis-angle in joint order."""
-        parts = (self.global_orient, self.body_pose, self.jaw_pose, self.leye_pose, self.reye_pose,
-                 self.left_hand_pose, self.right_hand_pose)
-        return np.concatenate(parts, 1).reshape(-1, J, 3)
+        return np.concatenate([getattr(self, name) for name in POSE_PARTS], 1).reshape(-1, J, 3)
 
     def camera(self, width: int, height: int) -> Camera:
         return Camera(tuple(map(float, self.focal)), tuple(map(float, self.center)), width, height)
+
+
+def split_pose(pose: np.ndarray) -> dict[str, np.ndarray]:
+    """The parts of a pose (T, 55, 3), axis-angle, under SMPL-X's names: each (T, 3 * joints) float32."""
+    flat = np.asarray(pose, np.float32).reshape(len(pose), J * 3)
+    return {name: flat[:, 3 * part.start:3 * part.stop] for name, part in POSE_PARTS.items()}
 
 
 @dataclass
@@ -127,8 +126,6 @@ class Body:
 
         Raises `ArtifactError` naming the array that is wrong.
         """
-        from gsac.avatar.body_file import read_body_file
-
         path = Path(path) if path else OPEN_BODY
         if not path.is_file():
             raise ArtifactError(f"{path}: there is no body model file; give an SMPLX_*.npz or leave the parameter empty")

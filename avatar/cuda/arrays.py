@@ -15,9 +15,9 @@ from gsac.avatar.cuda.recipe import Drawn, Recipe
 from gsac.avatar.cuda.smoothing import series
 from gsac.avatar.cuda.structs import FRAME, POINTERS, Scene, State
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY, FINGERS, JAW_EYES, J
 
-TILE, SEGMENT, JOINTS = 16, 128, 55
-BODY, JAW_EYES, FINGERS = slice(0, 22), slice(22, 25), 25
+TILE, SEGMENT, JOINTS = 16, 128, J
 NOW = 256
 """Bytes kept for each frame of the batch's `Now`; at least the struct's."""
 
@@ -156,7 +156,7 @@ class Arrays:
             self.scene.smoothness, self.scene.series_terms = self.recipe.smoothness, len(found.factors)
             self.scene.series_middle, self.scene.series_half = found.middle, found.half
             self._upload("series", found.factors, np.float32)
-        on_fingers = np.where(np.asarray(body.skin_index) >= FINGERS, body.skin_weight, 0).sum(1)
+        on_fingers = np.where(np.asarray(body.skin_index) >= FINGERS.start, body.skin_weight, 0).sum(1)
         for name, array, kind in (("near_start", near_start, np.int32), ("near_vertex", near_vertex, np.int32),
                                   ("offset_share", 1 - on_fingers, np.float32)):
             self._upload(name, array, kind)

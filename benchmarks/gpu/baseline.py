@@ -15,11 +15,12 @@ from gsac.avatar.cuda.adjacency import joint_levels
 from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.light import BRIGHTEST, DARKEST, FROM_CAMERA
 from gsac.benchmarks.gpu.figure import Figure
 from gsac.stages.train.fast import prealign, trainer
 from gsac.stages.train.fast.cuda import body_arrays, learning, recipe_of
-from gsac.stages.train.poses.poses import BODY, HAND_SHARE, JAW_EYES
+from gsac.stages.train.poses.poses import HAND_SHARE
 from gsac.stages.train.task import Fit, Task
 
 RATES = {"mu": "mu_rate", "quat": "quat_rate", "log_scale": "scale_rate", "rgb": "rgb_rate", "opacity": "opacity_rate",
