@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numba
 
-SOURCES = ("kernel.py", "simd.py", "binding.py", "losses.py", "ssim.py", "sobel.py", "raster/project.py", "raster/tiles.py",
-           "raster/forward.py", "raster/backward.py")
+SOURCES = ("kernel.py", "blend.py", "simd.py", "binding.py", "losses.py", "ssim.py", "sobel.py",
+           "raster/project.py", "raster/tiles.py", "raster/forward.py", "raster/backward.py")
 """Files under this folder that kernels or their constants come from."""
 
 

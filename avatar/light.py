@@ -11,11 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.blend import BRIGHTEST, DARKEST
+
 TERMS = 4
-DARKEST, BRIGHTEST = 0.25, 2.5
-"""A shade stays between these: the first order knows no shadow."""
-
-
 FROM_CAMERA = np.float32([1, -1, -1])
 """Of a normal in the clip's camera frame: times this, it is in the light's axes."""
 

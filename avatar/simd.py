@@ -13,6 +13,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, overload, register_model
 
+from gsac.avatar.blend import ALPHA_LEVELS
+
 WIDTH = 16
 
 _CONTRACT = ("contract", "nsz")
@@ -191,8 +193,8 @@ def _exp_coefficients(degree: int, end: float) -> list[float]:
 
 @intrinsic
 def falloff(typingctx, s):
-    """exp(-s) for s in 0..ln 255; relative error 7e-7 in float32, 1e-14 in float64; other s give any number."""
-    coefficients = _exp_coefficients(5 if s.real == types.float32 else 13, math.log(255) / 8)
+    """exp(-s) for s in 0..ln ALPHA_LEVELS; relative error 7e-7 in float32, 1e-14 in float64; other s give any number."""
+    coefficients = _exp_coefficients(5 if s.real == types.float32 else 13, math.log(ALPHA_LEVELS) / 8)
 
     def code(context, builder, signature, arguments):
         x = builder.fmul(arguments[0], _all(s, 0.125))

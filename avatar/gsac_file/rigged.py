@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar import blend
 from gsac.avatar.artifacts import AVATAR_SHAPES, LIGHT_SHAPE
 from gsac.avatar.gsac_file.container import Fault, GsacError, pack, read_bytes, unpack
 
@@ -19,7 +20,7 @@ QUAT_SCALE = 1 / 32767
 LOG_SCALE_SCALE = 1 / 2048
 MAX_JOINTS = 256
 MAX_LEVELS = 16
-BLEND = {"low_pass_px2": 0.3, "alpha_max": 0.999, "alpha_min": 1 / 255}
+BLEND = {"low_pass_px2": blend.BLUR, "alpha_max": blend.MAX_ALPHA, "alpha_min": blend.MIN_ALPHA}
 """How a gaussian is drawn: added to the image covariance's diagonal; cap of one alpha; below this it is not drawn."""
 BLEND_RANGE = {"low_pass_px2": (0, 100), "alpha_max": (0, 1), "alpha_min": (1e-6, 1)}
 
@@ -194,8 +195,8 @@ class _Reading:
 
     def drawing(self) -> None:
         """Checks what the head says of drawing and this reader does not keep."""
-        blend = self.entry(self.head, "blend", dict) if "blend" in self.head else {}
-        found = [(self.head, "ground", (-1e6, 1e6))] + [(blend, key, span) for key, span in BLEND_RANGE.items()]
+        drawn = self.entry(self.head, "blend", dict) if "blend" in self.head else {}
+        found = [(self.head, "ground", (-1e6, 1e6))] + [(drawn, key, span) for key, span in BLEND_RANGE.items()]
         for table, key, (least, most) in found:
             if key in table and not least <= self.entry(table, key, (int, float)) <= most:
                 raise self.bad(Fault.VALUE, f"`{key}` is out of range")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import torch
 
+from gsac.avatar.blend import BLUR, FRUSTUM, MAX_ALPHA, MIN_ALPHA, NEAR, STOP
 from gsac.avatar.camera import Camera
-from gsac.avatar.raster.forward import MAX_ALPHA, STOP
-from gsac.avatar.raster.project import BLUR, FRUSTUM, NEAR
 
 
 def render(means, rotations, scales, rgb, opacity, camera: Camera):
@@ -37,7 +36,7 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera):
     offset = torch.stack([x - centre[0][:, None, None], y - centre[1][:, None, None]], -1)
     s = 0.5 * torch.einsum("nhwi,nij,nhwj->nhw", offset, inverse, offset)
     alpha = (opacity[:, None, None] * torch.exp(-s)).clamp(max=MAX_ALPHA)
-    alpha = torch.where(alpha >= 1 / 255, alpha, torch.zeros_like(alpha))
+    alpha = torch.where(alpha >= MIN_ALPHA, alpha, torch.zeros_like(alpha))
     after = torch.cumprod(1 - alpha, 0)
     before = torch.cat([torch.ones_like(after[:1]), after[:-1]])
     weight = torch.where(after > STOP, before * alpha, torch.zeros_like(alpha))

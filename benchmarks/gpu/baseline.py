@@ -11,12 +11,13 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from gsac.avatar.blend import BRIGHTEST, DARKEST
 from gsac.avatar.cuda.adjacency import joint_levels
 from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, JAW_EYES
-from gsac.avatar.light import BRIGHTEST, DARKEST, FROM_CAMERA
+from gsac.avatar.light import FROM_CAMERA
 from gsac.benchmarks.gpu.figure import Figure
 from gsac.stages.train.fast import prealign, trainer
 from gsac.stages.train.fast.cuda import body_arrays, learning, recipe_of

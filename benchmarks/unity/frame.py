@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.blend import BLUR, MAX_ALPHA, MIN_ALPHA
 from gsac.avatar.camera import Camera
-from gsac.avatar.gsac_file.rigged import BLEND, RiggedAvatar
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.gpu import Gpu, projection
 from gsac.benchmarks.unity.packing import packed
@@ -108,7 +109,7 @@ class Frame:
             view = np.eye(4)
             view[:3, 3] = side * -EYES_APART, -self.avatar.joints[9, 1], -distance
             views.append(view.T)
-        blend = [BLEND["low_pass_px2"], BLEND["alpha_max"], BLEND["alpha_min"], 0]
+        rule = [BLUR, MAX_ALPHA, MIN_ALPHA, 0]
         return {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(camera).T] * 2,
-                "_ScreenParams": [size, size, 0, 0], "GsacBlend": blend, "GsacIndexBits": index_bits(self.count),
+                "_ScreenParams": [size, size, 0, 0], "GsacBlend": rule, "GsacIndexBits": index_bits(self.count),
                 **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.avatar.light import DARKEST, shade
+from gsac.avatar.light import shade
 from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.gpu import Painting, projection

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import face_frames
+from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
 from gsac.avatar.film import FOV, PITCH, look
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.avatar.light import DARKEST, shade
+from gsac.avatar.light import shade
 from gsac.avatar.raster import render_bound
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer.page import page_bytes
