@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gsac.avatar.binding import face_frames
 from gsac.avatar.camera import Camera
-from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.light import shade
 from gsac.avatar.motion.source import Motion
@@ -63,7 +62,7 @@ def performance(motion: Motion, fps: float, seconds: float | None = None) -> Fil
 def frames(avatar: RiggedAvatar, film: Film, width: int, height: int, background: np.ndarray,
            workspace: Workspace | None = None) -> Iterator[np.ndarray]:
     """(height, width, 3) uint8 RGB, one by one; background: (3,) in 0..1."""
-    gaussians, workspace = Gaussians(**avatar.gaussians), workspace or Workspace()
+    lit, gaussians, workspace = avatar.gaussians, replace(avatar.gaussians, light=None), workspace or Workspace()
     place = followed(film.transl + avatar.joints[0], film.fps)
     focal = height / 2 / math.tan(math.radians(FOV / 2))
     camera = Camera((focal, focal), (width / 2, height / 2), width, height)
@@ -71,9 +70,8 @@ def frames(avatar: RiggedAvatar, film: Film, width: int, height: int, background
     for t in range(len(film)):
         vertices = avatar.posed(film.pose[t]) + film.transl[t]
         R, eye = look(film.yaw[t], place[t] * (1, 0, 1) + (0, middle, 0), distance)
-        if avatar.light is not None:
-            normals = face_frames(vertices, avatar.faces).R[gaussians.face, :, 1]
-            gaussians.rgb = avatar.gaussians["rgb"] * shade(avatar.light, normals)
+        if lit.light is not None:  # the room's light stands in the avatar's axes, not in this camera's
+            gaussians.rgb = lit.rgb * shade(lit.light, face_frames(vertices, avatar.faces).R[lit.face, :, 1])
         out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, gaussians, camera, workspace)
         image = out.rgb + (1 - out.alpha[..., None]) * background
         yield np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)

@@ -19,7 +19,7 @@ GOLDEN = (0.7548776662466927, 0.5698402909980532)
 """Steps of the plane's R2 sequence: powers of 1/1.3247..., the plastic number."""
 
 
-EACH = tuple(artifacts.AVATAR_SHAPES)
+FIELDS = tuple(artifacts.AVATAR_SHAPES)
 """What every gaussian has."""
 
 
@@ -45,7 +45,7 @@ class Gaussians:
 
     def __getitem__(self, which) -> Gaussians:
         """The gaussians that an index array, mask or slice picks."""
-        return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in EACH), self.light)
+        return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in FIELDS), self.light)
 
     def write(self, path: Path, coarser: Sequence[Gaussians] = ()) -> None:
         """avatar.npz: float32, face int32; `light` where there is one; coarser levels of detail, finest first, where there are."""
@@ -55,7 +55,7 @@ class Gaussians:
         if coarser:
             arrays["levels"] = np.array([len(level) for level in coarser], np.int32)
             parts = [level._arrays() for level in coarser]
-            arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in EACH}
+            arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in FIELDS}
         artifacts.write_arrays(path, **arrays)
 
     @classmethod
@@ -69,11 +69,11 @@ class Gaussians:
         arrays = artifacts.check_avatar(path)
         light = arrays.get("light")
         ends = np.cumsum(arrays.get("levels", np.zeros(0, np.int32)))
-        parts = [{name: arrays[f"coarser_{name}"][a:b] for name in EACH} for a, b in zip([0, *ends], ends, strict=False)]
-        return [cls(**part, light=light) for part in [{name: arrays[name] for name in EACH}, *parts]]
+        parts = [{name: arrays[f"coarser_{name}"][a:b] for name in FIELDS} for a, b in zip([0, *ends], ends, strict=False)]
+        return [cls(**part, light=light) for part in [{name: arrays[name] for name in FIELDS}, *parts]]
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in EACH}
+        return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in FIELDS}
 
     @classmethod
     def per_face(cls, vertices: np.ndarray, faces: np.ndarray, rgb=(0.5, 0.5, 0.5), opacity: float = 0.9) -> Gaussians:

@@ -1,7 +1,7 @@
 """The bytes of `avatar.gsac`: a fixed header, a JSON head, aligned little-endian blocks (docs/gsac-format.md).
 
-This file knows bytes only; what the blocks mean is `rigged.py`'s affair. Nothing in a file is believed before it is
-checked: a bad file raises `GsacError` with one `Fault`, and memory stays in proportion to the file's real size.
+Only bytes are known here; `read.py` and `rigged.py` know what the blocks mean. Nothing in a file is believed before it is checked:
+a bad file raises `GsacError` with one `Fault`, and memory stays in proportion to the file's real size.
 """
 
 from __future__ import annotations

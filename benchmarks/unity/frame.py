@@ -55,7 +55,7 @@ class Frame:
 
     def __init__(self, gpu: Gpu, programs: dict[str, Program], avatar: RiggedAvatar) -> None:
         self.gpu, self.avatar = gpu, avatar
-        V, N, E, J = len(avatar.vertices), len(avatar.gaussians["face"]), len(avatar.expression_names), len(avatar.joints)
+        V, N, E, J = len(avatar.vertices), len(avatar.gaussians), len(avatar.expression_names), len(avatar.joints)
         self.count, self.weights = N, np.where(np.arange(E) % 4 == 0, np.float32(.5), np.float32(0))
         self.bones = joint_transforms(avatar.pose("A")[None], avatar.joints, avatar.parents)[0].astype(np.float32)
         keys, steps = sort_steps(N)
@@ -92,7 +92,7 @@ class Frame:
             rest[a.expression_vertex[span]] += w * a.expression_delta[span]
         vertices = skin(rest, self.bones, a.skin_index, a.skin_weight)
         posed = self.gpu.get("GsacPosed").reshape(-1, 4)[:, :3]
-        means = bind(face_frames(posed.astype(np.float64), a.faces), g["face"], g["mu"], g["quat"], g["log_scale"]).means
+        means = bind(face_frames(posed.astype(np.float64), a.faces), g.face, g.mu, g.quat, g.log_scale).means
         got = self.gpu.get("GsacSplats").reshape(-1, 12)[:, :3]
         keys = self.gpu.get("GsacKeys", np.uint32)
         order = keys[:self.count] & ((1 << index_bits(self.count)) - 1)

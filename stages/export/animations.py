@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsac.avatar.gsac_file.rigged import Clip, RiggedAvatar
+from gsac.avatar.gsac_file.animation import Animation
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 
 FPS = 20.0
 WAVE_S = 3.2
@@ -35,7 +36,7 @@ def add_motion(avatar: RiggedAvatar, names: tuple[str, ...]) -> None:
     avatar.clips = {name: CLIPS[name](avatar) for name in names}
 
 
-def wave(avatar: RiggedAvatar) -> Clip:
+def wave(avatar: RiggedAvatar) -> Animation:
     """The right hand greets; the rest breathes and leans a little."""
     t = np.arange(round(WAVE_S * FPS)) / (WAVE_S * FPS)
     turn = 2 * np.pi * t
@@ -60,7 +61,7 @@ def wave(avatar: RiggedAvatar) -> Clip:
     return _grounded(avatar, tracks)
 
 
-def walk(avatar: RiggedAvatar) -> Clip:
+def walk(avatar: RiggedAvatar) -> Animation:
     """One double step on the spot; the pelvis rides so that the lower foot stays on the floor."""
     t = np.arange(round(WALK_S * FPS)) / round(WALK_S * FPS)
     tracks = _relaxed(t)
@@ -129,11 +130,11 @@ def _periodic(t: np.ndarray, keys: tuple[tuple[float, float], ...]) -> np.ndarra
     return CubicSpline(times, values, bc_type="periodic")(t % 1)
 
 
-def _grounded(avatar: RiggedAvatar, tracks: dict[str, np.ndarray]) -> Clip:
+def _grounded(avatar: RiggedAvatar, tracks: dict[str, np.ndarray]) -> Animation:
     """A looping clip whose transl keeps the lowest vertex of each key on the floor."""
     joints = [name for name in avatar.joint_names if name in tracks]
     rotation = np.stack([tracks[name] for name in joints], axis=1).astype(np.float32)
-    clip = Clip(FPS, True, joints, rotation, np.zeros((len(rotation), 3), np.float32))
+    clip = Animation(FPS, True, joints, rotation, np.zeros((len(rotation), 3), np.float32))
     index = [avatar.joint_names.index(name) for name in joints]
     for k, keys in enumerate(rotation):
         pose = np.zeros((len(avatar.joints), 3), np.float32)

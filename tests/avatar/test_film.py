@@ -71,8 +71,8 @@ def test_the_camera_goes_along_and_a_step_is_still_seen_as_one(figure):
 
 
 def test_the_light_stands_still_in_the_room_while_the_camera_goes_round(figure):
-    grey = replace(figure, gaussians=figure.gaussians | {"rgb": np.full_like(figure.gaussians["rgb"], .4)})
-    from_its_left = replace(grey, light=np.float32([[1] * 3, [.8] * 3, [0] * 3, [0] * 3]))
+    grey = replace(figure, gaussians=replace(figure.gaussians, rgb=np.full_like(figure.gaussians.rgb, .4)))
+    from_its_left = replace(grey, gaussians=replace(grey.gaussians, light=np.float32([[1] * 3, [.8] * 3, [0] * 3, [0] * 3])))
     film = turntable(figure, 0.8, 10)
     even, lit = drawn(grey, film).mean(-1), drawn(from_its_left, film).mean(-1)
     person = even > 90
