@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsac.avatar.tflite import sigmoid
+from gsac.avatar.logistic import clipped_sigmoid
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def decode(raw: np.ndarray, logits: np.ndarray, centers: np.ndarray, size: int, 
 
     Returns those of score >= threshold, best first, not yet suppressed.
     """
-    score = sigmoid(logits[:, 0])
+    score = clipped_sigmoid(logits[:, 0])
     order = np.argsort(-score, kind="stable")
     keep = order[score[order] >= threshold]
     values = raw[keep].reshape(len(keep), raw.shape[1] // 2, 2) / size

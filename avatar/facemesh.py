@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.detections import anchor_centers, decode, suppress
+from gsac.avatar.logistic import clipped_sigmoid
 from gsac.avatar.region import Region, around_points, crop, upright_angle
-from gsac.avatar.tflite import Network, sigmoid
+from gsac.avatar.tflite import Network
 
 MODELS = ("face_detection_short_range", "face_landmark")
 POINTS = 468
@@ -107,7 +108,7 @@ class FaceMesh:
             points = points[mirror]
             points[:, 0] = 1 - points[:, 0]
         xy = region.to_frame(points[:, :2])
-        return Face(np.hstack([xy, points[:, 2:] * region.side]), float(sigmoid(presence.reshape(-1)[0])))
+        return Face(np.hstack([xy, points[:, 2:] * region.side]), float(clipped_sigmoid(presence.reshape(-1)[0])))
 
     @staticmethod
     def region_of(points: np.ndarray) -> Region:

@@ -37,7 +37,3 @@ class Network:
         interpreter.set_tensor(self._input, np.ascontiguousarray(image[None], dtype=np.float32))
         interpreter.invoke()
         return [interpreter.get_tensor(i)[0] for i in self._outputs]
-
-
-def sigmoid(x: np.ndarray) -> np.ndarray:
-    return 1 / (1 + np.exp(-np.clip(x, -80, 80)))

@@ -16,6 +16,7 @@ from gsac.avatar.cuda.smoothing import series
 from gsac.avatar.cuda.structs import FRAME, POINTERS, Scene, State
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, FINGERS, JAW_EYES, J
+from gsac.avatar.logistic import logit, sigmoid
 
 TILE, SEGMENT, JOINTS = 16, 128, J
 NOW = 256
@@ -63,7 +64,7 @@ class Arrays:
 
     def gaussians(self) -> Gaussians:
         b = self.buffers
-        opacity = 1 / (1 + np.exp(-b["logit"].read().astype(np.float64)))
+        opacity = sigmoid(b["logit"].read().astype(np.float64))
         return Gaussians(self.face.copy(), b["mu"].read(), b["quat"].read(), b["log_scale"].read(), b["rgb"].read(),
                          opacity.astype(np.float32), self.light)
 
@@ -208,7 +209,7 @@ class Arrays:
         """Buffers' names and what they are to hold."""
         opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
-                "logit": np.log(opacity / (1 - opacity)), "start": gaussians.mu}
+                "logit": logit(opacity), "start": gaussians.mu}
 
     def _scratch(self) -> None:
         batch, n, v = self.batch, self.count, self.scene.vertex_count

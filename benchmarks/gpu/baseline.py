@@ -18,6 +18,7 @@ from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.light import FROM_CAMERA
+from gsac.avatar.logistic import logit, sigmoid
 from gsac.benchmarks.gpu.figure import Figure
 from gsac.stages.train.fast import prealign, trainer
 from gsac.stages.train.fast.cuda import body_arrays, learning, recipe_of
@@ -100,7 +101,7 @@ class Loop:
         if compiled:
             self.geometry, self.loss = torch.compile(self.geometry), torch.compile(self.loss)
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
-        given = (gaussians.mu, gaussians.quat, gaussians.log_scale, gaussians.rgb, np.log(opacity / (1 - opacity)))
+        given = (gaussians.mu, gaussians.quat, gaussians.log_scale, gaussians.rgb, logit(opacity))
         self.values = [tensor(a).requires_grad_() for a in given]
         self.fitted = tensor(np.concatenate([pose, transl[:, None]], 1))
         # each frame's way from the fit has an Adam state of its own; its share makes fingers slow and holds jaw and eyes
@@ -132,8 +133,8 @@ class Loop:
         return self.loss(drawn[0], alpha[0], pixels, background), drawn[0], alpha[0]
 
     def gaussians(self) -> Gaussians:
-        mu, quat, log_scale, rgb, logit = (v.detach().cpu().numpy() for v in self.values)
-        return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), 1 / (1 + np.exp(-logit)), self.light)
+        mu, quat, log_scale, rgb, logits = (v.detach().cpu().numpy() for v in self.values)
+        return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), sigmoid(logits), self.light)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Pose (T, 55, 3) and translation (T, 3)."""

@@ -7,8 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gsac.avatar.logistic import clipped_sigmoid
 from gsac.avatar.region import Region, around_points, crop
-from gsac.avatar.tflite import Network, sigmoid
+from gsac.avatar.tflite import Network
 
 MARGIN = 1.2
 """Side of the square that the network sees, in sides of the points' own: crown and toes lie beyond the points."""
@@ -24,7 +25,7 @@ class PoseMask:
         """image: (H, W, 3) uint8. Returns (H, W) float32, probability."""
         size = self._network.width
         mask = next(o for o in self._network(crop(image, region, size)) if o.shape == (size, size, 1))
-        return onto_frame(sigmoid(mask[..., 0]), region, *image.shape[:2])
+        return onto_frame(clipped_sigmoid(mask[..., 0]), region, *image.shape[:2])
 
 
 class SelfieMask:

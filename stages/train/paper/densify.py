@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gsac.avatar.logistic import logit
+
 FIRST, LAST, EVERY, PHASE = 100, 2500, 201, 99
 """Events are the steps strictly between FIRST and LAST that leave PHASE when divided by EVERY."""
 LARGEST = 0.1
@@ -63,7 +65,7 @@ def children(values: dict[str, np.ndarray], chosen: np.ndarray, rng: np.random.G
         for shift in shifts:
             shift[:, 1] = np.abs(shift[:, 1])
         share = act / SHRINK / LARGEST
-        logits = np.log(share / (1 - share)).astype(np.float32)
+        logits = logit(share).astype(np.float32)
         new["mu"][split] += shifts[0].astype(np.float32)
         values["mu"][parents] += shifts[1].astype(np.float32)
         new["scale"][split] = values["scale"][parents] = logits
