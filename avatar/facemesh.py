@@ -15,6 +15,7 @@ from gsac.avatar.detections import anchor_centers, decode, suppress
 from gsac.avatar.logistic import clipped_sigmoid
 from gsac.avatar.region import Region, around_points, crop, upright_angle
 from gsac.avatar.tflite import Network
+from gsac.avatar.yaw import yaw_of
 
 MODELS = ("face_detection_short_range", "face_landmark")
 POINTS = 468
@@ -127,6 +128,5 @@ def region_of_head(points: np.ndarray) -> Region:
 
 
 def head_yaw(world: np.ndarray) -> float:
-    """world: (11, 3) m, BlazePose's head points. Radians as `Face.yaw`."""
-    forward = world[0] - (world[7] + world[8]) / 2
-    return float(np.arctan2(forward[0], -forward[2]))
+    """world: (11, 3) m, BlazePose's head points: nose, eyes, ears, mouth. Returns radians as `Face.yaw`."""
+    return float(yaw_of(world[0] - (world[7] + world[8]) / 2))

@@ -1,4 +1,4 @@
-"""Rotation vectors and matrices in float64, in batches: what the fit differentiates through."""
+"""Rotation vectors, matrices and the order of quaternions, in batches; float64 where the fit differentiates through it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def hat(v: np.ndarray) -> np.ndarray:
 
 
 def log_derivative(rotvec: np.ndarray) -> np.ndarray:
-    """(..., 3, 3): how log(R exp(delta)) moves with delta at R = exp(rotvec) (inverse right Jacobian)."""
+    """rotvec: (..., 3) rad. Returns (..., 3, 3): how log(R exp(delta)) moves with delta at R = exp(rotvec) (inverse right
+    Jacobian)."""
     angle2 = (rotvec**2).sum(-1)[..., None, None]
     k = hat(rotvec)
     small = angle2 < 1e-8
@@ -42,10 +43,25 @@ def log_derivative(rotvec: np.ndarray) -> np.ndarray:
 
 
 def align(source: np.ndarray, target: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
-    """Rotation (3, 3) that best turns centred source (P, 3) onto centred target (P, 3) (Kabsch)."""
+    """Rotation (3, 3) that best turns centred source (P, 3) onto centred target (P, 3); weight: (P,), one unless given (Kabsch)."""
     w = np.ones(len(source)) if weight is None else weight
     a = source - np.average(source, axis=0, weights=w)
     b = target - np.average(target, axis=0, weights=w)
     u, _, vt = np.linalg.svd((w[:, None] * a).T @ b)
     d = np.sign(np.linalg.det(vt.T @ u.T))
     return vt.T @ np.diag([1, 1, d]) @ u.T
+
+
+def about_y(angle: float) -> np.ndarray:
+    """(3, 3): a turn by `angle` rad about y, which takes z to x."""
+    return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+
+
+def to_wxyz(xyzw: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) as gaussians have them, from scipy's order."""
+    return xyzw[..., [3, 0, 1, 2]]
+
+
+def to_xyzw(wxyz: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) as scipy has them, from the gaussians' order."""
+    return wxyz[..., [1, 2, 3, 0]]

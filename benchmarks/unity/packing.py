@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from gsac.avatar.rotation import to_xyzw
+
 
 def packed(avatar):
     """Buffer name -> array, as Gsac.compute reads it."""
@@ -22,7 +24,7 @@ def packed(avatar):
     corners[:, :3] = avatar.faces[g.face]
     local = np.zeros((N, 3, 4), np.float32)
     quat = g.quat / np.linalg.norm(g.quat.astype(np.float64), axis=1, keepdims=True)
-    local[:, 0, :3], local[:, 1], local[:, 2, :3] = g.mu, quat[:, [1, 2, 3, 0]], np.exp(g.log_scale)
+    local[:, 0, :3], local[:, 1], local[:, 2, :3] = g.mu, to_xyzw(quat), np.exp(g.log_scale)
     return {
         "GsacRest": np.concatenate([avatar.vertices, np.ones((V, 1), np.float32)], 1), "GsacSkin": skin, "GsacMoves": moves,
         "GsacCorners": corners, "GsacLocal": local,

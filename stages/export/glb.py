@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.normals import vertex_normals
+from gsac.avatar.rotation import to_xyzw
 from gsac.stages.export.ply import SH0
 
 FLOAT, U16, U32, U8 = 5126, 5123, 5125, 5121
@@ -66,7 +67,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
         "mode": POINTS, "attributes": {
             "POSITION": file.add(means.astype("<f4"), ARRAY_BUFFER, bounds=True),
             "COLOR_0": file.add(np.column_stack([_linear(rgb), g.opacity]).astype("<f4"), ARRAY_BUFFER),
-            f"{SPLATS}:ROTATION": file.add(quats[:, [1, 2, 3, 0]].astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:ROTATION": file.add(to_xyzw(quats).astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:SCALE": file.add(scales.astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:OPACITY": file.add(g.opacity.astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:SH_DEGREE_0_COEF_0": file.add(((g.rgb - 0.5) / SH0).astype("<f4"), ARRAY_BUFFER),

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.rotation import to_wxyz
 
 MEMBERS = (3, 9)
 """How many gaussians become one, level by level."""
@@ -58,7 +59,7 @@ def coarser(avatar: RiggedAvatar, members: int) -> Gaussians:
     return Gaussians(
         face=face.astype(np.int32),
         mu=(np.einsum("nji,nj->ni", R, centre - frames.T[face]) / k[:, None]).astype(np.float32),
-        quat=quat[:, [3, 0, 1, 2]].astype(np.float32),
+        quat=to_wxyz(quat).astype(np.float32),
         log_scale=np.log(scales / k[:, None]).astype(np.float32),
         rgb=mean(g.rgb, weight * hidden).astype(np.float32),
         opacity=np.clip(total / scales[:, 1:].prod(1), 0, 1).astype(np.float32),

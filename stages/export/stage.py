@@ -13,6 +13,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.rotation import to_wxyz
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.animations import add_motion
@@ -103,4 +104,4 @@ def posed_gaussians(avatar: RiggedAvatar, pose: np.ndarray) -> tuple[np.ndarray,
     g = avatar.gaussians
     bound = bind(face_frames(vertices, avatar.faces), g.face, g.mu, g.quat, g.log_scale)
     xyzw = Rotation.from_matrix(bound.rotations).as_quat()
-    return bound.means, xyzw[:, [3, 0, 1, 2]].astype(np.float32), bound.scales
+    return bound.means, to_wxyz(xyzw).astype(np.float32), bound.scales

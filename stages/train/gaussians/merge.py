@@ -14,6 +14,7 @@ from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.distinct import distinct
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.rotation import to_wxyz
 
 NEIGHBOURS = 8
 EVEN = 0.06
@@ -100,7 +101,7 @@ def joined(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndar
     out = gaussians[np.arange(len(gaussians))]
     R, T, k = frames.R[out.face[keep]], frames.T[out.face[keep]], np.maximum(frames.k[out.face[keep], None], 1e-9)
     out.mu[keep] = np.einsum("nji,nj->ni", R, middle - T) / k
-    out.quat[keep] = Rotation.from_matrix(R.transpose(0, 2, 1) @ axes).as_quat()[:, [3, 0, 1, 2]]
+    out.quat[keep] = to_wxyz(Rotation.from_matrix(R.transpose(0, 2, 1) @ axes).as_quat())
     out.log_scale[keep] = np.log(scales / k)
     out.opacity[keep] = np.minimum(needed, OPAQUE)
     out.rgb[keep] = share * gaussians.rgb[keep] + (1 - share) * gaussians.rgb[drop]
