@@ -76,16 +76,6 @@ class Gaussians:
         return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in FIELDS}
 
     @classmethod
-    def per_face(cls, vertices: np.ndarray, faces: np.ndarray, rgb=(0.5, 0.5, 0.5), opacity: float = 0.9) -> Gaussians:
-        """One gaussian at the middle of every face that has an area.
-
-        vertices: (V, 3) m; faces: (F, 3). HAHA's start, with scales from the face's area.
-        """
-        areas = _areas(vertices, faces)
-        face = np.flatnonzero(areas > 0).astype(np.int32)
-        return cls._flat(vertices, faces, face, np.zeros((len(face), 3), np.float32), areas[face], rgb, opacity)
-
-    @classmethod
     def area(cls, vertices: np.ndarray, faces: np.ndarray, count: int, seed: int = 0, rgb=(0.5, 0.5, 0.5),
              opacity: float = 0.9, power: float = 0.85) -> Gaussians:
         """`count` gaussians spread over the faces, a face drawn with probability area ** power.

@@ -29,10 +29,6 @@ class Region:
         """points: (..., 2) in 0..1. Returns (..., 2) px."""
         return (points - 0.5) * self.side @ self.axes.T + np.asarray(self.center)
 
-    def to_region(self, points: np.ndarray) -> np.ndarray:
-        """points: (..., 2) px. Returns (..., 2) in 0..1; the inverse of `to_frame`."""
-        return (points - np.asarray(self.center)) @ self.axes / self.side + 0.5
-
     def turn(self, points: np.ndarray) -> np.ndarray:
         """points: (..., 3) in the region's axes. Returns them in the frame's axes: a turn about z."""
         return np.concatenate([points[..., :2] @ self.axes.T, points[..., 2:]], axis=-1)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.avatar.normals import vertex_normals
+from gsac.avatar.mesh import vertex_normals
 from gsac.stages.export.fbx_file import CREATED, FILE_ID, Long, Node, fbx_bytes
 from gsac.stages.export.glb import vertex_colours
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.avatar.normals import vertex_normals
+from gsac.avatar.mesh import vertex_normals
 from gsac.avatar.rotation import to_xyzw
 from gsac.stages.export.ply import SH0
 

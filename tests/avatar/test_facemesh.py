@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.facemesh import IBUG68, LEFT_SIDE, POINTS, RIGHT_SIDE, Face, FaceMesh, head_yaw
+from support.regions import to_region
 
 
 def ball(yaw: float) -> Face:
@@ -38,9 +39,9 @@ def test_yaw_of_the_bodys_head_points_to_where_the_nose_goes():
 def test_the_meshs_own_region_levels_the_eyes_and_holds_every_point():
     face = ball(0.2)
     region = FaceMesh.region_of(face.points)
-    inside = region.to_region(face.points[:, :2])
+    inside = to_region(region, face.points[:, :2])
     assert inside.min() > 0 and inside.max() < 1
-    eyes = region.to_region(face.points[[33, 263], :2])
+    eyes = to_region(region, face.points[[33, 263], :2])
     assert eyes[0, 1] == pytest.approx(eyes[1, 1])
 
 

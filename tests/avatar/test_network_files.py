@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from gsac.avatar.network_files import MODELS, ModelMissingError, model_path, store_path
+from gsac.avatar.network_files import MODELS, ModelMissingError, model_path
 
 
 def test_each_model_names_its_wheel_member_digest_and_licence():
@@ -23,7 +23,7 @@ def test_an_unknown_model_lists_the_known_ones(tmp_path):
 
 
 def test_a_file_in_the_store_is_found(tmp_path):
-    path = store_path("iris_landmark", tmp_path)
+    path = tmp_path / "models" / MODELS["iris_landmark"].sha256 / "iris_landmark"
     path.parent.mkdir(parents=True)
     path.write_bytes(b"x")
     assert model_path("iris_landmark", tmp_path) == path

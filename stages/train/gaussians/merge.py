@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.body import Body
-from gsac.avatar.distinct import distinct
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.mesh import distinct_pairs
 from gsac.avatar.rotation import to_wxyz
 
 NEIGHBOURS = 8
@@ -51,7 +51,7 @@ def cheapest(gaussians: Gaussians, bound: Bound, shown: np.ndarray, normals: np.
     places = bound.means.astype(np.float64)
     near = cKDTree(places).query(places, k=min(NEIGHBOURS + 1, len(places)))[1][:, 1:]
     one, other = np.repeat(np.arange(len(places)), near.shape[1]), near.ravel()
-    i, j = np.divmod(distinct(np.minimum(one, other) * len(places) + np.maximum(one, other)), len(places))
+    i, j = distinct_pairs(np.minimum(one, other), np.maximum(one, other), len(places))
     skin = skin_of(gaussians.face, body)
     fit = ((normals[i] * normals[j]).sum(1) > SAME_SIDE) & (0.5 * np.abs(skin[i] - skin[j]).sum(1) < SAME_PART)
     i, j = i[fit], j[fit]

@@ -20,12 +20,6 @@ def placed(mesh, gaussians):
     return binding.bind(binding.face_frames(*mesh), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
 
 
-def test_per_face_puts_one_gaussian_on_the_middle_of_each_face_with_an_area(mesh):
-    gaussians = Gaussians.per_face(*mesh)
-    assert gaussians.face.tolist() == [0, 1, 2]
-    assert np.allclose(placed(mesh, gaussians).means, mesh[0][mesh[1][:3]].mean(1), atol=1e-6)
-
-
 def test_area_placement_lies_on_the_faces_flat_along_the_normal(mesh):
     gaussians = Gaussians.area(*mesh, 400, seed=1)
     vertices, faces = mesh

@@ -5,6 +5,7 @@ import pytest
 
 from gsac.avatar.region import Region
 from gsac.stages.keypoints.hands import Arm, Hand, assign, distinct, merged, rough_region, same_hand
+from support.regions import to_region
 
 SHAPE = np.random.default_rng(1).uniform(0, 60, (21, 2)) - [30, 0]
 SHAPE[0] = 0
@@ -59,6 +60,6 @@ def test_looks_at_nearly_the_same_square_are_made_once():
 
 def test_rough_region_has_the_fingers_up_and_survives_points_that_coincide():
     region = rough_region(np.array([100.0, 100]), np.array([140.0, 95]), np.array([140.0, 105]))
-    knuckle, wrist = region.to_region(np.array([[140.0, 100], [100.0, 100]]))
+    knuckle, wrist = to_region(region, np.array([[140.0, 100], [100.0, 100]]))
     assert knuckle[1] < wrist[1] and abs(knuckle[0] - wrist[0]) < 0.05
     assert rough_region(*np.full((3, 2), 50.0)).side > 0
