@@ -7,7 +7,7 @@ from threading import local
 
 import numpy as np
 
-from gsac.avatar.threads import available
+from gsac.avatar.threads import available_cores
 
 
 class Network:
@@ -16,7 +16,7 @@ class Network:
     def __init__(self, path: Path, threads: int | None = None):
         """threads: of each interpreter; None takes the cores this process may use, at most four; more do not help nets this
         small."""
-        self._path, self._threads, self._own = path, threads or min(4, available()), local()
+        self._path, self._threads, self._own = path, threads or min(4, available_cores()), local()
         interpreter = self._interpreter()
         self._input = interpreter.get_input_details()[0]["index"]
         self._outputs = [d["index"] for d in interpreter.get_output_details()]

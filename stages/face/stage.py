@@ -8,7 +8,7 @@ import numpy as np
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS, FaceMesh
-from gsac.avatar.threads import available
+from gsac.avatar.threads import available_cores
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face.actions import Actions, fill, pace, smooth, solve
@@ -81,7 +81,7 @@ def read_clip(job: Job, paths: list, keypoints: dict, actions: Actions) -> tuple
             if face.presence >= job.config.threshold and looks[2] >= least:
                 landmarks[t], points[t], direction[t] = face.points, aligned, looks
 
-    with ThreadPoolExecutor(min(available(), MOST)) as pool:
+    with ThreadPoolExecutor(min(available_cores(), MOST)) as pool:
         for done, _ in enumerate(pool.map(frame, range(T)), 1):
             job.progress(done, T, "frames")
     return landmarks, points, direction

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
-from gsac.avatar.threads import ahead, available
+from gsac.avatar.threads import available_cores, prefetch
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.frame_names import name_frames
@@ -32,10 +32,10 @@ def run(job: Job) -> None:
     paths = frame_paths(job.inputs["split/frames"])
     detector = DETECTORS[job.config.detector](job.models, job.config)
     frames, at_edge = [], []
-    many = min(available(), MOST)
+    many = min(available_cores(), MOST)
     with ThreadPoolExecutor(many + 1) as pool:
-        looks = (Look(detector.follow(image), *image.shape[:2]) for image in ahead(pool, read_frame, paths, 2))
-        for frame, edge in ahead(pool, look, looks, many):
+        looks = (Look(detector.follow(image), *image.shape[:2]) for image in prefetch(pool, read_frame, paths, 2))
+        for frame, edge in prefetch(pool, look, looks, many):
             frames.append(frame)
             at_edge.append(edge)
             job.progress(len(frames), len(paths), "frames")

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, check_arrays, frame_paths, read_frame, write_alpha
-from gsac.avatar.threads import ahead, available
+from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.segment.components import keep_person
@@ -45,7 +45,7 @@ def run(job: Job) -> None:
 
     def looks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
         """Frames, and what the network says of them: it has threads of its own, so all are put to it by one."""
-        for t, image in enumerate(ahead(pool, read_frame, paths, 2)):
+        for t, image in enumerate(prefetch(pool, read_frame, paths, 2)):
             region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
             yield t, image, None if region is None else network(image, region)
 
@@ -64,8 +64,8 @@ def run(job: Job) -> None:
                                  "look at the frame, and remove it or try segment.method=selfie")
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
-    with ThreadPoolExecutor(available()) as pool:
-        for done, _ in enumerate(ahead(pool, cut, looks(pool), available()), 1):
+    with ThreadPoolExecutor(available_cores()) as pool:
+        for done, _ in enumerate(prefetch(pool, cut, looks(pool), available_cores()), 1):
             job.progress(done, len(paths), "frames")
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")

@@ -9,7 +9,7 @@ from gsac.avatar.threads import Workspace, side_by_side
 
 @pytest.mark.parametrize("cores", [1, 2, 5])
 def test_items_come_back_in_order_each_by_one_thread_with_a_workspace_of_its_own(monkeypatch, cores):
-    monkeypatch.setattr(workspace, "available", lambda: cores)
+    monkeypatch.setattr(workspace, "available_cores", lambda: cores)
     seen: dict[Workspace, set[int]] = {}
 
     def work(item: int, own: Workspace) -> float:
@@ -24,12 +24,12 @@ def test_items_come_back_in_order_each_by_one_thread_with_a_workspace_of_its_own
 
 
 def test_one_item_has_all_cores_and_none_is_no_trouble(monkeypatch):
-    monkeypatch.setattr(workspace, "available", lambda: 3)
+    monkeypatch.setattr(workspace, "available_cores", lambda: 3)
     assert side_by_side(lambda item, own: own.workers, [7]) == [3]
     assert side_by_side(lambda item, own: own.workers, []) == []
 
 
 def test_what_goes_wrong_with_an_item_is_heard(monkeypatch):
-    monkeypatch.setattr(workspace, "available", lambda: 2)
+    monkeypatch.setattr(workspace, "available_cores", lambda: 2)
     with pytest.raises(ZeroDivisionError):
         side_by_side(lambda item, own: 1 / item, [2, 1, 0])
