@@ -1,9 +1,9 @@
-"""The body model: one loader, one file layout (SMPL-X's npz keys), whichever body is inside.
+"""The body model: shape, pose and skin of a person. One loader and one file layout (SMPL-X's npz keys) for every body.
 
 B betas, E expression size, J = 55 joints in SMPL-X's order, V vertices, F faces, T frames, K = 133 keypoints.
 Canonical body: metres, right-handed, y up, facing +z, left = +x, T-pose at zero rotation. Linear blend skinning with
 axis-angle joint rotations; `global_orient` turns the body about its pelvis joint, then `transl` moves it.
-Source: SMPL-X (Pavlakos et al. 2019), eq. 1-7; the open body is baked by `open_body/bake.py`.
+Source: SMPL-X (Pavlakos et al. 2019), eq. 1-7; `tools/open_body/bake.py` bakes the open body.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gsac.avatar.skinning import joint_transforms, skin
 
 OPEN_BODY = Path(__file__).parent / "open_body" / "open_body.npz"
 LOST = 0.5
-"""Joint spread, m, of a frame that could not be fitted: far more than any fitted frame's."""
+"""m: sigma of the joints that marks a frame whose fit failed; that of fitted frames is far smaller."""
 
 
 @dataclass
@@ -49,10 +49,12 @@ class BodyParams:
 
     @classmethod
     def read(cls, path: Path) -> BodyParams:
+        """From body.npz; raises `ArtifactError` where an array is missing or has another shape."""
         arrays = check_arrays(path, BODY_SHAPES)
         return cls(**{f.name: arrays[f.name] for f in fields(cls) if f.name != "model"}, model=str(arrays["model"]))
 
     def write(self, path: Path) -> None:
+        """To body.npz, float32."""
         arrays = {f.name: np.asarray(getattr(self, f.name), np.float32) for f in fields(self) if f.name != "model"}
         write_arrays(path, **arrays, model=np.array(self.model))
 
@@ -76,11 +78,12 @@ class BodyParams:
 
     @property
     def frames(self) -> int:
+        """T, the number of frames."""
         return len(self.transl)
 
     @property
     def lost(self) -> np.ndarray:
-        """(T,) bool: frames that could not be fitted; nothing is to be learned from them."""
+        """(T,) bool: frames whose fit failed; training skips them."""
         return self.sigma_joints[:, 0] >= LOST
 
     @property
@@ -89,6 +92,7 @@ class BodyParams:
         return np.concatenate([getattr(self, name) for name in POSE_PARTS], 1).reshape(-1, J, 3)
 
     def camera(self, width: int, height: int) -> Camera:
+        """The clip's camera for images of width x height px."""
         return Camera(tuple(map(float, self.focal)), tuple(map(float, self.center)), width, height)
 
 
@@ -100,7 +104,7 @@ def split_pose(pose: np.ndarray) -> dict[str, np.ndarray]:
 
 @dataclass
 class Body:
-    """A loaded body file. Nothing above the loader knows which file it was."""
+    """A body model as loaded, the same for every kind of file."""
 
     v_template: np.ndarray  # (V, 3) m
     faces: np.ndarray  # (F, 3) int32
@@ -112,7 +116,7 @@ class Body:
     joint_names: tuple[str, ...]
     expression_names: tuple[str, ...]
     clothes: tuple[str, ...]
-    """What the last betas lift off the skin; empty where all betas are the figure's."""
+    """Names of the last betas, which lift clothes off the skin; empty where all betas shape the figure."""
     jaw_actions: np.ndarray  # (E, 3) expression that a jaw rotation stands for; zeros where the jaw has skin of its own
     keypoint_matrix: object  # (133, V) scipy CSR; an all-zero row is a keypoint that this body does not carry
     vt: np.ndarray | None  # (U, 2)
@@ -153,7 +157,10 @@ class Body:
 
     def rest(self, betas: np.ndarray, expression: np.ndarray | None = None,
              joint_offset: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Shaped T-pose: vertices (V, 3) and joints (55, 3). Joints follow the betas, not the expression."""
+        """The shaped body in T-pose: vertices (V, 3) and joints (55, 3), m. Joints follow the betas, not the expression.
+
+        betas: (up to B,); expression: (E,), neutral unless given; joint_offset: (55, 3) m, added to the joints.
+        """
         vertices = self.v_template + self.shapedirs[:, :, : len(betas)] @ np.asarray(betas, np.float32)
         joints = self.J_regressor @ vertices
         if joint_offset is not None:
@@ -163,7 +170,7 @@ class Body:
         return np.asarray(vertices, np.float32), np.asarray(joints, np.float32)
 
     def effective_expression(self, params: BodyParams, t: int) -> np.ndarray:
-        """(E,) expression of frame t with the jaw's rotation turned into actions where the body moves its jaw so."""
+        """(E,) expression of frame t. Where the body opens its mouth by expressions, those of the jaw's rotation are added."""
         return params.expression[t] + self.jaw_actions @ params.jaw_pose[t]
 
     def posed(self, params: BodyParams, frames: list[int] | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -176,20 +183,20 @@ class Body:
             expression = self.effective_expression(params, t)
             rest = shaped + self.exprdirs @ expression if expression.any() else shaped
             vertices[i] = skin(rest, transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
-        return vertices, self._carried(transforms, joints) + params.transl[frames][:, None]
+        return vertices, self._move_joints(transforms, joints) + params.transl[frames][:, None]
 
     def posed_joints(self, params: BodyParams) -> np.ndarray:
         """Joints (T, 55, 3) of all frames, as `posed` gives them."""
         joints = self.rest(params.betas, None, params.joint_offset)[1]
-        return self._carried(joint_transforms(params.pose, joints, self.parents), joints) + params.transl[:, None]
+        return self._move_joints(joint_transforms(params.pose, joints, self.parents), joints) + params.transl[:, None]
 
     @staticmethod
-    def _carried(transforms: np.ndarray, joints: np.ndarray) -> np.ndarray:
-        """(T, 55, 3) of transforms (T, 55, 3, 4) and joints (55, 3)."""
+    def _move_joints(transforms: np.ndarray, joints: np.ndarray) -> np.ndarray:
+        """Joints (55, 3) at rest under transforms (T, 55, 3, 4). Returns (T, 55, 3)."""
         return np.stack([np.einsum("jab,jb->ja", each[:, :, :3], joints) + each[:, :, 3] for each in transforms]).astype(np.float32)
 
     def keypoints(self, vertices: np.ndarray) -> np.ndarray:
-        """COCO-WholeBody points (..., 133, 3) of posed vertices (..., V, 3); NaN where the body carries no such point."""
+        """COCO-WholeBody points (..., 133, 3) of posed vertices (..., V, 3); NaN where the body has no such point."""
         flat = np.asarray(vertices).reshape(-1, len(self.v_template), 3)
         out = np.stack([self.keypoint_matrix @ v for v in flat])
         out[:, ~self.known_keypoints] = np.nan
@@ -197,5 +204,5 @@ class Body:
 
     @cached_property
     def known_keypoints(self) -> np.ndarray:
-        """(133,) bool, whether the body carries the keypoint."""
+        """(133,) bool, whether the body has the keypoint."""
         return np.diff(self.keypoint_matrix.indptr) > 0

@@ -1,6 +1,6 @@
-"""Reads a body file and says exactly what is wrong with one that is not.
+"""Reads and checks body model files; an error names the array, its shape and the expected one.
 
-Two kinds speak the same keys: the open body (`open_body/open_body.npz`, CC0 data) and the official SMPL-X npz that a user
+Two kinds have the same keys: the open body (`open_body/open_body.npz`, CC0 data) and the official SMPL-X npz that a user
 owns. Pickles are refused: they run code.
 """
 
@@ -32,11 +32,11 @@ SMPLX_VERTICES = 10475
 SMPLX_EXPRESSIONS = 100
 """The last shape directions of an official file are expressions: 300 + 100 in v1.1; older files have 10 + 10."""
 MOST_BETAS, MOST_EXPRESSIONS = 20, 10
-"""Directions taken of an official file: one clip says nothing about the later ones, whose variance is small."""
+"""Directions taken from an official file: the later ones have a small variance, which one clip cannot determine."""
 
 
 def read_body_file(path: Path) -> dict:
-    """Fields of `Body` but its digest. Raises `ArtifactError`."""
+    """All fields of `Body` except its digest. Raises `ArtifactError`."""
     if path.suffix != ".npz" and not zipfile.is_zipfile(path):  # the model store keeps files under names without suffix
         raise ArtifactError(f"{path}: a body model must be an .npz file (pickles run code when read, so .pkl is refused); "
                             "SMPL-X is distributed as SMPLX_NEUTRAL.npz, SMPLX_MALE.npz and SMPLX_FEMALE.npz")
@@ -65,7 +65,7 @@ def read_body_file(path: Path) -> dict:
 
 
 def _read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """The npz's arrays; official files also hold object arrays, which are left out."""
+    """Arrays of the npz by name; the object arrays of official files are left out."""
     try:
         with np.load(path, allow_pickle=False) as z:
             arrays = {}

@@ -84,9 +84,9 @@ class BoundGradients(NamedTuple):
 
 def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Workspace | None = None) -> Rendering:
     """means: (N, 3) m, camera frame; rotations: (N, 3, 3); scales: (N, 3) m; rgb: (N, 3); opacity: (N,) 0..1."""
-    means = binding.plain(means)
+    means = binding.kernel_array(means)
     real = means.dtype
-    rotations, scales, rgb, opacity = (binding.plain(a, real) for a in (rotations, scales, rgb, opacity))
+    rotations, scales, rgb, opacity = (binding.kernel_array(a, real) for a in (rotations, scales, rgb, opacity))
     workspace = workspace or Workspace()
     share, take, count = workspace.share, workspace.take, len(means)
     lens = np.array([*camera.focal, *camera.center], real)
@@ -129,7 +129,7 @@ def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) 
     scratch = take("backward", (state.workspace.workers, backward.PLANES * project.TILE ** 2), real)
     share(backward.composite_backward, state.tile_order, state.tile_start, state.pair_gaussian,
           state.pair_slot, state.pair_mask, state.splats, state.lattice, state.columns, scratch, state.rgb, state.alpha,
-          binding.plain(grad_rgb, real), binding.plain(grad_alpha, real), moments)
+          binding.kernel_array(grad_rgb, real), binding.kernel_array(grad_alpha, real), moments)
     gradients = Gradients(take("grad_means", (count, 3), real), take("grad_rotations", (count, 3, 3), real),
                           take("grad_scales", (count, 3), real), take("grad_rgb", (count, 3), real),
                           take("grad_opacity", (count,), real))
@@ -153,10 +153,10 @@ def screen_gradients(state: State) -> tuple[np.ndarray, np.ndarray]:
 def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, camera: Camera,
                  workspace: Workspace | None = None) -> Rendering:
     """vertices: (V, 3) m, camera frame; faces: (F, 3) int: the gaussians bound to the posed mesh, rendered."""
-    vertices = binding.plain(vertices)
+    vertices = binding.kernel_array(vertices)
     real = vertices.dtype
-    faces, face = binding.plain(faces, np.int32), binding.plain(gaussians.face, np.int32)
-    mu, quat, log_scale = (binding.plain(a, real) for a in (gaussians.mu, gaussians.quat, gaussians.log_scale))
+    faces, face = binding.kernel_array(faces, np.int32), binding.kernel_array(gaussians.face, np.int32)
+    mu, quat, log_scale = (binding.kernel_array(a, real) for a in (gaussians.mu, gaussians.quat, gaussians.log_scale))
     workspace = workspace or Workspace()
     take, n, f = workspace.take, len(face), len(faces)
     frames = binding.FaceFrames(take("R", (f, 3, 3), real), take("T", (f, 3), real), take("k", (f,), real),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsac.avatar.film import FOLLOW_S, frames, performance, turntable
+from gsac.avatar.film import FOLLOW_S, draw_frames, performance, turntable
 from gsac.avatar.motion.source import Motion
 
 WIDTH, HEIGHT = 120, 160
@@ -13,7 +13,7 @@ BLACK = np.zeros(3)
 
 
 def drawn(figure, film):
-    return np.stack(list(frames(figure, film, WIDTH, HEIGHT, BLACK))).astype(float)
+    return np.stack(list(draw_frames(figure, film, WIDTH, HEIGHT, BLACK))).astype(float)
 
 
 def columns(image, channel):

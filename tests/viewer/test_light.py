@@ -9,7 +9,7 @@ import pytest
 from gsac.avatar.binding import face_frames
 from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
-from gsac.avatar.film import FOV, PITCH, look
+from gsac.avatar.film import FOV, PITCH, look_at
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render_bound
@@ -44,7 +44,7 @@ def address(lit, tmp_path_factory):
 
 
 def expected(avatar, pose, yaw):
-    R, eye = look(yaw, np.zeros(3), DISTANCE)
+    R, eye = look_at(yaw, np.zeros(3), DISTANCE)
     f = SIZE / 2 / math.tan(math.radians(FOV / 2))
     vertices, gaussians, light = avatar.posed(avatar.pose(pose)), replace(avatar.gaussians, light=None), avatar.gaussians.light
     if light is not None:
