@@ -6,7 +6,7 @@ import numpy as np
 
 
 def exp(rotvec: np.ndarray) -> np.ndarray:
-    """rotvec: (..., 3) rad. Returns (..., 3, 3)."""
+    """Rotation matrices (..., 3, 3) of rotvec (..., 3), rad."""
     angle = np.linalg.norm(rotvec, axis=-1)[..., None, None]
     k = hat(rotvec)
     small = angle < 1e-6
@@ -17,14 +17,14 @@ def exp(rotvec: np.ndarray) -> np.ndarray:
 
 
 def log(matrix: np.ndarray) -> np.ndarray:
-    """matrix: (..., 3, 3). Returns (..., 3) rad, length at most pi."""
+    """Rotation vectors (..., 3), rad, at most pi long, of matrix (..., 3, 3)."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_rotvec().reshape(*matrix.shape[:-2], 3)
 
 
 def hat(v: np.ndarray) -> np.ndarray:
-    """v: (..., 3). Returns the cross-product matrices (..., 3, 3)."""
+    """Cross-product matrices (..., 3, 3) of v (..., 3)."""
     out = np.zeros((*v.shape[:-1], 3, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
@@ -58,10 +58,10 @@ def about_y(angle: float) -> np.ndarray:
 
 
 def to_wxyz(xyzw: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) as gaussians have them, from scipy's order."""
+    """Quaternions (..., 4) in the gaussians' order, from xyzw (..., 4), scipy's."""
     return xyzw[..., [3, 0, 1, 2]]
 
 
 def to_xyzw(wxyz: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) as scipy has them, from the gaussians' order."""
+    """Quaternions (..., 4) in scipy's order, from wxyz (..., 4), the gaussians'."""
     return wxyz[..., [1, 2, 3, 0]]

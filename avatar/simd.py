@@ -1,7 +1,7 @@
-"""Sixteen numbers at once inside a numba kernel: explicit SIMD, so that no compiler heuristic decides about the speed.
+"""Explicit SIMD in numba kernels: sixteen numbers at once, so that the speed does not hang on a compiler's heuristics.
 
 `Lanes` is an LLVM vector of 16 float32 or float64. `+ - *` and unary minus work between lanes, and with a scalar on the right.
-Everything else is a function of this module. LLVM splits the vector to what the machine has (AVX2: two registers).
+Everything else is a function of this module. LLVM splits the vector into the machine's registers (AVX2: two).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _CONTRACT = ("contract", "nsz")
 class Lanes(types.Type):
     """Numba type of 16 float32 or float64."""
 
-    def __init__(self, real):
+    def __init__(self, real: types.Float):
         self.real = real
         super().__init__(name=f"Lanes({real})")
 

@@ -15,6 +15,6 @@ class Animation:
     loop: bool
     joints: list[str]
     rotation: np.ndarray
-    """(K, len(joints), 3) rad, relative to the parent joint; joints not listed do not turn."""
+    """(K, n, 3) rad, relative to the parent joint, of the n listed joints; the others do not turn."""
     transl: np.ndarray
     """(K, 3) m, added to every vertex."""

@@ -1,4 +1,4 @@
-"""The avatar as every exported format takes it: rest mesh, skeleton, skin, expressions, gaussians; its `.gsac` file.
+"""The avatar that every export format is written from: rest mesh, skeleton, skin, expressions, gaussians; its `.gsac` file.
 
 Canonical axes: right-handed, y up, facing +z, left = +x, metres; T-pose at zero rotation.
 """
@@ -21,12 +21,12 @@ SKIN_SCALE = 1 / UNIT
 QUAT_SCALE = 1 / 32767
 LOG_SCALE_SCALE = 1 / 2048
 BLEND = {"low_pass_px2": blend.BLUR, "alpha_max": blend.MAX_ALPHA, "alpha_min": blend.MIN_ALPHA}
-"""How a gaussian is drawn: added to the image covariance's diagonal; cap of one alpha; below this it is not drawn."""
+"""The draw rule under the file's names."""
 
 
 @dataclass
 class RiggedAvatar:
-    """V vertices, F faces, J = 55 joints, N gaussians, M moved vertices over all expressions."""
+    """V vertices, F faces, J = 55 joints, E expressions, N gaussians, M moved vertices over all expressions."""
 
     vertices: np.ndarray
     """(V, 3) float32, m: the person's rest shape."""
@@ -73,7 +73,7 @@ class RiggedAvatar:
         return out
 
     def posed(self, pose: np.ndarray) -> np.ndarray:
-        """pose: (J, 3) axis-angle. Returns the mesh's vertices (V, 3)."""
+        """Vertices (V, 3), m, of the mesh in a pose (J, 3), axis-angle."""
         from gsac.avatar.skinning import joint_transforms, skin  # numba, which a reader of files can do without
 
         transforms = joint_transforms(pose[None].astype(np.float32), self.joints, self.parents)[0]
@@ -123,13 +123,13 @@ class RiggedAvatar:
 
     @classmethod
     def from_bytes(cls, data: bytes, where: str = "avatar.gsac") -> RiggedAvatar:
-        """Raises GsacError."""
+        """From the bytes of a file; where: its name in messages. Raises `GsacError`."""
         head, blocks = unpack(data, where)
         return cls(**Reader(head, blocks, where).fields())
 
     @classmethod
     def read(cls, path: Path) -> RiggedAvatar:
-        """Raises GsacError."""
+        """From a file. Raises `GsacError`."""
         return cls.from_bytes(read_bytes(path), str(path))
 
 

@@ -1,4 +1,4 @@
-"""Reader of AMASS-style npz files: SMPL, SMPL-H or SMPL-X rotations as axis-angle. Every fault names the file and the array."""
+"""Reads AMASS-style npz files: SMPL, SMPL-H or SMPL-X rotations as axis-angle. Every error names the file and the array."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gsac.avatar.motion import quat
 from gsac.avatar.motion.source import LARGEST, MotionError, Source
 
 FPS = 30.0
-"""Where the file names no rate."""
+"""Frames a second, where the file gives no rate."""
 RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 TRANSL = ("trans", "transl")
 LAYOUTS = {72: [(0, 22, BODY)], 156: [(0, 22, BODY), (22, 52, FINGERS)], 165: [(0, J, slice(0, J))]}

@@ -1,7 +1,8 @@
 """Gradient of the compositing, front to back again.
 
-With V = what is still to come of (image gradient . colour, alpha counted as a fourth colour of value 1), a gaussian's
-dL/d(alpha) at a pixel is T (v . c) - V_behind / (1 - alpha): no colour of what lies behind has to be kept.
+Let v be the image's gradient, c a gaussian's colour with alpha as a fourth channel of value 1, T the transmittance before it, and V
+the sum of weight v . c over all gaussians behind it. Then dL/d(alpha) at a pixel is T (v . c) - V / (1 - alpha): the colours behind
+need not be kept, only V.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from gsac.avatar.raster.project import BLUE, GREEN, HA, HC, OPACITY, RED, S_MAX,
 from gsac.avatar.simd import below_or_equal, falloff, load, lowest_bit, spread, store, store_totals, total
 
 PLANES = 6
-"""Transmittance, V, and the image gradient of red, green, blue, alpha of a block, 16 numbers each."""
+"""Transmittance, V of what is still to come, and the image gradient of red, green, blue, alpha of a block, 16 numbers each."""
 
 
 @kernel

@@ -31,7 +31,7 @@ BLOCK = 4
 BLOCKS = TILE // BLOCK
 LANES = BLOCK * BLOCK
 LOOK = 64
-"""After so many gaussians of a tile, blocks that are opaque everywhere are looked for and left out from there on."""
+"""Gaussians of a tile between two searches for blocks that are opaque everywhere; those are skipped from there on."""
 PLANES = 5
 """Transmittance, red, green, blue, alpha of a block, 16 numbers each."""
 
