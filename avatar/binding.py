@@ -43,7 +43,7 @@ class Bound(NamedTuple):
 
 
 class BindingGradients(NamedTuple):
-    """Of a loss, with respect to the gaussians' own values and the mesh."""
+    """Gradients of a loss with respect to the gaussians' own values and the mesh."""
 
     mu: np.ndarray
     """(N, 3)."""

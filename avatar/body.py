@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from gsac.avatar.artifacts import BODY_SHAPES, ArtifactError, check_arrays, write_arrays
 from gsac.avatar.body_file import read_body_file
@@ -118,7 +119,7 @@ class Body:
     clothes: tuple[str, ...]
     """Names of the last betas, which lift clothes off the skin; empty where all betas shape the figure."""
     jaw_actions: np.ndarray  # (E, 3) expression that a jaw rotation stands for; zeros where the jaw has skin of its own
-    keypoint_matrix: object  # (133, V) scipy CSR; an all-zero row is a keypoint that this body does not carry
+    keypoint_matrix: csr_matrix  # (133, V); an all-zero row is a keypoint that this body does not carry
     vt: np.ndarray | None  # (U, 2)
     ft: np.ndarray | None  # (F, 3) int32
     digest: str

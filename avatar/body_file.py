@@ -113,7 +113,7 @@ def _parents_of(kintree: np.ndarray) -> np.ndarray:
 
 
 def _four_heaviest(weights: np.ndarray) -> np.ndarray:
-    """(V, 55) with at most four weights a row, renormalised: what Unity and the browser skin with."""
+    """(V, 55) with at most four weights a row, renormalised: Unity and the browser skin with no more."""
     keep = np.argsort(-weights, 1, kind="stable")[:, :4]
     out = np.zeros_like(weights)
     np.put_along_axis(out, keep, np.take_along_axis(weights, keep, 1), 1)

@@ -29,7 +29,7 @@ NOSE_TIP = 4
 YAW_LIMIT = np.radians(115)
 """A head turned further has no face in the image."""
 YAW_DOUBT = np.radians(40)
-"""A mesh whose yaw differs more from the body's head is not believed."""
+"""A mesh whose yaw differs more from the body's head is rejected."""
 
 IBUG68 = np.array([
     162, 234, 93, 58, 172, 136, 149, 148, 152, 377, 378, 365, 397, 288, 323, 454, 389,

@@ -1,6 +1,6 @@
 """Explicit SIMD in numba kernels: sixteen numbers at once, so that the speed does not hang on a compiler's heuristics.
 
-`Lanes` is an LLVM vector of 16 float32 or float64. `+ - *` and unary minus work between lanes, and with a scalar on the right.
+`Lanes` is an LLVM vector of 16 float32 or float64. `+ - * /` work between lanes, and with a scalar on the right.
 Everything else is a function of this module. LLVM splits the vector into the machine's registers (AVX2: two).
 """
 

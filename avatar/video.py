@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 CRF = 18
-"""Quality of libx264: visually lossless."""
+"""libx264's quality: 0 is lossless, 51 the worst."""
 
 
 class VideoError(Exception):

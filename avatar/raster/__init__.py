@@ -58,7 +58,7 @@ class Rendering(NamedTuple):
 
 
 class Gradients(NamedTuple):
-    """Of a loss, with respect to free gaussians."""
+    """Gradients of a loss with respect to free gaussians."""
 
     means: np.ndarray
     """(N, 3)."""
@@ -73,7 +73,7 @@ class Gradients(NamedTuple):
 
 
 class BoundGradients(NamedTuple):
-    """Of a loss, with respect to gaussians on a mesh, and to the mesh."""
+    """Gradients of a loss with respect to gaussians on a mesh, and to the mesh."""
 
     mu: np.ndarray
     """(N, 3)."""

@@ -22,7 +22,7 @@ PLANES = 6
 @kernel
 def composite_backward(worker, workers, tile_order, tile_start, pair_gaussian, pair_slot, pair_mask, splats, lattice, columns,
                        scratch, rgb, alpha, grad_rgb, grad_alpha, moments):
-    """Fills moments (pairs, 9), one row for each (tile, gaussian); rgb and alpha are what `composite` gave."""
+    """Fills moments (pairs, 9), one row for each (tile, gaussian); rgb (H, W, 3) and alpha (H, W) as `composite` left them."""
     height, width = alpha.shape
     real = splats.dtype.type
     zero, one = spread(real(0)), spread(real(1))
