@@ -1,1 +1,1 @@
-"""What stages share: body model, camera, gaussians and their binding, rasterisers, losses, metrics, artifact files."""
+"""Shared by the stages: body model, camera, gaussians and their binding, rasterisers, losses, metrics, artifact files."""

@@ -10,13 +10,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.kernel import kernel
-from gsac.avatar.threads import Workspace
+from gsac.avatar.rotation import to_wxyz
+from gsac.avatar.threads import Share, Workspace
 
 
 class FaceFrames(NamedTuple):
+    """The local frame of each face of a posed mesh."""
+
     R: np.ndarray
     """(F, 3, 3) columns a, n, b."""
     T: np.ndarray
@@ -28,6 +32,8 @@ class FaceFrames(NamedTuple):
 
 
 class Bound(NamedTuple):
+    """Gaussians in space, as their faces carry them."""
+
     means: np.ndarray
     """(N, 3) m."""
     rotations: np.ndarray
@@ -37,6 +43,8 @@ class Bound(NamedTuple):
 
 
 class BindingGradients(NamedTuple):
+    """Gradients of a loss with respect to the gaussians' own values and the mesh."""
+
     mu: np.ndarray
     """(N, 3)."""
     quat: np.ndarray
@@ -48,69 +56,82 @@ class BindingGradients(NamedTuple):
 
 
 def face_frames(vertices: np.ndarray, faces: np.ndarray) -> FaceFrames:
-    """vertices: (V, 3) m; faces: (F, 3) int. A zero-area face gets R = I, k = 0, valid False."""
-    vertices = plain(vertices)
+    """Frames of all faces. vertices: (V, 3) m; faces: (F, 3) int. A zero-area face gets R = I, k = 0, valid False."""
+    vertices = kernel_array(vertices)
     count, real = len(faces), vertices.dtype
     frames = FaceFrames(np.empty((count, 3, 3), real), np.empty((count, 3), real), np.empty(count, real),
                         np.empty(count, np.bool_))
-    _all_frames(vertices, plain(faces, np.int32), *frames)
+    _all_frames(vertices, kernel_array(faces, np.int32), *frames)
     return frames
 
 
 def bind(frames: FaceFrames, face: np.ndarray, mu: np.ndarray, quat: np.ndarray, log_scale: np.ndarray) -> Bound:
-    """face: (N,) int; mu: (N, 3); quat: (N, 4) wxyz, any length (zero is taken as no rotation); log_scale: (N, 3)."""
-    mu = plain(mu)
+    """Gaussians in space from their values in the frames of their faces.
+
+    face: (N,) int; mu: (N, 3); quat: (N, 4) wxyz, any length (zero is taken as no rotation); log_scale: (N, 3).
+    """
+    mu = kernel_array(mu)
     out = Bound(np.empty_like(mu), np.empty((len(mu), 3, 3), mu.dtype), np.empty_like(mu))
-    _bind(0, 1, frames.R, frames.T, frames.k, plain(face, np.int32), mu, plain(quat, mu.dtype),
-          plain(log_scale, mu.dtype), *out)
+    _bind(0, 1, frames.R, frames.T, frames.k, kernel_array(face, np.int32), mu, kernel_array(quat, mu.dtype),
+          kernel_array(log_scale, mu.dtype), *out)
     return out
 
 
 def unbind(frames: FaceFrames, face: np.ndarray, bound: Bound) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What `bind` on the faces (N,) makes `bound` of: mu (N, 3), quat (N, 4) wxyz and log_scale (N, 3), float32."""
+    """The inverse of `bind`. face: (N,) int. Returns mu (N, 3), quat (N, 4) wxyz and log_scale (N, 3), float32."""
     R, T, k = frames.R[face], frames.T[face], np.maximum(frames.k[face, None], 1e-9)
     mu = np.einsum("nji,nj->ni", R, bound.means - T) / k
-    quat = np.roll(Rotation.from_matrix(np.einsum("nji,njk->nik", R, bound.rotations)).as_quat(), 1, axis=1)
+    quat = to_wxyz(Rotation.from_matrix(np.einsum("nji,njk->nik", R, bound.rotations)).as_quat())
     log_scale = np.log(np.maximum(bound.scales, 1e-9) / k)
-    return mu.astype(np.float32), quat.astype(np.float32), log_scale.astype(np.float32)
+    return mu.astype(np.float32), np.ascontiguousarray(quat, np.float32), log_scale.astype(np.float32)
 
 
 def bind_backward(vertices: np.ndarray, faces: np.ndarray, face: np.ndarray, mu: np.ndarray, quat: np.ndarray,
                   log_scale: np.ndarray, grad_means: np.ndarray, grad_rotations: np.ndarray,
                   grad_scales: np.ndarray) -> BindingGradients:
-    """Gradient of `bind(face_frames(vertices, faces), ...)`.
+    """Gradient of `bind(face_frames(vertices, faces), face, mu, quat, log_scale)`.
 
-    grad_means: (N, 3); grad_rotations: (N, 3, 3); grad_scales: (N, 3), gradients with respect to what `bind` gave.
+    vertices: (V, 3) m; faces: (F, 3) int; face: (N,) int; mu: (N, 3); quat: (N, 4) wxyz; log_scale: (N, 3); grad_means: (N, 3),
+    grad_rotations: (N, 3, 3), grad_scales: (N, 3): gradients with respect to the result of `bind`.
     """
-    vertices = plain(vertices)
+    vertices = kernel_array(vertices)
     real = vertices.dtype
-    mu = plain(mu, real)
+    mu = kernel_array(mu, real)
     out = BindingGradients(np.empty_like(mu), np.empty((len(mu), 4), real), np.empty_like(mu), np.empty_like(vertices))
-    backward(Workspace(1).share, vertices, plain(faces, np.int32), plain(face, np.int32), mu, plain(quat, real),
-             plain(log_scale, real), plain(grad_means, real), plain(grad_rotations, real), plain(grad_scales, real),
+    faces, face = kernel_array(faces, np.int32), kernel_array(face, np.int32)
+    quat, log_scale, grad_means, grad_rotations, grad_scales = (
+        kernel_array(a, real) for a in (quat, log_scale, grad_means, grad_rotations, grad_scales))
+    backward(Workspace(1).share, vertices, faces, face, mu, quat, log_scale, grad_means, grad_rotations, grad_scales,
              np.empty((len(mu), 9), real), out)
     return out
 
 
-def plain(array: np.ndarray, dtype=None) -> np.ndarray:
-    """The array as the kernels take it: C order, writeable, float32 unless it is float64 or a dtype is given."""
+def kernel_array(array: np.ndarray, dtype: DTypeLike = None) -> np.ndarray:
+    """The array (...) as kernels take it: C order, writeable, float32 unless it is float64 or a dtype is given."""
     if dtype is None:
         dtype = np.float64 if np.asarray(array).dtype == np.float64 else np.float32
     return np.require(array, dtype, ["C", "W"])
 
 
-def forward(share, vertices, faces, used, frames: FaceFrames, face, mu, quat, log_scale, out: Bound) -> None:
-    """Frames of the faces that carry gaussians, then the binding, into given buffers.
+def forward(share: Share, vertices: np.ndarray, faces: np.ndarray, used: np.ndarray, frames: FaceFrames, face: np.ndarray,
+            mu: np.ndarray, quat: np.ndarray, log_scale: np.ndarray, out: Bound) -> None:
+    """Frames of the faces that carry gaussians, then `bind`, into the buffers `frames` and `out`.
 
-    share: a workspace's; used: (F,) bool scratch.
+    share: `Workspace.share`; vertices: (V, 3) m; faces: (F, 3) int32; used: (F,) bool scratch; face: (N,) int32; mu: (N, 3);
+    quat: (N, 4) wxyz; log_scale: (N, 3).
     """
     _used_frames(vertices, faces, face, used, *frames)
     share(_bind, frames.R, frames.T, frames.k, face, mu, quat, log_scale, *out)
 
 
-def backward(share, vertices, faces, face, mu, quat, log_scale, grad_means, grad_rotations, grad_scales, corners,
-             out: BindingGradients) -> None:
-    """As `bind_backward`, into given buffers; corners: (N, 9) scratch."""
+def backward(share: Share, vertices: np.ndarray, faces: np.ndarray, face: np.ndarray, mu: np.ndarray, quat: np.ndarray,
+             log_scale: np.ndarray, grad_means: np.ndarray, grad_rotations: np.ndarray, grad_scales: np.ndarray,
+             corners: np.ndarray, out: BindingGradients) -> None:
+    """As `bind_backward`, into the buffer `out`.
+
+    share: `Workspace.share`; vertices: (V, 3) m; faces: (F, 3) int32; face: (N,) int32; mu: (N, 3); quat: (N, 4) wxyz;
+    log_scale: (N, 3); grad_means: (N, 3); grad_rotations: (N, 3, 3); grad_scales: (N, 3); corners: (N, 9) scratch.
+    """
     share(_bind_backward, vertices, faces, face, mu, quat, log_scale, grad_means, grad_rotations, grad_scales,
           out.mu, out.quat, out.log_scale, corners)
     _scatter(faces, face, corners, out.vertices)

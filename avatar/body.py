@@ -1,9 +1,9 @@
-"""The body model: one loader, one file layout (SMPL-X's npz keys), whichever body is inside.
+"""The body model: shape, pose and skin of a person. One loader and one file layout (SMPL-X's npz keys) for every body.
 
 B betas, E expression size, J = 55 joints in SMPL-X's order, V vertices, F faces, T frames, K = 133 keypoints.
 Canonical body: metres, right-handed, y up, facing +z, left = +x, T-pose at zero rotation. Linear blend skinning with
 axis-angle joint rotations; `global_orient` turns the body about its pelvis joint, then `transl` moves it.
-Source: SMPL-X (Pavlakos et al. 2019), eq. 1-7; the open body is baked by `open_body/bake.py`.
+Source: SMPL-X (Pavlakos et al. 2019), eq. 1-7; `tools/open_body/bake.py` bakes the open body.
 """
 
 from __future__ import annotations
@@ -14,23 +14,17 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from gsac.avatar.artifacts import BODY_SHAPES, ArtifactError, check_arrays, write_arrays
+from gsac.avatar.body_file import read_body_file
 from gsac.avatar.camera import Camera
+from gsac.avatar.joints import POSE_PARTS, J
 from gsac.avatar.skinning import joint_transforms, skin
 
 OPEN_BODY = Path(__file__).parent / "open_body" / "open_body.npz"
-J = 55
-SMPLX_JOINTS = (
-    "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 left_foot right_foot neck "
-    "left_collar right_collar head left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist jaw "
-    "left_eye_smplhf right_eye_smplhf"
-).split() + [f"{side}_{finger}{i}" for side in ("left", "right")
-             for finger in ("index", "middle", "pinky", "ring", "thumb") for i in (1, 2, 3)]
-SMPLX_EXPRESSIONS = 100
-"""How many of an official file's last shape directions are expressions (v1.1: 300 + 100; older files: 10 + 10)."""
 LOST = 0.5
-"""Joint spread, m, of a frame that could not be fitted: far more than any fitted frame's."""
+"""m: sigma of the joints that marks a frame whose fit failed; that of fitted frames is far smaller."""
 
 
 @dataclass
@@ -56,23 +50,27 @@ class BodyParams:
 
     @classmethod
     def read(cls, path: Path) -> BodyParams:
+        """From body.npz; raises `ArtifactError` where an array is missing or has another shape."""
         arrays = check_arrays(path, BODY_SHAPES)
         return cls(**{f.name: arrays[f.name] for f in fields(cls) if f.name != "model"}, model=str(arrays["model"]))
 
     def write(self, path: Path) -> None:
+        """To body.npz, float32."""
         arrays = {f.name: np.asarray(getattr(self, f.name), np.float32) for f in fields(self) if f.name != "model"}
         write_arrays(path, **arrays, model=np.array(self.model))
 
     @classmethod
-    def from_pose(cls, pose: np.ndarray, transl: np.ndarray, betas: np.ndarray, expression: np.ndarray, focal, center,
-                  joint_offset: np.ndarray | None = None, model: str = "") -> BodyParams:
-        """pose: (T, 55, 3) axis-angle; transl: (T, 3); expression: (T, E). `joints` is left zero: see `Body.posed`."""
+    def from_pose(cls, pose: np.ndarray, transl: np.ndarray, betas: np.ndarray, expression: np.ndarray,
+                  focal: float | np.ndarray, center: tuple[float, float] | np.ndarray, joint_offset: np.ndarray | None = None,
+                  model: str = "") -> BodyParams:
+        """A body in T poses, its `joints` zero (`Body.posed` gives them) and every frame taken as fitted.
+
+        pose: (T, 55, 3) axis-angle; transl: (T, 3) m; betas: (B,); expression: (T, E); focal: px, scalar or (2,);
+        center: (2,) px; joint_offset: (55, 3) m, zero unless given.
+        """
         t = len(pose)
-        flat = np.asarray(pose, np.float32).reshape(t, J * 3)
         return cls(
-            betas=np.asarray(betas, np.float32), expression=np.asarray(expression, np.float32),
-            global_orient=flat[:, :3], body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69], leye_pose=flat[:, 69:72],
-            reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120], right_hand_pose=flat[:, 120:165],
+            betas=np.asarray(betas, np.float32), expression=np.asarray(expression, np.float32), **split_pose(pose),
             transl=np.asarray(transl, np.float32),
             joint_offset=np.zeros((J, 3), np.float32) if joint_offset is None else np.asarray(joint_offset, np.float32),
             joints=np.zeros((t, J, 3), np.float32), focal=np.broadcast_to(np.asarray(focal, np.float32), (2,)).copy(),
@@ -81,27 +79,33 @@ class BodyParams:
 
     @property
     def frames(self) -> int:
+        """T, the number of frames."""
         return len(self.transl)
 
     @property
     def lost(self) -> np.ndarray:
-        """(T,) bool: frames that could not be fitted; nothing is to be learned from them."""
+        """(T,) bool: frames whose fit failed; training skips them."""
         return self.sigma_joints[:, 0] >= LOST
 
     @property
     def pose(self) -> np.ndarray:
         """(T, 55, 3) axis-angle in joint order."""
-        parts = (self.global_orient, self.body_pose, self.jaw_pose, self.leye_pose, self.reye_pose,
-                 self.left_hand_pose, self.right_hand_pose)
-        return np.concatenate(parts, 1).reshape(-1, J, 3)
+        return np.concatenate([getattr(self, name) for name in POSE_PARTS], 1).reshape(-1, J, 3)
 
     def camera(self, width: int, height: int) -> Camera:
+        """The clip's camera for images of width x height px."""
         return Camera(tuple(map(float, self.focal)), tuple(map(float, self.center)), width, height)
+
+
+def split_pose(pose: np.ndarray) -> dict[str, np.ndarray]:
+    """The parts of a pose (T, 55, 3), axis-angle, under SMPL-X's names: each (T, 3 * joints) float32."""
+    flat = np.asarray(pose, np.float32).reshape(len(pose), J * 3)
+    return {name: flat[:, 3 * part.start:3 * part.stop] for name, part in POSE_PARTS.items()}
 
 
 @dataclass
 class Body:
-    """A loaded body file. Nothing above the loader knows which file it was."""
+    """A body model as loaded, the same for every kind of file."""
 
     v_template: np.ndarray  # (V, 3) m
     faces: np.ndarray  # (F, 3) int32
@@ -113,9 +117,9 @@ class Body:
     joint_names: tuple[str, ...]
     expression_names: tuple[str, ...]
     clothes: tuple[str, ...]
-    """What the last betas lift off the skin; empty where all betas are the figure's."""
+    """Names of the last betas, which lift clothes off the skin; empty where all betas shape the figure."""
     jaw_actions: np.ndarray  # (E, 3) expression that a jaw rotation stands for; zeros where the jaw has skin of its own
-    keypoint_matrix: object  # (133, V) scipy CSR; an all-zero row is a keypoint that this body does not carry
+    keypoint_matrix: csr_matrix  # (133, V); an all-zero row is a keypoint that this body does not carry
     vt: np.ndarray | None  # (U, 2)
     ft: np.ndarray | None  # (F, 3) int32
     digest: str
@@ -127,8 +131,6 @@ class Body:
 
         Raises `ArtifactError` naming the array that is wrong.
         """
-        from gsac.avatar.body_file import read_body_file
-
         path = Path(path) if path else OPEN_BODY
         if not path.is_file():
             raise ArtifactError(f"{path}: there is no body model file; give an SMPLX_*.npz or leave the parameter empty")
@@ -156,7 +158,10 @@ class Body:
 
     def rest(self, betas: np.ndarray, expression: np.ndarray | None = None,
              joint_offset: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Shaped T-pose: vertices (V, 3) and joints (55, 3). Joints follow the betas, not the expression."""
+        """The shaped body in T-pose: vertices (V, 3) and joints (55, 3), m. Joints follow the betas, not the expression.
+
+        betas: (up to B,); expression: (E,), neutral unless given; joint_offset: (55, 3) m, added to the joints.
+        """
         vertices = self.v_template + self.shapedirs[:, :, : len(betas)] @ np.asarray(betas, np.float32)
         joints = self.J_regressor @ vertices
         if joint_offset is not None:
@@ -166,7 +171,7 @@ class Body:
         return np.asarray(vertices, np.float32), np.asarray(joints, np.float32)
 
     def effective_expression(self, params: BodyParams, t: int) -> np.ndarray:
-        """(E,) expression of frame t with the jaw's rotation turned into actions where the body moves its jaw so."""
+        """(E,) expression of frame t. Where the body opens its mouth by expressions, those of the jaw's rotation are added."""
         return params.expression[t] + self.jaw_actions @ params.jaw_pose[t]
 
     def posed(self, params: BodyParams, frames: list[int] | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -179,20 +184,20 @@ class Body:
             expression = self.effective_expression(params, t)
             rest = shaped + self.exprdirs @ expression if expression.any() else shaped
             vertices[i] = skin(rest, transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
-        return vertices, self._carried(transforms, joints) + params.transl[frames][:, None]
+        return vertices, self._move_joints(transforms, joints) + params.transl[frames][:, None]
 
     def posed_joints(self, params: BodyParams) -> np.ndarray:
         """Joints (T, 55, 3) of all frames, as `posed` gives them."""
         joints = self.rest(params.betas, None, params.joint_offset)[1]
-        return self._carried(joint_transforms(params.pose, joints, self.parents), joints) + params.transl[:, None]
+        return self._move_joints(joint_transforms(params.pose, joints, self.parents), joints) + params.transl[:, None]
 
     @staticmethod
-    def _carried(transforms: np.ndarray, joints: np.ndarray) -> np.ndarray:
-        """(T, 55, 3) of transforms (T, 55, 3, 4) and joints (55, 3)."""
+    def _move_joints(transforms: np.ndarray, joints: np.ndarray) -> np.ndarray:
+        """Joints (55, 3) at rest under transforms (T, 55, 3, 4). Returns (T, 55, 3)."""
         return np.stack([np.einsum("jab,jb->ja", each[:, :, :3], joints) + each[:, :, 3] for each in transforms]).astype(np.float32)
 
     def keypoints(self, vertices: np.ndarray) -> np.ndarray:
-        """COCO-WholeBody points (..., 133, 3) of posed vertices (..., V, 3); NaN where the body carries no such point."""
+        """COCO-WholeBody points (..., 133, 3) of posed vertices (..., V, 3); NaN where the body has no such point."""
         flat = np.asarray(vertices).reshape(-1, len(self.v_template), 3)
         out = np.stack([self.keypoint_matrix @ v for v in flat])
         out[:, ~self.known_keypoints] = np.nan
@@ -200,5 +205,5 @@ class Body:
 
     @cached_property
     def known_keypoints(self) -> np.ndarray:
-        """(133,) bool, whether the body carries the keypoint."""
+        """(133,) bool, whether the body has the keypoint."""
         return np.diff(self.keypoint_matrix.indptr) > 0

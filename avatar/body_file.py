@@ -1,6 +1,6 @@
-"""Reads a body file and says exactly what is wrong with one that is not.
+"""Reads and checks body model files; an error names the array, its shape and the expected one.
 
-Two kinds speak the same keys: the open body (`open_body/open_body.npz`, CC0 data) and the official SMPL-X npz that a user
+Two kinds have the same keys: the open body (`open_body/open_body.npz`, CC0 data) and the official SMPL-X npz that a user
 owns. Pickles are refused: they run code.
 """
 
@@ -12,59 +12,60 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
+from gsac.avatar import joints, wholebody
 from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.joints import J
+from gsac.avatar.wholebody import BODY_NAMES, HAND_POINTS
 
 ALWAYS = {"v_template": 2, "f": 2, "shapedirs": 3, "J_regressor": 2, "weights": 2, "kintree_table": 2}
 """Array -> number of dimensions."""
-SMPLX_KEYPOINT_JOINTS = {
-    5: 16, 6: 17, 7: 18, 8: 19, 9: 20, 10: 21, 11: 1, 12: 2, 13: 4, 14: 5, 15: 7, 16: 8, 91: 20, 112: 21,
-} | {91 + 1 + 4 * f + i: 25 + 3 * g + i for f, g in enumerate((4, 0, 1, 3, 2)) for i in range(3)} \
-  | {112 + 1 + 4 * f + i: 40 + 3 * g + i for f, g in enumerate((4, 0, 1, 3, 2)) for i in range(3)}
-"""COCO-WholeBody keypoint -> joint, for a file without a keypoint matrix (hand fingers: thumb, index, middle, ring, pinky)."""
+SMPLX_KEYPOINT_JOINTS = {keypoint: joints.INDEX[name] for keypoint, name in enumerate(BODY_NAMES) if name in joints.INDEX} | {
+    wholebody.INDEX[f"{side}_hand_{point}"]: joints.INDEX[f"{side}_{point}"]
+    for side in ("left", "right") for point in HAND_POINTS.split() if f"{side}_{point}" in joints.INDEX}
+"""COCO-WholeBody keypoint -> joint of the same name, for a file without a keypoint matrix."""
 SMPLX_KEYPOINT_VERTICES = {
     0: 9120, 1: 9448, 2: 9929, 3: 6, 4: 616, 17: 5770, 18: 5780, 19: 8846, 20: 8463, 21: 8474, 22: 8635,
     95: 5361, 99: 4933, 103: 5058, 107: 5169, 111: 5286, 116: 8079, 120: 7669, 124: 7794, 128: 7905, 132: 8022,
 }
 """COCO-WholeBody keypoint -> vertex of SMPL-X's mesh: nose, eyes, ears, toes, heels and finger tips."""
 SMPLX_VERTICES = 10475
+SMPLX_EXPRESSIONS = 100
+"""The last shape directions of an official file are expressions: 300 + 100 in v1.1; older files have 10 + 10."""
 MOST_BETAS, MOST_EXPRESSIONS = 20, 10
-"""Directions taken of an official file: one clip says nothing about the later ones, whose variance is small."""
+"""Directions taken from an official file: the later ones have a small variance, which one clip cannot determine."""
 
 
 def read_body_file(path: Path) -> dict:
-    """Fields of `Body` but its digest. Raises `ArtifactError`."""
+    """All fields of `Body` except its digest. Raises `ArtifactError`."""
     if path.suffix != ".npz" and not zipfile.is_zipfile(path):  # the model store keeps files under names without suffix
         raise ArtifactError(f"{path}: a body model must be an .npz file (pickles run code when read, so .pkl is refused); "
                             "SMPL-X is distributed as SMPLX_NEUTRAL.npz, SMPLX_MALE.npz and SMPLX_FEMALE.npz")
-    a = read_arrays_of_body(path)
+    a = _read_arrays(path)
     v = len(a["v_template"])
-    check_sizes(path, a, v)
+    _check_sizes(path, a, v)
     shapes = np.asarray(a["shapedirs"], np.float32)
     names = [str(n) for n in a["expression_names"]] if "expression_names" in a else None
     if "num_betas" in a:
         shapedirs, exprdirs = np.split(shapes, [int(a["num_betas"])], 2)
     else:
-        shapedirs, exprdirs = np.split(shapes, [official_betas(path, shapes.shape[2])], 2)
+        shapedirs, exprdirs = np.split(shapes, [_official_betas(path, shapes.shape[2])], 2)
         shapedirs, exprdirs = shapedirs[:, :, :MOST_BETAS], exprdirs[:, :, :MOST_EXPRESSIONS]
     expressions = exprdirs.shape[2]
-    matrix = keypoint_matrix(a, v)
-    from gsac.avatar.body import SMPLX_JOINTS
-
     return {
         "clothes": tuple(str(n) for n in a.get("clothes", ())),
         "v_template": np.asarray(a["v_template"], np.float32), "faces": np.asarray(a["f"], np.int32),
         "shapedirs": np.ascontiguousarray(shapedirs), "exprdirs": np.ascontiguousarray(exprdirs),
-        "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": four_heaviest(np.asarray(a["weights"], np.float32)),
-        "parents": parents_of(a["kintree_table"]), "joint_names": tuple(SMPLX_JOINTS),
+        "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": _four_heaviest(np.asarray(a["weights"], np.float32)),
+        "parents": _parents_of(a["kintree_table"]), "joint_names": joints.NAMES,
         "expression_names": tuple(names or (f"expression{i}" for i in range(expressions))),
         "jaw_actions": np.asarray(a.get("jaw_actions", np.zeros((expressions, 3))), np.float32),
-        "keypoint_matrix": matrix, "vt": np.asarray(a["vt"], np.float32) if "vt" in a else None,
+        "keypoint_matrix": _keypoint_matrix(a, v), "vt": np.asarray(a["vt"], np.float32) if "vt" in a else None,
         "ft": np.asarray(a["ft"], np.int32) if "ft" in a else None,
     }
 
 
-def read_arrays_of_body(path: Path) -> dict[str, np.ndarray]:
-    """The npz's arrays; official files also hold object arrays, which are left out."""
+def _read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Arrays of the npz by name; the object arrays of official files are left out."""
     try:
         with np.load(path, allow_pickle=False) as z:
             arrays = {}
@@ -83,22 +84,20 @@ def read_arrays_of_body(path: Path) -> dict[str, np.ndarray]:
     return arrays
 
 
-def check_sizes(path: Path, a: dict, v: int) -> None:
+def _check_sizes(path: Path, a: dict, v: int) -> None:
     wanted = {"v_template": (v, 3), "f": (len(a["f"]), 3), "shapedirs": (v, 3, a["shapedirs"].shape[2]),
-              "J_regressor": (55, v), "weights": (v, 55), "kintree_table": (2, 55)}
+              "J_regressor": (J, v), "weights": (v, J), "kintree_table": (2, J)}
     for name, shape in wanted.items():
         if a[name].shape != shape:
             raise ArtifactError(f"{path}: array {name} has shape {a[name].shape}, expected {shape}"
-                                + ("; SMPL and SMPL-H files have fewer joints, SMPL-X is needed" if 55 in shape else ""))
+                                + ("; SMPL and SMPL-H files have fewer joints, SMPL-X is needed" if J in shape else ""))
     if a["f"].min() < 0 or a["f"].max() >= v:
         raise ArtifactError(f"{path}: array f names vertex {a['f'].max()}, but there are {v}")
     if not np.allclose(np.asarray(a["weights"], np.float32).sum(1), 1, atol=2e-2):
         raise ArtifactError(f"{path}: rows of weights must sum to one")
 
 
-def official_betas(path: Path, directions: int) -> int:
-    from gsac.avatar.body import SMPLX_EXPRESSIONS
-
+def _official_betas(path: Path, directions: int) -> int:
     if directions == 20:
         return 10
     if directions <= SMPLX_EXPRESSIONS:
@@ -106,22 +105,22 @@ def official_betas(path: Path, directions: int) -> int:
     return directions - SMPLX_EXPRESSIONS
 
 
-def parents_of(kintree: np.ndarray) -> np.ndarray:
+def _parents_of(kintree: np.ndarray) -> np.ndarray:
     """(55,) int; official files write the root's parent as 2**32 - 1."""
     parents = np.asarray(kintree[0], np.int64).copy()
     parents[0] = -1
     return parents
 
 
-def four_heaviest(weights: np.ndarray) -> np.ndarray:
-    """(V, 55) with at most four weights a row, renormalised: what Unity and the browser skin with."""
+def _four_heaviest(weights: np.ndarray) -> np.ndarray:
+    """(V, 55) with at most four weights a row, renormalised: Unity and the browser skin with no more."""
     keep = np.argsort(-weights, 1, kind="stable")[:, :4]
     out = np.zeros_like(weights)
     np.put_along_axis(out, keep, np.take_along_axis(weights, keep, 1), 1)
     return out / out.sum(1, keepdims=True)
 
 
-def keypoint_matrix(a: dict, v: int) -> sparse.csr_matrix:
+def _keypoint_matrix(a: dict, v: int) -> sparse.csr_matrix:
     """(133, V); official files have the joints' regressors and known vertices for body and hands, and their face landmarks."""
     if "keypoint_row" in a:
         entries = (np.asarray(a["keypoint_weight"], np.float32), (a["keypoint_row"].astype(int), a["keypoint_vertex"].astype(int)))

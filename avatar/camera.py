@@ -9,6 +9,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Camera:
+    """Focal length, principal point and image size."""
+
     focal: tuple[float, float]
     """Pixels."""
     center: tuple[float, float]

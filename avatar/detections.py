@@ -1,4 +1,4 @@
-"""Boxes and points out of single-shot detector outputs: anchors, decoding, weighted non-maximum suppression."""
+"""Boxes and points from a single-shot detector's output: anchors, decoding, weighted non-maximum suppression."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsac.avatar.tflite import sigmoid
+from gsac.avatar.logistic import clipped_sigmoid
 
 
 @dataclass(frozen=True)
 class Detections:
-    """n finds, best first, in the units of the region they were made in (0..1) until mapped."""
+    """n detections, best first, in coordinates of their region (0..1) until mapped to the frame."""
 
     box: np.ndarray
     """(n, 4) x0 y0 x1 y1."""
@@ -25,7 +25,10 @@ class Detections:
 
 
 def anchor_centers(size: int, strides: tuple[int, ...]) -> np.ndarray:
-    """(n, 2) in 0..1: the grid of each stride, two anchors a cell and layer, equal strides side by side in one grid."""
+    """(n, 2) in 0..1: the cells of each stride's grid, with two anchors for every layer of that stride.
+
+    size: px of the square input; strides: px, one for each layer.
+    """
     centers = []
     for stride in dict.fromkeys(strides):
         cells = -(-size // stride)
@@ -35,11 +38,12 @@ def anchor_centers(size: int, strides: tuple[int, ...]) -> np.ndarray:
 
 
 def decode(raw: np.ndarray, logits: np.ndarray, centers: np.ndarray, size: int, threshold: float) -> Detections:
-    """raw: (n, 4 + 2 k) box centre, box size and points in input pixels about the anchor; logits: (n, 1).
+    """Detections of score >= threshold, best first, not yet suppressed.
 
-    Returns those of score >= threshold, best first, not yet suppressed.
+    raw: (n, 4 + 2 k) px of the input: box centre and points about the anchor, box size; logits: (n, 1); centers: (n, 2) of
+    `anchor_centers`; size: px of the input.
     """
-    score = sigmoid(logits[:, 0])
+    score = clipped_sigmoid(logits[:, 0])
     order = np.argsort(-score, kind="stable")
     keep = order[score[order] >= threshold]
     values = raw[keep].reshape(len(keep), raw.shape[1] // 2, 2) / size
@@ -48,7 +52,7 @@ def decode(raw: np.ndarray, logits: np.ndarray, centers: np.ndarray, size: int, 
 
 
 def iou(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a: (..., 4), b: (..., 4) boxes. Returns intersection over union; 0 for empty boxes."""
+    """Intersection over union (...) of boxes a (..., 4) and b (..., 4), x0 y0 x1 y1; 0 for empty boxes."""
     low, high = np.maximum(a[..., :2], b[..., :2]), np.minimum(a[..., 2:], b[..., 2:])
     inter = np.prod(np.clip(high - low, 0, None), axis=-1)
     area = np.prod(a[..., 2:] - a[..., :2], axis=-1) + np.prod(b[..., 2:] - b[..., :2], axis=-1) - inter
@@ -56,7 +60,7 @@ def iou(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def suppress(found: Detections, overlap: float = 0.3) -> Detections:
-    """Blends each best find with all that overlap it by more than `overlap` IoU, weighted by score (BlazeFace)."""
+    """Merges each best detection with all that overlap it by more than `overlap` IoU: their mean by score (BlazeFace)."""
     box, points, score = [], [], []
     rest = np.arange(len(found))
     while len(rest):

@@ -1,7 +1,7 @@
 """The 468-point face mesh: where to look, the network, and its correspondence to the 68 iBUG points.
 
 BlazeFace short range on a crop about a rough face box, then the face mesh, then the face mesh again on the crop that
-its own points ask for. Crop factors are the ones the networks were trained with.
+its own points give. Crop factors are those of the networks' training.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.detections import anchor_centers, decode, suppress
+from gsac.avatar.logistic import clipped_sigmoid
 from gsac.avatar.region import Region, around_points, crop, upright_angle
-from gsac.avatar.tflite import Network, sigmoid
+from gsac.avatar.tflite import Network
+from gsac.avatar.yaw import yaw_of
 
 MODELS = ("face_detection_short_range", "face_landmark")
 POINTS = 468
@@ -22,10 +24,12 @@ RIGHT_EYE, LEFT_EYE = 33, 263
 RIGHT_SIDE, LEFT_SIDE = 234, 454
 """Where the face ends before the ears."""
 EYE_POINTS = {"right": (33, 133, 159, 145), "left": (263, 362, 386, 374)}
-"""Corners and lids; their mean is the eye."""
+"""Mesh points of the corners and lids of each eye; their mean is its centre."""
 NOSE_TIP = 4
 YAW_LIMIT = np.radians(115)
+"""A head turned further has no face in the image."""
 YAW_DOUBT = np.radians(40)
+"""A mesh whose yaw differs more from the body's head is rejected."""
 
 IBUG68 = np.array([
     162, 234, 93, 58, 172, 136, 149, 148, 152, 377, 378, 365, 397, 288, 323, 454, 389,
@@ -37,41 +41,43 @@ IBUG68 = np.array([
 
 @dataclass(frozen=True)
 class Face:
+    """One reading of the mesh network."""
+
     points: np.ndarray
     """(468, 3) px; z away from the camera, in pixels at the face's scale, 0 near the face's middle."""
     presence: float
-    """0..1, the network's own."""
+    """0..1: the network's own confidence that there is a face."""
 
     @property
     def yaw(self) -> float:
-        """Radians: 0 looks at the camera, + to the frame's right."""
+        """Radians: 0 toward the camera, growing to the frame's right."""
         across = self.points[LEFT_SIDE] - self.points[RIGHT_SIDE]
         return float(np.arctan2(across[2], across[0]))
 
     def facing(self) -> np.ndarray:
-        """(468,) 0..1: 1 for points that face the camera, down to 0 for those that the head itself hides.
+        """(468,) 0..1: 1 for points that face the camera, 0 for those that the head itself hides.
 
-        The outward direction is taken as that from the middle between the ears."""
+        The outward direction of a point is that from the middle between the ears."""
         out = self.points - (self.points[LEFT_SIDE] + self.points[RIGHT_SIDE]) / 2
         toward = -out[:, 2] / np.maximum(np.linalg.norm(out, axis=1), 1e-6)
         return np.clip(toward / 0.3 + 1, 0, 1)
 
 
 class FaceMesh:
-    """models: name -> file, at least `MODELS`."""
+    """Detector and mesh network."""
 
     def __init__(self, models: dict[str, Path], threads: int | None = None):
+        """models: name -> file, at least `MODELS`; threads: of each network, as `Network`."""
         self._detector = Network(models["face_detection_short_range"], threads)
         self._mesh = Network(models["face_landmark"], threads)
         self._anchors = anchor_centers(self._detector.width, (8, 16, 16, 16))
 
     def find(self, image: np.ndarray, rough: Region, yaw: float | None = None, threshold: float = 0.5) -> Face | None:
-        """image: (H, W, 3) uint8; rough: a region about three face boxes wide, eyes level; yaw: radians, where the
-        body's points say the head looks (0 at the camera, + to the frame's right), None when that is not known.
+        """The face in an image; None where no crop gives a mesh that both the network and the head's yaw support.
 
-        On a profile the networks like to lay a frontal mesh over half a face and to believe in it, so a mesh that looks
-        more than `YAW_DOUBT` away from the body's head is not taken, and a head turned beyond `YAW_LIMIT` has no face.
-        None when no look gives a mesh that both the network and the head's direction support.
+        image: (H, W, 3) uint8; rough: a region about three face boxes wide, eyes level; yaw: rad of the head by the body's
+        points, as `Face.yaw`, None where unknown. On a profile the networks often fit a frontal mesh to half a face with a high
+        presence: hence a mesh more than `YAW_DOUBT` from that yaw is rejected, and beyond `YAW_LIMIT` no face is looked for.
         """
         if yaw is not None and abs(yaw) > YAW_LIMIT:
             return None
@@ -82,12 +88,12 @@ class FaceMesh:
             first = self.read(image, region)
             again = self.read(image, self.region_of(first.points))
             for face in (again, first):
-                if face.presence >= threshold and (yaw is None or abs(_turn(face.yaw - yaw)) < YAW_DOUBT):
+                if face.presence >= threshold and (yaw is None or abs(_wrap(face.yaw - yaw)) < YAW_DOUBT):
                     return face
         return None
 
     def detect(self, image: np.ndarray, rough: Region, threshold: float = 0.5) -> Region | None:
-        """The mesh network's region from the best detection inside `rough`."""
+        """The mesh network's region from the best detection inside `rough`, None without one. image: (H, W, 3) uint8."""
         size = self._detector.width
         raw, logits = self._detector(crop(image, rough, size, outside="black") * 2 - 1)
         found = suppress(decode(raw, logits, self._anchors, size, threshold))
@@ -98,7 +104,10 @@ class FaceMesh:
         return around_points(points, upright_angle(right, left, 0.0)).scaled(2.0).moved(0.0, -0.1)
 
     def read(self, image: np.ndarray, region: Region, mirror: np.ndarray | None = None) -> Face:
-        """One look of the mesh network; mirror: (468,) each point's mirror image, to look at the mirrored crop."""
+        """Runs the mesh network on one crop.
+
+        image: (H, W, 3) uint8; mirror: (468,) index of each point's mirror image, to run it on the mirrored crop.
+        """
         size = self._mesh.width
         seen = crop(image, region, size)
         raw, presence = self._mesh(seen if mirror is None else seen[:, ::-1])
@@ -107,25 +116,25 @@ class FaceMesh:
             points = points[mirror]
             points[:, 0] = 1 - points[:, 0]
         xy = region.to_frame(points[:, :2])
-        return Face(np.hstack([xy, points[:, 2:] * region.side]), float(sigmoid(presence.reshape(-1)[0])))
+        return Face(np.hstack([xy, points[:, 2:] * region.side]), float(clipped_sigmoid(presence.reshape(-1)[0])))
 
     @staticmethod
     def region_of(points: np.ndarray) -> Region:
-        """points: (468, 2 or 3) px. The region that centres them as the network was trained."""
+        """The region that centres the points (468, 2 or 3), px, as in the network's training."""
         angle = upright_angle(points[RIGHT_EYE, :2], points[LEFT_EYE, :2], 0.0)
         return around_points(points[:, :2], angle).scaled(1.5)
 
 
-def _turn(angle: float) -> float:
+def _wrap(angle: float) -> float:
+    """Radians in -pi..pi."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def region_of_head(points: np.ndarray) -> Region:
-    """points: (11, 2) px, BlazePose's nose, eyes, ears and mouth. The rough region for `FaceMesh.find`."""
+    """The rough region for `FaceMesh.find`. points: (11, 2) px, BlazePose's nose, eyes, ears and mouth."""
     return around_points(points, upright_angle(points[5], points[2], 0.0)).scaled(3.0)
 
 
 def head_yaw(world: np.ndarray) -> float:
-    """world: (11, 3) m, BlazePose's head points. Radians as `Face.yaw`."""
-    forward = world[0] - (world[7] + world[8]) / 2
-    return float(np.arctan2(forward[0], -forward[2]))
+    """Yaw as `Face.yaw`, rad. world: (11, 3) m, BlazePose's nose, eyes, ears and mouth."""
+    return float(yaw_of(world[0] - (world[7] + world[8]) / 2))

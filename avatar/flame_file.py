@@ -1,8 +1,8 @@
-"""Reads a FLAME head model (Li et al. 2017) that a user owns, and says exactly what is wrong with a file that is not one.
+"""Reads and checks a FLAME head model (Li et al. 2017) that a user owns; an error names the array, its shape and the expected one.
 
 V = 5023 vertices, F = 9976 faces, 5 joints (root, neck, jaw, eyes), 300 shape and 100 expression directions. The official file is
-a pickle, which runs code when it is read: it is refused, and has to be saved as .npz with the same names once. Where the points of
-a face network lie on the head says FLAME's own `mediapipe_landmark_embedding.npz`.
+a pickle, which runs code when it is read: it is refused, and has to be saved as .npz with the same names once. FLAME's own
+`mediapipe_landmark_embedding.npz` places the points of the face network on the head.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ARRAYS = {"v_template": (5023, 3), "f": (9976, 3), "shapedirs": (5023, 3, SHAPES
 POINTS = {"landmark_indices": 1, "lmk_face_idx": 1, "lmk_b_coords": 2}
 """Array of the landmarks' file -> number of dimensions."""
 MESH_POINTS = 468
-"""Of the face network; later numbers are of the iris, which no head carries."""
+"""Points of the face network; later numbers are of the iris, which no head has."""
 
 
 @dataclass
@@ -49,17 +49,17 @@ class Flame:
 class FlamePoints:
     """Where L of the face network's 468 points lie on the head."""
 
-    index: np.ndarray  # (L,) which points
-    face: np.ndarray  # (L,) in which face of the head
-    bary: np.ndarray  # (L, 3) where in it
+    index: np.ndarray  # (L,) number of the point
+    face: np.ndarray  # (L,) face of the head that it lies in
+    bary: np.ndarray  # (L, 3) its barycentric coordinates there
 
     def on(self, flame: Flame, vertices: np.ndarray) -> np.ndarray:
-        """vertices: (5023, ...). Returns (L, ...) the same of the points."""
+        """Values (5023, ...) of the vertices, interpolated at the points: (L, ...)."""
         return np.einsum("lk,lk...->l...", self.bary, vertices[flame.faces[self.face]])
 
 
 def read_flame(path: Path | str) -> Flame:
-    """Raises ArtifactError that names the array, what it is and what was expected."""
+    """The head model. Raises `ArtifactError` that names the array, its shape and the expected one."""
     path = Path(path)
     a = _arrays(path, ARRAYS)
     for name, shape in ARRAYS.items():
@@ -81,7 +81,7 @@ def read_flame(path: Path | str) -> Flame:
 
 
 def read_flame_points(path: Path | str) -> FlamePoints:
-    """Raises ArtifactError as `read_flame`."""
+    """The points of `mediapipe_landmark_embedding.npz`. Raises `ArtifactError` as `read_flame`."""
     path = Path(path)
     a = _arrays(path, POINTS)
     count = len(a["lmk_face_idx"])

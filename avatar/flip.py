@@ -1,4 +1,4 @@
-"""FLIP: how different two images look when one is flipped to the other (Andersson et al. 2020), for low dynamic range.
+"""FLIP: perceived difference of two images that alternate in one place (Andersson et al. 2020), for low dynamic range.
 
 Colour: opponent channels filtered by the eye's contrast sensitivity, Hunt-adjusted CIELAB, HyAB distance. Features: edges
 and points of the lightness. All constants are the paper's.
@@ -21,10 +21,10 @@ WHITE_POINT = TO_XYZ.sum(1)
 
 
 def flip(reference: np.ndarray, test: np.ndarray, pixels_per_degree: float = PIXELS_PER_DEGREE) -> np.ndarray:
-    """reference, test: (H, W, 3) sRGB in 0..1. Returns (H, W) in 0..1, 0 where equal."""
-    opponents = [_opponent(_linear(np.asarray(image, np.float64))) for image in (reference, test)]
-    filtered = [_hunt(_lab(_seen(o, pixels_per_degree))) for o in opponents]
-    corners = _hunt(_lab(np.array([[[0.0, 1, 0], [0, 0, 1]]])))
+    """Difference (H, W) in 0..1, 0 where equal. reference, test: (H, W, 3) sRGB in 0..1."""
+    opponents = [_to_opponent(_to_linear(np.asarray(image, np.float64))) for image in (reference, test)]
+    filtered = [_adjust_hunt(_to_lab(_filter_contrast(o, pixels_per_degree))) for o in opponents]
+    corners = _adjust_hunt(_to_lab(np.array([[[0.0, 1, 0], [0, 0, 1]]])))
     largest = float(_hyab(corners[:, :1], corners[:, 1:])[0, 0]) ** QC
     colour = _hyab(*filtered) ** QC
     knee = PC * largest
@@ -34,18 +34,18 @@ def flip(reference: np.ndarray, test: np.ndarray, pixels_per_degree: float = PIX
     return np.clip(colour, 0, 1) ** (1 - np.clip(strongest / np.sqrt(2), 0, 1) ** QF)
 
 
-def _linear(srgb: np.ndarray) -> np.ndarray:
+def _to_linear(srgb: np.ndarray) -> np.ndarray:
     return np.where(srgb > 0.04045, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4, srgb / 12.92)
 
 
-def _opponent(linear: np.ndarray) -> np.ndarray:
+def _to_opponent(linear: np.ndarray) -> np.ndarray:
     """YCxCz of linear RGB."""
     x, y, z = np.moveaxis(linear @ TO_XYZ.T / WHITE_POINT, -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], -1)
 
 
-def _seen(opponent: np.ndarray, ppd: float) -> np.ndarray:
-    """Linear RGB, in 0..1, of the channels after the eye's filters."""
+def _filter_contrast(opponent: np.ndarray, ppd: float) -> np.ndarray:
+    """Linear RGB in 0..1 of opponent channels, filtered by the eye's contrast sensitivity; ppd: pixels per degree."""
     radius = int(np.ceil(3 * np.sqrt(0.04 / (2 * np.pi**2)) * ppd))
     at = np.arange(-radius, radius + 1) / ppd
     out = np.empty_like(opponent)
@@ -53,20 +53,20 @@ def _seen(opponent: np.ndarray, ppd: float) -> np.ndarray:
         # each gaussian of x^2 + y^2 is a product; the weights make the whole kernel sum to one
         parts = [(a * np.sqrt(np.pi / b), np.exp(-np.pi**2 * at**2 / b)) for a, b in terms if a]
         total = sum(weight * line.sum() ** 2 for weight, line in parts)
-        out[..., c] = sum(weight / total * _separable(opponent[..., c], line, line) for weight, line in parts)
+        out[..., c] = sum(weight / total * _convolve(opponent[..., c], line, line) for weight, line in parts)
     y = (out[..., 0] + 16) / 116
     xyz = np.stack([y + out[..., 1] / 500, y, y - out[..., 2] / 200], -1) * WHITE_POINT
     return np.clip(xyz @ np.linalg.inv(TO_XYZ).T, 0, 1)
 
 
-def _lab(linear: np.ndarray) -> np.ndarray:
+def _to_lab(linear: np.ndarray) -> np.ndarray:
     ratio = linear @ TO_XYZ.T / WHITE_POINT
     limit = 6 / 29
     f = np.where(ratio > limit**3, np.cbrt(ratio), ratio / (3 * limit**2) + 4 / 29)
     return np.stack([116 * f[..., 1] - 16, 500 * (f[..., 0] - f[..., 1]), 200 * (f[..., 1] - f[..., 2])], -1)
 
 
-def _hunt(lab: np.ndarray) -> np.ndarray:
+def _adjust_hunt(lab: np.ndarray) -> np.ndarray:
     return np.concatenate([lab[..., :1], 0.01 * lab[..., :1] * lab[..., 1:]], -1)
 
 
@@ -84,11 +84,11 @@ def _features(lightness: np.ndarray, ppd: float) -> tuple[np.ndarray, np.ndarray
     found = []
     for kernel in (-at * plain, (at**2 / deviation**2 - 1) * plain):
         kernel = np.where(kernel > 0, kernel / kernel[kernel > 0].sum(), kernel / -kernel[kernel < 0].sum())
-        found.append(np.hypot(_separable(lightness, smooth, kernel), _separable(lightness, kernel, smooth)))
+        found.append(np.hypot(_convolve(lightness, smooth, kernel), _convolve(lightness, kernel, smooth)))
     return tuple(found)
 
 
-def _separable(image: np.ndarray, down: np.ndarray, across: np.ndarray) -> np.ndarray:
+def _convolve(image: np.ndarray, down: np.ndarray, across: np.ndarray) -> np.ndarray:
     import cv2
 
     return cv2.sepFilter2D(image, cv2.CV_64F, across, down, borderType=cv2.BORDER_REPLICATE)

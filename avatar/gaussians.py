@@ -17,14 +17,14 @@ SPREAD = 0.55
 
 GOLDEN = (0.7548776662466927, 0.5698402909980532)
 """Steps of the plane's R2 sequence: powers of 1/1.3247..., the plastic number."""
-
-
-EACH = tuple(artifacts.AVATAR_SHAPES)
-"""What every gaussian has."""
+FIELDS = tuple(artifacts.AVATAR_SHAPES)
+"""The arrays that have a row for every gaussian."""
 
 
 @dataclass
 class Gaussians:
+    """N gaussians in the frames of the faces that carry them (avatar/binding.py)."""
+
     face: np.ndarray
     """(N,) int32, index of the face that carries it."""
     mu: np.ndarray
@@ -38,29 +38,29 @@ class Gaussians:
     opacity: np.ndarray
     """(N,) in 0..1."""
     light: np.ndarray | None = None
-    """(4, 3) of `avatar.light`: what rgb is multiplied with by the way a face looks to the clip's camera; None: by 1."""
+    """(4, 3) of `avatar.light`: the room's light, a factor on rgb by the face's normal; None: factor 1."""
 
     def __len__(self) -> int:
         return len(self.face)
 
-    def __getitem__(self, which) -> Gaussians:
-        """The gaussians that an index array, mask or slice picks."""
-        return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in EACH), self.light)
+    def __getitem__(self, which: np.ndarray | slice) -> Gaussians:
+        """Those that an index array (M,), mask (N,) or slice picks."""
+        return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in FIELDS), self.light)
 
     def write(self, path: Path, coarser: Sequence[Gaussians] = ()) -> None:
-        """avatar.npz: float32, face int32; `light` where there is one; coarser levels of detail, finest first, where there are."""
+        """To avatar.npz, float32 and face int32, with `light` and coarser levels of detail, finest first, where given."""
         arrays = self._arrays()
         if self.light is not None:
             arrays["light"] = np.asarray(self.light, np.float32)
         if coarser:
             arrays["levels"] = np.array([len(level) for level in coarser], np.int32)
             parts = [level._arrays() for level in coarser]
-            arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in EACH}
+            arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in FIELDS}
         artifacts.write_arrays(path, **arrays)
 
     @classmethod
     def read(cls, path: Path) -> Gaussians:
-        """From avatar.npz; `artifacts.ArtifactError` where an array is missing or has another shape."""
+        """From avatar.npz; raises `ArtifactError` where an array is missing or has another shape."""
         return cls.read_levels(path)[0]
 
     @classmethod
@@ -69,19 +69,20 @@ class Gaussians:
         arrays = artifacts.check_avatar(path)
         light = arrays.get("light")
         ends = np.cumsum(arrays.get("levels", np.zeros(0, np.int32)))
-        parts = [{name: arrays[f"coarser_{name}"][a:b] for name in EACH} for a, b in zip([0, *ends], ends, strict=False)]
-        return [cls(**part, light=light) for part in [{name: arrays[name] for name in EACH}, *parts]]
+        parts = [{name: arrays[f"coarser_{name}"][a:b] for name in FIELDS} for a, b in zip([0, *ends], ends, strict=False)]
+        return [cls(**part, light=light) for part in [{name: arrays[name] for name in FIELDS}, *parts]]
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in EACH}
+        return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in FIELDS}
 
     @classmethod
-    def area(cls, vertices: np.ndarray, faces: np.ndarray, count: int, seed: int = 0, rgb=(0.5, 0.5, 0.5),
-             opacity: float = 0.9, power: float = 0.85) -> Gaussians:
-        """`count` gaussians spread over the faces, a face drawn with probability area ** power.
+    def area(cls, vertices: np.ndarray, faces: np.ndarray, count: int, seed: int = 0,
+             rgb: tuple[float, float, float] = (0.5, 0.5, 0.5), opacity: float = 0.9, power: float = 0.85) -> Gaussians:
+        """`count` gaussians spread over the faces of a mesh, a face drawn with probability area ** power.
 
-        Each stands for the area that the density leaves it, so small faces (eyes, mouth) do not collect sub-pixel gaussians.
-        Systematic draws in the mesh's own order and low-discrepancy points inside a face: few gaps, few clumps.
+        vertices: (V, 3) m; faces: (F, 3) int. A gaussian is as large as the area that the density leaves it, so small faces (eyes,
+        mouth) do not collect sub-pixel gaussians. Systematic draws in the mesh's own order and low-discrepancy points inside a
+        face leave few gaps and few clumps.
         """
         random = np.random.default_rng(seed)
         areas = _areas(vertices, faces)
@@ -105,7 +106,7 @@ class Gaussians:
 
     @classmethod
     def _flat(cls, vertices, faces, face, mu, area, rgb, opacity) -> Gaussians:
-        """Discs in the face's plane (the frame's middle axis is the normal), sized by the area each stands for."""
+        """Discs in the face's plane (the frame's middle axis is the normal), sized by `area` (N,), m2 a gaussian."""
         from gsac.avatar.binding import face_frames
 
         k = face_frames(vertices, faces).k[face]
@@ -118,7 +119,7 @@ class Gaussians:
 
 
 def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(F,) m2, 0 for faces whose frame is not defined."""
+    """(F,) m2, 0 for faces without a frame."""
     from gsac.avatar.binding import face_frames
 
     v = np.asarray(vertices, np.float64)[faces]

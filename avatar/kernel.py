@@ -1,30 +1,32 @@
-"""The one way our numba kernels are compiled.
+"""Decorator that compiles our numba kernels.
 
-numba's disk cache looks at the file of a kernel only, not at the kernels and constants that it takes from other files; a
-digest of all of them in the kernel's name keeps it from running old code after an edit elsewhere.
+numba's disk cache checks only the file of a kernel, not the kernels and constants that it takes from other files; a digest of
+all of them in the kernel's name keeps it from running old code after an edit elsewhere.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
 
-SOURCES = ("kernel.py", "simd.py", "binding.py", "losses.py", "ssim.py", "sobel.py", "raster/project.py", "raster/tiles.py",
-           "raster/forward.py", "raster/backward.py")
-"""Files under this folder that kernels or their constants come from."""
+SOURCES = ("kernel.py", "blend.py", "simd.py", "binding.py", "losses.py", "ssim.py", "sobel.py",
+           "raster/project.py", "raster/tiles.py", "raster/forward.py", "raster/backward.py")
+"""Files under this folder that hold kernels or their constants."""
 
 
 def digest(folder: Path) -> str:
-    """Of the content of `SOURCES` under a folder."""
+    """Hex digest of the content of `SOURCES` under a folder."""
     return hashlib.sha256(b"\0".join((folder / name).read_bytes() for name in SOURCES)).hexdigest()[:12]
 
 
 DIGEST = digest(Path(__file__).parent)
 
 
-def kernel(function):
-    """Compiled at the first call for each set of types and cached on disk; releases the GIL, fuses a * b + c, x / 0 is inf."""
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compiles at the first call for each set of types, cached on disk; releases the GIL, fuses a * b + c, x / 0 is inf."""
     function.__qualname__ += f"_{DIGEST}"
     return numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")(function)

@@ -1,8 +1,8 @@
 """Image losses on the CPU, value and gradient with respect to the image at once.
 
-Images are (H, W, 3) in 0..1. `box` = (top, bottom, left, right) in pixels: the loss sees that crop as if it were the whole image.
-`weights` (H, W) >= 0 make every mean a weighted mean over pixels. The gradient of `factor` times the value is added to
-`gradient` (H, W, 3) where one is given (losses of one image add up in one array), else to a new array of zeros.
+Images are (H, W, 3) in 0..1. `box` = (top, bottom, left, right), px: the loss is that of the crop alone. `weights` (H, W) >= 0
+make every mean a weighted mean over pixels. The gradient of `factor` times the value is added to `gradient` (H, W, 3) where one is
+given (losses of one image add up in one array), else to a new array of zeros.
 """
 
 from __future__ import annotations
@@ -18,16 +18,25 @@ from gsac.avatar.simd import WIDTH, load, spread, store, total
 from gsac.avatar.ssim import MARGIN
 from gsac.avatar.threads import Workspace
 
+Box = tuple[int, int, int, int]
+"""top, bottom, left, right, px."""
+
 
 class Loss(NamedTuple):
+    """Value and gradient of a loss."""
+
     value: float
     """Without the factor."""
     gradient: np.ndarray
     """(H, W, 3) of factor times the value, with respect to the image."""
 
 
-def l2(image, target, box=None, weights=None, factor: float = 1.0, gradient=None, workspace: Workspace | None = None) -> Loss:
-    """Mean squared difference over pixels and channels."""
+def l2(image: np.ndarray, target: np.ndarray, box: Box | None = None, weights: np.ndarray | None = None, factor: float = 1.0,
+       gradient: np.ndarray | None = None, workspace: Workspace | None = None) -> Loss:
+    """Mean squared difference over pixels and channels.
+
+    image, target, gradient: (H, W, 3); weights: (H, W).
+    """
     job = _Crop(image, target, box, weights, gradient, workspace)
     sums = np.empty(job.height, job.real)
     tail = job.take("l2_tail", (job.workspace.workers, WIDTH))
@@ -35,8 +44,12 @@ def l2(image, target, box=None, weights=None, factor: float = 1.0, gradient=None
     return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
 
 
-def ssim(image, target, box=None, weights=None, factor: float = 1.0, gradient=None, workspace: Workspace | None = None) -> Loss:
-    """Mean structural similarity (1 for equal images): 11x11 gaussian window, sigma 1.5, zero padding, data range 1."""
+def ssim(image: np.ndarray, target: np.ndarray, box: Box | None = None, weights: np.ndarray | None = None, factor: float = 1.0,
+         gradient: np.ndarray | None = None, workspace: Workspace | None = None) -> Loss:
+    """Mean structural similarity (1 for equal images): 11x11 gaussian window, sigma 1.5, zero padding, data range 1.
+
+    image, target, gradient: (H, W, 3); weights: (H, W).
+    """
     job = _Crop(image, target, box, weights, gradient, workspace)
     scratch = job.take("ssim_scratch", (job.workspace.workers, _ssim.SCRATCH))
     sums = np.empty((job.height, -(-job.count // _ssim.STRIP)), job.real)
@@ -45,8 +58,12 @@ def ssim(image, target, box=None, weights=None, factor: float = 1.0, gradient=No
     return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
 
 
-def sobel(image, target, box=None, weights=None, factor: float = 1.0, gradient=None, workspace: Workspace | None = None) -> Loss:
-    """Mean over pixels and channels of the squared difference of Sobel responses, summed over the two directions."""
+def sobel(image: np.ndarray, target: np.ndarray, box: Box | None = None, weights: np.ndarray | None = None, factor: float = 1.0,
+          gradient: np.ndarray | None = None, workspace: Workspace | None = None) -> Loss:
+    """Mean over pixels and channels of the squared difference of Sobel responses, summed over the two directions.
+
+    image, target, gradient: (H, W, 3); weights: (H, W).
+    """
     job = _Crop(image, target, box, weights, gradient, workspace)
     padded = job.take("sobel_difference", (job.height + 2, job.stride))
     across, down = (job.take(name, (job.height + 2, job.stride)) for name in ("sobel_across", "sobel_down"))
@@ -60,9 +77,10 @@ def sobel(image, target, box=None, weights=None, factor: float = 1.0, gradient=N
 
 
 class _Crop:
-    """Images, weights and box as the kernels take them: flat arrays, where the crop starts, numbers (3 a pixel) of a row."""
+    """Images, weights and box as the kernels take them: flat arrays, start of the crop, numbers (3 a pixel) of a row."""
 
-    def __init__(self, image, target, box, weights, gradient, workspace):
+    def __init__(self, image: np.ndarray, target: np.ndarray, box: Box | None, weights: np.ndarray | None,
+                 gradient: np.ndarray | None, workspace: Workspace | None):
         self.real = np.dtype(np.float64 if image.dtype == np.float64 else np.float32)
         self.workspace = workspace or Workspace()
         rows, columns, channels = image.shape
@@ -82,7 +100,7 @@ class _Crop:
         self.flat_gradient = self.gradient.reshape(-1)
         self.shares = self._shares(None if weights is None else weights[top:bottom, left:right])
 
-    def _shares(self, weights) -> np.ndarray:
+    def _shares(self, weights: np.ndarray | None) -> np.ndarray:
         """(1 or height, stride) share of each number in the mean; zero in the margins."""
         shares = self.take("shares", (1 if weights is None else self.height, self.stride))
         shares[:, :MARGIN] = 0

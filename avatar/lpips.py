@@ -1,8 +1,8 @@
-"""LPIPS: how different two images look, by the features of a network (Zhang et al. 2018, v0.1 of the weights).
+"""LPIPS: perceptual distance of two images by the features of a network (Zhang et al. 2018, v0.1 of the weights).
 
-Both images run through the network; where it is tapped, features are brought to length one in every place, their squared
-differences are weighed by channel and averaged over the places; the taps are added up. The weights belong to others and are
-brought by the user: the network's from torchvision, the heads' from the authors' repository.
+Both images run through the network; at each tap, features are normalised to length one in every place, their squared differences
+are weighted by channel and averaged over the places; the distance is the sum over the taps. The user brings the weights: the
+network's from torchvision, the heads' from the authors' repository.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from collections.abc import Iterable
 from copy import copy
 from pathlib import Path
 from threading import Lock
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gsac.avatar.weight_file import WeightsError, read_weights
+
+if TYPE_CHECKING:
+    import torch
 
 
 class Layer(NamedTuple):
@@ -28,7 +31,7 @@ class Layer(NamedTuple):
     stride: int = 1
     padding: int = 1
     pool: int = 0
-    """Size of the max pooling before it, by steps of 2; 0: none."""
+    """Size of the max pooling before it, stride 2; 0: none."""
     tap: bool = False
 
 
@@ -47,14 +50,14 @@ SOURCES = {"lpips-vgg": "torchvision's vgg16 and lpips/weights/v0.1/vgg.pth of t
 SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
 TINY = 1e-10
 LEAST_SIDE = 64
-"""px; a smaller image has nothing left after the poolings."""
+"""px; of a smaller image nothing is left after the poolings."""
 
 NETWORK = re.compile(r"(?:.*\.)?(?:features|slice\d)\.(\d+)\.(weight|bias)")
 HEAD = re.compile(r"(?:.*\.)?(?:lin|lins\.)(\d)(?:\.model\.\d)?\.weight")
 
 
 def shapes(name: str) -> dict[str, tuple[int, ...]]:
-    """Array -> shape, of the file of that name: what torchvision calls it, and `lin0` to `lin4` for the heads."""
+    """Array -> shape in the file of that name: torchvision's names, and `lin0` to `lin4` for the heads."""
     found, before, taps = {}, 3, 0
     for layer in NETS[name]:
         found[f"features.{layer.number}.weight"] = layer.channels, before, layer.kernel, layer.kernel
@@ -67,9 +70,9 @@ def shapes(name: str) -> dict[str, tuple[int, ...]]:
 
 
 def gather(name: str, files: Iterable[Path]) -> dict[str, np.ndarray]:
-    """The arrays of `shapes(name)` out of the user's files: one with all of them, or network and heads apart.
+    """The arrays (...) of `shapes(name)` from the user's files: one with all of them, or network and heads apart.
 
-    Known are the names of torchvision, of the `lpips` package, of its head files, and our own. Raises WeightsError.
+    Arrays may have the names of torchvision, of the `lpips` package, of its head files, or ours. Raises `WeightsError`.
     """
     files, wanted, found = list(files), shapes(name), {}
     for path in files:
@@ -104,10 +107,10 @@ def _own_name(called: str) -> str:
 
 
 class Lpips:
-    """LPIPS by one network. Images are (H, W, 3) in 0..1."""
+    """LPIPS by one network."""
 
     def __init__(self, name: str, arrays: dict[str, np.ndarray]):
-        """arrays: as `shapes(name)`."""
+        """arrays: name -> array (...) as in `shapes(name)`."""
         import torch
 
         self.layers, self.one_at_a_time, self.precision = NETS[name], Lock(), None
@@ -116,15 +119,15 @@ class Lpips:
 
     @classmethod
     def read(cls, name: str, path: Path) -> Lpips:
-        """From the store's file. Raises WeightsError where its arrays are not those of `shapes(name)`."""
+        """From the store's file. Raises `WeightsError` where its arrays are not those of `shapes(name)`."""
         with np.load(path, allow_pickle=False) as file:
             arrays = dict(file)
         if {own: values.shape for own, values in arrays.items()} != shapes(name):
             raise WeightsError(f"{path} does not hold the arrays of {name}; run `gsac models add {name} FILE` again")
         return cls(name, arrays)
 
-    def on(self, device: str, precision) -> Lpips:
-        """The same network there, its convolutions in that torch.dtype; for `compared`."""
+    def to(self, device: str, precision: torch.dtype) -> Lpips:
+        """The same network on that device, its convolutions in that precision; for `compare`."""
         import torch
 
         other = copy(self)
@@ -133,8 +136,8 @@ class Lpips:
                          for own, w in self.weights.items()}
         return other
 
-    def compared(self, image, target):
-        """The distance of two tensors (H, W, 3) in 0..1, left there, as a tensor; the image's gradient can be taken."""
+    def compare(self, image: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+        """Distance of image and target, (H, W, 3) in 0..1, as a scalar on their device; differentiable by the image."""
         import torch
 
         with torch.no_grad():
@@ -142,9 +145,9 @@ class Lpips:
         return self._distance(self._features(image.permute(2, 0, 1)), features)
 
     def distance(self, a: np.ndarray, b: np.ndarray, scaled: bool = True) -> float:
-        """scaled: images are brought to -1..1, as the network's own input is; False: left in 0..1, as many papers score.
+        """Distance of images a and b, (H, W, 3) in 0..1; NaN for images of fewer than LEAST_SIDE px.
 
-        NaN for images of fewer than LEAST_SIDE px.
+        scaled: map them to -1..1, the network's own range; False: leave them in 0..1, as many papers score.
         """
         import torch
 
@@ -154,7 +157,7 @@ class Lpips:
             return float(self._distance(*(self._features(_tensor(np.asarray(image, np.float32), scaled)) for image in (a, b))))
 
     def gradient(self, image: np.ndarray, target: np.ndarray, scaled: bool = True) -> tuple[float, np.ndarray]:
-        """The distance, and its gradient (H, W, 3) with respect to the image."""
+        """The distance, and its gradient (H, W, 3) with respect to the image. image, target: (H, W, 3) in 0..1."""
         import torch
 
         moved = torch.from_numpy(np.ascontiguousarray(image)).requires_grad_()

@@ -1,7 +1,7 @@
-"""Image metrics: one scorer for every row of every table.
+"""Image metrics: the one scorer behind every table.
 
-Images are (H, W, 3) float in 0..1 and are rounded to 8 bit before they are scored, as an image file would be. A
-render is scored as rgb premultiplied + alpha; the frame is cut out with the mask on the same background.
+Images are (H, W, 3) float in 0..1, rounded to 8 bit before they are scored, as in an image file. A rendering is premultiplied rgb
+and alpha, a frame is cut out by its mask; both are scored on the same background.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ WHITE, BLACK = 1.0, 0.0
 BOXES = ("face", "left_hand", "right_hand")
 NAMES = {"mse_white": "psnr_full", "mse_black": "psnr_full_black", "mse_fg": "psnr_fg",
          **{f"mse_{name}": f"psnr_{name}" for name in BOXES}}
-"""Mean squared errors that are told as PSNR."""
+"""Name of a mean squared error -> name of its PSNR."""
 LPIPS = {"lpips_alex": ("lpips-alex", True), "lpips_alex_unscaled": ("lpips-alex", False), "lpips_vgg": ("lpips-vgg", True)}
-"""Figure -> network, and whether images are handed to it in -1..1 as it was made for, or in 0..1 as many papers' scorers do."""
+"""Metric -> network, and whether its images are in -1..1, as in its training, or in 0..1, as in many papers' scorers."""
 
 
 def composite(premultiplied: np.ndarray, alpha: np.ndarray, background: float) -> np.ndarray:
-    """premultiplied: (H, W, 3), alpha: (H, W). Returns (H, W, 3) float64 in 0..1, rounded to 8 bit."""
+    """An image (H, W, 3) on a grey background, float64 in 0..1, rounded to 8 bit. premultiplied: (H, W, 3); alpha: (H, W)."""
     image = premultiplied.astype(np.float64) + (1 - alpha.astype(np.float64))[..., None] * background
     return np.round(np.clip(image, 0, 1) * 255) / 255
 
 
 def psnr(mse: float) -> float | None:
-    """dB for a peak of 1; equal images count as 8-bit rounding alone, 59 dB. None for no measurement."""
+    """dB for a peak of 1; equal images get 59 dB, the noise of 8-bit rounding. None for no measurement."""
     return None if mse is None or not np.isfinite(mse) else float(-10 * np.log10(max(mse, 1 / 12 / 255**2)))
 
 
 def ssim(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean SSIM of two (H, W, 3) images: Gaussian window of 11 taps, sigma 1.5, k1 .01, k2 .03, whole windows only."""
+    """Mean SSIM of images a and b, (H, W, 3): Gaussian window of 11 taps, sigma 1.5, k1 .01, k2 .03, whole windows only."""
     import cv2
 
     if min(a.shape[:2]) < 11:
@@ -61,10 +61,10 @@ def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
 
 def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray, boxes: dict | None = None,
           with_flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> dict[str, float]:
-    """One image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1; boxes: name -> x0, y0, x1, y1 px.
+    """Scores one image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1; boxes: name -> x0, y0, x1, y1 px.
 
     `mse_white`, `mse_black`: the whole frame on that background. `mse_fg`: the person only, that is pixels where mask
-    or alpha is at least 0.5, on white, so that a missing and an added limb both cost. `ssim`: whole frame on white.
+    or alpha is at least 0.5, on white, so that both a missing and an added limb count. `ssim`: whole frame on white.
     `alpha_iou`: of alpha and mask at 0.5. `detail`: gradient energy over the truth's, where both show the person.
     `mse_<name>`: all of a box on white, NaN without one. `flip`: mean over the person, NaN unless asked for. The names of LPIPS:
     whole frame on white, NaN for a network that is not in `lpips` (name -> network).
@@ -93,15 +93,15 @@ def _in_box(error: np.ndarray, box: tuple[int, int, int, int] | None) -> float:
 
 
 def figures(scores: dict[str, float]) -> dict[str, float | None]:
-    """One image's figures under the names of `summary`, the hands apart; None for what was not measured."""
+    """One image's metrics under the names of `summary`, each hand by itself; None where not measured."""
     known = {name: float(value) if np.isfinite(value) else None for name, value in scores.items()}
     return {NAMES.get(name, name): psnr(value) if name in NAMES else value for name, value in known.items()}
 
 
 def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
-    """Of many images: `psnr_*` is the mean of the images' PSNR, `psnr_*_pooled` the PSNR of all their pixels together.
+    """Metrics of many images: `psnr_*` is the mean of the images' PSNR, `psnr_*_pooled` the PSNR of all their pixels together.
 
-    `lpips` is that of `lpips_net`, the first network of LPIPS that was there; null without one.
+    `lpips` is that of `lpips_net`, the first available network of `LPIPS`; None without one.
     """
     def mean(name):
         values = [s[name] for s in scores if np.isfinite(s[name])]

@@ -1,8 +1,7 @@
-"""Network files: what they are, where they come from and where they lie.
+"""Network files: their source, content and place in a store.
 
-Every file of the table is a member of one wheel of the package index and Apache-2.0, as that wheel's own LICENSE says. Others are
-brought by the user under names of their own.
-Nothing here downloads; `gsac models pull` fills the store.
+Every file of the table is a member of one wheel of the package index, under that wheel's licence, Apache-2.0. Users bring others
+under names of their own. Nothing here downloads; `gsac models pull` fills the store.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 WHEEL = "mediapipe==0.10.21"
-"""The requirement whose wheel (any platform's) holds the members; later versions carry no network files."""
+"""The requirement whose wheel, of any platform, holds the members; later versions carry no network files."""
 
 
 class ModelMissingError(FileNotFoundError):
@@ -27,7 +26,7 @@ class ModelFile:
     sha256: str
     licence: str
     what: str
-    """Input and output in one line."""
+    """Its input and output in one line."""
 
 
 def _mediapipe(member: str, sha256: str, what: str) -> ModelFile:
@@ -70,11 +69,11 @@ MODELS: dict[str, ModelFile] = {
 
 
 BROUGHT = ("lpips-vgg", "lpips-alex")
-"""Networks that `train` judges by where the user has brought their weights (`avatar.lpips`); nothing needs them."""
+"""Optional networks whose weights the user brings: `train` then also reports LPIPS (`avatar.lpips`)."""
 
 
 def model_path(name: str, store_root: Path) -> Path:
-    """The file of this name. An unknown name raises `KeyError`, an absent file `ModelMissingError`."""
+    """The file of this name in a store. An unknown name raises `KeyError`, an absent file `ModelMissingError`."""
     if name not in MODELS:
         raise KeyError(f"unknown model file {name}; known: {', '.join(sorted(MODELS))}")
     path = Path(store_root) / "models" / MODELS[name].sha256 / name

@@ -1,4 +1,4 @@
-"""Square, turned region of a frame: the crop a network looks at, and the way back.
+"""A square, turned region of a frame: the crop that a network sees, and its points back in the frame.
 
 Pixels are continuous: the first pixel's centre is (0.5, 0.5). Region coordinates run 0..1 over the square.
 """
@@ -12,6 +12,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Region:
+    """Centre, side and angle of the square."""
+
     center: tuple[float, float]
     """Pixels."""
     side: float
@@ -26,11 +28,11 @@ class Region:
         return np.array([[c, -s], [s, c]])
 
     def to_frame(self, points: np.ndarray) -> np.ndarray:
-        """points: (..., 2) in 0..1. Returns (..., 2) px."""
+        """Maps points (..., 2) from the region's coordinates, 0..1, to the frame's, px."""
         return (points - 0.5) * self.side @ self.axes.T + np.asarray(self.center)
 
     def turn(self, points: np.ndarray) -> np.ndarray:
-        """points: (..., 3) in the region's axes. Returns them in the frame's axes: a turn about z."""
+        """Turns points (..., 3) from the region's axes to the frame's, about z."""
         return np.concatenate([points[..., :2] @ self.axes.T, points[..., 2:]], axis=-1)
 
     def moved(self, right: float, down: float) -> Region:
@@ -39,6 +41,7 @@ class Region:
         return Region((float(center[0]), float(center[1])), self.side, self.angle)
 
     def scaled(self, factor: float) -> Region:
+        """The same with another side."""
         return Region(self.center, self.side * factor, self.angle)
 
     def box(self) -> np.ndarray:
@@ -53,14 +56,14 @@ def full_frame(width: int, height: int) -> Region:
 
 
 def upright_angle(start: np.ndarray, end: np.ndarray, target: float) -> float:
-    """Angle of the region in which the direction start -> end (2,) px points to `target` (radians, counter-clockwise
-    as seen: pi/2 is up), in -pi..pi."""
+    """Angle of the region, -pi..pi, in which the direction from start (2,) to end (2,), px, points to `target`: radians,
+    counter-clockwise as seen, pi/2 is up."""
     angle = target - np.arctan2(-(end[1] - start[1]), end[0] - start[0])
     return float(angle - 2 * np.pi * np.floor((angle + np.pi) / (2 * np.pi)))
 
 
 def around_circle(center: np.ndarray, rim: np.ndarray, target: float = np.pi / 2) -> Region:
-    """The square about the circle with this centre through the rim point (2,) px, its rim turned to `target`."""
+    """The square about a circle, turned so that its rim point lies towards `target`, rad. center, rim: (2,) px."""
     side = 2 * float(np.hypot(*(rim - center)))
     return Region((float(center[0]), float(center[1])), side, upright_angle(center, rim, target))
 
@@ -79,16 +82,16 @@ def around_points(points: np.ndarray, angle: float = 0.0, tight: bool = False) -
 
 
 def crop(image: np.ndarray, region: Region, size: int, outside: str = "edge") -> np.ndarray:
-    """image: (H, W, 3) uint8. Returns (size, size, 3) float32 in 0..1 of the region.
+    """The region of an image (H, W, 3) uint8 as (size, size, 3) float32 in 0..1.
 
-    outside: what lies beyond the frame, `edge` (repeat) or `black`. Where the crop shrinks the frame by two or more,
-    the frame is averaged down first so that thin parts do not alias.
+    outside: fill beyond the frame, `edge` (repeat) or `black`. Where the crop shrinks the frame by two or more, the frame is
+    averaged down first so that thin parts do not alias.
     """
     import cv2
 
     shrink = max(1, int(region.side / size))
     if shrink > 1:
-        image, region = _shrunk(image, region, shrink)
+        image, region = _shrink(image, region, shrink)
     step = region.side / size
     axes = region.axes * step
     # Output pixel centre (i + 0.5) maps to frame point; OpenCV counts from pixel centres at 0.
@@ -101,7 +104,7 @@ def crop(image: np.ndarray, region: Region, size: int, outside: str = "edge") ->
     return out.astype(np.float32) / 255
 
 
-def _shrunk(image: np.ndarray, region: Region, factor: int) -> tuple[np.ndarray, Region]:
+def _shrink(image: np.ndarray, region: Region, factor: int) -> tuple[np.ndarray, Region]:
     """The part of the frame under the region averaged down by a whole factor, and the region in it."""
     import cv2
 

@@ -1,4 +1,4 @@
-"""Rotation vectors and matrices in float64, in batches: what the fit differentiates through."""
+"""Rotation vectors, matrices and the order of quaternions, in batches; float64 where the fit differentiates through it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def exp(rotvec: np.ndarray) -> np.ndarray:
-    """rotvec: (..., 3) rad. Returns (..., 3, 3)."""
+    """Rotation matrices (..., 3, 3) of rotvec (..., 3), rad."""
     angle = np.linalg.norm(rotvec, axis=-1)[..., None, None]
     k = hat(rotvec)
     small = angle < 1e-6
@@ -17,14 +17,14 @@ def exp(rotvec: np.ndarray) -> np.ndarray:
 
 
 def log(matrix: np.ndarray) -> np.ndarray:
-    """matrix: (..., 3, 3). Returns (..., 3) rad, length at most pi."""
+    """Rotation vectors (..., 3), rad, at most pi long, of matrix (..., 3, 3)."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_rotvec().reshape(*matrix.shape[:-2], 3)
 
 
 def hat(v: np.ndarray) -> np.ndarray:
-    """v: (..., 3). Returns the cross-product matrices (..., 3, 3)."""
+    """Cross-product matrices (..., 3, 3) of v (..., 3)."""
     out = np.zeros((*v.shape[:-1], 3, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
@@ -32,7 +32,8 @@ def hat(v: np.ndarray) -> np.ndarray:
 
 
 def log_derivative(rotvec: np.ndarray) -> np.ndarray:
-    """(..., 3, 3): how log(R exp(delta)) moves with delta at R = exp(rotvec) (inverse right Jacobian)."""
+    """rotvec: (..., 3) rad. Returns (..., 3, 3): how log(R exp(delta)) moves with delta at R = exp(rotvec) (inverse right
+    Jacobian)."""
     angle2 = (rotvec**2).sum(-1)[..., None, None]
     k = hat(rotvec)
     small = angle2 < 1e-8
@@ -42,10 +43,25 @@ def log_derivative(rotvec: np.ndarray) -> np.ndarray:
 
 
 def align(source: np.ndarray, target: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
-    """Rotation (3, 3) that best turns centred source (P, 3) onto centred target (P, 3) (Kabsch)."""
+    """Rotation (3, 3) that best turns centred source (P, 3) onto centred target (P, 3); weight: (P,), one unless given (Kabsch)."""
     w = np.ones(len(source)) if weight is None else weight
     a = source - np.average(source, axis=0, weights=w)
     b = target - np.average(target, axis=0, weights=w)
     u, _, vt = np.linalg.svd((w[:, None] * a).T @ b)
     d = np.sign(np.linalg.det(vt.T @ u.T))
     return vt.T @ np.diag([1, 1, d]) @ u.T
+
+
+def about_y(angle: float) -> np.ndarray:
+    """(3, 3): a turn by `angle` rad about y, which takes z to x."""
+    return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+
+
+def to_wxyz(xyzw: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) in the gaussians' order, from xyzw (..., 4), scipy's."""
+    return xyzw[..., [3, 0, 1, 2]]
+
+
+def to_xyzw(wxyz: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) in scipy's order, from wxyz (..., 4), the gaussians'."""
+    return wxyz[..., [1, 2, 3, 0]]

@@ -1,7 +1,7 @@
-"""Sixteen numbers at once inside a numba kernel: explicit SIMD, so that no compiler heuristic decides about the speed.
+"""Explicit SIMD in numba kernels: sixteen numbers at once, so that the speed does not hang on a compiler's heuristics.
 
-`Lanes` is an LLVM vector of 16 float32 or float64. `+ - *` and unary minus work between lanes, and with a scalar on the right.
-Everything else is a function of this module. LLVM splits the vector to what the machine has (AVX2: two registers).
+`Lanes` is an LLVM vector of 16 float32 or float64. `+ - * /` work between lanes, and with a scalar on the right.
+Everything else is a function of this module. LLVM splits the vector into the machine's registers (AVX2: two).
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, overload, register_model
 
+from gsac.avatar.blend import ALPHA_LEVELS
+
 WIDTH = 16
 
 _CONTRACT = ("contract", "nsz")
@@ -21,7 +23,7 @@ _CONTRACT = ("contract", "nsz")
 class Lanes(types.Type):
     """Numba type of 16 float32 or float64."""
 
-    def __init__(self, real):
+    def __init__(self, real: types.Float):
         self.real = real
         super().__init__(name=f"Lanes({real})")
 
@@ -191,8 +193,8 @@ def _exp_coefficients(degree: int, end: float) -> list[float]:
 
 @intrinsic
 def falloff(typingctx, s):
-    """exp(-s) for s in 0..ln 255; relative error 7e-7 in float32, 1e-14 in float64; other s give any number."""
-    coefficients = _exp_coefficients(5 if s.real == types.float32 else 13, math.log(255) / 8)
+    """exp(-s) for s in 0..ln ALPHA_LEVELS; relative error 7e-7 in float32, 1e-14 in float64; other s give any number."""
+    coefficients = _exp_coefficients(5 if s.real == types.float32 else 13, math.log(ALPHA_LEVELS) / 8)
 
     def code(context, builder, signature, arguments):
         x = builder.fmul(arguments[0], _all(s, 0.125))

@@ -24,7 +24,7 @@ def joint_transforms(pose: np.ndarray, joints: np.ndarray, parents: np.ndarray) 
 
 
 def rotation_matrices(pose: np.ndarray) -> np.ndarray:
-    """pose: (..., 3) axis-angle. Returns (..., 3, 3) of the same dtype."""
+    """Rotation matrices (..., 3, 3) of pose (..., 3), axis-angle, in the same dtype."""
     flat = np.ascontiguousarray(pose).reshape(-1, 3)
     out = np.empty((len(flat), 3, 3), flat.dtype)
     _rodrigues(flat, out)
@@ -32,7 +32,7 @@ def rotation_matrices(pose: np.ndarray) -> np.ndarray:
 
 
 def skin(rest: np.ndarray, transforms: np.ndarray, skin_index: np.ndarray, skin_weight: np.ndarray) -> np.ndarray:
-    """rest: (V, 3); transforms: (J, 3, 4); skin_index, skin_weight: (V, K). Returns (V, 3) without transl."""
+    """Vertices (V, 3) of a posed mesh, without transl. rest: (V, 3); transforms: (J, 3, 4); skin_index, skin_weight: (V, K)."""
     out = np.empty_like(rest, order="C")
     _skin(rest, transforms, skin_index, skin_weight, out)
     return out
@@ -43,8 +43,9 @@ def skin_backward(grad: np.ndarray, pose: np.ndarray, rest: np.ndarray, joints: 
                   ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Gradients of a loss through `skin(rest, joint_transforms(pose), ...) + transl`.
 
-    grad: (V, 3) dLoss/dvertices; pose: (J, 3) axis-angle; the rest as in the forward.
-    Returns pose (J, 3), transl (3,), rest (V, 3), joints (J, 3); the last two project on shape and expression bases.
+    grad: (V, 3) dLoss/dvertices; pose: (J, 3) axis-angle; rest: (V, 3); joints: (J, 3); parents: (J,);
+    skin_index, skin_weight: (V, K). Returns the gradients of pose (J, 3), transl (3,), rest (V, 3) and joints (J, 3); the last two
+    project on shape and expression bases.
     """
     pose64 = np.ascontiguousarray(pose, np.float64)
     joints64 = np.ascontiguousarray(joints, np.float64)

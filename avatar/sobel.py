@@ -13,7 +13,7 @@ from gsac.avatar.ssim import MARGIN
 
 @kernel
 def difference(worker, workers, image, target, pitch, start, height, count, padded):
-    """padded (height + 2, stride): image - target of the crop with zeros around it."""
+    """Fills padded (height + 2, stride): image - target of the crop with zeros around it."""
     real = image.dtype.type
     for row in range(worker, height + 2, workers):
         out = padded[row]

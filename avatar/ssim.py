@@ -26,7 +26,7 @@ W0, W1, W2, W3, W4, W5 = (w / _sum for w in _weights)
 
 
 WIDE, LONG = STRIP + 2 * MARGIN, STRIP + 4 * MARGIN
-"""A strip with what its gradient needs of its neighbours, and with what that needs."""
+"""A strip with the margin that its gradient needs, and with the margin that this needs in turn."""
 SCRATCH = 4 * LONG + (8 * ROWS + 3) * WIDE + 6 * ROWS * STRIP
 """Numbers of scratch that a worker needs."""
 
@@ -84,7 +84,7 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
 
     image, target, gradient: flat; pitch: numbers of a full row; start: index of the crop's first number; count: numbers of a crop
     row; shares (1 or height, padded row): share of each number in the mean, zero in the margins; scratch: (workers, SCRATCH).
-    All that is between the images and the gradient rolls through a few rows of a strip and never leaves the cache.
+    Between images and gradient only a few rows of a strip are kept, which never leave the cache.
     """
     real = image.dtype.type
     two, zero, c1, c2 = real(2), spread(real(0)), spread(real(C1)), spread(real(C2))

@@ -1,4 +1,4 @@
-"""LiteRT interpreter behind one call."""
+"""Runs .tflite networks by LiteRT."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from threading import local
 
 import numpy as np
 
-from gsac.avatar.threads import available
+from gsac.avatar.threads import available_cores
 
 
 class Network:
     """One .tflite file; input and outputs lose their batch axis. Each thread that calls has an interpreter of its own."""
 
     def __init__(self, path: Path, threads: int | None = None):
-        """threads: of each interpreter; None takes the cores this process may use, at most four; more do not help nets this
-        small."""
-        self._path, self._threads, self._own = path, threads or min(4, available()), local()
+        """threads: of each interpreter; all available cores unless given, at most four: more do not speed up nets this small."""
+        self._path, self._threads, self._own = path, threads or min(4, available_cores()), local()
         interpreter = self._interpreter()
         self._input = interpreter.get_input_details()[0]["index"]
         self._outputs = [d["index"] for d in interpreter.get_output_details()]
@@ -32,12 +31,8 @@ class Network:
         return self._own.interpreter
 
     def __call__(self, image: np.ndarray) -> list[np.ndarray]:
-        """image: (height, width, 3) float32 in the range the file asks for. Returns the outputs in the file's order."""
+        """Outputs in the file's order. image: (height, width, 3) float32 in the network's own range."""
         interpreter = self._interpreter()
         interpreter.set_tensor(self._input, np.ascontiguousarray(image[None], dtype=np.float32))
         interpreter.invoke()
         return [interpreter.get_tensor(i)[0] for i in self._outputs]
-
-
-def sigmoid(x: np.ndarray) -> np.ndarray:
-    return 1 / (1 + np.exp(-np.clip(x, -80, 80)))

@@ -10,43 +10,47 @@ import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import DTypeLike
 
-Item, Result = TypeVar("Item"), TypeVar("Result")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Share = Callable[..., None]
+"""Type of `Workspace.share`: what it calls takes any arguments."""
 
 _pools: dict[int, ThreadPoolExecutor] = {}
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pools.clear)
 
 
-def available() -> int:
-    """Cores that this process may use."""
+def available_cores() -> int:
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Workspace:
     """Buffers kept from step to step, and the threads that work on them.
 
-    What a function gives back may live in its workspace: it holds until the next call of that function with the same one.
+    A function's results may lie in its workspace's buffers: they hold until its next call with the same workspace.
     """
 
     def __init__(self, workers: int | None = None):
         """workers: threads to use; all available cores unless given."""
-        self.workers = workers or available()
+        self.workers = workers or available_cores()
         self._buffers: dict[str, np.ndarray] = {}
 
-    def take(self, name: str, shape: tuple[int, ...], dtype) -> np.ndarray:
-        """An array with any content; the same memory for the same name."""
+    def take(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> np.ndarray:
+        """An array of that shape (...) with any content; the same memory for the same name."""
         size = math.prod(shape)
         buffer = self._buffers.get(name)
         if buffer is None or buffer.size < size or buffer.dtype != dtype:
             buffer = self._buffers[name] = np.empty(size + size // 8, dtype)
         return buffer[:size].reshape(shape)
 
-    def share(self, kernel, *arguments) -> None:
+    def share(self, kernel: Callable[..., None], *arguments: Any) -> None:
         """Calls `kernel(worker, workers, *arguments)` once for each worker and waits for all."""
         if self.workers <= 1:
             kernel(0, 1, *arguments)
@@ -63,14 +67,14 @@ class Workspace:
 
 
 def side_by_side(work: Callable[[Item, Workspace], Result], items: Iterable[Item]) -> list[Result]:
-    """[work(item, workspace)] in the order of the items, each by one thread: images too small to be shared among threads.
+    """[work(item, workspace)] in the order of the items, one item a thread: for images too small to share among threads.
 
-    What `work` gives back must not live in its workspace, which the next item gets.
+    A result must not lie in its workspace, which the next item uses.
     """
     items = list(items)
-    many = min(available(), len(items))
+    many = min(available_cores(), len(items))
     if many <= 1:
-        workspace = Workspace(1) if available() == 1 else Workspace()
+        workspace = Workspace(1) if available_cores() == 1 else Workspace()
         return [work(item, workspace) for item in items]
 
     def part(k: int) -> list[Result]:
@@ -82,9 +86,9 @@ def side_by_side(work: Callable[[Item, Workspace], Result], items: Iterable[Item
     return [parts[i % many][i // many] for i in range(len(items))]
 
 
-def ahead(pool: ThreadPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item], most: int) -> Iterator[Result]:
-    """work(item) in the order of the items, done by the pool while the caller looks at earlier ones; at most `most` wait."""
-    waiting = deque()
+def prefetch(pool: ThreadPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item], most: int) -> Iterator[Result]:
+    """work(item) in the order of the items, computed by the pool while the caller uses earlier results; at most `most` wait."""
+    waiting: deque[Future[Result]] = deque()
     for item in items:
         waiting.append(pool.submit(work, item))
         if len(waiting) > most:

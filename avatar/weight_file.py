@@ -1,4 +1,4 @@
-"""Weights of networks as users have them: .safetensors, .npz, or a state_dict that torch saved; arrays only, no code is run."""
+"""Reads network weights from .safetensors, .npz or a state_dict saved by torch: arrays only, no code is run."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ LARGEST_HEADER = 100 << 20
 
 
 class WeightsError(ValueError):
-    """A file of weights is not what it should be. The message names the file, the array and what was expected."""
+    """A file of weights cannot be used. The message names the file, the array and the expected content."""
 
 
 def read_weights(path: Path) -> dict[str, np.ndarray]:
-    """Name -> float32 array; what is not of floats is left out. Raises WeightsError."""
+    """Name -> float32 array (...), of the file's arrays of floats. Raises `WeightsError`."""
     try:
         if path.suffix == ".safetensors":
             return _safetensors(path)
@@ -38,7 +38,7 @@ def read_weights(path: Path) -> dict[str, np.ndarray]:
 
 
 def _safetensors(path: Path) -> dict[str, np.ndarray]:
-    """The format's own words: 8 bytes of length, a JSON header, the arrays' bytes."""
+    """The format: 8 bytes of length, a JSON header, the arrays' bytes."""
     data = path.read_bytes()
     length = int.from_bytes(data[:8], "little")
     if len(data) < 8 or length > min(len(data) - 8, LARGEST_HEADER):

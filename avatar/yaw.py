@@ -1,16 +1,22 @@
-"""Which way a body faces, and how much of a turn its frames show."""
+"""Yaw: which way a body or a head faces in the camera frame, and how much of a turn a clip's frames show."""
 
 from __future__ import annotations
 
 import numpy as np
 
 
+def yaw_of(front: np.ndarray) -> np.ndarray:
+    """front: (..., 3), any length, where a body or a head faces, camera frame. Returns (...) rad: 0 toward the camera, growing
+    to the frame's right, which is the person's left."""
+    return np.arctan2(front[..., 0], -front[..., 2])
+
+
 def yaw(turns: np.ndarray) -> np.ndarray:
-    """turns: (..., 3, 3) of the body to the camera frame. (...) rad, 0 where it faces the camera, growing to its left."""
-    return np.arctan2(turns[..., 0, 2], -turns[..., 2, 2])
+    """turns: (..., 3, 3) rotations of a body from its own axes (z front) to the camera frame. Returns (...) rad as `yaw_of`."""
+    return yaw_of(turns[..., 2])
 
 
 def turn_seen(turns: np.ndarray) -> float:
-    """turns: (T, 3, 3). Degrees about the upright axis, of 360, from which the frames show the body: all but the widest gap."""
+    """turns: (T, 3, 3) as in `yaw`. How many of the 360 degrees of yaw the frames cover: all but the widest gap between them."""
     at = np.sort(np.degrees(yaw(turns)))
     return 360 - float(np.diff(at, append=at[0] + 360).max()) if len(at) else 0.0

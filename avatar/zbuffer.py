@@ -1,4 +1,4 @@
-"""Z-buffer triangle rasteriser on the CPU (numba): which face each pixel centre sees, where on it, how deep.
+"""Z-buffer triangle rasteriser on the CPU (numba): face, barycentric coordinates and depth at each pixel centre.
 
 Watertight: projected corners are snapped to 1/1024 px, so that an edge function is exact in float64 and the two faces
 of an edge get opposite signs; a pixel centre on the edge itself belongs to one of them (top-left rule). Both windings
@@ -17,32 +17,39 @@ NEAR = 0.01
 _SNAP = 1024.0
 
 
-def rasterise(vertices: np.ndarray, faces: np.ndarray, camera: Camera, near: float = NEAR):
-    """vertices: (V, 3) m, camera frame; faces: (F, 3) int.
+def rasterise(vertices: np.ndarray, faces: np.ndarray, camera: Camera,
+              near: float = NEAR) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Draws a mesh. vertices: (V, 3) m, camera frame; faces: (F, 3) int; near: m.
 
     Returns face_id (H, W) int32, -1 where no face; bary (H, W, 3) float32, perspective-correct weights of the face's
     corners, 0 where none; depth (H, W) float32, z in m, inf where none. At equal depth the face of lower index wins.
     """
-    vertices, faces = _checked(vertices, faces)
+    vertices, faces = _check(vertices, faces)
     return _rasterise(_screen(vertices, camera), vertices[:, 2], faces, camera.width, camera.height, near)
 
 
 def silhouette(vertices: np.ndarray, faces: np.ndarray, camera: Camera, near: float = NEAR) -> np.ndarray:
-    """(H, W) bool, exactly `rasterise(...)[0] >= 0`, without depth and barycentrics."""
-    vertices, faces = _checked(vertices, faces)
+    """(H, W) bool, exactly `rasterise(...)[0] >= 0`, without depth and barycentrics.
+
+    vertices: (V, 3) m, camera frame; faces: (F, 3) int.
+    """
+    vertices, faces = _check(vertices, faces)
     return _silhouette(_screen(vertices, camera), vertices[:, 2], faces, camera.width, camera.height, near)
 
 
 def interpolate(attributes: np.ndarray, faces: np.ndarray, face_id: np.ndarray, bary: np.ndarray) -> np.ndarray:
-    """attributes: (V, C) per vertex. Returns (H, W, C) float32, 0 where no face."""
+    """Values of the vertices at each pixel: (H, W, C) float32, 0 where no face.
+
+    attributes: (V, C); faces: (F, 3) int; face_id: (H, W) and bary: (H, W, 3) of `rasterise`.
+    """
     attributes = np.ascontiguousarray(attributes, dtype=np.float32)
     return _interpolate(attributes, np.ascontiguousarray(faces, dtype=np.int64), face_id, bary)
 
 
 def visible_points(points: np.ndarray, depth: np.ndarray, camera: Camera, slack: float = 0.01) -> np.ndarray:
-    """points: (N, 3) m, camera frame; depth: (H, W) of `rasterise`; slack: m that a point may lie behind the surface.
+    """(N,) bool: whether a point is inside the image, before the camera and not hidden by a nearer surface.
 
-    Returns (N,) bool: inside the image, before the camera, and not hidden by a nearer surface.
+    points: (N, 3) m, camera frame; depth: (H, W) m of `rasterise`; slack: m that a point may lie behind the surface.
     """
     points = np.asarray(points, dtype=np.float64)
     front = points[:, 2] > NEAR
@@ -52,7 +59,8 @@ def visible_points(points: np.ndarray, depth: np.ndarray, camera: Camera, slack:
     return inside & (points[:, 2] <= depth[row, column] + slack)
 
 
-def _checked(vertices, faces):
+def _check(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both as the kernels take them, float64 and int64; raises `ValueError` for wrong shapes or indices."""
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     faces = np.ascontiguousarray(faces, dtype=np.int64)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import ConvexHull
 
-from gsac.avatar.normals import vertex_normals
+from gsac.avatar.mesh import vertex_normals
 
 
 @dataclass

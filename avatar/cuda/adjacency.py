@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from gsac.avatar.distinct import distinct
+from gsac.avatar.mesh import distinct_pairs
 
 
 def joint_levels(parents: np.ndarray) -> np.ndarray:
@@ -48,8 +48,8 @@ def neighbours(faces: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray
 def _neighbours(faces: bytes, vertices: int) -> tuple[np.ndarray, np.ndarray]:
     faces = np.frombuffer(faces, np.int64).reshape(-1, 3)
     i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
-    both = distinct(np.r_[i, j] * vertices + np.r_[j, i])
-    start, near = _starts(both // vertices, vertices), both % vertices
+    owner, near = distinct_pairs(np.r_[i, j], np.r_[j, i], vertices)
+    start = _starts(owner, vertices)
     start.flags.writeable = near.flags.writeable = False
     return start, near
 

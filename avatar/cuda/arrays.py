@@ -15,9 +15,10 @@ from gsac.avatar.cuda.recipe import Drawn, Recipe
 from gsac.avatar.cuda.smoothing import series
 from gsac.avatar.cuda.structs import FRAME, POINTERS, Scene, State
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY, FINGERS, JAW_EYES, J
+from gsac.avatar.logistic import logit, sigmoid
 
-TILE, SEGMENT, JOINTS = 16, 128, 55
-BODY, JAW_EYES, FINGERS = slice(0, 22), slice(22, 25), 25
+TILE, SEGMENT, JOINTS = 16, 128, J
 NOW = 256
 """Bytes kept for each frame of the batch's `Now`; at least the struct's."""
 
@@ -63,7 +64,7 @@ class Arrays:
 
     def gaussians(self) -> Gaussians:
         b = self.buffers
-        opacity = 1 / (1 + np.exp(-b["logit"].read().astype(np.float64)))
+        opacity = sigmoid(b["logit"].read().astype(np.float64))
         return Gaussians(self.face.copy(), b["mu"].read(), b["quat"].read(), b["log_scale"].read(), b["rgb"].read(),
                          opacity.astype(np.float32), self.light)
 
@@ -156,7 +157,7 @@ class Arrays:
             self.scene.smoothness, self.scene.series_terms = self.recipe.smoothness, len(found.factors)
             self.scene.series_middle, self.scene.series_half = found.middle, found.half
             self._upload("series", found.factors, np.float32)
-        on_fingers = np.where(np.asarray(body.skin_index) >= FINGERS, body.skin_weight, 0).sum(1)
+        on_fingers = np.where(np.asarray(body.skin_index) >= FINGERS.start, body.skin_weight, 0).sum(1)
         for name, array, kind in (("near_start", near_start, np.int32), ("near_vertex", near_vertex, np.int32),
                                   ("offset_share", 1 - on_fingers, np.float32)):
             self._upload(name, array, kind)
@@ -208,7 +209,7 @@ class Arrays:
         """Buffers' names and what they are to hold."""
         opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
-                "logit": np.log(opacity / (1 - opacity)), "start": gaussians.mu}
+                "logit": logit(opacity), "start": gaussians.mu}
 
     def _scratch(self) -> None:
         batch, n, v = self.batch, self.count, self.scene.vertex_count

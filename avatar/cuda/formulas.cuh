@@ -1,6 +1,6 @@
 // Formulas of one gaussian, one pixel and one joint, forward and backward: binding, EWA projection, compositing, rotation
 // vectors, Adam. The kernels and the host test (float64) compile this same text; avatar/binding.py, avatar/raster/ and
-// avatar/skinning.py say the same on the CPU.
+// avatar/skinning.py say the same on the CPU. The draw rule's constants stand before this text: avatar/blend.py writes them.
 #pragma once
 
 #ifdef __CUDACC__
@@ -11,9 +11,6 @@
 using std::ceil; using std::cos; using std::exp; using std::floor; using std::fmax; using std::fmin; using std::log; using std::pow;
 using std::sin; using std::sqrt;
 #endif
-
-constexpr double NEAR_PLANE = 0.01, BLUR = 0.3, FRUSTUM = 0.3, MAX_ALPHA = 0.999, STOP = 1e-4;
-constexpr double DARKEST = 0.25, BRIGHTEST = 2.5;
 
 template <class real> struct Vec { real x, y, z; };
 template <class real> FORMULA Vec<real> operator+(Vec<real> a, Vec<real> b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -191,7 +188,7 @@ template <class real> struct Splat { real x, y, ha, b, hc, s_max, wide, high; bo
 
 template <class real> FORMULA Splat<real> project(const Lens<real> &lens, const Bound<real> &g, real opacity) {
     Splat<real> s;
-    s.seen = g.mean.z > real(NEAR_PLANE) && g.mean.z < real(1e6) && opacity > real(1.0 / 255) && opacity < real(1e6);
+    s.seen = g.mean.z > real(NEAR_PLANE) && g.mean.z < real(1e6) && opacity > real(MIN_ALPHA) && opacity < real(1e6);
     if (!s.seen) return s;
     Rows<real> r = rows_of(lens, g);
     real aa = 0, ab = 0, bb = 0;
@@ -210,7 +207,7 @@ template <class real> FORMULA Splat<real> project(const Lens<real> &lens, const 
     s.ha = yy / (2 * determinant);
     s.b = -ab / determinant;
     s.hc = xx / (2 * determinant);
-    s.s_max = log(255 * opacity);
+    s.s_max = log(real(ALPHA_LEVELS) * opacity);
     s.wide = sqrt(2 * s.s_max * xx);
     s.high = sqrt(2 * s.s_max * yy);
     s.seen = determinant < real(1e30) && xx < real(1e15) && yy < real(1e15) && s.x < real(1e7) && s.x > real(-1e7) &&

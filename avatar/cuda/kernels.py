@@ -7,6 +7,7 @@ import os
 import tempfile
 from pathlib import Path
 
+from gsac.avatar.blend import cuda_constants
 from gsac.avatar.cuda.structs import declarations
 
 SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "perceptual.cuh", "update.cuh",
@@ -24,7 +25,7 @@ class CompileError(Exception):
 def source() -> str:
     folder = Path(__file__).parent
     first, *rest = ((folder / name).read_text().replace("#pragma once\n", "") for name in SOURCES)
-    return "\n".join([first, declarations(), *rest])
+    return "\n".join([cuda_constants(), first, declarations(), *rest])
 
 
 def folder() -> Path:

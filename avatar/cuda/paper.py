@@ -11,6 +11,7 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.cuda.recipe import Drawn, Recipe, draw
 from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.logistic import sigmoid
 
 NEAREST = 3
 COLUMNS = 10
@@ -57,7 +58,7 @@ class PaperTrainer(CudaTrainer):
 
     def gaussians(self) -> Gaussians:
         v, limit = self.values(), self.recipe.scale_limit
-        opacity = 1 / (1 + np.exp(-self.buffers["logit"].read()))
+        opacity = sigmoid(self.buffers["logit"].read())
         return Gaussians(self.face.copy(), v["mu"], v["quat"] / np.linalg.norm(v["quat"], axis=1, keepdims=True),
                          np.log(limit) - np.log1p(np.exp(-v["scale"])), np.clip(v["rgb"], 0, 1), opacity)
 
@@ -76,7 +77,7 @@ class PaperTrainer(CudaTrainer):
         moments = {name: self.buffers[name].read() for name in ("first", "second")}
         fresh = len(face) - self.count
         self.face, self.count, self.scene.count = np.asarray(face, np.int32), len(face), len(face)
-        opacity = 1 / (1 + np.exp(-self.buffers["logit"].read()[0]))
+        opacity = sigmoid(self.buffers["logit"].read()[0])
         self._upload_gaussians(Gaussians(self.face, values["mu"], values["quat"], values["scale"], values["rgb"],
                                          np.full(len(face), opacity, np.float32)))
         for name, kept in moments.items():

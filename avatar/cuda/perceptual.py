@@ -33,7 +33,7 @@ class Window:
         """precision: of the convolutions, by torch's name."""
         import torch
 
-        self._torch, self.network = torch, network.on("cuda", getattr(torch, precision))
+        self._torch, self.network = torch, network.to("cuda", getattr(torch, precision))
         self.images = torch.zeros((2, height, width, 3), device="cuda")
         self.slope, self.value = torch.zeros((height, width, 3), device="cuda"), torch.zeros((), device="cuda")
         self.stream = torch.cuda.ExternalStream(int(device.stream))
@@ -54,6 +54,6 @@ class Window:
 
     def _compute(self) -> None:
         image = self.images[0].detach().requires_grad_()
-        value = self.network.compared(image, self.images[1])
+        value = self.network.compare(image, self.images[1])
         self.slope.copy_(self._torch.autograd.grad(value, image)[0])
         self.value.copy_(value.detach())

@@ -1,1 +1,1 @@
-"""The `.gsac` format: one file that holds a rigged avatar, written and read."""
+"""The `.gsac` format: one file that holds a rigged avatar. Writing, reading and checking."""

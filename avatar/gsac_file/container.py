@@ -1,7 +1,7 @@
 """The bytes of `avatar.gsac`: a fixed header, a JSON head, aligned little-endian blocks (docs/gsac-format.md).
 
-This file knows bytes only; what the blocks mean is `rigged.py`'s affair. Nothing in a file is believed before it is
-checked: a bad file raises `GsacError` with one `Fault`, and memory stays in proportion to the file's real size.
+Only bytes are known here; `read.py` and `rigged.py` know what the blocks mean. Nothing in a file is believed before it is checked:
+a bad file raises `GsacError` with one `Fault`, and memory stays in proportion to the file's real size.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DTYPES = {"f32": "<f4", "f16": "<f2", "u8": "u1", "u16": "<u2", "u32": "<u4", "i
 
 
 class Fault(Enum):
-    """What is wrong with a file; every reader, in whatever language, uses these names."""
+    """Kinds of bad files; the readers in all languages use these names."""
 
     NOT_GSAC = "it does not begin with the GSAC magic bytes"
     VERSION = "its format version is not one that this reader knows"
@@ -55,7 +55,7 @@ def pack(head: dict, blocks: dict[str, np.ndarray], scales: dict[str, float] | N
     """The bytes of a container; the same input gives the same bytes.
 
     head: JSON-able, without the key `blocks`
-    blocks: name -> array of a dtype in `DTYPES`
+    blocks: name -> array (...) of a dtype in `DTYPES`
     scales: name -> factor that turns the stored integers into values
     """
     names = {np.dtype(v): k for k, v in DTYPES.items()}
@@ -79,8 +79,8 @@ def pack(head: dict, blocks: dict[str, np.ndarray], scales: dict[str, float] | N
 def unpack(data: bytes, where: str = "avatar.gsac") -> tuple[dict, dict[str, np.ndarray]]:
     """Head and blocks of a container.
 
-    Returns the head (its `blocks` table included) and name -> read-only array: a view into `data` as stored, or
-    float32 where the block carries a scale. Raises GsacError.
+    Returns the head (its `blocks` table included) and name -> read-only array (...): a view into `data` as stored, or
+    float32 where the block carries a scale. Raises `GsacError`.
     """
     def bad(fault: Fault, detail: str) -> GsacError:
         return GsacError(fault, where, detail)

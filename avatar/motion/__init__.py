@@ -1,1 +1,1 @@
-"""Motion from other tools, put on the avatar's own 55 joints: a file -> `Source` -> `retarget` -> `Motion`."""
+"""Motion files of other tools on the avatar's 55 joints: a file is read as a `Source`, which `retarget` turns into a `Motion`."""

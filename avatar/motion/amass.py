@@ -1,4 +1,4 @@
-"""Reader of AMASS-style npz files: SMPL, SMPL-H or SMPL-X rotations as axis-angle. Every fault names the file and the array."""
+"""Reads AMASS-style npz files: SMPL, SMPL-H or SMPL-X rotations as axis-angle. Every error names the file and the array."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.artifacts import ArtifactError, read_arrays
+from gsac.avatar.joints import BODY, FINGERS, POSE_PARTS, J
 from gsac.avatar.motion import quat
 from gsac.avatar.motion.source import LARGEST, MotionError, Source
 
 FPS = 30.0
-"""Where the file names no rate."""
+"""Frames a second, where the file gives no rate."""
 RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 TRANSL = ("trans", "transl")
-BODY, JAW, EYES, HANDS = slice(1, 22), slice(22, 23), slice(23, 25), slice(25, 55)
-LAYOUTS = {72: [(0, 22, slice(0, 22))], 156: [(0, 22, slice(0, 22)), (22, 52, HANDS)], 165: [(0, 55, slice(0, 55))]}
+LAYOUTS = {72: [(0, 22, BODY)], 156: [(0, 22, BODY), (22, 52, FINGERS)], 165: [(0, J, slice(0, J))]}
 """Width of `poses` -> (first, end, ours) in joints: SMPL (its two hand joints are left out), SMPL-H, SMPL-X."""
 PARTS = {
-    "root_orient": slice(0, 1), "global_orient": slice(0, 1), "pose_body": BODY, "body_pose": BODY, "pose_jaw": JAW,
-    "jaw_pose": JAW, "pose_eye": EYES, "leye_pose": slice(23, 24), "reye_pose": slice(24, 25), "pose_hand": HANDS,
-    "left_hand_pose": slice(25, 40), "right_hand_pose": slice(40, 55),
-}
+    "root_orient": POSE_PARTS["global_orient"], "pose_body": POSE_PARTS["body_pose"], "pose_jaw": POSE_PARTS["jaw_pose"],
+    "pose_eye": slice(23, 25), "pose_hand": FINGERS,
+} | POSE_PARTS
+"""AMASS' names for parts of a pose, and SMPL-X's -> their joints; where a file has both, SMPL-X's count."""
 
 
 def read_amass(path: Path, joint_names: list[str], parents: np.ndarray, joints: np.ndarray) -> Source:
@@ -31,7 +31,7 @@ def read_amass(path: Path, joint_names: list[str], parents: np.ndarray, joints: 
     except (ArtifactError, MemoryError) as e:
         raise MotionError(str(e) or f"{path}: an array says that it is larger than the memory") from e
     pose = _pose(arrays, str(path))
-    T, J = pose.shape[:2]
+    T = len(pose)
     if len(joint_names) != J:
         raise MotionError(f"{path}: its {J} joints are SMPL-X's, and the avatar has {len(joint_names)} others")
     name = next((n for n in TRANSL if n in arrays), None)
@@ -60,15 +60,15 @@ def _pose(arrays: dict[str, np.ndarray], where: str) -> np.ndarray:
         if len(shape) != 2 or shape[1] not in LAYOUTS or not shape[0]:
             raise MotionError(f"{where}: array poses has shape {shape}; expected (T, 72), (T, 156) or (T, 165)")
         given = _numbers(arrays, "poses", shape, where).reshape(shape[0], -1, 3)
-        out = np.zeros((shape[0], 55, 3))
+        out = np.zeros((shape[0], J, 3))
         for first, end, ours in LAYOUTS[shape[1]]:
             out[:, ours] = given[:, first:end]
         return out
     parts = {name: at for name, at in PARTS.items() if name in arrays}
-    if not any(at == BODY for at in parts.values()):
+    if not any(at == POSE_PARTS["body_pose"] for at in parts.values()):
         raise MotionError(f"{where}: no array poses, pose_body or body_pose (it has {', '.join(sorted(arrays)[:20])})")
-    T = len(arrays[next(name for name, at in parts.items() if at == BODY)].reshape(-1, 63))
-    out = np.zeros((T, 55, 3))
+    T = len(arrays[next(name for name, at in parts.items() if at == POSE_PARTS["body_pose"])].reshape(-1, 63))
+    out = np.zeros((T, J, 3))
     for name, at in parts.items():
         out[:, at] = _numbers(arrays, name, (T, 3 * (at.stop - at.start)), where).reshape(T, -1, 3)
     return out

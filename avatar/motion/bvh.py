@@ -1,4 +1,4 @@
-"""Reader of Biovision BVH files. Every fault names the file and the line."""
+"""Reads Biovision BVH files. Every error names the file and the line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_bvh(path: Path) -> Source:
 
 
 def parse_bvh(text: str, where: str = "motion.bvh") -> Source:
-    """The same for the text of a file."""
+    """As `read_bvh`, from the text of a file; where: its name in messages."""
     return _Reader(text, where).source()
 
 

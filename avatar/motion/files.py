@@ -1,4 +1,4 @@
-"""Motion files of other tools as motions of the avatar: read, then retarget."""
+"""Reads a motion file of another tool as a motion of the avatar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which joint of a strange skeleton is which of SMPL-X's: by name, through the spellings that tools use.
+"""Matches the joints of other skeletons to SMPL-X's by name, through the spellings of common tools.
 
 The viewer's scripts get `RULES` from here, so there is one table.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 NOISE = ("mixamorig", "bip", "j", "c", "b", "f", "def", "org", "jnt", "bone", "bn")
-"""Words of a name that say nothing: prefixes of Mixamo, Biped, VRoid, Rigify."""
+"""Words without meaning in a name: prefixes of Mixamo, Biped, VRoid, Rigify."""
 SIDES = {"left": "left_", "l": "left_", "right": "right_", "r": "right_"}
 LIMBS = (
     ("hip", "upleg upperleg thigh thighbend hip"),
@@ -21,8 +21,8 @@ LIMBS = (
     ("wrist", "wrist hand"),
     ("eye_smplhf", "eye eyesmplhf"),
 )
-"""Joint without its side, and spellings; the first that is there and not yet taken. So `LeftShoulder` is the upper arm
-where nothing else is, and the collar beside a `LeftArm`."""
+"""Joint without its side -> spellings; the first that is present and not yet taken counts. So `LeftShoulder` is the collar of a
+skeleton with a `LeftArm`, and the upper arm of one without."""
 MIDDLE = (("neck", "neck neck1"), ("head", "head"), ("jaw", "jaw"))
 PHALANGES = {"index": "index", "middle": "middle mid", "pinky": "pinky little", "ring": "ring", "thumb": "thumb"}
 PARTS = ("proximal", "intermediate", "distal")
@@ -43,11 +43,11 @@ def _rules() -> list[tuple[str, str, list[str]]]:
 
 
 RULES = _rules()
-"""(joint of SMPL-X, side, spellings) in the order in which names are taken. VRM's thumb counts from its metacarpal."""
+"""(joint of SMPL-X, side, spellings) in the order of matching. VRM's thumb counts from its metacarpal."""
 
 
-def plain(name: str) -> tuple[str, str]:
-    """Side (`left_`, `right_` or nothing) and the bare word of a joint's name."""
+def split_side(name: str) -> tuple[str, str]:
+    """Side (`left_`, `right_` or empty) and the bare word of a joint's name."""
     words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+", re.split(r"[:|]", name)[-1])
     side, out = "", []
     for i, word in enumerate(w.lower() for w in words):
@@ -63,10 +63,10 @@ def plain(name: str) -> tuple[str, str]:
 
 
 def match(names: list[str]) -> dict[str, int]:
-    """Joint of SMPL-X -> index into names, for those that are found. Hips and spine have no rule: they are found by place."""
+    """Joint of SMPL-X -> index into names, for the joints found. Hips and spine have no rule: `retarget` finds them by place."""
     known: dict[tuple[str, str], int] = {}
     for i, name in enumerate(names):
-        known.setdefault(plain(name), i)
+        known.setdefault(split_side(name), i)
     found: dict[str, int] = {}
     taken: set[int] = set()
     for joint, side, spellings in RULES:

@@ -1,12 +1,12 @@
-"""A motion of another skeleton on the avatar's joints. The viewer's retarget.js follows the same rules, step by step.
+"""Puts a motion of another skeleton on the avatar's joints. The viewer's retarget.js follows the same rules, step by step.
 
 1. Joints are found by name (`names.py`); hips and chest are where the legs and the arms meet, the spine is between them.
-2. Reference: the file's rest pose, or, where that is no standing person (bones that all point one way), the frame that
-   looks most like the T-pose. There each of the avatar's joints is laid on the source's: torso, neck and head upright,
-   limbs and fingers along the source's bones by the smallest turn from the parent, feet in the source's direction. What is
-   left between a source joint's turn and ours is a constant of the joint.
-3. Every frame: our turn in the world is the source's with that constant. Joints without a source follow their parent.
-4. The source's up axis becomes +y, its first frame faces +z at the origin; lengths follow the legs; the feet's lowest
+2. The reference is the file's rest pose, or, where that is no standing person (bones that all point one way), the frame
+   most similar to the T-pose. There the avatar's joints are aligned with the source's: torso, neck and head upright, limbs
+   and fingers along the source's bones by the smallest turn from the parent, feet in the source's direction. The remaining
+   rotation between a source joint and ours is a constant of the joint.
+3. In every frame our rotation in the world is the source's times that constant. Joints without a source follow their parent.
+4. The source's up axis becomes +y, its first frame faces +z at the origin; lengths are scaled by the legs'; the feet's lowest
    place (2nd percentile over time) is the floor.
 """
 
@@ -21,30 +21,34 @@ from gsac.avatar.motion.source import Motion, MotionError, Source
 NEEDED = [f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "shoulder", "elbow")]
 LIMBS = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right")
          for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))]
-"""Bones that are laid along the source's."""
+"""Bones that are aligned with the source's."""
 SPINE = ("spine1", "spine2", "spine3")
 STANDS = 0.4
-"""A pose with at least this mean cosine between its limbs and the T-pose's is a reference: arms that hang give 0.5."""
+"""Least mean cosine between the limbs of a reference and the T-pose's: hanging arms give 0.5."""
 REFERENCES = 64
-"""How many frames are looked at for a reference."""
+"""Number of frames that are candidates for the reference."""
 UPRIGHT = 0.7
-"""Cosine: the torso's mean direction lies this near to an axis of the source's world, which is then up."""
+"""Least cosine between the torso's mean direction and an axis of the source's world, for that axis to be up."""
 FLOOR_SHARE = 0.02
+"""Share of the frames whose feet may lie under the floor."""
 
 
 def retarget(source: Source, joint_names: list[str], parents: np.ndarray, joints: np.ndarray, where: str = "motion") -> Motion:
-    """joint_names (J), parents (J,), joints (J, 3) m: the avatar's. Raises MotionError where the skeleton is not a person's."""
-    ours = {name: np.asarray(place, float) for name, place in zip(joint_names, joints, strict=True)}
-    found, torso = _matched(source, where)
-    rest_turns, rest_places = _reference(source, found, torso, ours)
-    laid, up = _laid(rest_places, found, torso, ours)
+    """The motion on the avatar's joint_names (J), parents (J,) and joints (J, 3) at rest, m. where: the file in messages.
 
-    def followed(at: int, turn: np.ndarray) -> np.ndarray:
-        """(T, 4): our joint's turn in the world, which is `turn` where the source's joint `at` is as in the reference."""
+    Raises `MotionError` where the source's skeleton is not a person's.
+    """
+    ours = {name: np.asarray(place, float) for name, place in zip(joint_names, joints, strict=True)}
+    found, torso = _match_joints(source, where)
+    rest_turns, rest_places = _reference(source, found, torso, ours)
+    laid, up = _lay_bones(rest_places, found, torso, ours)
+
+    def follow(at: int, turn: np.ndarray) -> np.ndarray:
+        """Our joint's rotation in the world (T, 4), which is `turn` (4,) while the source's joint `at` is as in the reference."""
         return quat.multiply(source.turns[:, at], quat.multiply(quat.inverse(rest_turns[at]), turn))
 
-    world = {name: followed(at, laid.get(name, laid["pelvis"])) for name, at in found.items() if name in ours}
-    spine = [followed(at, laid["pelvis"]) for at in torso]
+    world = {name: follow(at, laid.get(name, laid["pelvis"])) for name, at in found.items() if name in ours}
+    spine = [follow(at, laid["pelvis"]) for at in torso]
     world["pelvis"] = spine[0]
     for k, name in enumerate(SPINE, 1):
         place = k * (len(spine) - 1) / len(SPINE)
@@ -63,8 +67,8 @@ def retarget(source: Source, joint_names: list[str], parents: np.ndarray, joints
     return Motion(source.fps, rotation, _transl(hips, turns, list(joint_names), parents, joints))
 
 
-def _matched(source: Source, where: str) -> tuple[dict[str, int], list[int]]:
-    """Our joint -> theirs; their joints of the torso from the hips to the chest."""
+def _match_joints(source: Source, where: str) -> tuple[dict[str, int], list[int]]:
+    """Our joint -> index of the source's; indices of the source's torso from the hips to the chest."""
     found = match(source.names)
     missing = [name for name in NEEDED if name not in found]
     if missing:
@@ -94,15 +98,15 @@ def _matched(source: Source, where: str) -> tuple[dict[str, int], list[int]]:
 
 def _reference(source: Source, found: dict[str, int], torso: list[int],
                ours: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (P, 4) and places (P, 3) of the pose in which the skeletons are laid on each other."""
-    if _likeness(source.rest_places, found, torso, ours) >= STANDS:
+    """Turns (P, 4) and places (P, 3) of the pose in which the skeletons are aligned."""
+    if _similarity_to_t_pose(source.rest_places, found, torso, ours) >= STANDS:
         return source.rest_turns, source.rest_places
     frames = np.unique(np.linspace(0, len(source.turns) - 1, REFERENCES).astype(int))
-    best = max(frames, key=lambda k: _likeness(source.places[k], found, torso, ours))
+    best = max(frames, key=lambda k: _similarity_to_t_pose(source.places[k], found, torso, ours))
     return source.turns[best], source.places[best]
 
 
-def _likeness(places: np.ndarray, found: dict[str, int], torso: list[int], ours: dict[str, np.ndarray]) -> float:
+def _similarity_to_t_pose(places: np.ndarray, found: dict[str, int], torso: list[int], ours: dict[str, np.ndarray]) -> float:
     """Mean cosine between the limbs and those of the T-pose."""
     standing, _ = _standing(places, found, torso, ours)
     bones = [(places[found[b]] - places[found[a]], quat.rotate(standing, ours[b] - ours[a]))
@@ -112,7 +116,7 @@ def _likeness(places: np.ndarray, found: dict[str, int], torso: list[int], ours:
 
 def _standing(places: np.ndarray, found: dict[str, int], torso: list[int],
               ours: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Turn (4,) from our axes to an upright person's in these places (P, 3), and the axis (3,) that is up there."""
+    """Rotation (4,) from our axes to those of an upright person with joints at places (P, 3), and its up axis (3,)."""
     top = found.get("head", found.get("neck", torso[-1]))
     rise = places[top] - places[torso[0]]
     up = np.zeros(3)
@@ -122,7 +126,7 @@ def _standing(places: np.ndarray, found: dict[str, int], torso: list[int],
 
 
 def _facing(places: dict[str, np.ndarray], up: np.ndarray) -> np.ndarray:
-    """(4,): the turn that takes x to the person's left, y to up."""
+    """Rotation (4,) that takes x to the person's left and y to up."""
     left = places["left_hip"] - places["right_hip"] + places["left_shoulder"] - places["right_shoulder"]
     left = left - (left @ up) * up
     if np.linalg.norm(left) < 1e-9:
@@ -131,41 +135,41 @@ def _facing(places: dict[str, np.ndarray], up: np.ndarray) -> np.ndarray:
     return quat.from_columns(left, up, np.cross(left, up))
 
 
-def _laid(places: np.ndarray, found: dict[str, int], torso: list[int],
+def _lay_bones(places: np.ndarray, found: dict[str, int], torso: list[int],
           ours: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Turns (4,) of our joints in the source's world in the reference pose, those that are not `pelvis`' too; up (3,)."""
+    """Our joints' rotations (4,) in the source's world in the reference pose, where they differ from the pelvis', and up (3,)."""
     standing, up = _standing(places, found, torso, ours)
     laid = {"pelvis": standing}
 
-    def along(a: str, b: str, start: np.ndarray) -> None:
-        """Lays our bone from a to b on theirs, by the smallest turn from `start`."""
+    def align(a: str, b: str, start: np.ndarray) -> None:
+        """Aligns our bone from a to b with the source's, by the smallest turn from `start`."""
         laid[a] = start
         if a in found and b in found and b in ours and np.linalg.norm(places[found[b]] - places[found[a]]) > 1e-9:
             here = quat.rotate(start, ours[b] - ours[a])
             laid[a] = quat.multiply(quat.between(here, places[found[b]] - places[found[a]]), start)
 
     for side in ("left_", "right_"):
-        along(side + "hip", side + "knee", standing)
-        along(side + "knee", side + "ankle", laid[side + "hip"])
-        laid[side + "ankle"] = laid[side + "foot"] = _turned(standing, up, (side + "ankle", side + "foot"), places, found, ours)
-        along(side + "shoulder", side + "elbow", standing)
-        along(side + "elbow", side + "wrist", laid[side + "shoulder"])
-        along(side + "wrist", side + "middle1", laid[side + "elbow"])
+        align(side + "hip", side + "knee", standing)
+        align(side + "knee", side + "ankle", laid[side + "hip"])
+        laid[side + "ankle"] = laid[side + "foot"] = _turn_bone(standing, up, (side + "ankle", side + "foot"), places, found, ours)
+        align(side + "shoulder", side + "elbow", standing)
+        align(side + "elbow", side + "wrist", laid[side + "shoulder"])
+        align(side + "wrist", side + "middle1", laid[side + "elbow"])
         if side + "middle1" in found and side + "wrist" in found:
             palm = places[found[side + "middle1"]] - places[found[side + "wrist"]]
-            laid[side + "wrist"] = _turned(laid[side + "wrist"], palm, (side + "pinky1", side + "index1"), places, found, ours)
+            laid[side + "wrist"] = _turn_bone(laid[side + "wrist"], palm, (side + "pinky1", side + "index1"), places, found, ours)
         for finger in ("index", "middle", "pinky", "ring", "thumb"):
             start = laid[side + "wrist"]
             for k in (1, 2):
-                along(f"{side}{finger}{k}", f"{side}{finger}{k + 1}", start)
+                align(f"{side}{finger}{k}", f"{side}{finger}{k + 1}", start)
                 start = laid[f"{side}{finger}{k}"]
             laid[f"{side}{finger}3"] = start
     return laid, up
 
 
-def _turned(start: np.ndarray, axis: np.ndarray, bone: tuple[str, str], places: np.ndarray, found: dict[str, int],
+def _turn_bone(start: np.ndarray, axis: np.ndarray, bone: tuple[str, str], places: np.ndarray, found: dict[str, int],
             ours: dict[str, np.ndarray]) -> np.ndarray:
-    """(4,): `start` turned about an axis (3,) until our bone lies beside theirs as well as that can be."""
+    """`start` (4,) turned about an axis (3,) until our bone is as parallel to the source's as it can be."""
     a, b = bone
     if a not in found or b not in found or a not in ours or b not in ours or np.linalg.norm(axis) < 1e-9:
         return start
@@ -178,7 +182,7 @@ def _turned(start: np.ndarray, axis: np.ndarray, bone: tuple[str, str], places: 
 
 
 def _upright(pelvis: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """(4,): from the source's world to ours; pelvis: (T, 4) in the source's world."""
+    """Rotation (4,) from the source's world to ours; pelvis: (T, 4) in the source's world; up: (3,)."""
     mean = quat.rotate(pelvis, np.array([0.0, 1.0, 0.0])).mean(0)
     axis = np.argmax(np.abs(mean))
     if abs(mean[axis]) >= UPRIGHT:
@@ -193,14 +197,14 @@ def _upright(pelvis: np.ndarray, up: np.ndarray) -> np.ndarray:
 
 
 def _scale(source: Source, found: dict[str, int], ours: dict[str, np.ndarray]) -> float:
-    """Our legs' length by theirs."""
+    """Length of our legs over the source's."""
     legs = [(a, b) for a, b in LIMBS if a in found and b in found and ("hip" in a or "knee" in a)]
     theirs = sum(np.linalg.norm(source.rest_places[found[b]] - source.rest_places[found[a]]) for a, b in legs)
     return float(sum(np.linalg.norm(ours[b] - ours[a]) for a, b in legs) / max(theirs, 1e-12))
 
 
 def _transl(hips: np.ndarray, turns: np.ndarray, names: list[str], parents: np.ndarray, joints: np.ndarray) -> np.ndarray:
-    """(T, 3) float32: what moves the pelvis to hips (T, 3), from the origin on, with the feet on the floor."""
+    """Translation (T, 3) float32, m, that moves the pelvis along hips (T, 3) from the origin, with the feet on the floor."""
     places = np.empty((*turns.shape[:2], 3))
     for j, parent in enumerate(parents):
         places[:, j] = joints[j] if parent < 0 else (

@@ -1,4 +1,4 @@
-"""A motion as it was recorded, on whatever skeleton, and a motion of the avatar."""
+"""A motion as recorded on any skeleton, and a motion of the avatar."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.motion import quat
 
 LARGEST = 1e9
-"""Of any number in a motion file: beyond it sums and products leave float32."""
+"""Upper limit of the numbers in a motion file: beyond it sums and products leave float32."""
 
 
 class MotionError(ArtifactError):

@@ -1,8 +1,8 @@
 """Differentiable CPU rasteriser of 3-D gaussians.
 
-`render` and `render_bound` give the image and a state; `render_backward` and `render_bound_backward` take the image's
-gradient back. EWA splatting in 32x32 tiles, one global depth sort, gradients in one slot for each (tile, gaussian): results
-are bitwise the same for any number of threads. float32; float64 in, float64 out (tests).
+`render` and `render_bound` return the image and a state, from which `render_backward` and `render_bound_backward` turn the image's
+gradient into the gaussians'. EWA splatting in 32x32 tiles, one global depth sort, gradients in one slot for each (tile, gaussian):
+results are bitwise the same for any number of threads. float32; float64 in, float64 out (tests).
 """
 
 from __future__ import annotations
@@ -21,32 +21,35 @@ from gsac.avatar.threads import Workspace
 
 @dataclass
 class State:
-    """What the backward pass needs of a rendering."""
+    """A rendering's intermediate values, which its backward pass needs. P pairs of a tile and a gaussian that it shows."""
 
     camera: Camera
     workspace: Workspace
-    means: np.ndarray
-    rotations: np.ndarray
-    scales: np.ndarray
-    lens: np.ndarray
-    lattice: np.ndarray
-    splats: np.ndarray
-    slot_start: np.ndarray
-    tile_order: np.ndarray
-    tile_start: np.ndarray
-    pair_gaussian: np.ndarray
-    pair_slot: np.ndarray
-    pair_mask: np.ndarray
+    means: np.ndarray  # (N, 3) m, camera frame
+    rotations: np.ndarray  # (N, 3, 3)
+    scales: np.ndarray  # (N, 3) m
+    lens: np.ndarray  # (4,) focal lengths and principal point, px
+    lattice: np.ndarray  # (32,) x, then y of the pixel centres of a block
+    splats: np.ndarray  # (N, 16), columns as in project.py
+    slot_start: np.ndarray  # (N + 1,) int32: the slots of a gaussian's pairs
+    tile_order: np.ndarray  # (tiles,) int, the tile with most gaussians first
+    tile_start: np.ndarray  # (tiles + 1,) int32: the pairs of a tile
+    pair_gaussian: np.ndarray  # (P,) int32, front to back in each tile
+    pair_slot: np.ndarray  # (P,) int32
+    pair_mask: np.ndarray  # (P,) uint64, a bit for each block of the tile in which it was composited
     columns: int
-    rgb: np.ndarray
-    alpha: np.ndarray
+    """Tiles in a row of the image."""
+    rgb: np.ndarray  # (H, W, 3) as rendered
+    alpha: np.ndarray  # (H, W) as rendered
     bound: tuple = field(default=())
     """vertices, faces, face, mu, quat, log_scale of `render_bound`."""
     shade: np.ndarray | None = None
-    """(N, 3) that `render_bound` multiplied the colours with; None without a light."""
+    """(N, 3) factors of the colours in `render_bound`; None without a light."""
 
 
 class Rendering(NamedTuple):
+    """Image and state of a forward pass; both may lie in its workspace."""
+
     rgb: np.ndarray
     """(H, W, 3) premultiplied, without background: an image is rgb + (1 - alpha) background."""
     alpha: np.ndarray
@@ -55,6 +58,8 @@ class Rendering(NamedTuple):
 
 
 class Gradients(NamedTuple):
+    """Gradients of a loss with respect to free gaussians."""
+
     means: np.ndarray
     """(N, 3)."""
     rotations: np.ndarray
@@ -68,6 +73,8 @@ class Gradients(NamedTuple):
 
 
 class BoundGradients(NamedTuple):
+    """Gradients of a loss with respect to gaussians on a mesh, and to the mesh."""
+
     mu: np.ndarray
     """(N, 3)."""
     quat: np.ndarray
@@ -82,11 +89,15 @@ class BoundGradients(NamedTuple):
     """(V, 3)."""
 
 
-def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Workspace | None = None) -> Rendering:
-    """means: (N, 3) m, camera frame; rotations: (N, 3, 3); scales: (N, 3) m; rgb: (N, 3); opacity: (N,) 0..1."""
-    means = binding.plain(means)
+def render(means: np.ndarray, rotations: np.ndarray, scales: np.ndarray, rgb: np.ndarray, opacity: np.ndarray, camera: Camera,
+           workspace: Workspace | None = None) -> Rendering:
+    """Renders free gaussians.
+
+    means: (N, 3) m, camera frame; rotations: (N, 3, 3); scales: (N, 3) m; rgb: (N, 3); opacity: (N,) in 0..1.
+    """
+    means = binding.kernel_array(means)
     real = means.dtype
-    rotations, scales, rgb, opacity = (binding.plain(a, real) for a in (rotations, scales, rgb, opacity))
+    rotations, scales, rgb, opacity = (binding.kernel_array(a, real) for a in (rotations, scales, rgb, opacity))
     workspace = workspace or Workspace()
     share, take, count = workspace.share, workspace.take, len(means)
     lens = np.array([*camera.focal, *camera.center], real)
@@ -122,14 +133,14 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera, workspace: Wo
 
 
 def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) -> Gradients:
-    """grad_rgb: (H, W, 3), grad_alpha: (H, W): gradient of a loss with respect to the rendering that gave `state`."""
+    """Gradients of the gaussians from grad_rgb (H, W, 3) and grad_alpha (H, W), those of the rendering of `state`."""
     real, count = state.means.dtype, len(state.means)
     share, take = state.workspace.share, state.workspace.take
     moments = take("moments", (len(state.pair_slot), project.MOMENTS), real)
     scratch = take("backward", (state.workspace.workers, backward.PLANES * project.TILE ** 2), real)
     share(backward.composite_backward, state.tile_order, state.tile_start, state.pair_gaussian,
           state.pair_slot, state.pair_mask, state.splats, state.lattice, state.columns, scratch, state.rgb, state.alpha,
-          binding.plain(grad_rgb, real), binding.plain(grad_alpha, real), moments)
+          binding.kernel_array(grad_rgb, real), binding.kernel_array(grad_alpha, real), moments)
     gradients = Gradients(take("grad_means", (count, 3), real), take("grad_rotations", (count, 3, 3), real),
                           take("grad_scales", (count, 3), real), take("grad_rgb", (count, 3), real),
                           take("grad_opacity", (count,), real))
@@ -139,7 +150,7 @@ def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) 
 
 
 def screen_gradients(state: State) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 2) gradient with respect to the splats' centres, 1/px, of the last backward pass, and (N,) bool, in the image at all."""
+    """Of the last backward pass: gradient with respect to the splats' centres (N, 2), 1/px, and (N,) bool, visible at all."""
     moments = state.workspace.take("moments", (len(state.pair_slot), project.MOMENTS), state.means.dtype)
     visible = np.diff(state.slot_start) > 0
     g = np.zeros((len(visible), 2))
@@ -152,11 +163,11 @@ def screen_gradients(state: State) -> tuple[np.ndarray, np.ndarray]:
 
 def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, camera: Camera,
                  workspace: Workspace | None = None) -> Rendering:
-    """vertices: (V, 3) m, camera frame; faces: (F, 3) int: the gaussians bound to the posed mesh, rendered."""
-    vertices = binding.plain(vertices)
+    """Renders gaussians bound to a posed mesh. vertices: (V, 3) m, camera frame; faces: (F, 3) int."""
+    vertices = binding.kernel_array(vertices)
     real = vertices.dtype
-    faces, face = binding.plain(faces, np.int32), binding.plain(gaussians.face, np.int32)
-    mu, quat, log_scale = (binding.plain(a, real) for a in (gaussians.mu, gaussians.quat, gaussians.log_scale))
+    faces, face = binding.kernel_array(faces, np.int32), binding.kernel_array(gaussians.face, np.int32)
+    mu, quat, log_scale = (binding.kernel_array(a, real) for a in (gaussians.mu, gaussians.quat, gaussians.log_scale))
     workspace = workspace or Workspace()
     take, n, f = workspace.take, len(face), len(faces)
     frames = binding.FaceFrames(take("R", (f, 3, 3), real), take("T", (f, 3), real), take("k", (f,), real),
@@ -173,7 +184,7 @@ def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, 
 def render_bound_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) -> BoundGradients:
     """As `render_backward`, for the state of `render_bound`: gradients of the gaussians' own values and of the vertices.
 
-    The light is taken as it falls on the mesh: what a turning face gains or loses by it gives no gradient.
+    grad_rgb: (H, W, 3); grad_alpha: (H, W). The light is a constant here: how it changes with a face's normal gives no gradient.
     """
     gradients = render_backward(state, grad_rgb, grad_alpha)
     vertices, faces, face, mu, quat, log_scale = state.bound

@@ -1,26 +1,28 @@
 """Gradient of the compositing, front to back again.
 
-With V = what is still to come of (image gradient . colour, alpha counted as a fourth colour of value 1), a gaussian's
-dL/d(alpha) at a pixel is T (v . c) - V_behind / (1 - alpha): no colour of what lies behind has to be kept.
+Let v be the image's gradient, c a gaussian's colour with alpha as a fourth channel of value 1, T the transmittance before it, and V
+the sum of weight v . c over all gaussians behind it. Then dL/d(alpha) at a pixel is T (v . c) - V / (1 - alpha): the colours behind
+need not be kept, only V.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.blend import MAX_ALPHA, STOP
 from gsac.avatar.kernel import kernel
-from gsac.avatar.raster.forward import BLOCK, BLOCKS, LANES, MAX_ALPHA, STOP
+from gsac.avatar.raster.forward import BLOCK, BLOCKS, LANES
 from gsac.avatar.raster.project import BLUE, GREEN, HA, HC, OPACITY, RED, S_MAX, TILE, B, X, Y
 from gsac.avatar.simd import below_or_equal, falloff, load, lowest_bit, spread, store, store_totals, total
 
 PLANES = 6
-"""Transmittance, V, and the image gradient of red, green, blue, alpha of a block, 16 numbers each."""
+"""Transmittance, V of what is still to come, and the image gradient of red, green, blue, alpha of a block, 16 numbers each."""
 
 
 @kernel
 def composite_backward(worker, workers, tile_order, tile_start, pair_gaussian, pair_slot, pair_mask, splats, lattice, columns,
                        scratch, rgb, alpha, grad_rgb, grad_alpha, moments):
-    """Fills moments (pairs, 9), one row for each (tile, gaussian); rgb and alpha are what `composite` gave."""
+    """Fills moments (pairs, 9), one row for each (tile, gaussian); rgb (H, W, 3) and alpha (H, W) as `composite` left them."""
     height, width = alpha.shape
     real = splats.dtype.type
     zero, one = spread(real(0)), spread(real(1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.blend import MAX_ALPHA, STOP
 from gsac.avatar.kernel import kernel
 from gsac.avatar.raster.project import (
     BLUE,
@@ -29,11 +30,8 @@ from gsac.avatar.simd import any_above, below_or_equal, falloff, load, lowest_bi
 BLOCK = 4
 BLOCKS = TILE // BLOCK
 LANES = BLOCK * BLOCK
-MAX_ALPHA = 0.999
-STOP = 1e-4
-"""A gaussian that would leave this transmittance or less is not composited, nor any behind it."""
 LOOK = 64
-"""After so many gaussians of a tile, blocks that are opaque everywhere are looked for and left out from there on."""
+"""Gaussians of a tile between two searches for blocks that are opaque everywhere; those are skipped from there on."""
 PLANES = 5
 """Transmittance, red, green, blue, alpha of a block, 16 numbers each."""
 

@@ -1,13 +1,14 @@
 """EWA projection of 3-D gaussians to image splats, and its gradient.
 
 A splat is a row of 16 numbers; s = ha dx^2 + b dx dy + hc dy^2 is the exponent at (dx, dy) pixels from its centre, and the pixel's
-alpha is min(0.999, opacity exp(-s)) where s <= `S_MAX` (that is, alpha >= 1/255).
+alpha is min(`MAX_ALPHA`, opacity exp(-s)) where s <= `S_MAX` (that is, alpha >= `MIN_ALPHA`).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.blend import ALPHA_LEVELS, BLUR, FRUSTUM, MIN_ALPHA, NEAR
 from gsac.avatar.kernel import kernel
 
 X, Y, HA, B, HC, S_MAX, OPACITY, RED, GREEN, BLUE, HALF_WIDTH, HALF_HEIGHT, RIGHTMOST, CHORD, SLOPE, RIM = range(16)
@@ -19,12 +20,6 @@ MOMENTS = 9
 """Sums over pixels that the raster's backward pass leaves for each (tile, gaussian): g, g dx, g dy, g dx^2, g dx dy,
 g dy^2, with g = dL/d(-s), and w times the image gradient of red, green, blue."""
 
-NEAR = 0.01
-"""Metres; nearer gaussians are skipped."""
-BLUR = 0.3
-"""Pixels squared, added to the variance of every splat."""
-FRUSTUM = 0.3
-"""The Jacobian is taken at a point clamped to the frustum grown by this share of its half width on each side."""
 TILE = 32
 
 
@@ -75,7 +70,7 @@ def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width
     for i in range(count * worker // workers, count * (worker + 1) // workers):
         boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3] = 0, 0, 0, 0
         x, y, z, o = means[i, 0], means[i, 1], means[i, 2], opacity[i]
-        if not (z > real(NEAR) and z < real(1e6) and o > real(1 / 255) and o < real(1e6)):
+        if not (z > real(NEAR) and z < real(1e6) and o > real(MIN_ALPHA) and o < real(1e6)):
             continue
         jx, jy, u, v, _, _ = _jacobian(lens, real(width), real(height), x, y, z)
         a0, a1, a2, b0, b1, b2 = _rows(rotations, scales, i, jx, jy, u, v)
@@ -83,7 +78,7 @@ def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width
         px, py = x / z * lens[0] + lens[2], y / z * lens[1] + lens[3]
         if not (determinant < real(1e30) and xx < real(1e15) and yy < real(1e15) and abs(px) < real(1e7) and abs(py) < real(1e7)):
             continue
-        s_max = np.log(real(255) * o)
+        s_max = np.log(real(ALPHA_LEVELS) * o)
         wide, high = np.sqrt(two * s_max * xx), np.sqrt(two * s_max * yy)
         first_x, last_x = max(np.ceil(px - wide - half), real(0)), min(np.floor(px + wide - half), real(width - 1))
         first_y, last_y = max(np.ceil(py - high - half), real(0)), min(np.floor(py + high - half), real(height - 1))

@@ -1,23 +1,25 @@
-"""What the rasteriser must give: every gaussian at every pixel, in plain torch. Slow; for tests."""
+"""The rasteriser's result in plain torch: every gaussian at every pixel. Slow; for tests."""
 
 from __future__ import annotations
 
 import torch
 
+from gsac.avatar.blend import BLUR, FRUSTUM, MAX_ALPHA, MIN_ALPHA, NEAR, STOP
 from gsac.avatar.camera import Camera
-from gsac.avatar.raster.forward import MAX_ALPHA, STOP
-from gsac.avatar.raster.project import BLUR, FRUSTUM, NEAR
 
 
-def render(means, rotations, scales, rgb, opacity, camera: Camera):
-    """means (N, 3), rotations (N, 3, 3), scales (N, 3), rgb (N, 3), opacity (N,) tensors -> rgb (H, W, 3), alpha (H, W)."""
+def render(means: torch.Tensor, rotations: torch.Tensor, scales: torch.Tensor, rgb: torch.Tensor, opacity: torch.Tensor,
+           camera: Camera) -> tuple[torch.Tensor, torch.Tensor]:
+    """The rgb (H, W, 3) and alpha (H, W) of free gaussians.
+
+    means: (N, 3) m, camera frame; rotations: (N, 3, 3); scales: (N, 3) m; rgb: (N, 3); opacity: (N,) in 0..1.
+    """
     front = means[:, 2] > NEAR
     means, rotations, scales, rgb, opacity = (t[front] for t in (means, rotations, scales, rgb, opacity))
     order = torch.argsort(means[:, 2], stable=True)
     means, rotations, scales, rgb, opacity = (t[order] for t in (means, rotations, scales, rgb, opacity))
     z = means[:, 2]
-    centre, jacobian = [], torch.zeros(len(z), 2, 3, dtype=means.dtype)
-    rows = []
+    centre, rows = [], []
     for axis, size in enumerate((camera.width, camera.height)):
         f, c = camera.focal[axis], camera.center[axis]
         ratio = means[:, axis] / z
@@ -37,7 +39,7 @@ def render(means, rotations, scales, rgb, opacity, camera: Camera):
     offset = torch.stack([x - centre[0][:, None, None], y - centre[1][:, None, None]], -1)
     s = 0.5 * torch.einsum("nhwi,nij,nhwj->nhw", offset, inverse, offset)
     alpha = (opacity[:, None, None] * torch.exp(-s)).clamp(max=MAX_ALPHA)
-    alpha = torch.where(alpha >= 1 / 255, alpha, torch.zeros_like(alpha))
+    alpha = torch.where(alpha >= MIN_ALPHA, alpha, torch.zeros_like(alpha))
     after = torch.cumprod(1 - alpha, 0)
     before = torch.cat([torch.ones_like(after[:1]), after[:-1]])
     weight = torch.where(after > STOP, before * alpha, torch.zeros_like(alpha))

@@ -1,4 +1,4 @@
-"""Depth order, and the list of gaussians of every 32x32 tile."""
+"""Depth order of the gaussians, and the list of gaussians of every 32x32 tile."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ RADIX_BITS = 11
 
 @kernel
 def slots(boxes, slot_start):
-    """slot_start (N + 1,): where the slots of each gaussian's tiles begin. Returns how many gaussians are seen."""
+    """Fills slot_start (N + 1,): where the slots of each gaussian's tiles begin. Returns the number of visible gaussians."""
     seen, at = 0, 0
     for i in range(len(boxes)):
         slot_start[i] = at
@@ -24,9 +24,9 @@ def slots(boxes, slot_start):
 
 @kernel
 def depth_order(depths, slot_start, keys, order, spare_keys, spare):
-    """order[:seen]: the gaussians seen, front to back, equal depths by index. keys: unsigned view's type of the depths.
+    """The visible gaussians front to back, equal depths by index, in order[:seen]. keys: unsigned, as wide as the depths.
 
-    Positive floats sort like their bits; a stable radix sort, so the order does not depend on the machine.
+    Positive floats sort like their bits. The radix sort is stable, so the order does not depend on the machine.
     """
     seen = 0
     bits = depths.view(keys.dtype)
@@ -58,7 +58,7 @@ def depth_order(depths, slot_start, keys, order, spare_keys, spare):
 
 @kernel
 def fill(order, seen, boxes, slot_start, columns, tile_start, pair_gaussian, pair_slot):
-    """Each tile's gaussians front to back: pairs tile_start[t] .. tile_start[t + 1] hold the gaussian and its slot."""
+    """Lists each tile's gaussians front to back: pairs tile_start[t] .. tile_start[t + 1] hold the gaussian and its slot."""
     tile_start[:] = 0
     for r in range(seen):
         i = order[r]

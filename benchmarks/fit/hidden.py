@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.artifacts import read_arrays, write_arrays
-from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.joints import NAMES
 from gsac.avatar.wholebody import ARM, HANDS
 from gsac.benchmarks.fit.clips import FitCase
 from gsac.benchmarks.fit.score import joint_distances
@@ -81,7 +82,7 @@ def measure(case: FitCase) -> list[Hidden]:
         fit(Job(case.inputs | {"handgap/keypoints.npz": root / "handgap" / "keypoints.npz"}, root / "smplx", SmplxConfig()))
         params = BodyParams.read(root / "smplx" / "body.npz")
     off = joint_distances(Body.load(), params, case.truth)
-    column = {SMPLX_JOINTS[j]: i for i, j in enumerate(case.truth.joint)}
+    column = {NAMES[j]: i for i, j in enumerate(case.truth.joint)}
     return [Hidden(case.name, side, first, off[first:last, column[f"{side}_wrist"]])
             for side, first, last in list_windows(len(masked["xy"]))]
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from gsac.avatar.artifacts import ArtifactError, frame_paths, read_arrays
-from gsac.avatar.body import SMPLX_JOINTS
+from gsac.avatar.joints import BODY, NAMES, J
 from gsac.avatar.wholebody import BODY_NAMES, FEET_NAMES
 
 BONES = {"pelvis": "root", "hip": "upperleg01", "knee": "lowerleg01", "ankle": "foot", "foot": "toe3-1", "spine1": "spine04",
@@ -53,13 +53,13 @@ def read_truth(folder: Path) -> Truth:
     if not {"joints", "keypoints"} <= arrays.keys():
         raise ArtifactError(f"{folder / 'truth.npz'}: expected joints and keypoints (gsac.turntable) or joints_cam")
     points = arrays["keypoints"][:, :23]
-    return Truth(np.arange(22), arrays["joints"][:, :22], arrays.get("vertices"), points, focal, center, masks)
+    return Truth(np.arange(J)[BODY], arrays["joints"][:, BODY], arrays.get("vertices"), points, focal, center, masks)
 
 
 def _bones(names: list[str]) -> tuple[np.ndarray, list[int]]:
     """Those of the body's first 22 joints (n,) that the rig has, and their columns in the rig."""
     joint, columns = [], []
-    for j, name in enumerate(SMPLX_JOINTS[:22]):
+    for j, name in enumerate(NAMES[BODY]):
         side, _, part = name.partition("_")
         bone = f"{BONES[part]}.{side[0].upper()}" if part else BONES[name]
         if bone in names:

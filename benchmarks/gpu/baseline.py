@@ -12,15 +12,18 @@ import torch
 from numpy.typing import ArrayLike
 from torch.nn import functional
 
+from gsac.avatar.blend import BRIGHTEST, DARKEST
 from gsac.avatar.cuda.adjacency import joint_levels
 from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.cuda.recipe import Recipe, draw
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.light import BRIGHTEST, DARKEST, FROM_CAMERA
+from gsac.avatar.joints import BODY, JAW_EYES
+from gsac.avatar.light import FROM_CAMERA
+from gsac.avatar.logistic import logit, sigmoid
 from gsac.benchmarks.gpu.figure import Figure
 from gsac.stages.train.fast import prealign, trainer
 from gsac.stages.train.fast.cuda import body_arrays, learning, recipe_of
-from gsac.stages.train.poses.poses import BODY, HAND_SHARE, JAW_EYES
+from gsac.stages.train.poses.poses import HAND_SHARE
 from gsac.stages.train.task import Fit, Task
 
 RATES = {"mu": "mu_rate", "quat": "quat_rate", "log_scale": "scale_rate", "rgb": "rgb_rate", "opacity": "opacity_rate",
@@ -101,7 +104,7 @@ class TorchTrainer:
         if compiled:
             self.geometry, self.loss = torch.compile(self.geometry), torch.compile(self.loss)
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
-        given = (gaussians.mu, gaussians.quat, gaussians.log_scale, gaussians.rgb, np.log(opacity / (1 - opacity)))
+        given = (gaussians.mu, gaussians.quat, gaussians.log_scale, gaussians.rgb, logit(opacity))
         self.values = [tensor(a).requires_grad_() for a in given]
         self.fitted = tensor(np.concatenate([pose, transl[:, None]], 1))
         # each frame's change from the fit has its own Adam state; `share` slows fingers and fixes jaw and eyes
@@ -138,8 +141,8 @@ class TorchTrainer:
 
     def gaussians(self) -> Gaussians:
         """The gaussians as they are now."""
-        mu, quat, log_scale, rgb, logit = (v.detach().cpu().numpy() for v in self.values)
-        return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), 1 / (1 + np.exp(-logit)), self.light)
+        mu, quat, log_scale, rgb, logits = (v.detach().cpu().numpy() for v in self.values)
+        return Gaussians(self.face, mu, quat, log_scale, np.clip(rgb, 0, 1), sigmoid(logits), self.light)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Pose (T, 55, 3) rad and translation (T, 3) m as they are now."""

@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 
 from gsac.avatar.artifacts import frame_paths, read_arrays, read_frame
-from gsac.avatar.body import Body, BodyParams, J
+from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY, J
 from gsac.avatar.metrics import summary
 from gsac.stages.train.judge.heldout import judge
 from gsac.stages.train.poses.photometric import converge
@@ -22,8 +23,6 @@ from gsac.stages.train.views import View
 
 ALIGN_ROUNDS = 16
 """Rounds of Gauss-Newton: novel poses are further off than held-out ones, and 40 steps of Adam would end half-way."""
-BODY = slice(0, 22)
-"""Joints that are aligned with the truth's: all but jaw, eyes and fingers."""
 
 
 def read_true_params(truth: Path, model: str) -> BodyParams:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.blend import BLUR, MAX_ALPHA, MIN_ALPHA
 from gsac.avatar.camera import Camera
-from gsac.avatar.gsac_file.rigged import BLEND, RiggedAvatar
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.gpu import Gpu, Job, Parameters, projection
 from gsac.benchmarks.unity.packing import pack_avatar
@@ -57,7 +58,7 @@ class Frame:
 
     def __init__(self, gpu: Gpu, programs: dict[str, Program], avatar: RiggedAvatar) -> None:
         self.gpu, self.avatar = gpu, avatar
-        V, N, E, J = len(avatar.vertices), len(avatar.gaussians["face"]), len(avatar.expression_names), len(avatar.joints)
+        V, N, E, J = len(avatar.vertices), len(avatar.gaussians), len(avatar.expression_names), len(avatar.joints)
         self.count, self.weights = N, np.where(np.arange(E) % 4 == 0, np.float32(.5), np.float32(0))
         self.bones = joint_transforms(avatar.pose("A")[None], avatar.joints, avatar.parents)[0].astype(np.float32)
         keys, steps = sort_steps(N)
@@ -94,7 +95,7 @@ class Frame:
             rest[a.expression_vertex[span]] += w * a.expression_delta[span]
         vertices = skin(rest, self.bones, a.skin_index, a.skin_weight)
         posed = self.gpu.get("GsacPosed").reshape(-1, 4)[:, :3]
-        means = bind(face_frames(posed.astype(np.float64), a.faces), g["face"], g["mu"], g["quat"], g["log_scale"]).means
+        means = bind(face_frames(posed.astype(np.float64), a.faces), g.face, g.mu, g.quat, g.log_scale).means
         got = self.gpu.get("GsacSplats").reshape(-1, 12)[:, :3]
         keys = self.gpu.get("GsacKeys", np.uint32)
         order = keys[:self.count] & ((1 << index_bits(self.count)) - 1)
@@ -111,7 +112,7 @@ class Frame:
             view = np.eye(4)
             view[:3, 3] = side * -EYES_APART, -self.avatar.joints[9, 1], -distance
             views.append(view.T)
-        blend = [BLEND["low_pass_px2"], BLEND["alpha_max"], BLEND["alpha_min"], 0]
+        rule = [BLUR, MAX_ALPHA, MIN_ALPHA, 0]
         return {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(camera).T] * 2,
-                "_ScreenParams": [size, size, 0, 0], "GsacBlend": blend, "GsacIndexBits": index_bits(self.count),
+                "_ScreenParams": [size, size, 0, 0], "GsacBlend": rule, "GsacIndexBits": index_bits(self.count),
                 **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.rotation import to_xyzw
 
 
 def pack_avatar(avatar: RiggedAvatar) -> dict[str, np.ndarray]:
@@ -21,14 +22,14 @@ def pack_avatar(avatar: RiggedAvatar) -> dict[str, np.ndarray]:
     skin[:V, 1], skin[:V, 2] = weight[:, 0] | weight[:, 1] << 16, weight[:, 2] | weight[:, 3] << 16
     skin[:, 3] = first
     g = avatar.gaussians
-    N = len(g["face"])
+    N = len(g)
     corners = np.zeros((N, 4), np.uint32)
-    corners[:, :3] = avatar.faces[g["face"]]
+    corners[:, :3] = avatar.faces[g.face]
     local = np.zeros((N, 3, 4), np.float32)
-    quat = g["quat"] / np.linalg.norm(g["quat"].astype(np.float64), axis=1, keepdims=True)
-    local[:, 0, :3], local[:, 1], local[:, 2, :3] = g["mu"], quat[:, [1, 2, 3, 0]], np.exp(g["log_scale"])
+    quat = g.quat / np.linalg.norm(g.quat.astype(np.float64), axis=1, keepdims=True)
+    local[:, 0, :3], local[:, 1], local[:, 2, :3] = g.mu, to_xyzw(quat), np.exp(g.log_scale)
     return {
         "GsacRest": np.concatenate([avatar.vertices, np.ones((V, 1), np.float32)], 1), "GsacSkin": skin, "GsacMoves": moves,
         "GsacCorners": corners, "GsacLocal": local,
-        "GsacColours": np.concatenate([g["rgb"], g["opacity"][:, None]], 1).astype(np.float32),
+        "GsacColours": np.concatenate([g.rgb, g.opacity[:, None]], 1).astype(np.float32),
     }

@@ -7,12 +7,11 @@ import numpy as np
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.joints import WRISTS
 from gsac.stages.export.animations import add_motion
 from gsac.stages.export.stage import rig_avatar
 
 SEED = 1
-WRIST = 20
-"""The left wrist's joint."""
 
 
 def make_avatar(count: int) -> RiggedAvatar:
@@ -26,7 +25,7 @@ def make_avatar(count: int) -> RiggedAvatar:
     centre = vertices[body.faces[gaussians.face]].mean(1)
     middle = (vertices[:, 1].min() + vertices[:, 1].max()) / 2
     rgb = np.where(centre[:, 1:2] > middle, (.3, .5, .7), (.3, .3, .4))
-    rgb = np.where(centre[:, :1] > joints[WRIST, 0], (.9, .05, .05), rgb)
+    rgb = np.where(centre[:, :1] > joints[WRISTS[0], 0], (.9, .05, .05), rgb)
     gaussians.rgb = np.clip(rgb + rng.normal(size=(count, 3)) * .03, 0, 1).astype(np.float32)
     gaussians.opacity = rng.uniform(.5, 1, count).astype(np.float32)
     avatar = rig_avatar(body, params, gaussians)

@@ -58,7 +58,7 @@ def main(argv: list[str] | None = None) -> int:
                 picture = options.out / f"{name.lower()}.png" if k == 0 else None
                 rates.setdefault(name, []).append(race.measure(f"{address}/{page}", options.size, options.seconds, picture))
                 print(f"round {k + 1}: {name:11} {rates[name][-1].fps:6.2f} frames a second", file=sys.stderr)
-    words = text(rates, len(avatar.gaussians["face"]), options.size)
+    words = text(rates, len(avatar.gaussians), options.size)
     print(words)
     (options.out / "viewer.txt").write_text(words + "\n")
     return 0
@@ -77,7 +77,7 @@ def prepare(options: argparse.Namespace) -> RiggedAvatar:
         raise BadInput(f"{options.avatar}: it carries no clip walk; export it with export.animations=walk")
     splats = pose_gaussians(avatar, avatar.pose("A"))
     (options.out / "viewer.html").write_bytes(page_bytes(avatar.to_bytes()))
-    (options.out / "avatar.ply").write_bytes(ply_bytes(*splats, avatar.gaussians["rgb"], avatar.gaussians["opacity"]))
+    (options.out / "avatar.ply").write_bytes(ply_bytes(*splats, avatar.gaussians.rgb, avatar.gaussians.opacity))
     shutil.copy(PAGE, options.out)
     if not (options.out / "node_modules" / "playcanvas").is_dir():
         done = subprocess.run(["npm", "install", "--silent", "--no-audit", "--no-fund", PACKAGE], cwd=options.out,

@@ -70,7 +70,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
     import numpy as np
 
     from gsac.avatar.artifacts import ArtifactError
-    from gsac.avatar.film import frames, performance, turntable
+    from gsac.avatar.film import draw_frames, performance, turntable
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.avatar.video import Video, VideoError
 
@@ -82,7 +82,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
         plan = (turntable(avatar, arguments.seconds or TURN_S, arguments.fps) if motion is None
                 else performance(motion, arguments.fps, arguments.seconds))
         with Video(out, *size, arguments.fps) as video:
-            for done, frame in enumerate(frames(avatar, plan, *size, np.array(background))):
+            for done, frame in enumerate(draw_frames(avatar, plan, *size, np.array(background))):
                 reporter.progress("render", done, len(plan), "frames")
                 video.add(frame)
     except ArtifactError as e:

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsac.avatar.gsac_file.rigged import Clip, RiggedAvatar
-from gsac.stages.export.config import Animation
+from gsac.avatar.gsac_file.animation import Animation
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 
 FPS = 20.0
 WAVE_S = 3.2
@@ -38,7 +38,7 @@ def add_motion(avatar: RiggedAvatar, names: tuple[str, ...]) -> None:
     avatar.clips = {name: CLIPS[name](avatar) for name in names}
 
 
-def wave(avatar: RiggedAvatar) -> Clip:
+def wave(avatar: RiggedAvatar) -> Animation:
     """The right hand waves; the body breathes and leans slightly."""
     t = np.arange(round(WAVE_S * FPS)) / (WAVE_S * FPS)
     turn = 2 * np.pi * t
@@ -63,7 +63,7 @@ def wave(avatar: RiggedAvatar) -> Clip:
     return _ground(avatar, tracks)
 
 
-def walk(avatar: RiggedAvatar) -> Clip:
+def walk(avatar: RiggedAvatar) -> Animation:
     """One double step on the spot; the pelvis rises and sinks so that the lower foot stays on the floor."""
     t = np.arange(round(WALK_S * FPS)) / round(WALK_S * FPS)
     tracks = _hang_arms(t)
@@ -89,7 +89,7 @@ def walk(avatar: RiggedAvatar) -> Clip:
     return _ground(avatar, tracks)
 
 
-CLIPS: dict[Animation, Callable[[RiggedAvatar], Clip]] = {"wave": wave, "walk": walk}
+CLIPS: dict[AnimationName, Callable[[RiggedAvatar], Animation]] = {"wave": wave, "walk": walk}
 
 HIP = ((0.0, 0.40), (0.12, 0.32), (0.3, 0.02), (0.5, -0.26), (0.58, -0.16), (0.72, 0.28), (0.86, 0.47))
 """(time in the cycle, angle in rad); at 0 this heel strikes; a leg forward is positive."""
@@ -132,11 +132,11 @@ def _periodic(t: np.ndarray, keys: tuple[tuple[float, float], ...]) -> np.ndarra
     return CubicSpline(times, values, bc_type="periodic")(t % 1)
 
 
-def _ground(avatar: RiggedAvatar, tracks: dict[str, np.ndarray]) -> Clip:
+def _ground(avatar: RiggedAvatar, tracks: dict[str, np.ndarray]) -> Animation:
     """A looping clip; its transl puts the lowest vertex of each key on the floor. tracks: (K, 3) axis-angle by joint."""
     joints = [name for name in avatar.joint_names if name in tracks]
     rotation = np.stack([tracks[name] for name in joints], axis=1).astype(np.float32)
-    clip = Clip(FPS, True, joints, rotation, np.zeros((len(rotation), 3), np.float32))
+    clip = Animation(FPS, True, joints, rotation, np.zeros((len(rotation), 3), np.float32))
     index = [avatar.joint_names.index(name) for name in joints]
     for k, keys in enumerate(rotation):
         pose = np.zeros((len(avatar.joints), 3), np.float32)

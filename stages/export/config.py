@@ -9,7 +9,7 @@ from gsac.stages.body_choice import OPEN, brought_files
 from gsac.stages.contract import BadInput
 
 Pose = Literal["a", "t"]
-Animation = Literal["wave", "walk"]
+AnimationName = Literal["wave", "walk"]
 
 
 @dataclass
@@ -31,8 +31,8 @@ class ExportConfig:
 
     def check(self) -> None:
         for name in self.clip_names():
-            if name not in get_args(Animation):
-                raise BadInput(f"export.animations names {name!r}; choices: {', '.join(get_args(Animation))}")
+            if name not in get_args(AnimationName):
+                raise BadInput(f"export.animations names {name!r}; choices: {', '.join(get_args(AnimationName))}")
 
     def clip_names(self) -> tuple[str, ...]:
         """Names in `animations`, each once, in order."""

@@ -11,8 +11,9 @@ from itertools import count
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsac.avatar.gsac_file.rigged import Clip, RiggedAvatar
-from gsac.avatar.normals import vertex_normals
+from gsac.avatar.gsac_file.animation import Animation
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.mesh import vertex_normals
 from gsac.stages.export.fbx_file import CREATED, FILE_ID, Long, Node, fbx_bytes
 from gsac.stages.export.glb import vertex_colours
 
@@ -41,7 +42,7 @@ class _Scene:
         mesh.add("Version", 232)
         mesh.properties(("InheritType", "enum", "", "", 1))
         self.connect(mesh, 0)
-        self.geometry = self.mesh(vertex_colours(self.vertices, means, avatar.gaussians["rgb"], avatar.gaussians["opacity"]))
+        self.geometry = self.mesh(vertex_colours(self.vertices, means, avatar.gaussians.rgb, avatar.gaussians.opacity))
         self.connect(self.geometry, mesh)
         self.connect(self.material(), mesh)
         self.joints: list[Node] = []
@@ -167,7 +168,7 @@ class _Scene:
             self.connect(channel, shapes)
             self.connect(shape, channel)
 
-    def take(self, name: str, clip: Clip) -> None:
+    def take(self, name: str, clip: Animation) -> None:
         """Adds an animation; a looping one ends with its first key."""
         closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]
         times = np.rint(np.arange(len(closed)) / clip.fps * SECOND).astype(np.int64)

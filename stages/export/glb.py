@@ -15,8 +15,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gsac.avatar.gsac_file.rigged import Clip, RiggedAvatar
-from gsac.avatar.normals import vertex_normals
+from gsac.avatar.gsac_file.animation import Animation
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.mesh import vertex_normals
+from gsac.avatar.rotation import to_xyzw
 from gsac.stages.export.ply import SH0
 
 FLOAT, U16, U32, U8 = 5126, 5123, 5125, 5121
@@ -44,7 +46,7 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
         node = {"name": name, "translation": (joints[j] - (joints[parent] if parent >= 0 else 0)).tolist()}
         children = np.flatnonzero(avatar.parents == j).tolist()
         nodes.append(node | ({"children": children} if children else {}))
-    colours = vertex_colours(vertices, means, g["rgb"], g["opacity"])
+    colours = vertex_colours(vertices, means, g.rgb, g.opacity)
     root = int(np.flatnonzero(avatar.parents < 0)[0])
     skin = {"joints": list(range(J)), "skeleton": root, "inverseBindMatrices": file.add(inverse.reshape(J, 16))}
     mesh = {"primitives": [{
@@ -58,17 +60,17 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
     if avatar.expression_names:
         mesh["primitives"][0]["targets"] = _targets(file, avatar)
         mesh |= {"weights": [0.0] * len(avatar.expression_names), "extras": {"targetNames": avatar.expression_names}}
-    corners = avatar.faces[g["face"]]
-    rgb = np.clip(g["rgb"], 0, 1)
+    corners = avatar.faces[g.face]
+    rgb = np.clip(g.rgb, 0, 1)
     points = {"primitives": [{
         "mode": POINTS, "attributes": {
             "POSITION": file.add(means.astype("<f4"), ARRAY_BUFFER, bounds=True),
-            "COLOR_0": file.add(np.column_stack([_linear(rgb), g["opacity"]]).astype("<f4"), ARRAY_BUFFER),
-            f"{SPLATS}:ROTATION": file.add(quats[:, [1, 2, 3, 0]].astype("<f4"), ARRAY_BUFFER),
+            "COLOR_0": file.add(np.column_stack([_linear(rgb), g.opacity]).astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:ROTATION": file.add(to_xyzw(quats).astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:SCALE": file.add(scales.astype("<f4"), ARRAY_BUFFER),
-            f"{SPLATS}:OPACITY": file.add(g["opacity"].astype("<f4"), ARRAY_BUFFER),
-            f"{SPLATS}:SH_DEGREE_0_COEF_0": file.add(((g["rgb"] - 0.5) / SH0).astype("<f4"), ARRAY_BUFFER),
-            "_GSAC_FACE": file.add(g["face"].astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:OPACITY": file.add(g.opacity.astype("<f4"), ARRAY_BUFFER),
+            f"{SPLATS}:SH_DEGREE_0_COEF_0": file.add(((g.rgb - 0.5) / SH0).astype("<f4"), ARRAY_BUFFER),
+            "_GSAC_FACE": file.add(g.face.astype("<f4"), ARRAY_BUFFER),
             **_skin_attributes(file, *_point_skin(avatar, corners)),
         }, "extensions": {SPLATS: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display",
                                    "projection": "perspective", "sortingMethod": "cameraDistance"}}}],
@@ -130,7 +132,7 @@ def _targets(file: _Buffer, avatar: RiggedAvatar) -> list[dict[str, int]]:
             for span in spans]
 
 
-def _animation(file: _Buffer, name: str, clip: Clip, avatar: RiggedAvatar, rest: list[float], root: int) -> dict:
+def _animation(file: _Buffer, name: str, clip: Animation, avatar: RiggedAvatar, rest: list[float], root: int) -> dict:
     """A glTF animation; a looping one ends with its first key."""
     closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]
     times = file.add((np.arange(len(closed)) / clip.fps).astype("<f4"), bounds=True)

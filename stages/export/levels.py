@@ -11,7 +11,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.rotation import to_wxyz
 
 MEMBERS = (3, 9)
 """Number of gaussians that become one, level by level."""
@@ -23,22 +25,22 @@ LEAST_SCALE = 1e-4
 """Least standard deviation along an axis of a merged gaussian, m."""
 
 
-def merge_level(avatar: RiggedAvatar, members: int) -> dict[str, np.ndarray]:
-    """Arrays named as in `avatar.gaussians`, as mu (M, 3): about one gaussian for each `members` of them.
+def merge_level(avatar: RiggedAvatar, members: int) -> Gaussians:
+    """Fewer gaussians than the avatar's, about one for each `members` of them.
 
     Mean, covariance, colour and covered area are those of the members together, in the rest pose.
     """
     g = avatar.gaussians
     frames = face_frames(avatar.vertices.astype(np.float64), avatar.faces)
-    bound = bind(frames, *(g[name] for name in ("face", "mu", "quat", "log_scale")))
-    cluster, count = _cluster(avatar, bound.means, frames.R[g["face"], :, 1], members)
+    bound = bind(frames, g.face, g.mu, g.quat, g.log_scale)
+    cluster, count = _cluster(avatar, bound.means, frames.R[g.face, :, 1], members)
 
     area = np.sort(bound.scales, axis=1)[:, 1:].prod(1)
-    height = g["mu"][:, 1] * frames.k[g["face"]]
+    height = g.mu[:, 1] * frames.k[g.face]
     top = np.full(count, -np.inf)
     np.maximum.at(top, cluster, height)
     hidden = np.exp((height - top[cluster]) / UNDER)
-    weight = np.maximum(g["opacity"] * area, 1e-12)
+    weight = np.maximum(g.opacity * area, 1e-12)
     total = np.bincount(cluster, weight, count)
 
     def mean(values: np.ndarray, weight: np.ndarray = weight) -> np.ndarray:
@@ -56,17 +58,18 @@ def merge_level(avatar: RiggedAvatar, members: int) -> dict[str, np.ndarray]:
 
     # the heaviest member's face carries it; its frame was valid, or it would have no area
     order = np.lexsort((weight, cluster))
-    face = g["face"][order[np.r_[np.flatnonzero(np.diff(cluster[order])), len(order) - 1]]]
+    face = g.face[order[np.r_[np.flatnonzero(np.diff(cluster[order])), len(order) - 1]]]
     R, k = frames.R[face], np.maximum(frames.k[face], 1e-6)
     quat = Rotation.from_matrix(R.transpose(0, 2, 1) @ axes).as_quat()
-    return {
-        "face": face.astype(np.int32),
-        "mu": (np.einsum("nji,nj->ni", R, centre - frames.T[face]) / k[:, None]).astype(np.float32),
-        "quat": quat[:, [3, 0, 1, 2]].astype(np.float32),
-        "log_scale": np.log(scales / k[:, None]).astype(np.float32),
-        "rgb": mean(g["rgb"], weight * hidden).astype(np.float32),
-        "opacity": np.clip(total / scales[:, 1:].prod(1), 0, 1).astype(np.float32),
-    }
+    return Gaussians(
+        face=face.astype(np.int32),
+        mu=(np.einsum("nji,nj->ni", R, centre - frames.T[face]) / k[:, None]).astype(np.float32),
+        quat=to_wxyz(quat).astype(np.float32),
+        log_scale=np.log(scales / k[:, None]).astype(np.float32),
+        rgb=mean(g.rgb, weight * hidden).astype(np.float32),
+        opacity=np.clip(total / scales[:, 1:].prod(1), 0, 1).astype(np.float32),
+        light=g.light,
+    )
 
 
 def _cluster(avatar: RiggedAvatar, means: np.ndarray, normals: np.ndarray, members: int) -> tuple[np.ndarray, int]:
@@ -74,7 +77,7 @@ def _cluster(avatar: RiggedAvatar, means: np.ndarray, normals: np.ndarray, membe
 
     The gaussians of each bone are halved along their widest axis until a cluster has at most `members`.
     """
-    corners = avatar.faces[avatar.gaussians["face"]]
+    corners = avatar.faces[avatar.gaussians.face]
     load = np.zeros((len(corners), len(avatar.joints)))
     for corner in corners.T:
         for joint, weight in zip(avatar.skin_index[corner].T, avatar.skin_weight[corner].T, strict=True):

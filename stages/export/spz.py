@@ -13,6 +13,7 @@ import struct
 
 import numpy as np
 
+from gsac.avatar.rotation import to_xyzw
 from gsac.stages.export.ply import MIN_SCALE, SH0
 
 HEADER = struct.Struct("<IIIBBBB")
@@ -44,7 +45,7 @@ def spz_bytes(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, rgb: np.
 def pack_smallest_three(quats: np.ndarray) -> np.ndarray:
     """quats: (N, 4) wxyz. Returns (N,) little-endian 32-bit words: the index of the largest of x, y, z, w, then the others in
     order."""
-    xyzw = quats[:, [1, 2, 3, 0]].astype(np.float64)
+    xyzw = to_xyzw(quats).astype(np.float64)
     xyzw /= np.linalg.norm(xyzw, axis=1, keepdims=True)
     rows, largest = np.arange(len(xyzw)), np.abs(xyzw).argmax(1)
     xyzw *= np.where(xyzw[rows, largest] < 0, -1, 1)[:, None]

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
-from gsac.avatar.gaussians import EACH, Gaussians
+from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.rotation import to_wxyz
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.animations import add_motion
@@ -44,11 +45,11 @@ def run(job: Job) -> None:
     avatar.licence = {"avatar": job.config.licence, "body": BODY_LICENCE}
     avatar.provenance = {"gsac": version("gsac"), "body_model": body.digest, "clip_sha256": clip.source_sha256}
     add_motion(avatar, job.config.clip_names())
-    avatar.coarser = [arrays_of(level) for level in trained] or [merge_level(avatar, members) for members in MEMBERS]
+    avatar.coarser = trained or [merge_level(avatar, members) for members in MEMBERS]
 
     container = avatar.to_bytes()
     pose = avatar.pose(job.config.ply_pose.upper())
-    splats = (*pose_gaussians(avatar, pose), avatar.gaussians["rgb"], avatar.gaussians["opacity"])
+    splats = (*pose_gaussians(avatar, pose), avatar.gaussians.rgb, avatar.gaussians.opacity)
     rest = pose_gaussians(avatar, avatar.pose("T"))
     files = {
         "avatar.gsac": lambda: container,
@@ -92,14 +93,8 @@ def rig_avatar(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAv
         expression_vertex=np.concatenate([*moves, []]).astype(np.int32),
         expression_delta=np.concatenate([*(body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
         jaw_actions=body.jaw_actions.astype(np.float32),
-        gaussians=arrays_of(gaussians),
-        light=gaussians.light,
+        gaussians=gaussians,
     )
-
-
-def arrays_of(gaussians: Gaussians) -> dict[str, np.ndarray]:
-    """The arrays of N gaussians by name, as mu (N, 3)."""
-    return {name: getattr(gaussians, name) for name in EACH}
 
 
 def pose_gaussians(avatar: RiggedAvatar, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -107,6 +102,6 @@ def pose_gaussians(avatar: RiggedAvatar, pose: np.ndarray) -> tuple[np.ndarray, 
     vertices = avatar.posed(pose)
     vertices = vertices - np.array([0, avatar.ground, 0], np.float32)
     g = avatar.gaussians
-    bound = bind(face_frames(vertices, avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    bound = bind(face_frames(vertices, avatar.faces), g.face, g.mu, g.quat, g.log_scale)
     xyzw = Rotation.from_matrix(bound.rotations).as_quat()
-    return bound.means, xyzw[:, [3, 0, 1, 2]].astype(np.float32), bound.scales
+    return bound.means, to_wxyz(xyzw).astype(np.float32), bound.scales

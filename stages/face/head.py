@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gsac.avatar import joints
 from gsac.avatar.body import Body
 from gsac.stages.face.actions import Actions
 
@@ -18,8 +19,6 @@ AXES = np.array([1.0, 1.0, 0.3])
 """Weights of the network's x, y and z."""
 ROUNDS = 10
 """Alternations between shape and similarity."""
-HEAD_JOINTS = ("head", "jaw", "left_eye_smplhf", "right_eye_smplhf")
-EYE_JOINTS = [23, 24]
 
 
 @dataclass
@@ -39,12 +38,12 @@ class HeadModel:
     def of_open_body(cls, actions: Actions) -> HeadModel:
         """The open body's head, with the shape directions of the figure, without those of the clothes."""
         body = Body.load()
-        on = body.weights[:, [body.joint_names.index(name) for name in HEAD_JOINTS]].sum(1) > 0.5
+        on = body.weights[:, [joints.HEAD, joints.JAW, *joints.EYES]].sum(1) > 0.5
         on[np.unique(actions.corner)] = True
         place = np.cumsum(on) - 1
         faces = body.faces[on[body.faces].all(1)]
         return cls(body.v_template[on], place[faces], body.shapedirs[on][:, :, : body.num_figure],
-                   body.J_regressor[EYE_JOINTS] @ body.v_template, np.arange(len(actions.corner)), place[actions.corner],
+                   body.J_regressor[joints.EYES] @ body.v_template, np.arange(len(actions.corner)), place[actions.corner],
                    actions.share, actions.neutral)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS, FaceMesh
-from gsac.avatar.threads import available
+from gsac.avatar.threads import available_cores
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sigma, solve
@@ -89,7 +89,7 @@ def read_clip(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], act
             if face.presence >= job.config.threshold and toward[2] >= least:
                 landmarks[t], points[t], direction[t] = face.points, aligned, toward
 
-    with ThreadPoolExecutor(min(available(), MOST_THREADS)) as pool:
+    with ThreadPoolExecutor(min(available_cores(), MOST_THREADS)) as pool:
         for done, _ in enumerate(pool.map(frame, range(T)), 1):
             job.progress(done, T, "frames")
     return landmarks, points, direction

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.detections import anchor_centers, decode, suppress
+from gsac.avatar.logistic import clipped_sigmoid
 from gsac.avatar.region import Region, around_circle, crop, full_frame
-from gsac.avatar.tflite import Network, sigmoid
+from gsac.avatar.tflite import Network
 
 POINTS = 33
 HIPS, RIM = 33, 34
@@ -67,7 +68,7 @@ class PoseNetworks:
         raw = raw.reshape(-1, 5).astype(np.float64)
         points = region.to_frame(refine(raw[:, :2] / size, heat))
         world = region.turn(world.reshape(-1, 3)[:POINTS].astype(np.float64))
-        return Pose(points[:POINTS], sigmoid(raw[:POINTS, 3]), sigmoid(raw[:POINTS, 4]), world, float(score[0]),
+        return Pose(points[:POINTS], clipped_sigmoid(raw[:POINTS, 3]), clipped_sigmoid(raw[:POINTS, 4]), world, float(score[0]),
                     around_circle(points[HIPS], points[RIM]).scaled(1.25))
 
 
@@ -82,7 +83,7 @@ def refine(points: np.ndarray, heat: np.ndarray, reach: int = 3, least: float = 
             continue
         rows = np.arange(max(0, row - reach), min(height, row + reach + 1))
         cols = np.arange(max(0, col - reach), min(width, col + reach + 1))
-        weight = sigmoid(heat[rows[0]:rows[-1] + 1, cols[0]:cols[-1] + 1, i].astype(np.float64))
+        weight = clipped_sigmoid(heat[rows[0]:rows[-1] + 1, cols[0]:cols[-1] + 1, i].astype(np.float64))
         if weight.max() >= least:
             # The networks count a cell by its low corner, not its middle.
             out[i] = (weight.sum(axis=0) @ cols / width, weight.sum(axis=1) @ rows / height) / weight.sum()

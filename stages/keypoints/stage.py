@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, read_frame, write_arrays
-from gsac.avatar.threads import ahead, available
+from gsac.avatar.threads import available_cores, prefetch
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.frame_names import name_frames
@@ -33,10 +33,10 @@ def run(job: Job) -> None:
     paths = frame_paths(job.inputs["split/frames"])
     detector = DETECTORS[job.config.detector](job.models, job.config)
     frames, at_edge = [], []
-    threads = min(available(), MOST_THREADS)
+    threads = min(available_cores(), MOST_THREADS)
     with ThreadPoolExecutor(threads + 1) as pool:
-        started = ((detector.start(image), *image.shape[:2]) for image in ahead(pool, read_frame, paths, 2))
-        for frame, edge in ahead(pool, _finish, started, threads):
+        started = ((detector.start(image), *image.shape[:2]) for image in prefetch(pool, read_frame, paths, 2))
+        for frame, edge in prefetch(pool, _finish, started, threads):
             frames.append(frame)
             at_edge.append(edge)
             job.progress(len(frames), len(paths), "frames")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.region import Region
-from gsac.avatar.threads import available
+from gsac.avatar.threads import available_cores
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.pose import Person, Pose, PoseNetworks
@@ -24,7 +24,7 @@ class Tracker:
 
     def __init__(self, models: dict[str, Path], config: KeypointsConfig):
         self._least = config.person_threshold
-        self._pose = PoseNetworks(models, threads=max(1, min(4, available() // 4)))  # the other cores have other frames
+        self._pose = PoseNetworks(models, threads=max(1, min(4, available_cores() // 4)))  # the other cores have other frames
         self._last: Region | None = None
 
     def track(self, image: np.ndarray, frame: Frame) -> Pose | None:

@@ -8,8 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gsac.avatar.logistic import clipped_sigmoid
 from gsac.avatar.region import Region, around_points, crop
-from gsac.avatar.tflite import Network, sigmoid
+from gsac.avatar.tflite import Network
 
 MARGIN = 1.2
 """Side of the network's square crop, in sides of the points' square: crown and toes lie beyond the points."""
@@ -29,7 +30,7 @@ class PoseMask:
         """image: (H, W, 3) uint8. Returns (H, W) float32, the person's probability, 0 outside the region."""
         size = self._network.width
         mask = next(o for o in self._network(crop(image, region, size)) if o.shape == (size, size, 1))
-        return onto_frame(sigmoid(mask[..., 0]), region, *image.shape[:2])
+        return onto_frame(clipped_sigmoid(mask[..., 0]), region, *image.shape[:2])
 
 
 class SelfieMask:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from gsac.avatar.artifacts import read_frame
-from gsac.avatar.threads import ahead, available
+from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.segment.network import PersonMask, person_region
 from gsac.stages.segment.plate import Plate
 
@@ -31,9 +31,9 @@ def learn_plate(paths: list[Path], xy: np.ndarray, score: np.ndarray, network: P
     regions = {t: person_region(np.nan_to_num(xy[t]), score[t])
                for t in np.unique(np.linspace(0, len(paths) - 1, SAMPLES).astype(int)).tolist()}
     images, free = [], []
-    with ThreadPoolExecutor(available()) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         seen = [t for t, region in regions.items() if region is not None]
-        for t, image in zip(seen, ahead(pool, lambda t: read_frame(paths[t]), seen, available()), strict=True):
+        for t, image in zip(seen, prefetch(pool, lambda t: read_frame(paths[t]), seen, available_cores()), strict=True):
             reach = 2 * int(CLEAR * len(image)) + 1
             person = (network(image, regions[t]) > 0.05).astype(np.uint8)
             images.append(image)
@@ -55,6 +55,6 @@ def masked_median(images: np.ndarray, free: np.ndarray) -> Plate:
             ordered = np.sort(np.where(free[:, rows], images[:, rows, :, channel], 255), axis=0)
             image[rows, :, channel] = np.take_along_axis(ordered, middle[:, rows], axis=0)[0]
 
-    with ThreadPoolExecutor(available()) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         deque(pool.map(band, [slice(k, k + BAND) for k in range(0, len(image), BAND)]), maxlen=0)
     return Plate(image, count >= LEAST_SEEN, MOST_CHANGED)

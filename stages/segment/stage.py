@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha
-from gsac.avatar.threads import ahead, available
+from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.segment.components import keep_person
@@ -44,7 +44,7 @@ def run(job: Job) -> None:
 
     def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
         """Index, image and probability of each frame; the network has threads of its own, so one thread feeds it."""
-        for t, image in enumerate(ahead(pool, read_frame, paths, 2)):
+        for t, image in enumerate(prefetch(pool, read_frame, paths, 2)):
             region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
             yield t, image, None if region is None else network(image, region)
 
@@ -63,8 +63,8 @@ def run(job: Job) -> None:
                                  "look at the frame, and remove it or try segment.method=selfie")
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
-    with ThreadPoolExecutor(available()) as pool:
-        for done, _ in enumerate(ahead(pool, cut, masks(pool), available()), 1):
+    with ThreadPoolExecutor(available_cores()) as pool:
+        for done, _ in enumerate(prefetch(pool, cut, masks(pool), available_cores()), 1):
             job.progress(done, len(paths), "frames")
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.body import SMPLX_JOINTS
+from gsac.avatar.joints import BODY, FINGERS, NAMES, J
 
-BODY_JOINTS = np.arange(22)
-FINGER_JOINTS = np.arange(25, 55)
+BODY_JOINTS = np.arange(J)[BODY]
+FINGER_JOINTS = np.arange(J)[FINGERS]
 
 SPREAD = {
     "pelvis": (400, 400, 400), "hip": (35, 20, 15), "spine1": (10, 8, 8), "spine2": (8, 8, 6), "spine3": (8, 8, 6),
@@ -32,10 +32,10 @@ def pose_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean (A, 3) and spread (A, 3) of the joints' rotation vectors, rad. joints: (A,) indices."""
     mean, spread = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
     for i, j in enumerate(joints):
-        name = SMPLX_JOINTS[j]
+        name = NAMES[j]
         side, _, part = name.partition("_")
         part = part or name
-        if j >= 25:
+        if j >= FINGERS.start:
             mean[i], spread[i] = finger_prior(side, part)
             continue
         mean[i] = np.radians(MEAN.get(name, (0, 0, 0)))
@@ -60,7 +60,7 @@ def motion_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     speed[ankles], acceleration[ankles] = 3.0, 20.0
     trunk = np.isin(joints, (3, 6, 9, 13, 14, 10, 11))
     speed[trunk], acceleration[trunk] = 0.15, 0.5
-    fingers = joints >= 25
+    fingers = joints >= FINGERS.start
     speed[fingers], acceleration[fingers] = 0.25, 1.0
     speed[joints == 0], acceleration[joints == 0] = np.inf, 0.75
     return speed, acceleration

@@ -16,7 +16,7 @@ import numpy as np
 from gsac.avatar.artifacts import read_alpha
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
-from gsac.avatar.threads import available
+from gsac.avatar.threads import available_cores
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.smplx.jacobians import Pairs, make_surface_pairs
 
@@ -27,7 +27,7 @@ POINTS = 160
 INSET = 0.5
 """Distance, field pixels, from an outline point (the middle of a covered pixel) out to the outline."""
 
-THREADS = min(available(), 8)
+THREADS = min(available_cores(), 8)
 """The rasteriser releases Python's lock; more threads mostly wait for code that holds it."""
 POSED_AT_ONCE = 64
 """Frames whose vertices are held in memory together."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.gaussians import EACH, Gaussians
+from gsac.avatar.gaussians import FIELDS, Gaussians
 from gsac.stages.contract import StageError
 from gsac.stages.train.poses.poses import Poses
 
@@ -22,7 +22,7 @@ def gradients(grads) -> dict[str, np.ndarray]:
 
 
 def values(gaussians: Gaussians) -> dict[str, np.ndarray]:
-    return {name: getattr(gaussians, name) for name in EACH}
+    return {name: getattr(gaussians, name) for name in FIELDS}
 
 
 def pose(poses: Poses, t: int) -> dict[str, np.ndarray]:

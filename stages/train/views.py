@@ -11,7 +11,7 @@ import numpy as np
 
 from gsac.avatar.artifacts import frame_paths, read_alpha, read_frame
 from gsac.avatar.camera import Camera
-from gsac.avatar.threads import available
+from gsac.avatar.threads import available_cores
 from gsac.stages.contract import StageError
 
 MARGIN = 0.06
@@ -51,7 +51,7 @@ def read_views(frames: Path, alphas: Path, camera: Camera, height: int) -> tuple
     for path in paths:
         if path.stem not in masks:
             raise StageError(f"{alphas}: no mask for frame {path.name}; run segment again")
-    with ThreadPoolExecutor(available()) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         read = list(pool.map(lambda path: _read_view(path, masks[path.stem], camera, height), paths))
     return [view for view, _ in read], [t for t, (_, shown) in enumerate(read) if shown < LEAST_SHARE]
 

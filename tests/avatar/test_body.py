@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gsac.avatar import wholebody
 from gsac.avatar.artifacts import ArtifactError
-from gsac.avatar.body import SMPLX_JOINTS, Body, BodyParams
-from gsac.avatar.wholebody import INDEX
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.joints import INDEX, NAMES
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def test_at_zero_rotation_the_body_stands_in_a_t_pose_facing_plus_z(body):
     assert at["left_wrist"][0] > 0.5 > -0.5 > at["right_wrist"][0]
     assert abs(at["left_wrist"][1] - at["left_shoulder"][1]) < 0.02
     assert np.ptp(vertices[:, 1]) == pytest.approx(1.8, abs=0.15)
-    points = dict(zip(INDEX, body.keypoints(vertices), strict=True))
+    points = dict(zip(wholebody.INDEX, body.keypoints(vertices), strict=True))
     assert points["nose"][2] > points["left_ear"][2] + 0.05 and points["left_eye"][0] > 0 > points["right_eye"][0]
 
 
@@ -55,9 +56,9 @@ def test_clothes_stand_off_the_skin_alike_on_both_sides_and_move_no_joint(body):
 
 
 def test_joints_come_in_smplx_order_and_parents_before_children(body):
-    assert body.joint_names == tuple(SMPLX_JOINTS) and len(SMPLX_JOINTS) == 55
+    assert body.joint_names == NAMES and len(NAMES) == 55
     assert body.parents[0] == -1 and all(p < j for j, p in enumerate(body.parents))
-    assert body.joint_names[body.parents[SMPLX_JOINTS.index("left_thumb1")]] == "left_wrist"
+    assert body.joint_names[body.parents[INDEX["left_thumb1"]]] == "left_wrist"
 
 
 def test_at_most_four_weights_a_vertex_and_they_sum_to_one(body):
@@ -79,18 +80,18 @@ def test_posing_turns_about_the_pelvis_and_then_translates(body):
 
 def test_a_bent_elbow_moves_the_hand_and_nothing_of_the_other_side(body):
     pose = np.zeros((2, 55, 3))
-    pose[1, SMPLX_JOINTS.index("left_elbow")] = [0, -1.2, 0]
+    pose[1, INDEX["left_elbow"]] = [0, -1.2, 0]
     params = BodyParams.from_pose(pose, np.zeros((2, 3)), np.zeros(body.num_betas), np.zeros((2, 52)), 1000, (0, 0))
     vertices, joints = body.posed(params)
     assert np.array_equal(body.posed_joints(params), joints)
     moved = np.linalg.norm(vertices[1] - vertices[0], axis=1)
     assert moved[vertices[0][:, 0] < 0].max() < 1e-6
-    assert joints[1, SMPLX_JOINTS.index("left_wrist"), 2] > joints[0, SMPLX_JOINTS.index("left_wrist"), 2] + 0.1
+    assert joints[1, INDEX["left_wrist"], 2] > joints[0, INDEX["left_wrist"], 2] + 0.1
 
 
 def test_jaw_rotation_opens_the_mouth_of_a_body_whose_jaw_is_an_action(body):
     pose = np.zeros((2, 55, 3))
-    pose[1, SMPLX_JOINTS.index("jaw")] = [0.3, 0, 0]
+    pose[1, INDEX["jaw"]] = [0.3, 0, 0]
     params = BodyParams.from_pose(pose, np.zeros((2, 3)), np.zeros(body.num_betas), np.zeros((2, 52)), 1000, (0, 0))
     vertices, _ = body.posed(params)
     opened = body.exprdirs[..., body.expression_names.index("jawOpen")]
@@ -100,10 +101,10 @@ def test_jaw_rotation_opens_the_mouth_of_a_body_whose_jaw_is_an_action(body):
 def test_hand_points_lie_in_the_hand(body):
     points = body.keypoints(body.v_template)
     _, joints = body.rest(np.zeros(body.num_betas))
-    middle = joints[SMPLX_JOINTS.index("left_middle1")]
+    middle = joints[INDEX["left_middle1"]]
     assert np.linalg.norm(points[91:112] - middle, axis=1).max() < 0.16
-    assert np.linalg.norm(points[INDEX["left_hand_middle1"]] - middle) < 0.01
-    assert points[INDEX["left_hand_middle4"], 0] > points[INDEX["left_hand_middle1"], 0] + 0.06
+    assert np.linalg.norm(points[wholebody.INDEX["left_hand_middle1"]] - middle) < 0.01
+    assert points[wholebody.INDEX["left_hand_middle4"], 0] > points[wholebody.INDEX["left_hand_middle1"], 0] + 0.06
 
 
 def test_params_survive_writing_and_reading(tmp_path, body):

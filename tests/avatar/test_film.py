@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsac.avatar.film import FOLLOW_S, frames, performance, turntable
+from gsac.avatar.film import FOLLOW_S, draw_frames, performance, turntable
 from gsac.avatar.motion.source import Motion
 
 WIDTH, HEIGHT = 120, 160
@@ -13,7 +13,7 @@ BLACK = np.zeros(3)
 
 
 def drawn(figure, film):
-    return np.stack(list(frames(figure, film, WIDTH, HEIGHT, BLACK))).astype(float)
+    return np.stack(list(draw_frames(figure, film, WIDTH, HEIGHT, BLACK))).astype(float)
 
 
 def columns(image, channel):
@@ -71,8 +71,8 @@ def test_the_camera_goes_along_and_a_step_is_still_seen_as_one(figure):
 
 
 def test_the_light_stands_still_in_the_room_while_the_camera_goes_round(figure):
-    grey = replace(figure, gaussians=figure.gaussians | {"rgb": np.full_like(figure.gaussians["rgb"], .4)})
-    from_its_left = replace(grey, light=np.float32([[1] * 3, [.8] * 3, [0] * 3, [0] * 3]))
+    grey = replace(figure, gaussians=replace(figure.gaussians, rgb=np.full_like(figure.gaussians.rgb, .4)))
+    from_its_left = replace(grey, gaussians=replace(grey.gaussians, light=np.float32([[1] * 3, [.8] * 3, [0] * 3, [0] * 3])))
     film = turntable(figure, 0.8, 10)
     even, lit = drawn(grey, film).mean(-1), drawn(from_its_left, film).mean(-1)
     person = even > 90

@@ -185,7 +185,7 @@ def test_a_network_in_another_precision_says_nearly_the_same_and_its_slope_point
     value, slope = scorer.gradient(image, target, scaled=False)
     for precision, near, along in ((torch.float32, 1e-5, 0.9999), (torch.bfloat16, 0.02, 0.8)):
         moved = torch.from_numpy(image).requires_grad_()
-        found = scorer.on("cpu", precision).compared(moved, torch.from_numpy(target))
+        found = scorer.to("cpu", precision).compare(moved, torch.from_numpy(target))
         got = torch.autograd.grad(found, moved)[0].numpy()
         assert found.dtype == torch.float32 and found.item() == pytest.approx(value, rel=near)
         assert (got * slope).sum() > along * np.linalg.norm(got) * np.linalg.norm(slope)

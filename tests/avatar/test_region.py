@@ -7,7 +7,7 @@ from support.regions import to_region
 TURNED = Region((62.0, 55.0), 35.0, 0.7)
 
 
-def test_to_region_undoes_to_frame():
+def test_to_frame_maps_the_square_one_to_one():
     points = np.random.default_rng(0).uniform(-1, 2, (50, 2))
     np.testing.assert_allclose(to_region(TURNED, TURNED.to_frame(points)), points, atol=1e-12)
 

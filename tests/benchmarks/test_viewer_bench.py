@@ -12,7 +12,7 @@ def test_both_pages_look_at_the_same_point_from_the_same_distance():
     assert {k: asked[0][k] for k in ("fov", "dist", "bg")} == {k: asked[1][k] for k in ("fov", "dist", "bg")}
     target = float(asked[0]["target"].split(",")[1])
     assert abs(target - avatar.ground - float(asked[1]["height"])) < 1e-4
-    assert len(avatar.gaussians["face"]) == 200 and list(avatar.clips)[0] == "walk"
+    assert len(avatar.gaussians) == 200 and list(avatar.clips)[0] == "walk"
 
 
 def test_the_ratio_is_of_medians():

@@ -6,6 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
+from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.stages.export.animations import add_motion
 
@@ -88,14 +89,14 @@ def make_figure(per_face=1, seed=0):
         expression_vertex=nose.astype(np.int32),
         expression_delta=np.tile(np.float32([0, -.02, 0]), (len(nose), 1)),
         jaw_actions=np.float32([[4, 0, 0], [0, 0, 0]]),
-        gaussians={
-            "face": face, "mu": rng.normal(size=(N, 3)).astype(np.float32) * .004,
-            "quat": (quat / np.linalg.norm(quat, axis=1, keepdims=True)).astype(np.float32),
-            "log_scale": np.log(rng.uniform(.008, .02, (N, 3)) * (1, .3, 1)).astype(np.float32),
-            "rgb": np.clip(rgb + rng.normal(size=(N, 3)) * .03, 0, 1).astype(np.float32),
-            "opacity": rng.uniform(.6, 1, N).astype(np.float32)},
+        gaussians=Gaussians(
+            face=face, mu=rng.normal(size=(N, 3)).astype(np.float32) * .004,
+            quat=(quat / np.linalg.norm(quat, axis=1, keepdims=True)).astype(np.float32),
+            log_scale=np.log(rng.uniform(.008, .02, (N, 3)) * (1, .3, 1)).astype(np.float32),
+            rgb=np.clip(rgb + rng.normal(size=(N, 3)) * .03, 0, 1).astype(np.float32),
+            opacity=rng.uniform(.6, 1, N).astype(np.float32)),
         licence={"avatar": "test figure"}, provenance={"gsac": "0"})
-    avatar.coarser = [{name: array[::step] for name, array in avatar.gaussians.items()} for step in (3, 9)]
+    avatar.coarser = [avatar.gaussians[::step] for step in (3, 9)]
     add_motion(avatar, ("wave", "walk"))
     return avatar
 
@@ -110,7 +111,6 @@ def person(tmp_path_factory):
     """Input files of the stage: the open body with 6,000 noisy gaussians, the left hand red."""
     from gsac.avatar.artifacts import Clip
     from gsac.avatar.body import Body, BodyParams
-    from gsac.avatar.gaussians import Gaussians
 
     folder = tmp_path_factory.mktemp("person")
     body, rng, N = Body.load(), np.random.default_rng(1), 6000

@@ -1,4 +1,4 @@
-"""The way from a frame into a region of it, for tests to look from there."""
+"""Points of a frame in a region's own coordinates, to measure what a region shows."""
 
 import numpy as np
 
@@ -6,5 +6,5 @@ from gsac.avatar.region import Region
 
 
 def to_region(region: Region, points: np.ndarray) -> np.ndarray:
-    """points: (..., 2) px. Returns (..., 2) in 0..1; the inverse of `Region.to_frame`."""
+    """points: (..., 2) px. Returns (..., 2) in 0..1 over the square; the inverse of `Region.to_frame`."""
     return (points - np.asarray(region.center)) @ region.axes / region.side + 0.5

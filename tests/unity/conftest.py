@@ -78,7 +78,8 @@ def files(figure, exported, tmp_path_factory):
     rng = np.random.default_rng(2)
     (folder / "figure.gsac").write_bytes(figure.to_bytes())
     light = np.float32([[.8, .75, .7], [.3, .2, -.1], [.2, .1, .3], [.25, -.6, .2]])
-    (folder / "person.gsac").write_bytes(replace(RiggedAvatar.read(exported / "avatar.gsac"), light=light).to_bytes())
+    avatar = RiggedAvatar.read(exported / "avatar.gsac")
+    (folder / "person.gsac").write_bytes(replace(avatar, gaussians=replace(avatar.gaussians, light=light)).to_bytes())
     for name, count in (("figure", 2), ("person", 52)):
         pose, transl = rng.normal(size=165) * .3, rng.normal(size=3) * .2
         np.savetxt(folder / f"{name}.txt", np.concatenate([pose, transl, rng.random(count) * .6]).astype(np.float32)[None], "%.9g")

@@ -36,8 +36,8 @@ document.documentElement.dataset.ready = "yes";
 
 def gsac(path):
     avatar = RiggedAvatar.read(path)
-    corners = avatar.vertices[avatar.faces[avatar.gaussians["face"]]].mean(1)
-    return corners, avatar.gaussians["rgb"]
+    corners = avatar.vertices[avatar.faces[avatar.gaussians.face]].mean(1)
+    return corners, avatar.gaussians.rgb
 
 
 def ply(path):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.avatar.light import DARKEST, shade
+from gsac.avatar.light import shade
 from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.gpu import Painting, projection
@@ -50,8 +51,8 @@ def truth(given):
     vertices = skin(rest, bones, avatar.skin_index, avatar.skin_weight) + transl - (0, avatar.ground, 0)
     g = avatar.gaussians
     frames = face_frames(vertices, avatar.faces)
-    bound = bind(frames, g["face"], g["mu"], g["quat"], g["log_scale"])
-    return vertices @ MIRROR, bound, shade(avatar.light, frames.R[g["face"], :, 1])
+    bound = bind(frames, g.face, g.mu, g.quat, g.log_scale)
+    return vertices @ MIRROR, bound, shade(g.light, frames.R[g.face, :, 1])
 
 
 def test_a_frame_of_the_scripts_skins_as_the_trainer_does(frame, truth):
@@ -93,7 +94,7 @@ def test_a_frame_of_the_scripts_sorts_from_far_to_near_for_the_camera(frame):
 
 def test_the_draw_is_two_triangles_a_gaussian_with_the_files_blending_made_linear(frame, files):
     asked, _ = frame
-    N = len(RiggedAvatar.read(files / "person.gsac").gaussians["face"])
+    N = len(RiggedAvatar.read(files / "person.gsac").gaussians)
     assert int(asked["draw"][-1]) == 6 * N
     np.testing.assert_allclose(asked["draw"][12:16], [.3, .999, 1 / 255, 1], rtol=1e-6)
     corners = asked["indices"].view(np.uint32)[:6 * N].reshape(N, 6)
@@ -127,7 +128,7 @@ def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, fra
     centre = np.diag([1.0, -1, -1]) @ (view[:3, :3] @ model[:, 3] + view[:3, 3])
     assert np.linalg.det(total) > 0
     want = render((bound.means @ total.T + centre).astype(np.float32), (total / size @ bound.rotations).astype(np.float32),
-                  (bound.scales * size).astype(np.float32), g["rgb"] * truth[2], g["opacity"], camera)
+                  (bound.scales * size).astype(np.float32), g.rgb * truth[2], g.opacity, camera)
     want = np.concatenate([want.rgb, want.alpha[..., None]], 2)
     assert (want[..., 3] > .5).mean() > .05, "the figure is in the picture"
     assert -10 * np.log10(((got - want) ** 2).mean()) > 55

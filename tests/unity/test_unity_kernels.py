@@ -35,7 +35,7 @@ def frame(avatar):
 @pytest.fixture(scope="module")
 def on_gpu(gpu, kernels, avatar, frame):
     """The device after skin and bind of that frame, and the kernels' parameters."""
-    V, N = len(avatar.vertices), len(avatar.gaussians["face"])
+    V, N = len(avatar.vertices), len(avatar.gaussians)
     for name, array in pack_avatar(avatar).items():
         gpu.put(name, array)
     gpu.put("GsacWeights", frame["weights"])
@@ -55,7 +55,7 @@ def bound(gpu, on_gpu, avatar):
     """The trainer's binding, in double precision, on the vertices that the skin kernel left."""
     g = avatar.gaussians
     vertices = gpu.get("GsacPosed").reshape(-1, 4)[:, :3].astype(np.float64)
-    return bind(face_frames(vertices, avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    return bind(face_frames(vertices, avatar.faces), g.face, g.mu, g.quat, g.log_scale)
 
 
 def test_skin_and_expression_agree_with_the_trainer(gpu, on_gpu, frame):
@@ -64,7 +64,7 @@ def test_skin_and_expression_agree_with_the_trainer(gpu, on_gpu, frame):
 
 
 def test_bound_means_rotations_and_scales_agree_with_the_trainer(gpu, bound, avatar):
-    N = len(avatar.gaussians["face"])
+    N = len(avatar.gaussians)
     parts = gpu.get("Parts").reshape(-1, 5, 4)[:N, :, :3]
     assert abs(parts[:, 0] - bound.means).max() < 1e-5
     assert abs(parts[:, 4] - bound.scales).max() < 1e-5
@@ -86,7 +86,7 @@ def test_covariances_agree_with_the_trainer(gpu, bound):
 
 def test_a_face_without_area_gives_a_point_and_no_nan(gpu, kernels, figure):
     vertices = figure.vertices.copy()
-    f = figure.faces[figure.gaussians["face"][0]]
+    f = figure.faces[figure.gaussians.face[0]]
     vertices[f[1]] = vertices[f[0]]
     flat = pack_avatar(replace(figure, vertices=vertices))
     N = len(flat["GsacCorners"])

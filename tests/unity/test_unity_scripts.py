@@ -87,7 +87,7 @@ def test_the_benchmark_shows_three_poses_and_writes_the_percentiles(play, files,
     assert abs(result["median_ms"] - 10) < .02 and abs(result["p95_ms"] - 10) < .02 and abs(result["p99_ms"] - 50) < .02
     assert abs(result["mean_fps"] - 1 / .011) < .5
     assert abs(sum(result["fps_each_second"]) - result["frames"]) <= 100 and 18 <= len(result["fps_each_second"]) <= 21
-    assert result["gpu"] == 'stub "GPU"' and result["gaussians"] == len(RiggedAvatar.read(files / "figure.gsac").gaussians["face"])
+    assert result["gpu"] == 'stub "GPU"' and result["gaussians"] == len(RiggedAvatar.read(files / "figure.gsac").gaussians)
 
 
 def test_the_importer_makes_a_prefab_with_a_whole_human_skeleton(play, files, figure):
@@ -159,18 +159,18 @@ def test_wrong_calls_name_the_avatar_and_the_word(play, files):
 
 
 def test_coarser_levels_are_drawn_from_afar_and_do_not_flicker_where_they_change(play, files, figure):
-    counts = [len(level["face"]) for level in (figure.gaussians, *figure.coarser)]
+    counts = [len(level) for level in (figure.gaussians, *figure.coarser)]
     drawn = [counts.index(int(n)) for n in play("levels", files / "figure.gsac").split()]
     assert drawn == [0, 1, 2, 2, 0, 0, 1, 1, 0], "at 3, 12, 30, 300, 3, 8.5, 9.2, 8.5 and 7.9 m; they change at 8 and 16"
 
 
 def test_every_level_is_bound_in_the_light_of_the_file_as_far_as_the_component_says(play, files, tmp_path, figure):
     light = np.linspace(-.4, .7, 12, dtype=np.float32).reshape(4, 3)
-    (tmp_path / "lit.gsac").write_bytes(replace(figure, light=light).to_bytes())
+    (tmp_path / "lit.gsac").write_bytes(replace(figure, gaussians=replace(figure.gaussians, light=light)).to_bytes())
     got = np.array([line.split() for line in play("light", tmp_path / "lit.gsac").splitlines()], float)
     mirrored = (light[[1, 2, 3, 0]] * np.float32([[1], [-1], [1], [1]])).T
     even = np.tile([0, 0, 0, 1], (3, 1))
-    assert [row[0] for row in got] == [len(g["face"]) for g in (figure.gaussians, figure.coarser[-1])] * 4
+    assert [row[0] for row in got] == [len(g) for g in (figure.gaussians, figure.coarser[-1])] * 4
     for row, strength in zip(got, np.repeat([1, .25, 0, 1], 2), strict=True):
         np.testing.assert_allclose(row[1:].reshape(3, 4), (1 - strength) * even + strength * mirrored, atol=1e-6)
     got = [line.split()[1:] for line in play("light", files / "figure.gsac").splitlines()]

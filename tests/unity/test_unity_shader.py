@@ -25,11 +25,11 @@ def test_every_render_pipeline_has_a_pass_that_compiles(passes):
 def scene(exported):
     """2,500 gaussians of an avatar in its own space, a turned and shifted root, an off-centre camera, and the truth."""
     avatar = RiggedAvatar.read(exported / "avatar.gsac")
-    pick = np.arange(2500) * len(avatar.gaussians["face"]) // 2500
-    avatar.gaussians = {name: array[pick] for name, array in avatar.gaussians.items()}
-    avatar.gaussians["log_scale"] = avatar.gaussians["log_scale"] + .4
+    pick = np.arange(2500) * len(avatar.gaussians) // 2500
+    avatar.gaussians = avatar.gaussians[pick]
+    avatar.gaussians.log_scale = avatar.gaussians.log_scale + .4
     g = avatar.gaussians
-    bound = bind(face_frames(avatar.posed(avatar.pose("A")), avatar.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    bound = bind(face_frames(avatar.posed(avatar.pose("A")), avatar.faces), g.face, g.mu, g.quat, g.log_scale)
     turn = exp(np.array([.1, .7, 0]))
     model = np.concatenate([turn, [[.3], [-.35], [.2]]], 1)
     view = np.concatenate([exp(np.array([.15, 0, .1])), [[.1], [-.1], [-2.6]]], 1)  # y up, -z ahead
@@ -38,14 +38,14 @@ def scene(exported):
     total = flip @ view[:, :3] @ model[:, :3]
     place = flip @ (view[:, :3] @ model[:, 3] + view[:, 3])
     truth = render((bound.means @ total.T + place).astype(np.float32), (total @ bound.rotations).astype(np.float32),
-                   bound.scales, g["rgb"], g["opacity"], camera)
+                   bound.scales, g.rgb, g.opacity, camera)
     return {"avatar": avatar, "bound": bound, "model": model, "view": view, "camera": camera, "total": total, "place": place,
             "truth": np.concatenate([truth.rgb, truth.alpha[..., None]], 2)}
 
 
 def picture(gpu, passes, scene, pipeline, flipped=False, linear=0):
     g, bound = scene["avatar"].gaussians, scene["bound"]
-    N = len(g["face"])
+    N = len(g)
     half = bound.rotations * bound.scales[:, None]
     c = half @ half.transpose(0, 2, 1)
     splats = np.zeros((N, 12), np.float32)
@@ -99,7 +99,7 @@ def test_in_a_linear_project_an_opaque_colour_is_the_lit_display_colour_made_lin
     one = scene | {"shade": factor, "bound": first, "avatar": _first(scene["avatar"])}
     got = picture(gpu, passes, one, "", linear=1)
     peak = got.reshape(-1, 4)[got[..., 3].argmax()]
-    rgb = one["avatar"].gaussians["rgb"][0].astype(np.float64) * factor
+    rgb = one["avatar"].gaussians.rgb[0].astype(np.float64) * factor
     linear = np.where(rgb > .04045, ((rgb + .055) / 1.055) ** 2.4, rgb / 12.92)
     np.testing.assert_allclose(peak[:3] / peak[3], linear, atol=2e-3)
 
@@ -107,4 +107,4 @@ def test_in_a_linear_project_an_opaque_colour_is_the_lit_display_colour_made_lin
 def _first(avatar):
     from dataclasses import replace
 
-    return replace(avatar, gaussians={name: array[:1] for name, array in avatar.gaussians.items()})
+    return replace(avatar, gaussians=avatar.gaussians[:1])

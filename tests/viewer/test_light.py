@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import face_frames
+from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
-from gsac.avatar.film import FOV, PITCH, look
-from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.film import FOV, PITCH, look_at
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.avatar.light import DARKEST, shade
+from gsac.avatar.light import shade
 from gsac.avatar.raster import render_bound
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer.page import page_bytes
@@ -32,7 +32,8 @@ def browser():
 
 @pytest.fixture(scope="module")
 def lit(exported):
-    return replace(RiggedAvatar.read(exported / "avatar.gsac"), light=LIGHT)
+    avatar = RiggedAvatar.read(exported / "avatar.gsac")
+    return replace(avatar, gaussians=replace(avatar.gaussians, light=LIGHT))
 
 
 @pytest.fixture(scope="module")
@@ -43,11 +44,11 @@ def address(lit, tmp_path_factory):
 
 
 def expected(avatar, pose, yaw):
-    R, eye = look(yaw, np.zeros(3), DISTANCE)
+    R, eye = look_at(yaw, np.zeros(3), DISTANCE)
     f = SIZE / 2 / math.tan(math.radians(FOV / 2))
-    vertices, gaussians = avatar.posed(avatar.pose(pose)), Gaussians(**avatar.gaussians)
-    if avatar.light is not None:
-        gaussians.rgb = gaussians.rgb * shade(avatar.light, face_frames(vertices, avatar.faces).R[gaussians.face, :, 1])
+    vertices, gaussians, light = avatar.posed(avatar.pose(pose)), replace(avatar.gaussians, light=None), avatar.gaussians.light
+    if light is not None:
+        gaussians.rgb = gaussians.rgb * shade(light, face_frames(vertices, avatar.faces).R[gaussians.face, :, 1])
     out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, gaussians,
                        Camera((f, f), (SIZE / 2, SIZE / 2), SIZE, SIZE))
     image = out.rgb + (1 - out.alpha[..., None]) * np.array(BACKGROUND) / 255
@@ -66,7 +67,7 @@ def test_in_its_light_the_person_looks_as_the_trainers_renderer_shows_from_every
         pytest.skip("this chromium has no WebGPU")
     for pose, yaw in (("A", 20), ("T", 160), ("A", -80)):
         pictures = []
-        for words, avatar in (("", lit), ("&light=off", replace(lit, light=None))):
+        for words, avatar in (("", lit), ("&light=off", replace(lit, gaussians=replace(lit.gaussians, light=None)))):
             view = f"pose={pose}&yaw={yaw}&pitch={PITCH}&dist={DISTANCE}&fov={FOV}&target=0,0,0&bg=3a6080&still{words}"
             browser.run(f"location.hash = '{view}'")
             browser.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")

@@ -63,7 +63,7 @@ def expected(avatar, vertices, yaw, pitch, distance, target):
     R = np.stack([right, np.cross(-back, right), -back])
     eye = np.array(target) + distance * back
     f = SIZE / 2 / math.tan(math.radians(FOV / 2))
-    out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, Gaussians(**avatar.gaussians),
+    out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, avatar.gaussians,
                        Camera((f, f), (SIZE / 2, SIZE / 2), SIZE, SIZE))
     image = out.rgb + (1 - out.alpha[..., None]) * np.array(BACKGROUND) / 255
     return np.clip(image, 0, 1), out.alpha > 0.02

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from gsac.avatar import rotation
+from gsac.avatar import joints, rotation
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, INDEX
 from gsac.stages.contract import StageError
@@ -24,7 +24,6 @@ VERTEX, LAPLACIAN, EDGE = 10.0, 10000.0, 1.0
 VISIBLE = float(np.cos(np.radians(135)))
 EYES = [INDEX["left_eye"], INDEX["right_eye"]]
 EARS = [INDEX["left_ear"], INDEX["right_ear"]]
-HEAD_JOINTS, EYE_JOINTS = [15, 22], [23, 24]
 ICP_STEPS = 24
 """Rounds of iterative closest points."""
 NEAR, LEAST_SHARE = 0.015, 0.3
@@ -64,7 +63,7 @@ class Head:
 
 def select_head(body: Body) -> np.ndarray:
     """Vertices (V,) bool that head and jaw carry; the eyes are left out."""
-    return body.weights[:, HEAD_JOINTS].sum(1) > 0.5
+    return body.weights[:, [joints.HEAD, joints.JAW]].sum(1) > 0.5
 
 
 def lay_on_body(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body: Body) -> tuple[np.ndarray, ...]:
@@ -75,7 +74,7 @@ def lay_on_body(vertices: np.ndarray, faces: np.ndarray, eyes: np.ndarray, body:
     """
     index = np.flatnonzero(select_head(body))
     skin, around = body.v_template[index].astype(float), find_incident_faces(faces, len(vertices))
-    own = (body.J_regressor[EYE_JOINTS] @ body.v_template).astype(float)
+    own = (body.J_regressor[joints.EYES] @ body.v_template).astype(float)
     size = np.linalg.norm(own[0] - own[1]) / max(np.linalg.norm(eyes[0] - eyes[1]), 1e-6)
     turn, shift = np.eye(3), own.mean(0) - size * eyes.mean(0)
     for _ in range(ICP_STEPS):

@@ -13,6 +13,7 @@ import numpy as np
 
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import HEAD, JAW, WRISTS, J
 from gsac.avatar.metrics import psnr
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace, side_by_side
@@ -38,7 +39,7 @@ WIDTHS = 3.0
 """Rate of the scales in that time, over a training's: of what was merged these are off most."""
 ROUNDS = 5
 """That move the held-out frames' poses, on any device: sizes are to be chosen alike."""
-NEAR, CARE = [15, 20, 21, *range(22, 55)], 3.0
+NEAR, CARE = [HEAD, *WRISTS, *range(JAW, J)], 3.0
 """Joints of head and hands, and what their pixels count for beside others."""
 
 

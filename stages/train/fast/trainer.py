@@ -15,6 +15,7 @@ import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.logistic import logit, sigmoid
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.checkpoint import standing
@@ -138,7 +139,7 @@ class Trainer:
         self.faces, self.face, self.light = task.poses.body.faces, gaussians.face, gaussians.light
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
-                       "rgb": gaussians.rgb, "opacity": np.log(opacity / (1 - opacity))[:, None]}
+                       "rgb": gaussians.rgb, "opacity": logit(opacity)[:, None]}
         self.values = {name: np.array(value, np.float32, order="C") for name, value in self.values.items()}
         self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
@@ -178,7 +179,7 @@ class Trainer:
     def gaussians(self) -> Gaussians:
         v = self.values
         return Gaussians(self.face, v["mu"].copy(), v["quat"].copy(), v["log_scale"].copy(), v["rgb"].copy(),
-                         1 / (1 + np.exp(-v["opacity"][:, 0])), self.light)
+                         sigmoid(v["opacity"][:, 0]), self.light)
 
     def step(self, t: int, view: View, done: float, background: np.ndarray, number: int) -> float:
         """One step on frame t. done: share of the steps so far; background: (3,). Returns the loss."""
@@ -240,7 +241,7 @@ class Trainer:
         gaussians = levelled(laid(gaussians, self.seen, self.rest, self.faces), self.rest, self.faces)
         opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values |= {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
-                        "opacity": np.log(opacity / (1 - opacity))[:, None].astype(np.float32)}
+                        "opacity": logit(opacity)[:, None].astype(np.float32)}
         self.start = gaussians.mu.copy()
 
     def rest_unseen(self, views: dict[int, View]) -> Gaussians:
@@ -293,7 +294,3 @@ class Trainer:
             adam_rows(v[name], by_name[name], self.first[name], self.second[name], self.count, rate)
         limit(v["mu"], v["quat"], v["log_scale"], v["rgb"], v["opacity"], self.start, self.face_scale, config.needle,
               self.largest, self.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
-
-
-def sigmoid(x: np.ndarray) -> np.ndarray:
-    return 1 / (1 + np.exp(-x))

@@ -15,11 +15,10 @@ from scipy.sparse.linalg import splu
 
 from gsac.avatar.binding import bind, face_frames, unbind
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import FINGERS
 
 SMOOTHNESS = 30.0
 """lambda: a step reaches about its root in edges."""
-FINGERS = 25
-"""First finger joint: fingers are too thin for a displacement, their error is pose."""
 EVERY = 4
 """Steps of which the gradients are gathered for one step of the offsets."""
 KEPT = ("offset", "first", "second", "gathered", "seen", "count")
@@ -37,7 +36,7 @@ class Offsets:
         laplacian = diags(np.asarray(edges.sum(1)).ravel()) - edges
         self.solve = splu((identity(vertices) + SMOOTHNESS * laplacian).tocsc(), permc_spec="MMD_AT_PLUS_A",
                           options={"SymmetricMode": True}).solve
-        self.share = 1 - np.where(body.skin_index >= FINGERS, body.skin_weight, 0).sum(1, keepdims=True)
+        self.share = 1 - np.where(body.skin_index >= FINGERS.start, body.skin_weight, 0).sum(1, keepdims=True)
         self.offset = np.zeros((vertices, 3), np.float32)
         self.first, self.second = np.zeros((vertices, 3)), 0.0
         self.gathered, self.seen, self.count = np.zeros((vertices, 3)), 0, 0

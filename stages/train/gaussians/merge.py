@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.body import Body
-from gsac.avatar.distinct import distinct
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.mesh import distinct_pairs
+from gsac.avatar.rotation import to_wxyz
 
 NEIGHBOURS = 8
 EVEN = 0.06
@@ -53,7 +54,7 @@ def cheapest(gaussians: Gaussians, bound: Bound, shown: np.ndarray, normals: np.
     places = bound.means.astype(np.float64)
     near = cKDTree(places).query(places, k=min(NEIGHBOURS + 1, len(places)))[1][:, 1:]
     one, other = np.repeat(np.arange(len(places)), near.shape[1]), near.ravel()
-    i, j = np.divmod(distinct(np.minimum(one, other) * len(places) + np.maximum(one, other)), len(places))
+    i, j = distinct_pairs(np.minimum(one, other), np.maximum(one, other), len(places))
     skin = skin_of(gaussians.face, body)
     fit = ((normals[i] * normals[j]).sum(1) > SAME_SIDE) & (0.5 * np.abs(skin[i] - skin[j]).sum(1) < SAME_PART)
     i, j = i[fit], j[fit]
@@ -103,7 +104,7 @@ def joined(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndar
     out = gaussians[np.arange(len(gaussians))]
     R, T, k = frames.R[out.face[keep]], frames.T[out.face[keep]], np.maximum(frames.k[out.face[keep], None], 1e-9)
     out.mu[keep] = np.einsum("nji,nj->ni", R, middle - T) / k
-    out.quat[keep] = Rotation.from_matrix(R.transpose(0, 2, 1) @ axes).as_quat()[:, [3, 0, 1, 2]]
+    out.quat[keep] = to_wxyz(Rotation.from_matrix(R.transpose(0, 2, 1) @ axes).as_quat())
     out.log_scale[keep] = np.log(scales / k)
     out.opacity[keep] = np.minimum(needed, OPAQUE)
     out.rgb[keep] = share * gaussians.rgb[keep] + (1 - share) * gaussians.rgb[drop]

@@ -16,6 +16,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import WHITE, composite, score
 from gsac.avatar.raster import render_bound, render_bound_backward
+from gsac.avatar.rotation import about_y
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
 from gsac.stages.train.finite import finite, pose
@@ -143,7 +144,7 @@ def turned(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:
 
     def tile(degrees: tuple[int, int], workspace: Workspace) -> np.ndarray:
         y, x = np.radians(degrees)
-        turn = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
+        turn = about_y(y)
         tilt = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
         posed = (vertices - middle) @ (tilt @ upright @ turn).T + np.array([0, 0, 5 * half])
         camera = Camera((size * 2.4, size * 2.4), (size / 2, size / 2), size, size)

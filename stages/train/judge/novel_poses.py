@@ -13,6 +13,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
+from gsac.avatar.rotation import about_y
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
@@ -69,8 +70,7 @@ def in_pose(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.nd
 
 def before_camera(vertices: np.ndarray, degrees: float) -> tuple[np.ndarray, Camera, float]:
     """The body turned about the upright axis before a camera that sees all of it: vertices (V, 3), camera, px for each m."""
-    a = np.radians(degrees)
-    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    turn = about_y(np.radians(degrees))
     middle = (vertices.min(0) + vertices.max(0)) / 2
     half = float(np.linalg.norm(vertices - middle, axis=1).max())
     placed = (vertices - middle) @ (np.diag([1.0, -1.0, -1.0]) @ turn).T + [0, 0, 6 * half]

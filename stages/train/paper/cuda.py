@@ -6,6 +6,7 @@ import numpy as np
 
 from gsac.avatar.cuda.paper import PaperRecipe, PaperTrainer
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.logistic import sigmoid
 from gsac.stages.train.fast.cuda import PERCEPTUAL_STEPS, follow, hand_back, training
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.paper.densify import LARGEST, Densifier, due
@@ -44,7 +45,7 @@ def recipe_of(task: Task) -> PaperRecipe:
 
 def start(count: int, rng: np.random.Generator) -> Gaussians:
     """One gaussian a face, colours from noise; `log_scale` holds logits."""
-    opacity = 1 / (1 + np.exp(-paper.OPACITY_LOGIT))
+    opacity = sigmoid(paper.OPACITY_LOGIT)
     return Gaussians(np.arange(count, dtype=np.int32), np.zeros((count, 3), np.float32),
                      np.tile(np.float32([1, 0, 0, 0]), (count, 1)), np.tile(np.float32(paper.SCALE_LOGITS), (count, 1)),
                      rng.random((count, 3)).astype(np.float32), np.full(count, opacity, np.float32))

@@ -8,6 +8,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gsac.avatar.logistic import logit
+from gsac.avatar.rotation import to_xyzw
+
 FIRST, LAST, EVERY, PHASE = 100, 2500, 201, 99
 """Events are the steps strictly between FIRST and LAST that leave PHASE when divided by EVERY."""
 LARGEST = 0.1
@@ -58,12 +61,12 @@ def children(values: dict[str, np.ndarray], chosen: np.ndarray, rng: np.random.G
     split = act.max(1) > SMALL
     parents, act = chosen[split], act[split]
     if len(parents):
-        turn = Rotation.from_quat(new["quat"][split][:, [1, 2, 3, 0]])
+        turn = Rotation.from_quat(to_xyzw(new["quat"][split]))
         shifts = [turn.apply(rng.normal(size=act.shape) * act * SHIFT) for _ in range(2)]
         for shift in shifts:
             shift[:, 1] = np.abs(shift[:, 1])
         share = act / SHRINK / LARGEST
-        logits = np.log(share / (1 - share)).astype(np.float32)
+        logits = logit(share).astype(np.float32)
         new["mu"][split] += shifts[0].astype(np.float32)
         values["mu"][parents] += shifts[1].astype(np.float32)
         new["scale"][split] = values["scale"][parents] = logits

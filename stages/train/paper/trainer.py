@@ -16,6 +16,7 @@ import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import face_frames
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.logistic import sigmoid
 from gsac.avatar.raster import render_bound, render_bound_backward, screen_gradients
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.checkpoint import standing
@@ -103,7 +104,7 @@ class Trainer:
 
     def shown(self) -> Gaussians:
         v = self.values
-        opacity = np.full(len(self.face), 1 / (1 + np.exp(-OPACITY_LOGIT)), np.float32)
+        opacity = np.full(len(self.face), sigmoid(OPACITY_LOGIT), np.float32)
         return Gaussians(self.face, v["mu"], v["quat"], np.log(LARGEST) - np.log1p(np.exp(-v["scale"])), v["rgb"], opacity)
 
     def step(self, views: dict[int, View], number: int, steps: int) -> float:

@@ -12,9 +12,10 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.binding import bind, face_frames, unbind
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.normals import vertex_normals
+from gsac.avatar.joints import BODY
+from gsac.avatar.mesh import vertex_normals
 from gsac.avatar.skinning import joint_transforms, skin
-from gsac.stages.train.poses.poses import BODY, Poses
+from gsac.stages.train.poses.poses import Poses
 
 BONES = BODY.stop
 POINTS, FRAMES = 800, 24

@@ -12,12 +12,13 @@ import numpy as np
 
 from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.contract import StageError
 from gsac.stages.train.finite import finite
 from gsac.stages.train.holdout import near
 from gsac.stages.train.poses.photometric import CORRELATED, TURNING, UNKNOWNS, Normal, carriers, normal_equations
-from gsac.stages.train.poses.poses import BODY, Poses, carried
+from gsac.stages.train.poses.poses import Poses, carried
 from gsac.stages.train.views import View
 
 TURN, SHIFT = 0.1, 0.03

@@ -14,10 +14,11 @@ from numba import njit
 
 from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY
 from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.finite import finite
-from gsac.stages.train.poses.poses import BODY, Poses
+from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View, person_crop
 
 TURNING = BODY.stop

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from gsac.avatar.body import split_pose
+from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.skinning import joint_transforms, skin, skin_backward
 from gsac.stages.train.holdout import carry_corrections
 from gsac.stages.train.poses.interpolate import follow_neighbours
 
-BODY, JAW_EYES = slice(0, 22), slice(22, 25)
 HAND_SHARE = 0.1
 """Rate of the fingers, relative to the body's: an image says little about them."""
 TURN, SHIFT = 0.05, 0.02
@@ -180,11 +181,8 @@ class Poses:
 
     def refined(self):
         """BodyParams with the poses as they stand; `joints` computed anew."""
-        flat = self.pose.astype(np.float32).reshape(len(self.pose), -1)
-        params = replace(self.params, betas=self.betas.astype(np.float32), global_orient=flat[:, :3],
-                         body_pose=flat[:, 3:66], jaw_pose=flat[:, 66:69],
-                         leye_pose=flat[:, 69:72], reye_pose=flat[:, 72:75], left_hand_pose=flat[:, 75:120],
-                         right_hand_pose=flat[:, 120:165], transl=self.transl.astype(np.float32),
+        params = replace(self.params, betas=self.betas.astype(np.float32), **split_pose(self.pose),
+                         transl=self.transl.astype(np.float32),
                          expression=(self.params.expression + self.expression).astype(np.float32),
                          joint_offset=(self.params.joint_offset + self.joint_offset).astype(np.float32))
         params.joints = self.body.posed_joints(params)

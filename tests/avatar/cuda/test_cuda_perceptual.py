@@ -99,7 +99,7 @@ def through_features_of(window, network, images, monkeypatch):
 
     with torch.no_grad(), torch.backends.cudnn.flags(enabled=True, benchmark=False, deterministic=True, allow_tf32=False):
         monkeypatch.setattr(functional, "relu", keep)
-        window.network.compared(*torch.from_numpy(images).cuda())
+        window.network.compare(*torch.from_numpy(images).cuda())
     features = iter([x.float().cpu() for x in kept])
 
     def replay(x):
@@ -107,10 +107,10 @@ def through_features_of(window, network, images, monkeypatch):
         return feature + (x - x.detach()) * (feature > 0)
 
     monkeypatch.setattr(functional, "relu", replay)
-    own = network.on("cpu", torch.float32)
+    own = network.to("cpu", torch.float32)
     own.weights = {name: w.float().cpu() for name, w in window.network.weights.items()}
     image = torch.from_numpy(images[0]).requires_grad_()
-    value = own.compared(image, torch.from_numpy(images[1]))
+    value = own.compare(image, torch.from_numpy(images[1]))
     slope, = torch.autograd.grad(value, image)
     monkeypatch.undo()
     return value.item(), slope.numpy()

@@ -49,10 +49,10 @@ def test_what_is_written_is_read(figure, data):
     np.testing.assert_allclose(back.skin_weight, figure.skin_weight, atol=2e-5)
     np.testing.assert_allclose(back.expression_delta, figure.expression_delta, atol=1e-5)
     for name, tolerance in (("mu", 2e-5), ("quat", 2e-5), ("log_scale", 3e-4), ("rgb", 5e-4), ("opacity", 1e-5)):
-        np.testing.assert_allclose(back.gaussians[name], figure.gaussians[name], atol=tolerance)
-    np.testing.assert_array_equal(back.gaussians["face"], figure.gaussians["face"])
-    assert [len(level["face"]) for level in back.coarser] == [len(level["face"]) for level in figure.coarser]
-    np.testing.assert_array_equal(back.coarser[1]["mu"], back.gaussians["mu"][::9])
+        np.testing.assert_allclose(getattr(back.gaussians, name), getattr(figure.gaussians, name), atol=tolerance)
+    np.testing.assert_array_equal(back.gaussians.face, figure.gaussians.face)
+    assert [len(level) for level in back.coarser] == [len(level) for level in figure.coarser]
+    np.testing.assert_array_equal(back.coarser[1].mu, back.gaussians.mu[::9])
     for name, clip in figure.clips.items():
         assert (back.clips[name].fps, back.clips[name].joints) == (clip.fps, clip.joints)
         np.testing.assert_array_equal(back.clips[name].rotation, clip.rotation)
@@ -60,11 +60,11 @@ def test_what_is_written_is_read(figure, data):
 
 def test_a_light_is_written_and_read_and_without_one_no_block_is_there(figure, data):
     light = np.linspace(-.4, 1, 12, dtype=np.float32).reshape(4, 3)
-    lit = replace(figure, light=light)
+    lit = replace(figure, gaussians=replace(figure.gaussians, light=light))
     back = RiggedAvatar.from_bytes(lit.to_bytes())
-    np.testing.assert_array_equal(back.light, light)
+    np.testing.assert_array_equal(back.gaussians.light, light)
     assert back.to_bytes() == lit.to_bytes()
-    assert "light" not in head_and_body(data)[0]["blocks"] and RiggedAvatar.from_bytes(data).light is None
+    assert "light" not in head_and_body(data)[0]["blocks"] and RiggedAvatar.from_bytes(data).gaussians.light is None
 
 
 def test_same_avatar_same_bytes_and_a_second_round_changes_nothing(figure, data):

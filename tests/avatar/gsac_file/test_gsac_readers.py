@@ -80,7 +80,7 @@ def collection(figure):
 
 @pytest.fixture(scope="module")
 def fuzzed(figure):
-    data = replace(figure, light=np.full((4, 3), .5, np.float32)).to_bytes()
+    data = replace(figure, gaussians=replace(figure.gaussians, light=np.full((4, 3), .5, np.float32))).to_bytes()
     return hostile.fuzzed(data, 300) | hostile.rewritten(data, 300)
 
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.motion import quat
 from gsac.avatar.motion.bvh import parse_bvh, read_bvh
-from gsac.avatar.motion.names import match, plain
+from gsac.avatar.motion.names import match, split_side
 from gsac.avatar.motion.retarget import retarget
 from gsac.avatar.motion.source import Motion, MotionError, Source
 from support import dances
@@ -137,7 +137,7 @@ def test_names_of_the_tools_are_known(names, expected):
 
 
 def test_a_name_without_a_side_is_no_limb():
-    assert plain("mixamorig:LeftUpLeg") == ("left_", "upleg")
+    assert split_side("mixamorig:LeftUpLeg") == ("left_", "upleg")
     assert match(["Thigh", "Foot", "Head"]) == {"head": 2}
 
 

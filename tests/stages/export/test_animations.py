@@ -5,7 +5,7 @@ import pytest
 
 from gsac.avatar.skinning import joint_transforms
 from gsac.stages.export.animations import CLIPS
-from gsac.stages.export.config import Animation
+from gsac.stages.export.config import AnimationName
 
 
 def poses(figure, name):
@@ -67,4 +67,4 @@ def test_a_pose_lowers_both_arms_alike(figure):
 
 
 def test_every_animation_that_can_be_named_exists():
-    assert tuple(CLIPS) == get_args(Animation)
+    assert tuple(CLIPS) == get_args(AnimationName)

@@ -62,10 +62,10 @@ def test_the_container_poses_and_moves_the_face_as_the_body_does(exported, perso
 
 
 def test_the_light_of_the_clip_is_carried_on_and_left_out_where_there_is_none(person, exported):
-    assert RiggedAvatar.read(exported / "avatar.gsac").light is None
+    assert RiggedAvatar.read(exported / "avatar.gsac").gaussians.light is None
     gaussians, params = Gaussians.read(person["train/avatar.npz"]), BodyParams.read(person["train/body.npz"])
     gaussians.light = np.float32([[.9, .8, .7], [.1, 0, 0], [0, -.2, 0], [0, 0, -.3]])
-    np.testing.assert_array_equal(rig_avatar(Body.load(), params, gaussians).light, gaussians.light)
+    np.testing.assert_array_equal(rig_avatar(Body.load(), params, gaussians).gaussians.light, gaussians.light)
 
 
 def test_the_viewer_page_is_at_most_2_mb_for_6000_gaussians_and_names_no_other_address(exported):

@@ -100,13 +100,13 @@ def test_every_key_of_every_clip_poses_the_mesh_as_the_avatar_does(figure, gltf)
 def test_points_are_the_gaussians_in_linear_units(figure, gltf):
     a, g = gltf.attributes(1), figure.gaussians
     vertices = figure.vertices - np.float32([0, figure.ground, 0])
-    bound = bind(face_frames(vertices, figure.faces), g["face"], g["mu"], g["quat"], g["log_scale"])
+    bound = bind(face_frames(vertices, figure.faces), g.face, g.mu, g.quat, g.log_scale)
     np.testing.assert_allclose(a["POSITION"], bound.means, atol=1e-5)
     np.testing.assert_allclose(a["KHR_gaussian_splatting:SCALE"], bound.scales, rtol=1e-4)
     R = Rotation.from_quat(a["KHR_gaussian_splatting:ROTATION"]).as_matrix()
     np.testing.assert_allclose(R, bound.rotations, atol=1e-5)
-    np.testing.assert_array_equal(a["KHR_gaussian_splatting:OPACITY"], g["opacity"])
-    np.testing.assert_array_equal(a["_GSAC_FACE"], g["face"])
+    np.testing.assert_array_equal(a["KHR_gaussian_splatting:OPACITY"], g.opacity)
+    np.testing.assert_array_equal(a["_GSAC_FACE"], g.face)
 
 
 def test_points_keep_the_rules_of_the_extensions_release_candidate(figure, gltf):
@@ -123,7 +123,7 @@ def test_points_keep_the_rules_of_the_extensions_release_candidate(figure, gltf)
     a = {name: gltf.attributes(1)[f"KHR_gaussian_splatting:{name}"] for name in kinds}
     np.testing.assert_allclose(np.linalg.norm(a["ROTATION"], axis=1), 1, atol=1e-5)
     assert a["SCALE"].min() >= 0 and 0 <= a["OPACITY"].min() and a["OPACITY"].max() <= 1
-    np.testing.assert_allclose(a["SH_DEGREE_0_COEF_0"] * .2820947917738781 + .5, figure.gaussians["rgb"], atol=1e-6)
+    np.testing.assert_allclose(a["SH_DEGREE_0_COEF_0"] * .2820947917738781 + .5, figure.gaussians.rgb, atol=1e-6)
     node = gltf.doc["nodes"][gltf.node["gaussians"]]
     assert not {"scale", "matrix", "rotation"} & node.keys()
 
@@ -150,7 +150,7 @@ def test_trimesh_opens_it(figure, glb):
     scene = trimesh.load(io.BytesIO(glb), file_type="glb")
     body, points = scene.geometry["body"], scene.geometry["gaussians"]
     assert body.faces.shape == figure.faces.shape
-    assert points.vertices.shape == (len(figure.gaussians["face"]), 3)
+    assert points.vertices.shape == (len(figure.gaussians), 3)
     assert body.bounds[0][1] == pytest.approx(0, abs=1e-6), "feet at y = 0"
 
 

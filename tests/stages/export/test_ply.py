@@ -21,7 +21,7 @@ def posed(figure):
 
 @pytest.fixture(scope="module")
 def ply(figure, posed):
-    return ply_bytes(*posed, figure.gaussians["rgb"], figure.gaussians["opacity"])
+    return ply_bytes(*posed, figure.gaussians.rgb, figure.gaussians.opacity)
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +39,9 @@ def test_values_are_decoded_as_every_3dgs_reader_does(figure, posed, table):
     np.testing.assert_allclose(columns(table, "x", "y", "z"), means * FLIP, atol=1e-6)
     np.testing.assert_allclose(np.exp(columns(table, "scale_0", "scale_1", "scale_2")), scales, rtol=1e-5)
     opacity = 1 / (1 + np.exp(-table["opacity"].astype(float)))
-    np.testing.assert_allclose(opacity, figure.gaussians["opacity"], atol=1e-5)
+    np.testing.assert_allclose(opacity, figure.gaussians.opacity, atol=1e-5)
     rgb = 0.5 + SH0 * columns(table, "f_dc_0", "f_dc_1", "f_dc_2")
-    np.testing.assert_allclose(rgb, figure.gaussians["rgb"], atol=1e-6)
+    np.testing.assert_allclose(rgb, figure.gaussians.rgb, atol=1e-6)
 
 
 def test_covariances_turn_with_the_axes(posed, table):
@@ -85,16 +85,16 @@ def test_an_independent_reader_gives_the_same_picture(tmp_path, figure, posed, p
     means, quats, scales = posed
     turned = np.diag(FLIP) @ Rotation.from_quat(quats[:, [1, 2, 3, 0]]).as_matrix()
     direct = render((means * FLIP + place).astype(np.float32), turned.astype(np.float32), scales,
-                    figure.gaussians["rgb"], figure.gaussians["opacity"], camera)
+                    figure.gaussians.rgb, figure.gaussians.opacity, camera)
     direct = np.concatenate([direct.rgb, direct.alpha[..., None]], axis=2)
     assert direct[..., 3].max() > 0.9
     assert np.abs(read - direct).max() < 2e-3
 
 
 def test_padding_adds_45_zeros_and_248_bytes_a_gaussian(figure, posed, ply):
-    padded = ply_bytes(*posed, figure.gaussians["rgb"], figure.gaussians["opacity"], pad_sh=True)
+    padded = ply_bytes(*posed, figure.gaussians.rgb, figure.gaussians.opacity, pad_sh=True)
     body = padded.split(b"end_header\n", 1)[1]
-    assert len(body) == 248 * len(figure.gaussians["face"])
+    assert len(body) == 248 * len(figure.gaussians)
     rows = np.frombuffer(body, "<f4").reshape(-1, 62)
     assert not rows[:, 9:54].any()
     plain = np.frombuffer(ply.split(b"end_header\n", 1)[1], "<f4").reshape(-1, 17)
@@ -102,6 +102,6 @@ def test_padding_adds_45_zeros_and_248_bytes_a_gaussian(figure, posed, ply):
 
 
 def test_full_and_no_opacity_stay_finite(figure, posed):
-    opacity = np.where(np.arange(len(figure.gaussians["face"])) % 2, 0, 1).astype(np.float32)
-    rows = np.frombuffer(ply_bytes(*posed, figure.gaussians["rgb"], opacity).split(b"end_header\n", 1)[1], "<f4")
+    opacity = np.where(np.arange(len(figure.gaussians)) % 2, 0, 1).astype(np.float32)
+    rows = np.frombuffer(ply_bytes(*posed, figure.gaussians.rgb, opacity).split(b"end_header\n", 1)[1], "<f4")
     assert np.isfinite(rows).all()

@@ -22,7 +22,7 @@ def posed(figure):
 
 @pytest.fixture(scope="module")
 def spz(figure, posed):
-    return spz_bytes(*posed, figure.gaussians["rgb"], figure.gaussians["opacity"])
+    return spz_bytes(*posed, figure.gaussians.rgb, figure.gaussians.opacity)
 
 
 @pytest.fixture(scope="module")
@@ -43,15 +43,15 @@ def test_every_value_comes_back_within_a_step(figure, posed, read):
     means, quats, scales = posed
     np.testing.assert_allclose(read.means, means, atol=2 ** -16)
     np.testing.assert_allclose(read.scales, np.log(scales), atol=1 / 31)
-    np.testing.assert_allclose(1 / (1 + np.exp(-np.ravel(read.opacities))), figure.gaussians["opacity"], atol=1 / 500)
-    np.testing.assert_allclose(0.5 + SH0 * np.squeeze(read.sh0), figure.gaussians["rgb"], atol=SH0 / 0.15 / 500)
+    np.testing.assert_allclose(1 / (1 + np.exp(-np.ravel(read.opacities))), figure.gaussians.opacity, atol=1 / 500)
+    np.testing.assert_allclose(0.5 + SH0 * np.squeeze(read.sh0), figure.gaussians.rgb, atol=SH0 / 0.15 / 500)
     turned = Rotation.from_quat(read.quats[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(quats[:, [1, 2, 3, 0]])
     assert np.degrees(turned.magnitude()).max() < 0.3
 
 
 @pytest.mark.slow
 def test_the_left_hand_is_on_the_left_upright_and_facing_us(figure, read):
-    red = (figure.gaussians["rgb"][:, 0] > .7)
+    red = (figure.gaussians.rgb[:, 0] > .7)
     assert read.means[red, 0].min() > 0.2 and read.means[:, 1].max() > 1.4
     toes = read.means[read.means[:, 1] < 0.05]
     assert toes[:, 2].max() > 0.1 > -toes[:, 2].min()
@@ -71,7 +71,7 @@ def test_a_rotation_keeps_its_sense_whatever_its_largest_part(wxyz):
 
 
 def test_it_is_small_and_the_same_each_time(figure, posed, spz):
-    again = spz_bytes(*posed, figure.gaussians["rgb"], figure.gaussians["opacity"])
+    again = spz_bytes(*posed, figure.gaussians.rgb, figure.gaussians.opacity)
     assert again == spz and len(spz) < 20 * len(posed[0])
 
 
@@ -88,7 +88,7 @@ def test_splat_transform_sees_the_same_gaussians_as_in_our_ply(figure, posed, sp
     (folder / "avatar.spz").write_bytes(spz)
     subprocess.run(["node", "node_modules/@playcanvas/splat-transform/bin/cli.mjs", "avatar.spz", "back.ply"], cwd=folder,
                    capture_output=True, check=True)
-    ours = ply_bytes(*posed, figure.gaussians["rgb"], figure.gaussians["opacity"])
+    ours = ply_bytes(*posed, figure.gaussians.rgb, figure.gaussians.opacity)
     ours, back = (plyfile.PlyData.read(io.BytesIO(raw))["vertex"].data for raw in (ours, (folder / "back.ply").read_bytes()))
 
     def rows(table, *names):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from gsac.avatar.body import SMPLX_JOINTS
+from gsac.avatar.joints import NAMES
 from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.paper.loss import Objective, Unknowns, box_person
 from support.turning_person import FOCAL, HEIGHT, WIDTH, facing_person, sightings_of
@@ -26,7 +26,7 @@ def test_joint_offsets_of_both_sides_are_drawn_together(body):
         objective.target = objective.project(moved(objective, unknowns), slice(0, 4)).detach()
         losses.append(float(objective.loss(unknowns, slice(0, 4), 1.0).detach()))
     assert losses[0] + 0.02 / 24 / 3 == pytest.approx(losses[1], abs=2e-6)
-    pairs = {(SMPLX_JOINTS[a], SMPLX_JOINTS[b]) for a, b in zip(objective.left, objective.right, strict=True)}
+    pairs = {(NAMES[a], NAMES[b]) for a, b in zip(objective.left, objective.right, strict=True)}
     assert ("left_wrist", "right_wrist") in pairs and len(pairs) == 24
 
 

@@ -5,7 +5,8 @@ import numpy as np
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
-from gsac.stages.train.gaussians.cloth_offsets import EVERY, FINGERS, Offsets, fold
+from gsac.avatar.joints import FINGERS
+from gsac.stages.train.gaussians.cloth_offsets import EVERY, Offsets, fold
 
 
 def test_folding_leaves_every_gaussian_where_it_was():
@@ -33,7 +34,7 @@ def test_a_pull_on_one_vertex_moves_its_surroundings_smoothly_and_no_finger():
     edges = np.concatenate([body.faces[:, [0, 1]], body.faces[:, [1, 2]]])
     steps = np.abs(offsets.offset[edges[:, 0]] - offsets.offset[edges[:, 1]]).max()
     assert steps < 0.5 * np.abs(offsets.offset).max()
-    finger = (body.skin_index[:, 0] >= FINGERS) & (body.skin_weight[:, 0] > 0.999)
+    finger = (body.skin_index[:, 0] >= FINGERS.start) & (body.skin_weight[:, 0] > 0.999)
     pulled = Offsets(body)
     grad[:] = 0
     grad[finger, 2] = -1

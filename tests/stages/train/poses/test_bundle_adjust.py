@@ -6,12 +6,13 @@ import pytest
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.joints import BODY
 from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.fast import prealign
 from gsac.stages.train.fast import trainer as fast
 from gsac.stages.train.poses import bundle_adjust, photometric
-from gsac.stages.train.poses.poses import BODY, Poses, carried
+from gsac.stages.train.poses.poses import Poses, carried
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import read_views
 

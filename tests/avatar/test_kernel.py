@@ -14,7 +14,7 @@ def test_every_file_that_has_kernels_or_is_used_by_them_is_in_the_digest():
     folder = Path(kernel.__file__).parent
     using = {p.relative_to(folder).as_posix() for p in folder.rglob("*.py") if "avatar.kernel import" in p.read_text()}
     assert using <= set(kernel.SOURCES)
-    assert {"simd.py", "raster/forward.py", "raster/backward.py"} <= set(kernel.SOURCES)
+    assert {"blend.py", "simd.py", "raster/forward.py", "raster/backward.py"} <= set(kernel.SOURCES)
 
 
 @pytest.mark.parametrize("name", kernel.SOURCES)

@@ -1,0 +1,28 @@
+"""The draw rule: the numbers by which every program draws a gaussian alike.
+
+Both rasterisers, their plain reference and the head of `.gsac` files take them from here; the viewer and Unity repeat them as
+defaults (tests/avatar/test_blend.py compares). A splat is `alpha = min(MAX_ALPHA, opacity exp(-s))`, not drawn below MIN_ALPHA.
+"""
+
+from __future__ import annotations
+
+BLUR = 0.3
+"""Low-pass: px^2 added to both variances of every splat."""
+MAX_ALPHA = 0.999
+ALPHA_LEVELS = 255
+MIN_ALPHA = 1 / ALPHA_LEVELS
+STOP = 1e-4
+"""A gaussian that would leave this transmittance or less is not composited, nor any behind it."""
+NEAR = 0.01
+"""m: gaussians nearer to the camera are not drawn."""
+FRUSTUM = 0.3
+"""The projection's Jacobian is taken at a point clamped to the frustum grown by this share of its half width on each side."""
+DARKEST, BRIGHTEST = 0.25, 2.5
+"""The clip's light changes a colour by a factor between these: its first order knows no shadow."""
+
+
+def cuda_constants() -> str:
+    """The same numbers as CUDA text, each the exact double."""
+    numbers = {"BLUR": BLUR, "MAX_ALPHA": MAX_ALPHA, "ALPHA_LEVELS": ALPHA_LEVELS, "MIN_ALPHA": MIN_ALPHA, "STOP": STOP,
+               "NEAR_PLANE": NEAR, "FRUSTUM": FRUSTUM, "DARKEST": DARKEST, "BRIGHTEST": BRIGHTEST}
+    return "".join(f"constexpr double {name} = {value!r};\n" for name, value in numbers.items())
