@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.stages.export.config import AnimationName
 
 FPS = 20.0
 WAVE_S = 3.2
