@@ -1,5 +1,5 @@
 // From poses to tile lists: skinning, binding + projection, and the list of gaussians of every tile.
-// `Scene` is made by scene.py; `Plan`, `Frame`, `State` and `Now` are below.
+// `Scene` is made by structs.py; `Plan`, `Frame`, `State` and `Now` are below.
 
 constexpr int TILE = 16, PIXELS = TILE * TILE, SEGMENT = 128, HEAVY = 256;
 
