@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -44,6 +44,18 @@ class Shot(NamedTuple):
     camera: Camera
     corner: tuple[int, int] = (0, 0)
     """x, y in the whole frame, px."""
+
+
+class OnFaces(Protocol):
+    """Gaussians of any recipe, as far as all trainers know them."""
+
+    face: np.ndarray
+    """(N,) index of the face that carries it."""
+    light: np.ndarray | None
+    """(4, 3) of the clip."""
+
+    def __len__(self) -> int:
+        """N."""
 
 
 class Arrays:

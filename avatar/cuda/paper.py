@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from gsac.avatar.binding import face_frames
 from gsac.avatar.cuda.arrays import Shot
 from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, draw_plan
-from gsac.avatar.cuda.trainer import CudaTrainer
+from gsac.avatar.cuda.trainer import CudaTrainer, opacity_logit
 from gsac.avatar.gaussians import Gaussians
 
 NEAREST = 3
@@ -37,7 +37,8 @@ class PaperGaussians:
     """(N, 3), not limited to 0..1."""
     opacity: np.ndarray
     """(N,) in 0..1, not learned."""
-    light: None = None
+    light: np.ndarray | None = None
+    """(4, 3) as `Gaussians.light`; the recipe has none."""
 
     def __len__(self) -> int:
         return len(self.face)
@@ -121,9 +122,8 @@ class PaperTrainer(CudaTrainer):
             setattr(self.scene, name, value)
 
     def _values(self, gaussians: PaperGaussians) -> dict[str, np.ndarray]:
-        opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.scale_logit, "rgb": gaussians.rgb,
-                "logit": np.log(opacity / (1 - opacity)), "start": gaussians.mu}
+                "logit": opacity_logit(gaussians.opacity), "start": gaussians.mu}
 
     def _upload_gaussians(self, values: dict[str, np.ndarray]) -> None:
         super()._upload_gaussians(values)

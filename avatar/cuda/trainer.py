@@ -6,7 +6,7 @@ import ctypes
 
 import numpy as np
 
-from gsac.avatar.cuda.arrays import JOINTS, TILE, Arrays, BodyArrays, Shot
+from gsac.avatar.cuda.arrays import JOINTS, TILE, Arrays, BodyArrays, OnFaces, Shot
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, draw_plan
 from gsac.avatar.cuda.structs import State
@@ -24,7 +24,7 @@ class CudaTrainer:
     Raises device.NoDeviceError without a GPU, device.DeviceError where it has too little memory.
     """
 
-    def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: Gaussians,
+    def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: OnFaces,
                  recipe: Recipe, device: Device | None = None, pair_room: int | None = None, network: Lpips | None = None):
         """levels: one or two lists of T shots, coarse first; pose: (T, 55, 3) rad; transl: (T, 3) m.
 
@@ -197,7 +197,7 @@ class CudaTrainer:
         self._graph = None
 
     def _upload(self, levels: list[list[Shot]], drawn: DrawnPlan, pose: np.ndarray, transl: np.ndarray,
-                gaussians: Gaussians) -> None:
+                gaussians: OnFaces) -> None:
         arrays = self.arrays
         upload_shots(arrays, levels, self.body.rest_of)
         arrays.upload("plan", drawn.rates.view(np.uint8), np.uint8)
@@ -214,9 +214,8 @@ class CudaTrainer:
 
     def _values(self, gaussians: Gaussians) -> dict[str, np.ndarray]:
         """Buffer's name -> its content, (N, ...)."""
-        opacity = np.clip(gaussians.opacity.astype(np.float64), 1e-4, 1 - 1e-4)
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
-                "logit": np.log(opacity / (1 - opacity)), "start": gaussians.mu}
+                "logit": opacity_logit(gaussians.opacity), "start": gaussians.mu}
 
     def _make_scratch(self) -> None:
         make_scratch(self.arrays, self.recipe)
@@ -281,3 +280,9 @@ class CudaTrainer:
         for name, value in values.items():
             setattr(state, name, value)
         self.buffers["state"].write(np.frombuffer(bytes(state), np.uint8))
+
+
+def opacity_logit(opacity: np.ndarray) -> np.ndarray:
+    """(N,) float64 of opacity (N,), which is kept off 0 and 1."""
+    opacity = np.clip(opacity.astype(np.float64), 1e-4, 1 - 1e-4)
+    return np.log(opacity / (1 - opacity))

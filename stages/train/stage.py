@@ -214,7 +214,7 @@ class Run:
         folder.mkdir()
         poses = self.poses_of_all()
         gaussians.write(job.out / "avatar.npz", self.result.coarser)
-        poses.refined().write(job.out / "body.npz")
+        poses.to_params().write(job.out / "body.npz")
         write_frame(folder / "views.png", draw_all_round(gaussians, poses))
         (job.out / "metrics.json").write_text(json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n")
 

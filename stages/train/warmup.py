@@ -37,4 +37,4 @@ def warm_up() -> None:
     converge(gaussians, poses, frames[:1], views, 1)
     BACKENDS["cpu"].align_poses(gaussians, poses, frames[:1], views, 1)
     judge(gaussians, poses, frames[:1], views)
-    poses.refined()
+    poses.to_params()

@@ -36,7 +36,7 @@ class Cpu(Backend):
         if task.resumed is None:
             trainer, first = Trainer(init_gaussians(task, coarse, count), task), 0
         else:
-            trainer, first = Trainer.restored(task.resumed["trainer"], task), task.resumed["step"]
+            trainer, first = Trainer.from_state(task.resumed["trainer"], task), task.resumed["step"]
             order, rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
             task.resumed = None
         midway = round(MIDWAY * steps) if config.pose_rounds else -1

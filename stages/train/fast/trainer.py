@@ -50,9 +50,8 @@ class Trainer:
         self.frozen_body, self.pose_rate = frozen_body, task.config.pose_rate
         self.offsets = None if frozen_body else Offsets(task.poses.body)
         self.faces, self.face, self.light = task.poses.body.faces, gaussians.face, gaussians.light
-        opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
-                       "rgb": gaussians.rgb, "opacity_logit": np.log(opacity / (1 - opacity))[:, None]}
+                       "rgb": gaussians.rgb, "opacity_logit": logit(gaussians.opacity)[:, None]}
         self.values = {name: np.array(value, np.float32, order="C") for name, value in self.values.items()}
         self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
@@ -76,7 +75,7 @@ class Trainer:
             "offsets": self.offsets and self.offsets.state()}
 
     @classmethod
-    def restored(cls, state: dict, task: Task) -> Trainer:
+    def from_state(cls, state: dict, task: Task) -> Trainer:
         """The trainer that `state` was called on."""
         v = state["values"]
         made = cls(Gaussians(state["face"], v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity_logit"][:, 0])), task)
@@ -93,7 +92,7 @@ class Trainer:
         """A copy of the gaussians as they stand."""
         v = self.values
         return Gaussians(self.face, v["mu"].copy(), v["quat"].copy(), v["log_scale"].copy(), v["rgb"].copy(),
-                         1 / (1 + np.exp(-v["opacity_logit"][:, 0])), self.light)
+                         sigmoid(v["opacity_logit"][:, 0]), self.light)
 
     def step(self, t: int, view: View, done: float, background: np.ndarray, number: int) -> float:
         """One step on frame t. done: share of the steps so far; background: (3,) in 0..1; number: of the step. Returns the loss."""
@@ -154,9 +153,8 @@ class Trainer:
         """
         gaussians = self.freeze_unseen(views)
         gaussians = level_heights(flatten_unseen(gaussians, self.seen, self.rest, self.faces), self.rest, self.faces)
-        opacity = np.clip(gaussians.opacity, 1e-4, 1 - 1e-4)
         self.values |= {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
-                        "opacity_logit": np.log(opacity / (1 - opacity))[:, None].astype(np.float32)}
+                        "opacity_logit": logit(gaussians.opacity)[:, None].astype(np.float32)}
         self.start = gaussians.mu.copy()
 
     def freeze_unseen(self, views: dict[int, View]) -> Gaussians:
@@ -218,3 +216,9 @@ class Trainer:
 def sigmoid(x: np.ndarray) -> np.ndarray:
     """(...) in 0..1 of logits x (...)."""
     return 1 / (1 + np.exp(-x))
+
+
+def logit(opacity: np.ndarray) -> np.ndarray:
+    """(N,) of opacity (N,), which is kept off 0 and 1."""
+    opacity = np.clip(opacity, 1e-4, 1 - 1e-4)
+    return np.log(opacity / (1 - opacity))

@@ -183,7 +183,7 @@ class Poses:
         self.joint_count += 1
         self.joint_offset -= self.joint_share * adam_move(self.joint_moments, self.joint_count, grad, rate)
 
-    def refined(self) -> BodyParams:
+    def to_params(self) -> BodyParams:
         """The parameters with the poses as they stand; `joints` computed anew."""
         flat = self.pose.astype(np.float32).reshape(len(self.pose), -1)
         params = replace(self.params, betas=self.betas.astype(np.float32), global_orient=flat[:, :3],

@@ -1,4 +1,4 @@
-"""What the GPU's side of `train` refuses and promises without a GPU, and, where there is one, the stage's bytes."""
+"""The configuration of `train`: recipes and devices, what it tells the GPU, what it refuses; on a GPU, the bytes of the stage."""
 
 import json
 from dataclasses import fields
