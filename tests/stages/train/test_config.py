@@ -13,6 +13,7 @@ from gsac.stages.train import STAGE, config
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.fast import schedule, size_search
 from gsac.stages.train.fast.cuda import STEPS, make_recipe
+from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.stage import check_device, run
 
@@ -25,6 +26,11 @@ def test_every_recipe_has_an_entry_for_every_device():
 def test_the_docstrings_of_the_parameters_tell_the_full_size():
     told = [text for text in meanings(TrainConfig).values() if f"{config.FULL_SIZE:,}" in text]
     assert len(told) == 2 and size_search.SIZES[0] == config.FULL_SIZE == TrainConfig().budget()
+
+
+def test_the_docstring_of_the_steps_tells_those_of_each_recipe():
+    told = meanings(TrainConfig)["steps"]
+    assert all(str(steps) in told for steps in (schedule.STEPS, STEPS, paper.STEPS))
 
 
 def test_a_configuration_tells_whether_the_size_is_searched_and_with_how_many_it_begins():
