@@ -1,6 +1,6 @@
 """The CUDA path of training: every step on the GPU, kernels compiled at first use by NVRTC.
 
-`why_not()` says in a sentence why it cannot run here, or None; `trainer.CudaTrainer` is the driver. Importing costs nothing.
+`why_not()` gives the reason why it cannot run here, or None; `trainer.CudaTrainer` is the driver. Importing costs nothing.
 """
 
 from __future__ import annotations

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from gsac.avatar.cuda import why_not
 from gsac.avatar.cuda.kernels import KERNELS, cubin
 
+Shape = int | tuple[int, ...]
+
 
 class NoDeviceError(Exception):
-    """There is no GPU that can be used; the words say why."""
+    """No GPU can be used; the message gives the reason."""
 
 
 class DeviceError(Exception):
-    """A driver call failed: its name and the driver's word for it."""
+    """A driver call failed; the message has the call's name and the driver's error."""
 
 
-def _call(name: str, *arguments):
+def _call(name: str, *arguments: Any) -> Any:
     from cuda.bindings import driver
 
     error, *out = getattr(driver, name)(*arguments)
@@ -32,12 +36,13 @@ def _call(name: str, *arguments):
 class Buffer:
     """An array on the device."""
 
-    def __init__(self, shape, dtype):
+    def __init__(self, shape: Shape, dtype: DTypeLike):
         self.shape, self.dtype = tuple(np.atleast_1d(shape)), np.dtype(dtype)
         self.bytes = int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
         self.pointer = int(_call("cuMemAlloc", max(self.bytes, 16)))
 
     def write(self, array: np.ndarray) -> Buffer:
+        """Copies array (...) of the buffer's size to the device."""
         array = np.ascontiguousarray(array, self.dtype)
         if array.nbytes != self.bytes:
             raise ValueError(f"the buffer is {self.shape}, the array {array.shape}")
@@ -45,15 +50,18 @@ class Buffer:
         return self
 
     def read(self) -> np.ndarray:
+        """A copy (...) in the buffer's shape."""
         array = np.empty(self.shape, self.dtype)
         _call("cuMemcpyDtoH", array.ctypes.data, self.pointer, self.bytes)
         return array
 
     def fill(self, byte: int) -> Buffer:
+        """Sets every byte."""
         _call("cuMemsetD8", self.pointer, byte, self.bytes)
         return self
 
     def free(self) -> None:
+        """Gives the memory back; more than once does no harm."""
         if self.pointer:
             _call("cuMemFree", self.pointer)
             self.pointer = 0
@@ -86,16 +94,17 @@ class Device:
         self.kernels |= {name: _call("cuModuleGetFunction", module, name.encode()) for name in names}
 
     def launch(self, kernel: str, grid: tuple[int, int], threads: int, struct: ctypes.Structure) -> None:
-        """The kernel takes one struct by value."""
+        """Launches a kernel, which takes one struct by value."""
         arguments = (ctypes.c_void_p * 1)(ctypes.addressof(struct))
         _call("cuLaunchKernel", self.kernels[kernel], grid[0], grid[1], 1, threads, 1, 1, 0, self.stream,
               ctypes.addressof(arguments), 0)
 
     def wait(self) -> None:
+        """Until the stream has done all its work."""
         _call("cuStreamSynchronize", self.stream)
 
-    def graph(self, record: Callable[[], None]):
-        """What `record` launches, as one graph; `replay` runs it."""
+    def graph(self, record: Callable[[], object]) -> Any:
+        """Handle of a graph of all that `record` launches; `replay` runs it."""
         driver = self._driver
         _call("cuStreamBeginCapture", self.stream, driver.CUstreamCaptureMode.CU_STREAM_CAPTURE_MODE_THREAD_LOCAL)
         record()
@@ -104,23 +113,28 @@ class Device:
         _call("cuGraphDestroy", captured)
         return ready
 
-    def replay(self, graph) -> None:
+    def replay(self, graph: Any) -> None:
+        """Puts a graph's work into the stream."""
         _call("cuGraphLaunch", graph, self.stream)
 
-    def drop(self, graph) -> None:
+    def drop(self, graph: Any) -> None:
+        """Frees a graph."""
         _call("cuGraphExecDestroy", graph)
 
-    def event(self):
+    def event(self) -> Any:
+        """Handle of a new event, for `mark`."""
         return _call("cuEventCreate", 0)
 
-    def mark(self, event) -> None:
+    def mark(self, event: Any) -> None:
+        """Records the event at this place of the stream."""
         _call("cuEventRecord", event, self.stream)
 
-    def milliseconds(self, begin, end) -> float:
+    def milliseconds(self, begin: Any, end: Any) -> float:
+        """From one marked event to the other."""
         _call("cuEventSynchronize", end)
         return float(_call("cuEventElapsedTime", begin, end))
 
     def used(self) -> tuple[int, int]:
-        """Bytes of the GPU's memory in use by anyone, and all there are."""
+        """Bytes of the GPU's memory in use, by any process, and in all."""
         free, total = _call("cuMemGetInfo")
         return int(total) - int(free), int(total)

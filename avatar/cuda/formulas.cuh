@@ -1,6 +1,6 @@
 // Formulas of one gaussian, one pixel and one joint, forward and backward: binding, EWA projection, compositing, rotation
 // vectors, Adam. The kernels and the host test (float64) compile this same text; avatar/binding.py, avatar/raster/ and
-// avatar/skinning.py say the same on the CPU. The draw rule's constants stand before this text: avatar/blend.py writes them.
+// avatar/skinning.py are the same on the CPU. The draw rule's constants stand before this text: avatar/blend.py writes them.
 #pragma once
 
 #ifdef __CUDACC__
@@ -75,7 +75,7 @@ template <class real> FORMULA Turn<real> turn_of(real w, real x, real y, real z)
     return t;
 }
 
-// What the binding gives: mean, rotation by columns, standard deviations; its gradient has the same shape.
+// A bound gaussian: mean, rotation by columns, standard deviations; its gradient has the same shape.
 template <class real> struct Bound { Vec<real> mean, column[3]; real scale[3]; };
 
 template <class real> FORMULA Vec<real> on_axes(const Face<real> &f, Vec<real> v) { return f.a * v.x + f.n * v.y + f.b * v.z; }
@@ -155,7 +155,7 @@ template <class real> FORMULA int window_begin(real centre, int size, int whole)
 
 template <class real> struct Lens { real fx, fy, cx, cy, width, height; };
 
-// What the clip's light makes of a colour channel on a face (avatar/light.py); light: 4 rows of 3; n: normal, camera frame.
+// Factor of the clip's light on a colour channel of a face (avatar/light.py); light: 4 rows of 3; n: normal, camera frame.
 template <class real> FORMULA real shade_of(const real *light, Vec<real> n, int channel) {
     const real *l = light + channel;
     return fmin(fmax(l[0] + l[3] * n.x - l[6] * n.y + l[9] * fmax(n.z, -n.z), real(DARKEST)), real(BRIGHTEST));

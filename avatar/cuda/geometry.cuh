@@ -1,9 +1,9 @@
 // From poses to tile lists: skinning, binding + projection, and the list of gaussians of every tile.
-// `Scene` is made by scene.py; `Plan`, `Frame`, `State` and `Now` are below.
+// `Scene` is made by structs.py; `Plan`, `Frame`, `State` and `Now` are below.
 
 constexpr int TILE = 16, PIXELS = TILE * TILE, SEGMENT = 128, HEAVY = 256;
 
-// What a batch works on, copied out of plan and frames by the first kernel so that the others read it with one load.
+// Frame, rates and background of a step, copied from plan and frames by the first kernel: the others read them with one load.
 struct Now {
     Frame frame;
     Plan plan;
@@ -27,7 +27,7 @@ FORMULA int reserve(int *counter, int n) {
 
 FORMULA Vec<float> vec(const float *p) { return {p[0], p[1], p[2]}; }
 
-// What the learned expression of a frame does to a vertex at rest.
+// Displacement of a vertex at rest by the learned expression of a frame.
 FORMULA Vec<float> expressed(const Scene &s, int pose, int v) {
     Vec<float> sum = {0, 0, 0};
     const double *value = s.expression + size_t(pose) * s.expression_count;

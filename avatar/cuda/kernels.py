@@ -1,4 +1,4 @@
-"""The kernels' text, and its machine code: compiled by NVRTC for the GPU that is there, kept by source and architecture."""
+"""The kernels' source and machine code: compiled by NVRTC for the GPU at hand, cached by source and architecture."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ OPTIONS = ("--std=c++17", "--extra-device-vectorization")
 
 
 class CompileError(Exception):
-    """NVRTC's own words."""
+    """NVRTC refused the kernels; the message is its log."""
 
 
 def source() -> str:
+    """The CUDA text of all kernels, struct declarations included."""
     folder = Path(__file__).parent
     first, *rest = ((folder / name).read_text().replace("#pragma once\n", "") for name in SOURCES)
     return "\n".join([cuda_constants(), first, declarations(), *rest])
@@ -34,7 +35,7 @@ def folder() -> Path:
 
 
 def cubin(architecture: str) -> bytes:
-    """Machine code for an architecture such as sm_90; compiles (about 2 s) where it is not kept yet."""
+    """Machine code for an architecture such as sm_90; compiles (about 2 s) where the cache has none."""
     from cuda.bindings import nvrtc
 
     text = source()
@@ -43,7 +44,7 @@ def cubin(architecture: str) -> bytes:
     kept = folder() / f"{key}.cubin"
     if kept.is_file():
         return kept.read_bytes()
-    code = compiled(text, architecture)
+    code = compile_source(text, architecture)
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=kept.parent, delete=False) as half:
@@ -54,7 +55,8 @@ def cubin(architecture: str) -> bytes:
     return code
 
 
-def compiled(text: str, architecture: str) -> bytes:
+def compile_source(text: str, architecture: str) -> bytes:
+    """Machine code of a CUDA text. Raises CompileError."""
     from cuda.bindings import nvrtc
 
     _, program = nvrtc.nvrtcCreateProgram(text.encode(), b"gsac.cu", 0, [], [])

@@ -1,5 +1,5 @@
-// Clothes and hair: a smooth displacement of the rest vertices (Nicolet et al. 2021), every few steps. What the mesh's smoothing
-// makes of the gradient, once and twice over, are series (smoothing.py) inside one kernel, with a barrier over its blocks.
+// Clothes and hair: a smooth displacement of the rest vertices (Nicolet et al. 2021), every few steps. The gradient smoothed once
+// and twice over is a pair of series (smoothing.py) inside one kernel, with a barrier over its blocks.
 
 constexpr int CLOSE = 8;  // neighbours whose numbers are kept in registers
 

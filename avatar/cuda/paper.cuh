@@ -1,5 +1,5 @@
-// What recipe `paper` adds: Dice of what is not person, likeness of neighbours, Adam without limits. Scales are logits of a largest
-// scale (`scale_limit`), the opacity stays.
+// Recipe `paper`: Dice of the background, the neighbour term, Adam without limits. `log_scale` holds logits, scales are
+// scale_limit * sigmoid(logit); the opacity stays.
 
 constexpr int COLUMNS = 10;  // scales, quaternion, colour
 
@@ -23,7 +23,7 @@ extern "C" __global__ void __launch_bounds__(256) dice(Scene s) {
     s.dice[3 * b + 2] = float(found.value);
 }
 
-// What neighbours are alike in.
+// The values of a gaussian that its neighbours are compared with.
 FORMULA void columns_of(const Scene &s, int i, float *v) {
     for (int c = 0; c < 3; ++c) {
         v[c] = exp(log_scale_of(s.log_scale[3 * i + c], s.scale_limit));

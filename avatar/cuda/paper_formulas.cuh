@@ -1,5 +1,5 @@
 // Formulas that only recipe `paper` has, of one gaussian, one neighbourhood, one pixel and one frame. As formulas.cuh, the kernels
-// and the host test compile this same text; stages/train/{paper,paper_losses,neighbours,kernels}.py say the same on the CPU.
+// and the host test compile this same text; on the CPU it is stages/train/paper/ and stages/train/gaussians/kernels.py.
 #pragma once
 
 constexpr int NEAREST = 3;  // gaussians of a neighbourhood
@@ -20,7 +20,7 @@ template <class real> FORMULA real strength_slope(real own, real target, real we
     return own == target ? real(0) : (own > target ? weight : -weight) / own;
 }
 
-// Dice of what is not person over a frame of `area` pixels, from sums of alpha, mask and their product. Its slope by the alpha of a
+// Dice of the background over a frame of `area` pixels, from sums of alpha, mask and their product. Its slope by the alpha of a
 // pixel is by_clear * (1 - mask) - everywhere.
 struct Dice { double value, by_clear, everywhere; };
 

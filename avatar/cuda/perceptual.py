@@ -1,4 +1,4 @@
-"""LPIPS of a window of the image, in the loss of late steps: the value and its slope by torch's convolutions, recorded once.
+"""LPIPS of a window of the image, for the loss of late steps: value and gradient by torch's convolutions, recorded as a graph.
 
 The kernel `cut_window` fills `Window.images`, `image_gradient` adds `Window.slope`; nothing waits for the host in between.
 """
@@ -11,9 +11,9 @@ from gsac.avatar.cuda.device import Device
 from gsac.avatar.lpips import Lpips
 
 SIDE = 256
-"""px, at most; a smaller frame is taken whole."""
+"""px, side of the window at most; a smaller frame is taken whole."""
 WARM = 3
-"""Runs before the recording: libraries choose and load their kernels."""
+"""Runs before the recording, in which libraries choose and load their kernels."""
 
 
 @cache
@@ -27,10 +27,10 @@ def why_not() -> str | None:
 
 
 class Window:
-    """images (2, height, width, 3), render and target in 0..1; value () and its slope (height, width, 3) by the render."""
+    """images: (2, height, width, 3), render and target in 0..1; value: scalar LPIPS; slope: (height, width, 3), by the render."""
 
     def __init__(self, device: Device, network: Lpips, width: int, height: int, precision: str = "bfloat16"):
-        """precision: of the convolutions, by torch's name."""
+        """width, height: px; precision: torch's name of the convolutions' type."""
         import torch
 
         self._torch, self.network = torch, network.to("cuda", getattr(torch, precision))

@@ -1,28 +1,32 @@
-"""What a training on the GPU is told, and its plan: every step's frames, backgrounds and rates, drawn before the first."""
+"""The numbers of a training on the GPU (`Recipe`), and its plan: frames, backgrounds and rates of all steps, drawn in advance."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from gsac.avatar.cuda.structs import MOST_BATCH, PLAN
 
+FROM_CONFIG = ("seed", "mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "pose_pull",
+               "expression_rate", "joint_rate", "ssim", "sobel", "mask", "needle", "reach", "place_pull")
+"""Fields of a recipe that a configuration has by the same name."""
+
 
 @dataclass(kw_only=True)
 class Recipe:
-    """No number here is a recipe's own: what is not given is not learned (rates), not counted (weights) and not limited."""
+    """Defaults are neutral: what is not given is not learned (rates), not in the loss (weights) and not limited."""
 
     steps: int
     batch: int = 1
     """Frames of one step, at most as many as there are."""
     seed: int = 0
     begin: float = 0.0
-    """Share of its way at which the training begins, for the rates: a refit begins late."""
+    """Share of the steps at whose rates the training begins: a refit begins late."""
     coarse_share: float = 0.0
-    """Part of the steps that run on the first of two levels."""
+    """Share of the steps that run on the first of two levels."""
     mu_rate: float = 0.0
     rgb_rate: float = 0.0
     quat_rate: float = 0.0
@@ -39,25 +43,25 @@ class Recipe:
     reach: float = math.inf
     place_pull: float = 0.0
     turn_unit: float = 1.0
-    """rad in which a pose's distance from the fit is measured."""
+    """rad, unit of a turn away from the fit's pose."""
     shift_unit: float = 1.0
-    """m, likewise."""
+    """m, unit of a shift away from the fit's translation."""
     offset_rate: float = 0.0
     """m of a step of the body's displacement at rest, falls to a tenth over its share of the steps."""
     offset_share: float = 1.0
-    """Part of the steps that move it; then `CudaTrainer.replace` takes the gaussians that it was folded into."""
+    """Share of the steps, the first, that displace; then `CudaTrainer.replace` takes the gaussians it was folded into."""
     offset_every: int = 1
-    """Steps whose gradients are gathered for one of the displacement."""
+    """Steps whose gradients are gathered for one step of the displacement."""
     beta_rate: float = 0.0
     """Adam rate of the betas, which all frames share."""
     expression_rate: float = 0.0
-    """Adam rate of each frame's expression, falls to a hundredth; as the poses' it is pulled, to none."""
+    """Adam rate of each frame's expression, falls to a hundredth; pulled to the fit's as poses are."""
     expression_unit: float = 1.0
-    """Coefficient in which an expression's size is measured."""
+    """Unit of an expression's distance from the fit's."""
     joint_rate: float = 0.0
-    """m, Adam rate of the joints at rest, which all frames share, likewise."""
+    """m, Adam rate of the joints at rest, which all frames share; falls and is pulled likewise."""
     joint_unit: float = 1.0
-    """m."""
+    """m, unit of a joint's distance from the fit's."""
     gain_rate: float = 0.0
     """Step of each frame's gain per colour channel at the start, falls to a tenth."""
     smoothness: float = 0.0
@@ -65,30 +69,31 @@ class Recipe:
     hand_share: float = 1.0
     """Pose rate of the fingers relative to the body's; jaw and eyes stay."""
     perceptual: float = 0.0
-    """Weight of LPIPS of a window of one of a step's frames, where the trainer is given a network; as a mean over the frames."""
+    """Weight of LPIPS, of a window of one of a step's frames, where the trainer is given a network; as a mean over the frames."""
     perceptual_steps: int = 0
-    """Steps that have it, the last."""
+    """Steps, the last, that have LPIPS in the loss."""
     frame_size: tuple[int, int] = (0, 0)
-    """Width and height of the whole frame that the shots are cut from, px."""
+    """Width and height of the whole frame that the shots are cropped from, px."""
 
     @classmethod
-    def of(cls, config, **more) -> Recipe:
-        """The fields that `config` has by the same name and not as None, `more` on top."""
-        given = {f.name: getattr(config, f.name, None) for f in fields(cls)}
-        return cls(**({name: value for name, value in given.items() if value is not None} | more))
+    def of(cls, config: object, **more: Any) -> Self:
+        """`FROM_CONFIG` as `config` has it, and `more`, which takes precedence. Raises AttributeError that names missing fields."""
+        if missing := [name for name in FROM_CONFIG if not hasattr(config, name)]:
+            raise AttributeError(f"{type(config).__name__} has no {', '.join(missing)}, which a recipe for the GPU takes from it")
+        return cls(**({name: getattr(config, name) for name in FROM_CONFIG} | more))
 
 
-class Drawn(NamedTuple):
+class DrawnPlan(NamedTuple):
     order: np.ndarray
     """(steps, batch) int32, indices of frames; no frame twice in a step."""
     background: np.ndarray
-    """(steps, batch, 3) float32."""
+    """(steps, batch, 3) float32 in 0..1."""
     rates: np.ndarray
-    """(steps,) structured as `scene.PLAN`."""
+    """(steps,) structured as `structs.PLAN`."""
 
 
-def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
-    """The same draws as `stages.train.fast` makes from the seed, for one frame a step."""
+def draw_plan(recipe: Recipe, frames: int, levels: int) -> DrawnPlan:
+    """The plan from the recipe's seed; with one frame a step the draws are those of the CPU's training."""
     batch = min(recipe.batch, frames, MOST_BATCH)
     random = np.random.default_rng(recipe.seed)
     order, background = np.empty((recipe.steps, batch), np.int32), np.empty((recipe.steps, batch, 3), np.float32)
@@ -100,19 +105,19 @@ def draw(recipe: Recipe, frames: int, levels: int) -> Drawn:
             order[step, b] = left.pop()
             background[step, b] = random.random(3)
     done = recipe.begin + (1 - recipe.begin) * np.arange(recipe.steps) / max(recipe.steps, 1)
-    return Drawn(order, background, rates_of(recipe, done, levels))
+    return DrawnPlan(order, background, rates_of(recipe, done, levels))
 
 
-def no_rates(steps: int) -> np.ndarray:
-    """(steps,) as `Drawn.rates`: nothing is learned, LPIPS takes no part."""
+def zero_rates(steps: int) -> np.ndarray:
+    """(steps,) as `DrawnPlan.rates`: nothing is learned, LPIPS is not in the loss."""
     rates = np.zeros(steps, [(name, np.dtype(kind)) for name, kind in PLAN.items()])
     rates["centre"] = -1
     return rates
 
 
 def rates_of(recipe: Recipe, done: np.ndarray, levels: int = 1) -> np.ndarray:
-    """As `Drawn.rates`, of steps at these shares of the way, (steps,)."""
-    rates = no_rates(len(done))
+    """(steps,) as `DrawnPlan.rates`. done: (steps,) shares of the training that each step has behind it."""
+    rates = zero_rates(len(done))
     rates["level"] = np.where(done < recipe.coarse_share, 0, levels - 1)
     for name, rate, end in (("mu", recipe.mu_rate, 0.01), ("quat", recipe.quat_rate, 0.1), ("log_scale", recipe.scale_rate, 0.1),
                             ("expression", recipe.expression_rate, 0.01),

@@ -1,4 +1,4 @@
-"""Rounds of steps with the poses given from outside: gaussians and surface learn, then someone else moves the poses."""
+"""Rounds of steps with fixed poses: gaussians and surface learn; between rounds the caller moves the poses."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsac.avatar.cuda.recipe import Drawn, Recipe, rates_of
+from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, rates_of
 from gsac.avatar.cuda.trainer import CudaTrainer
 
 
@@ -15,9 +15,9 @@ class Round(NamedTuple):
     frames: np.ndarray
     """(n,) indices of the trainer's frames, in the order of the steps."""
     backgrounds: np.ndarray
-    """(n, 3)."""
+    """(n, 3) in 0..1."""
     done: float
-    """Share of the way that the rates are those of."""
+    """Share of a training's steps whose rates the round has."""
 
 
 @dataclass(kw_only=True)
@@ -30,8 +30,9 @@ class RoundsTrainer(CudaTrainer):
 
     recipe: RoundsRecipe
 
-    def plan(self, levels) -> Drawn:
+    def plan(self, levels: int) -> DrawnPlan:
+        """As `CudaTrainer.plan`: the recipe's rounds."""
         rounds = self.recipe.rounds
         done = np.repeat([r.done for r in rounds], [len(r.frames) for r in rounds])
-        return Drawn(np.concatenate([r.frames for r in rounds]).astype(np.int32)[:, None],
+        return DrawnPlan(np.concatenate([r.frames for r in rounds]).astype(np.int32)[:, None],
                      np.concatenate([r.backgrounds for r in rounds]).astype(np.float32)[:, None], rates_of(self.recipe, done))

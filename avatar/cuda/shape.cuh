@@ -1,5 +1,5 @@
-// What else of the body is learned. Its shape (betas) and its joints at rest, which all frames share, and each frame's expression:
-// gradient by its directions, Adam, and the body moved on.
+// Learned parameters of the body beside its poses: shape (betas) and joints at rest, shared by all frames, and each frame's
+// expression. Gradient by their directions, Adam, and the body moved on.
 
 // (blocks of vertices), after the step's pose update. The last block takes the step.
 extern "C" __global__ void __launch_bounds__(256) shape_gradient(Scene s) {

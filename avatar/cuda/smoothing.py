@@ -1,6 +1,6 @@
-"""(I + lambda L)^-1 of a mesh, L its uniform Laplacian, once and twice over, as series of Chebyshev polynomials in it.
+"""Smoothing on a mesh: (I + lambda L)^-1 and its square, L the uniform Laplacian, as series of Chebyshev polynomials of L.
 
-A term costs the kernels one look at the neighbours, and both series share their terms.
+A term costs the kernels one pass over the neighbours, and both series share their terms.
 """
 
 from __future__ import annotations
@@ -13,30 +13,31 @@ from numpy.polynomial.chebyshev import chebvander
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import eigsh
 
-from gsac.avatar.cuda.adjacency import neighbours
+from gsac.avatar.cuda.adjacency import vertex_neighbours
 
 TERMS = 72
 """At lambda 30 on the open body the series are right to 0.2 and 2 percent in the worst mode, and to a tenth of that in most."""
 MARGIN = 1.03
-"""Of the largest eigenvalue, which is found to a percent."""
+"""Factor on the largest eigenvalue, which is found to a percent."""
 
 
 class Series(NamedTuple):
     factors: np.ndarray
-    """(TERMS, 2) of the polynomials, once and twice over."""
+    """(TERMS, 2) of the polynomials: of the inverse, and of its square."""
     middle: float
-    """Of the eigenvalues of I + lambda L; the polynomials are in (I + lambda L - middle) / half."""
+    """Of the range of eigenvalues of I + lambda L; the polynomials are in (I + lambda L - middle) / half."""
     half: float
+    """Half the width of that range."""
 
 
-def series(faces: np.ndarray, vertices: int, smoothness: float) -> Series:
-    """faces: (F, 3) int; smoothness: lambda."""
-    return _series(np.ascontiguousarray(faces, np.int64).tobytes(), vertices, smoothness)
+def smoothing_series(faces: np.ndarray, vertices: int, smoothness: float) -> Series:
+    """The series for one mesh. faces: (F, 3) int; smoothness: lambda."""
+    return _smoothing_series(np.ascontiguousarray(faces, np.int64).tobytes(), vertices, smoothness)
 
 
 @lru_cache(maxsize=2)
-def _series(faces: bytes, vertices: int, smoothness: float) -> Series:
-    start, near = neighbours(np.frombuffer(faces, np.int64).reshape(-1, 3), vertices)
+def _smoothing_series(faces: bytes, vertices: int, smoothness: float) -> Series:
+    start, near = vertex_neighbours(np.frombuffer(faces, np.int64).reshape(-1, 3), vertices)
     laplacian = diags(np.diff(start).astype(float)) - csr_matrix((np.ones(len(near)), near, start), (vertices, vertices))
     begin = np.sin(np.arange(vertices, dtype=float))
     top = eigsh(laplacian, k=1, which="LA", tol=1e-2, v0=begin, return_eigenvectors=False)[0]

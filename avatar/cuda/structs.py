@@ -1,4 +1,4 @@
-"""The structs that host and kernels share: one table each, from which both the CUDA text and the ctypes class are made."""
+"""The structs that host and kernels share: a table for each, from which both the CUDA text and the ctypes class are made."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ MOST_BATCH = 16
 
 FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT, "fy": FLOAT, "cx": FLOAT, "cy": FLOAT, "rest": INT,
          "pose": INT, "left": INT, "top": INT, "spare": INT}
-"""pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: which vertices at rest and which pose it shows;
+"""pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: indices of its vertices at rest and of its pose;
 left, top: px, its corner in the whole frame."""
 
 PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
         "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT, "expression": FLOAT, "joints": FLOAT, "centre": INT}
-"""Of one step: size of the images, Adam rates, the share of its way that a gaussian is pulled back, m of an offset's step, the
-vertex in the middle of the window that LPIPS sees (-1: no LPIPS)."""
+"""Of one step. level: size of the images; place_pull: share of its way that a gaussian is pulled back; offset: m of a step of the
+displacement; centre: vertex in the middle of the window that LPIPS sees, -1 for no LPIPS; the others: Adam rates."""
 
 STATE = {name: INT for name in (
     "step", "stop", "overflow", "needed", "most", "pairs", "listed", "checkpoints", "heavy", "light", "near", "segments",
     "blend_ticket", "back_ticket", "frames_done", "shape_done", "barrier", "peak")} | {"joints_done": INT * MOST_BATCH}
-"""Counters on the device. overflow: the lists were too short, nothing moves until they are longer; needed: how long."""
+"""Counters on the device. overflow: the lists were too short, and nothing moves until they have the length `needed`."""
 
 POINTERS = {
     "frames": "Frame", "pixels": "unsigned char", "occupied": "unsigned char", "plan": "Plan", "order": "int",
@@ -58,7 +58,7 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
            "scale_limit": FLOAT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
            "perceptual": FLOAT, "expression_count": INT, "expression_unit": FLOAT, "joint_unit": FLOAT}
 """area: pixels that a frame's losses are a mean over, 0: its own; it and the next seven are recipe `paper`'s (paper.cuh); the next
-five are LPIPS' (perceptual.cuh), the last three of what else of the body is learned (shape.cuh)."""
+five are LPIPS' (perceptual.cuh), the last three belong to expressions and joints at rest (shape.cuh)."""
 
 
 def _struct(name: str, fields: dict) -> type[ctypes.Structure]:

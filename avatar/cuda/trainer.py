@@ -2,50 +2,105 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 
-from gsac.avatar.cuda.arrays import JOINTS, TILE, Arrays, BodyArrays, Shot
+from gsac.avatar.cuda.arrays import JOINTS, TILE, Arrays, BodyArrays, OnFaces, Shot
 from gsac.avatar.cuda.device import Device
-from gsac.avatar.cuda.recipe import Drawn, Recipe, draw
+from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, draw_plan
 from gsac.avatar.cuda.structs import State
+from gsac.avatar.cuda.uploads import make_pairs, make_scratch, upload_body, upload_gaussians, upload_shots
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.logistic import logit, sigmoid
 from gsac.avatar.lpips import Lpips
 
 REPLAY = 10
 """Steps of one graph."""
 
 
-class CudaTrainer(Arrays):
-    """levels: one or two lists of T shots, coarse first; pose: (T, 55, 3) rad; transl: (T, 3) m.
+class CudaTrainer:
+    """Gaussians, poses and Adam's state on the GPU, and the steps of a recipe.
 
     Raises device.NoDeviceError without a GPU, device.DeviceError where it has too little memory.
     """
 
-    def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: Gaussians,
+    def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: OnFaces,
                  recipe: Recipe, device: Device | None = None, pair_room: int | None = None, network: Lpips | None = None):
-        """network: for the loss of the recipe's last `perceptual_steps`, by torch."""
+        """levels: one or two lists of T shots, coarse first; pose: (T, 55, 3) rad; transl: (T, 3) m.
+
+        pair_room: (tile, gaussian) pairs that there is memory for at first; network: for LPIPS in the loss of the recipe's last
+        `perceptual_steps`, by torch.
+        """
         self.device = device or Device()
-        super().__init__(body, gaussians, recipe, len(levels[0]))
+        self.recipe, self.body, self.face = recipe, body, np.asarray(gaussians.face, np.int32)
+        self.frames, self.count, self.light = len(levels[0]), len(gaussians), gaussians.light
+        self.arrays = Arrays()
+        self.buffers, self.scene = self.arrays.buffers, self.arrays.scene
         self._graph = None
         self.seconds = 0.0
-        """On the device, by its own clock, in all calls of `train`."""
+        """Spent in all calls of `train`, by the device's own clock."""
         self._clock = self.device.event(), self.device.event()
-        drawn = self.plan(levels)
+        drawn = self.plan(len(levels))
         self.batch, self.order, self.rates = drawn.order.shape[1], drawn.order, drawn.rates
         self._numbers(levels)
         self.window, self.late = None, recipe.steps
         if network is not None and recipe.perceptual_steps:
             self._open_window(network)
-        self._upload_all(levels, drawn, pose, transl, gaussians)
+        self._upload(levels, drawn, pose, transl, gaussians)
         self.grids = self._grids()
-        self._lists(pair_room or max(65536, 6 * self.count * self.batch))
+        self._resize_lists(pair_room or max(65536, 6 * self.count * self.batch))
 
-    def plan(self, levels: list[list[Shot]]) -> Drawn:
-        """The steps' frames, backgrounds and rates."""
-        return draw(self.recipe, self.frames, len(levels))
+    def plan(self, levels: int) -> DrawnPlan:
+        """The frames, backgrounds and rates of the steps. levels: sizes of the shots, 1 or 2."""
+        return draw_plan(self.recipe, self.frames, levels)
+
+    def gaussians(self) -> Gaussians:
+        """A copy of the gaussians as they stand."""
+        b = self.buffers
+        opacity = sigmoid(b["logit"].read().astype(np.float64))
+        return Gaussians(self.face.copy(), b["mu"].read(), b["quat"].read(), b["log_scale"].read(), b["rgb"].read(),
+                         opacity.astype(np.float32), self.light)
+
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Pose (T, 55, 3) rad and translation (T, 3) m, float64."""
+        both = self.buffers["pose"].read()
+        return both[:, :JOINTS].copy(), both[:, JOINTS].copy()
+
+    def betas(self) -> np.ndarray:
+        """(B,) float64, learned on top of the body's betas; empty where none are learned."""
+        return self.buffers["betas"].read() if self.recipe.beta_rate else np.zeros(0)
+
+    def expressions(self) -> np.ndarray:
+        """(T, E) float64, learned on top of the expressions that are in the rest vertices."""
+        return self.buffers["expression"].read()
+
+    def joint_offset(self) -> np.ndarray:
+        """(55, 3) float64 m, learned on top of the joints at rest."""
+        return self.buffers["joint_offset"].read()
+
+    def gains(self) -> np.ndarray:
+        """(T, 3), one for each of a frame's colour channels; 1 where none are learned."""
+        return self.buffers["gain"].read()
+
+    def offset(self) -> np.ndarray:
+        """(V, 3) m, the learned displacement of the vertices at rest, without that by betas."""
+        return self.buffers["offset"].read() - self._beta_offset()
+
+    def _beta_offset(self) -> np.ndarray | float:
+        """(V, 3) m, the displacement of the vertices at rest by the learned betas."""
+        return (self.body.shape @ self.betas()).astype(np.float32) if self.recipe.beta_rate else 0.0
+
+    def memory(self) -> int:
+        """Bytes of the device's memory that this training holds."""
+        return self.arrays.memory()
+
+    def poison(self) -> None:
+        """Fills with NaN all that a step must write before it reads."""
+        self.arrays.poison()
 
     def train(self, steps: int) -> None:
-        """So many steps more, as far as the recipe goes; lists that prove too short are made longer and nothing is lost."""
+        """Does `steps` more steps, at most to the recipe's end; lists that prove too short are made longer and nothing is lost."""
         stop = min(self.state().step + steps, self.recipe.steps)
         begin, end = self._clock
         self.device.mark(begin)
@@ -64,7 +119,7 @@ class CudaTrainer(Arrays):
                 self.device.wait()
                 state = self.state()
                 if state.overflow:
-                    self._lists(state.needed * 3 // 2)
+                    self._resize_lists(state.needed * 3 // 2)
 
     def _replay(self, steps: int) -> None:
         if self._graph is None:
@@ -81,18 +136,20 @@ class CudaTrainer(Arrays):
                 self.launch(name)
 
     def step(self) -> None:
-        """Launches one step's kernels; no more than `stop` are carried out."""
+        """Launches one step's kernels; they do nothing from step `State.stop` on."""
         for name in self.grids:
             self.launch(name)
 
     def launch(self, name: str) -> None:
+        """Launches one kernel of the step."""
         self.device.launch(name, *self.grids[name], self.scene)
 
-    def state(self):
+    def state(self) -> State:
+        """A copy of the counters on the device."""
         return State.from_buffer_copy(self.buffers["state"].read().tobytes())
 
     def place(self, pose: np.ndarray, transl: np.ndarray) -> None:
-        """The poses (T, 55, 3) and translations (T, 3) from here on: refined from there, pulled to there, moments anew."""
+        """Sets the poses to go on from, and to be pulled to, with empty moments. pose: (T, 55, 3) rad; transl: (T, 3) m."""
         both = np.concatenate([pose, transl[:, None]], 1)
         for name in ("pose", "fit"):
             self.buffers[name].write(both)
@@ -101,8 +158,10 @@ class CudaTrainer(Arrays):
                 self.buffers[name].fill(0)
 
     def replace(self, gaussians: Gaussians, resting: np.ndarray | None = None, reach: float | None = None) -> None:
-        """From here on as these are, on the plain body (`stages.train.offsets.fold`). resting: (N,) bool, what moves no more;
-        reach: instead of the recipe's."""
+        """Sets the gaussians to go on from; the body's displacement, which the caller has folded into them, becomes zero.
+
+        resting: (N,) bool, gaussians that no longer move; reach: m, in the place of the recipe's.
+        """
         for name, array in self._values(gaussians).items():
             self.buffers[name].write(array)
         if resting is not None:
@@ -110,23 +169,22 @@ class CudaTrainer(Arrays):
         if reach is not None:
             self.scene.reach = reach
             self._forget_graph()
-        self.buffers["offset"].write(np.zeros((self.scene.vertex_count, 3), np.float32) + self._shaped())
+        self.buffers["offset"].write(np.zeros((self.scene.vertex_count, 3), np.float32) + self._beta_offset())
 
     def losses(self) -> np.ndarray:
-        """(steps done, batch)."""
+        """(steps done, batch) of each frame of each step."""
         return self.buffers["losses"].read()[: self.state().step]
 
     def _forget_graph(self) -> None:
-        """To be called when the scene has changed: a graph keeps what it was when it was recorded."""
+        """To be called when the scene has changed: a graph keeps the scene that it was recorded with."""
         if self._graph is not None:
             self.device.drop(self._graph)
             self._graph = None
 
     def close(self) -> None:
+        """Frees the device's memory."""
         self._forget_graph()
-        for buffer in self.buffers.values():
-            buffer.free()
-        self.buffers.clear()
+        self.arrays.free()
 
     def shot_size(self, step: int) -> tuple[int, int]:
         """Height and width of the first frame of a step."""
@@ -135,11 +193,36 @@ class CudaTrainer(Arrays):
 
     def want_gradients(self) -> None:
         """From now on the buffers `grad_out` (N, 14) and `pose_grad_out` (batch, 56, 3) hold the last step's gradients."""
-        self._empty("grad_out", (self.count, 14), np.float32)
-        self._empty("pose_grad_out", (self.batch, JOINTS + 1, 3), np.float64)
+        self.arrays.allocate("grad_out", (self.count, 14), np.float32)
+        self.arrays.allocate("pose_grad_out", (self.batch, JOINTS + 1, 3), np.float64)
         self._graph = None
 
-    def _numbers(self, levels) -> None:
+    def _upload(self, levels: list[list[Shot]], drawn: DrawnPlan, pose: np.ndarray, transl: np.ndarray,
+                gaussians: OnFaces) -> None:
+        arrays = self.arrays
+        upload_shots(arrays, levels, self.body.rest_of)
+        arrays.upload("plan", drawn.rates.view(np.uint8), np.uint8)
+        arrays.upload("order", drawn.order, np.int32)
+        arrays.upload("background", drawn.background, np.float32)
+        upload_body(arrays, self.body, self.recipe, pose, transl)
+        self._upload_gaussians(self._values(gaussians))
+        arrays.allocate("losses", (self.recipe.steps, self.batch), np.float32).fill(0)
+        arrays.allocate("state", ctypes.sizeof(State), np.uint8).fill(0)
+        self._make_scratch()
+
+    def _upload_gaussians(self, values: dict[str, np.ndarray]) -> None:
+        upload_gaussians(self.arrays, values, self.face, self.light, self.body)
+
+    def _values(self, gaussians: Gaussians) -> dict[str, np.ndarray]:
+        """Buffer's name -> its content, (N, ...)."""
+        return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
+                "logit": opacity_logit(gaussians.opacity), "start": gaussians.mu}
+
+    def _make_scratch(self) -> None:
+        make_scratch(self.arrays, self.recipe)
+
+    def _numbers(self, levels: list[list[Shot]]) -> None:
+        """Sizes and weights in the scene."""
         recipe, scene = self.recipe, self.scene
         self.sizes = sizes = [shot.pixels.shape[:2] for level in levels for shot in level]
         scene.frame_count, scene.batch, scene.count = self.frames, self.batch, self.count
@@ -151,6 +234,7 @@ class CudaTrainer(Arrays):
             setattr(scene, name, getattr(recipe, name))
 
     def _open_window(self, network: Lpips) -> None:
+        """Prepares LPIPS of a window for the last steps."""
         from gsac.avatar.cuda.perceptual import SIDE, Window
 
         recipe, scene = self.recipe, self.scene
@@ -186,9 +270,9 @@ class CudaTrainer(Arrays):
             grids["place_joints"] = ((1, 1), 192)
         return grids
 
-    def _lists(self, room: int) -> None:
-        """Room for so many (tile, gaussian) pairs of a batch."""
-        self._pairs(room)
+    def _resize_lists(self, room: int) -> None:
+        """Makes room for `room` (tile, gaussian) pairs of a batch."""
+        make_pairs(self.arrays, room)
         self._forget_graph()
         self._set_state(overflow=0)
 
@@ -197,3 +281,9 @@ class CudaTrainer(Arrays):
         for name, value in values.items():
             setattr(state, name, value)
         self.buffers["state"].write(np.frombuffer(bytes(state), np.uint8))
+
+
+def opacity_logit(opacity: np.ndarray) -> np.ndarray:
+    """(N,) float64 of opacity (N,), which is kept off 0 and 1."""
+    opacity = np.clip(opacity.astype(np.float64), 1e-4, 1 - 1e-4)
+    return logit(opacity)

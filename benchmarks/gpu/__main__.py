@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 def make_bench_recipe(count: int = 25000, **more: Any) -> Recipe:
     """Recipe `fast` with the paper's Sobel term and without the displaced surface. more: fields of the recipe."""
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import make_recipe
 
-    return recipe_of(TrainConfig(sobel=0.1), count, **({"offset_rate": 0.0} | more))
+    return make_recipe(TrainConfig(sobel=0.1), count, **({"offset_rate": 0.0} | more))
 
 
 def main() -> None:
@@ -114,8 +114,8 @@ def measure_paper(device: Device, figure: Figure, ceilings: tuple[float, float])
 
     model = Body.load()
     body = figure.body._replace(shape=model.shapedirs, joint_shape=np.tensordot(model.J_regressor, model.shapedirs, 1))
-    recipe = paper_cuda.recipe_of(SimpleNamespace(config=TrainConfig(recipe="paper"), trained=figure.shots, views=figure.shots))
-    start = paper_cuda.start(len(body.faces), np.random.default_rng(0))
+    recipe = paper_cuda.make_recipe(SimpleNamespace(config=TrainConfig(recipe="paper"), trained=figure.shots, views=figure.shots))
+    start = paper_cuda.init_gaussians(len(body.faces), np.random.default_rng(0))
     trainer = PaperTrainer(body, [figure.shots], figure.pose, figure.transl, start, recipe, device)
     trainer.train(200)
     print(f"recipe paper, {trainer.count} gaussians, batch {trainer.batch}; neighbours searched in "
@@ -131,7 +131,7 @@ def measure_rounds(device: Device, figure: Figure) -> None:
     from gsac.benchmarks.gpu.figure import start
     from gsac.benchmarks.gpu.timing import kernel_microseconds, step_milliseconds
     from gsac.stages.train.fast import prealign
-    from gsac.stages.train.fast.trainer import OFFSET_RATE
+    from gsac.stages.train.fast.schedule import OFFSET_RATE
 
     recipe = make_bench_recipe(prealign.COUNT, steps=600, sobel=0.0, pose_rate=0.0, offset_rate=OFFSET_RATE, offset_share=1.0)
     trainer = CudaTrainer(figure.body, [figure.scaled(8)], figure.pose, figure.transl, start(figure.body, prealign.COUNT), recipe,

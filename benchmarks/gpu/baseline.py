@@ -15,14 +15,17 @@ from torch.nn import functional
 from gsac.avatar.blend import BRIGHTEST, DARKEST
 from gsac.avatar.cuda.adjacency import joint_levels
 from gsac.avatar.cuda.arrays import BodyArrays, Shot
-from gsac.avatar.cuda.recipe import Recipe, draw
+from gsac.avatar.cuda.recipe import Recipe, draw_plan
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.light import FROM_CAMERA
 from gsac.avatar.logistic import logit, sigmoid
 from gsac.benchmarks.gpu.figure import Figure
-from gsac.stages.train.fast import prealign, trainer
-from gsac.stages.train.fast.cuda import body_arrays, learning, recipe_of
+from gsac.stages.train.fast import prealign
+from gsac.stages.train.fast.cuda import Cuda, make_recipe
+from gsac.stages.train.fast.start import crop_views, init_gaussians
+from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.gpu import body_arrays
 from gsac.stages.train.poses.poses import HAND_SHARE
 from gsac.stages.train.task import Fit, Task
 
@@ -56,15 +59,15 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
 
 def fit(task: Task) -> Fit:
     """Recipe fast for the stage, eager, with the frames, sizes, backgrounds and rates of the CUDA trainer."""
-    prealign.adjust(task, learning)
-    fine, coarse = trainer.crops(task)
-    gaussians = trainer.start(task, coarse, task.config.gaussians)
-    recipe = recipe_of(task.config, len(gaussians))
+    prealign.adjust(task, Cuda())
+    fine, coarse = crop_views(task)
+    gaussians = init_gaussians(task, coarse, task.config.budget())
+    recipe = make_recipe(task.config, len(gaussians))
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]
     poses = task.poses
     loop = TorchTrainer(body_arrays(poses, task.trained, recipe), poses.pose[task.trained], poses.transl[task.trained], gaussians,
                         recipe)
-    plan = draw(recipe, len(task.trained), 2)
+    plan = draw_plan(recipe, len(task.trained), 2)
     backgrounds, seconds, done = tensor(plan.background[:, 0]), 0.0, 0
     begin, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
     for mark in [*(m for m in task.marks(recipe.steps) if m < recipe.steps), recipe.steps]:
@@ -78,7 +81,7 @@ def fit(task: Task) -> Fit:
         poses.pose[task.trained], poses.transl[task.trained] = loop.poses()
         task.checkpoint(mark, recipe.steps, float(loss), loop.gaussians, seconds)
         done = mark
-    return Fit(*trainer.Trainer(loop.gaussians(), task, settled=True).recoloured(coarse))
+    return Fit(*Trainer(loop.gaussians(), task, frozen_body=True).finish(coarse))
 
 
 def on_device(shots: list[Shot]) -> list[tuple]:

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from gsac.avatar.cuda.device import Device
-from gsac.avatar.cuda.kernels import KERNELS, compiled, cubin, source
+from gsac.avatar.cuda.kernels import KERNELS, compile_source, cubin, source
 from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.benchmarks.gpu.timing import kernel_microseconds
 
@@ -23,7 +23,7 @@ def compile_variants(architecture: str) -> dict[str, bytes]:
     changed = {"unsorted": text.replace(SORT, "")}
     for most in CUTS:
         changed[f"cut at {most}"] = text.replace(LENGTH, LENGTH.replace("s.tile_count[tile]", f"min(s.tile_count[tile], {most})"))
-    return {"as it is": cubin(architecture)} | {name: compiled(other, architecture) for name, other in changed.items()}
+    return {"as it is": cubin(architecture)} | {name: compile_source(other, architecture) for name, other in changed.items()}
 
 
 def measure(trainer: CudaTrainer, device: Device) -> None:

@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 
 from gsac.avatar.cuda.device import Buffer, Device, _call
-from gsac.avatar.cuda.kernels import compiled
+from gsac.avatar.cuda.kernels import compile_source
 from gsac.avatar.cuda.paper import PaperTrainer
 from gsac.avatar.cuda.trainer import REPLAY, CudaTrainer
 from gsac.avatar.gaussians import Gaussians
@@ -110,7 +110,7 @@ extern "C" __global__ void spin(Spin s) {
 
 def float_rate(device: Device, turns: int = 4096) -> float:
     """float32 operations a second of independent multiply-adds, two operations each."""
-    device.load(compiled(SPIN, device.architecture), ["spin"])
+    device.load(compile_source(SPIN, device.architecture), ["spin"])
     blocks = device.processors * 16
     out = Buffer(blocks * 256, np.float32)
     begin, end, times = device.event(), device.event(), []

@@ -1,4 +1,4 @@
-"""Parameters of `train`."""
+"""Parameters of stage `train`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from gsac.stages.contract import BadInput
 
 RECIPES = ("fast", "paper")
 AUTO = "auto"
-"""`gaussians` that the ladder of sizes chooses; `device` that the engine chooses; `lpips` as the recipe has it."""
+"""`gaussians` that the size search chooses; `device` that the engine chooses; `lpips` as the recipe has it."""
+FULL_SIZE = 12000
+"""Gaussians that `auto` starts from, and that `largest` is meant for."""
 DEVICES = (AUTO, "cpu", "cuda")
 LPIPS = (AUTO, "none", "judge", "loss")
 NETWORKS = ("lpips-vgg", "lpips-alex")
@@ -20,27 +22,27 @@ class TrainConfig:
     body_model: str = OPEN
     """Which body; the same as smplx.body_model."""
     recipe: str = "fast"
-    """Which optimisation fits the gaussians: fast, or paper: one gaussian a face and rates of its own."""
+    """Which optimisation fits the gaussians: fast; or paper, with one gaussian a face and its own rates."""
     device: str = AUTO
     """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
     gaussians: int | str = AUTO
-    """How many; auto: at most 12,000, as few as the held-out frames hardly tell from them; paper: one a face instead."""
+    """How many; auto: the smallest size whose held-out frames score as well as with 12,000. Recipe paper has one a face."""
     every_size: bool = False
-    """Whether auto tries all sizes of its ladder, and not only those up to the first that is told apart: for `gsac bench size`."""
+    """Whether auto tries all its sizes instead of stopping at the first that scores worse: for `gsac bench size`."""
     steps: int | None = None
-    """Optimisation steps; null: the recipe's own, 1400 of one frame, 3200 on cuda (fast), 3000 of four (paper)."""
+    """Optimisation steps; null: the recipe's own: fast 1400 of one frame, 3200 on cuda; paper 3000 of four frames."""
     height: int = 540
-    """Height of the images that are trained on and judged, px; smaller frames are not enlarged."""
+    """Height of the images for training and judging, px; smaller frames are not enlarged."""
     seed: int = 0
-    """Of the placement, the order of the frames and the backgrounds."""
+    """Seed of the placement, the order of the frames and the backgrounds."""
     holdout: int = 8
-    """Every k-th frame in the order of the body's yaw is kept for judging, at least one; 0, or fewer than 5 frames, keep none."""
+    """Holds out every k-th frame, in the order of the body's yaw, for judging; at least one. 0, or fewer than 5 frames: none."""
     curve: int = 0
-    """How many times on the way the held-out frames are judged for the curve in metrics.json; that time is not counted."""
+    """How often the held-out frames are judged during training, for the curve in metrics.json; that time is not counted."""
     mu_rate: float = 3e-3
-    """Adam rate of the places (face units) at the start; falls to a hundredth."""
+    """Adam rate of the positions (face units) at the start; falls to a hundredth."""
     rgb_rate: float = 1e-2
-    """Adam rate of the colours at the start; falls to a tenth, as do the three below."""
+    """Adam rate of the colours at the start; falls to a tenth, like the three below."""
     quat_rate: float = 1e-2
     """Adam rate of the rotations."""
     scale_rate: float = 2e-2
@@ -48,19 +50,19 @@ class TrainConfig:
     opacity_rate: float = 3e-2
     """Adam rate of the opacity logits."""
     pose_rounds: int = 6
-    """Rounds of Gauss-Newton that move all poses to small images before the steps (fast); 0: none, nor in their midst."""
+    """Rounds of Gauss-Newton that align all poses to small images before the steps (fast); 0: none, and none midway."""
     pose_rate: float = 2e-3
-    """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; hands a tenth of it."""
+    """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; the hands have a tenth of it."""
     pose_pull: float = 1e-4
-    """Weight of the squared distance of a refined pose from the one it starts with, in units of 0.05 rad and 2 cm."""
+    """Weight of the squared distance of a refined pose from its start, in units of 0.05 rad and 2 cm."""
     expression_rate: float = 0.0
-    """Adam rate of each frame's expression (fast), falls to a hundredth; pulled to the fit's as poses are, in units of 0.3."""
+    """Adam rate of each frame's expression (fast), falls to a hundredth; pulled to the fit's like poses, in units of 0.3."""
     joint_rate: float = 0.0
-    """Adam rate of the joints' places at rest, m (fast), which all frames share, likewise; in units of 1 cm."""
+    """Adam rate of the joints at rest, m, shared by all frames (fast), falls to a hundredth; pulled likewise, in units of 1 cm."""
     light: bool = True
-    """Whether the clip's light, which stays while the person turns, is told apart from the colours (fast)."""
+    """Whether to separate the clip's light, which stays while the person turns, from the colours (fast)."""
     exposure: bool = False
-    """Whether each frame gets a learned gain per colour channel."""
+    """Whether to learn a gain per frame and colour channel (fast)."""
     ssim: float = 0.1
     """Weight of 1 - SSIM beside L2."""
     sobel: float = 0.0
@@ -68,34 +70,43 @@ class TrainConfig:
     mask: float = 0.3
     """Weight of the L2 between the avatar's alpha and the mask."""
     needle: float = 4.0
-    """Longest axis of a gaussian over its middle one, at most."""
+    """Largest ratio of a gaussian's longest axis to its middle one."""
     largest: float = 0.025
-    """Longest axis (standard deviation) of a gaussian at rest, m; more where there are fewer than 12,000."""
+    """Longest axis (standard deviation) of a gaussian at rest, m, in an avatar of 12,000; fewer gaussians may be larger."""
     reach: float = 0.08
-    """How far a gaussian may lie from where it was placed on its face, m at rest."""
+    """How far a gaussian may move from where it was placed on its face, m at rest."""
     place_pull: float = 1e-3
-    """Share of that distance that each step takes back, relative to the rate of the places."""
+    """Share of that distance that each step takes back, relative to the rate of the positions."""
     pose_test_steps: int = 40
-    """Steps of the test-time pose optimisation behind the `*_ttpo` figures; 0 leaves these figures null."""
+    """Steps of the test-time pose optimisation for the `*_ttpo` figures; 0 leaves these figures null."""
     flip: bool = False
-    """Whether held-out frames are also judged by FLIP, at 67 pixels a degree."""
-
+    """Whether to judge held-out frames by FLIP, too, at 67 pixels a degree."""
     lpips: str = AUTO
-    """Weights that `gsac models add` brought: none, judge, loss (cpu: paper alone, hours), or auto: loss for paper on cpu."""
+    """Where LPIPS is used, if `gsac models add` brought its weights: none; judge: metrics only; loss: also in the training loss (on
+    the CPU only recipe paper, takes hours); auto: loss for recipe paper on the CPU, otherwise judge."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
         return brought_files(self.body_model)
 
     def wishes(self) -> tuple[str, ...]:
-        """Names of the model files that are used where they are here."""
+        """Names of the model files that are used where the user has brought them."""
         return () if self.lpips == "none" else NETWORKS
 
     def in_loss(self) -> bool:
-        """Whether LPIPS is to take part in the loss, where it can."""
+        """Whether LPIPS is to be in the loss, where it can."""
         return self.lpips == "loss" or self.lpips == AUTO and self.recipe == "paper"
 
+    def searches_size(self) -> bool:
+        """Whether held-out frames choose the number of gaussians."""
+        return self.recipe == "fast" and self.gaussians == AUTO
+
+    def budget(self) -> int:
+        """Gaussians of recipe `fast`: as many as asked for, or those that the size search starts from."""
+        return FULL_SIZE if self.gaussians == AUTO else self.gaussians
+
     def check(self) -> None:
+        """Raises BadInput that names the first value that cannot be."""
         if self.recipe not in RECIPES:
             raise BadInput(f"train.recipe is {self.recipe!r}; choices: {', '.join(RECIPES)}")
         if self.device not in DEVICES:

@@ -1,4 +1,4 @@
-"""Which frames are kept for judging, and what pose they are judged with."""
+"""Holds out frames for judging, and gives them poses: the corrections of the trained frames around them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from gsac.avatar import rotation
 from gsac.avatar.yaw import yaw
 
 FEWEST = 5
-"""Frames below which every one is needed for training."""
+"""Fewest frames of a clip that can spare one."""
 LONG = 60
-"""Frames that must be left for training where some are kept to choose by that nothing else is judged on."""
+"""Fewest frames left for training where frames are held out for choosing alone."""
 NEAR = np.radians(45)
-"""Frames between which the body turns by more say nothing of each other's pose: photos of one turn, not a clip."""
+"""rad; frames between which the body turns by more share no pose correction: they are photos of a turn, not a clip."""
 
 
-def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> np.ndarray:
-    """Indices of the frames to hold out: every `every`-th of the usable (T,) bool frames in the order of yaw.
+def hold_out(global_orient: np.ndarray, usable: np.ndarray, every: int) -> np.ndarray:
+    """(m,) indices of the frames to hold out: every `every`-th of the usable ones in the order of yaw.
 
-    A short clip keeps one; fewer than `FEWEST` frames keep none.
+    A short clip holds out one, fewer than `FEWEST` frames none. global_orient: (T, 3) axis-angle; usable: (T,) bool.
     """
     frames = np.flatnonzero(usable)
     if every < 2 or len(frames) < FEWEST:
@@ -28,14 +28,14 @@ def spaced_in_yaw(global_orient: np.ndarray, usable: np.ndarray, every: int) -> 
     return np.sort(frames[np.argsort(yaws, kind="stable")][every // 2::every])
 
 
-def to_choose_by(global_orient: np.ndarray, usable: np.ndarray, held: np.ndarray, every: int) -> np.ndarray:
-    """Indices of the frames that the number of gaussians is chosen by.
+def hold_out_for_choosing(global_orient: np.ndarray, usable: np.ndarray, held: np.ndarray, every: int) -> np.ndarray:
+    """(c,) indices of the frames to choose the number of gaussians by: others than held (m,) where the clip is long.
 
-    Others than `held` where the clip is long; a short one needs its frames for training, and those of `held` serve for both.
+    A short clip needs its frames for training, and `held` serves both. global_orient: (T, 3) axis-angle; usable: (T,) bool.
     """
     rest = usable.copy()
     rest[held] = False
-    others = spaced_in_yaw(global_orient, rest, every)
+    others = hold_out(global_orient, rest, every)
     return others if len(others) and int(rest.sum()) - len(others) >= LONG else held
 
 
@@ -43,10 +43,10 @@ def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.nda
                       trained: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gives every frame that was not trained on the pose correction of its trained neighbours in the clip.
 
-    pose: (T, J, 3) axis-angle and transl (T, 3) as fitted; refined_*: the same after training; trained: (T,) bool.
-    A correction is the turn from the fitted to the refined joint and the shift between the translations; both are
-    interpolated linearly between the nearest trained frames, of which one that is not near counts as not corrected.
-    Returns pose, transl: refined where trained.
+    As fitted: pose (T, J, 3) axis-angle, transl (T, 3) m; after training: refined_pose (T, J, 3), refined_transl (T, 3);
+    trained: (T,) bool. A correction is the turn from the fitted to the refined joint and the shift between the translations;
+    both are interpolated linearly between the nearest trained frames, where one that is not near counts as not corrected.
+    Returns pose (T, J, 3) and transl (T, 3), refined where trained.
     """
     frames = np.flatnonzero(trained)
     if not len(frames):
@@ -59,14 +59,14 @@ def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.nda
         after = np.searchsorted(frames, t)
         a, b = frames[max(after - 1, 0)], frames[min(after, len(frames) - 1)]
         u = (t - a) / (b - a) if b > a else 0.0
-        before, behind = (1 - u) * near(pose[t, 0], pose[a, 0]), u * near(pose[t, 0], pose[b, 0])
+        before, behind = (1 - u) * is_near(pose[t, 0], pose[a, 0]), u * is_near(pose[t, 0], pose[b, 0])
         turn = before * turns[a] + behind * turns[b]
         out_pose[t] = (Rotation.from_rotvec(pose[t]) * Rotation.from_rotvec(turn)).as_rotvec()
         out_transl[t] = transl[t] + before * shifts[a] + behind * shifts[b]
     return out_pose, out_transl
 
 
-def near(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(...) bool of global_orient (..., 3) axis-angle: the body turned by less than NEAR."""
+def is_near(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(...) bool, whether the body turned by less than NEAR. one, other: (..., 3) axis-angle, global_orient."""
     turn = Rotation.from_rotvec(np.reshape(one, (-1, 3))).inv() * Rotation.from_rotvec(np.reshape(other, (-1, 3)))
     return (turn.magnitude() < NEAR).reshape(np.shape(one)[:-1])

@@ -1,33 +1,37 @@
-"""The recipes by name and device: what `train.recipe` and `train.device` choose from. A recipe is `fit(Task) -> Fit`."""
+"""The recipes by name and device: what `train.recipe` and `train.device` choose from."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from functools import partial
 
-from gsac.stages.train.config import AUTO
-from gsac.stages.train.fast import cuda, lod, prealign, size_search
-from gsac.stages.train.fast import trainer as fast
-from gsac.stages.train.finite import finite, values
-from gsac.stages.train.judge.heldout import align_poses
+from gsac.stages.train.fast import lod, prealign, size_search
+from gsac.stages.train.fast.backend import Backend
+from gsac.stages.train.fast.cpu import Cpu
+from gsac.stages.train.fast.cuda import Cuda
+from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.poses import bone_drift
-from gsac.stages.train.task import Fit, Loop, Task
+from gsac.stages.train.task import Fit, Task
 
 
-def fit_fast(loop: Loop, task: Task) -> Fit:
-    """Poses moved to the images; the given number of gaussians, or the ladder; coarser levels; bones turned back to the fit's."""
+def fit_fast(backend: Backend, task: Task) -> Fit:
+    """Aligns the poses, fits the given number of gaussians or searches for it, adds coarser levels, removes bone drift."""
     if task.resumed is None:
-        prealign.adjust(task, loop.learning)
-    fit = size_search.fit(task, loop) if task.config.gaussians == AUTO else fast.fit(task, loop)
-    finite("after the last step", values(fit.gaussians))
-    fit.gaussians, *fit.coarser = bone_drift.taken_back([fit.gaussians, *lod.coarser(task, loop, fit)], task.poses, task.trained)
+        prealign.adjust(task, backend)
+    fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, task.config.budget())
+    require_finite("after the last step", named_values(fit.gaussians))
+    levels = [fit.gaussians, *lod.fit_levels(task, backend, fit)]
+    fit.gaussians, *fit.coarser = bone_drift.remove_drift(levels, task.poses, task.trained)
     return fit
 
 
-RECIPES = {
-    ("fast", "cpu"): partial(fit_fast, Loop(fast.train, size_search.refit, prealign.learning_on_cpu)),
-    ("fast", "cuda"): partial(fit_fast, Loop(cuda.train, cuda.refit, cuda.learning)),
+BACKENDS: dict[str, Backend] = {"cpu": Cpu(), "cuda": Cuda()}
+"""By device; test-time poses of every recipe run there, too."""
+RECIPES: dict[tuple[str, str], Callable[[Task], Fit]] = {
+    ("fast", "cpu"): partial(fit_fast, BACKENDS["cpu"]),
+    ("fast", "cuda"): partial(fit_fast, BACKENDS["cuda"]),
     ("paper", "cpu"): paper.fit,
     ("paper", "cuda"): paper_cuda.fit,
 }
-ALIGN = {"cpu": align_poses, "cuda": cuda.align_poses}
-"""Test-time pose optimisation by device."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -15,6 +16,7 @@ from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
+from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import LEAST_SIDE, Lpips
 from gsac.avatar.metrics import figures, summary
 from gsac.avatar.yaw import turn_seen
@@ -22,31 +24,32 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
-from gsac.stages.train.config import AUTO, NETWORKS, TrainConfig
-from gsac.stages.train.fast.lod import judged
-from gsac.stages.train.finite import finite, result, values
-from gsac.stages.train.holdout import spaced_in_yaw, to_choose_by
+from gsac.stages.train.config import NETWORKS, TrainConfig
+from gsac.stages.train.fast.lod import judge_levels
+from gsac.stages.train.finite import named_result, named_values, require_finite
+from gsac.stages.train.holdout import hold_out, hold_out_for_choosing
 from gsac.stages.train.judge.coverage import unseen_parts
-from gsac.stages.train.judge.heldout import Look, judge, judge_all, turned
+from gsac.stages.train.judge.heldout import Candidate, draw_all_round, judge, judge_all
 from gsac.stages.train.judge.novel_poses import judge_novel
-from gsac.stages.train.poses.poses import Poses, carried
-from gsac.stages.train.recipes import ALIGN, RECIPES
+from gsac.stages.train.poses.poses import Poses, carry_to_untrained
+from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import read_views
-from gsac.stages.train.warmup import rehearse
+from gsac.stages.train.views import View, read_views
+from gsac.stages.train.warmup import warm_up
 
 LOSS_ROWS = 20
-"""How many rows of the curve tell the loss."""
+"""Rows of the curve that have the loss."""
 LEAST_TURN = 270
-"""Degrees of the turn below which the user is warned."""
+"""Degrees of the person's turn below which the user is warned."""
 MOST_UNSEEN = 0.2
 """Share of gaussians that no frame shows above which the user is warned."""
 TRAIN_SAMPLE = 8
-"""How many trained frames `psnr_fg_train` is taken over."""
+"""Trained frames, at most, that `psnr_fg_train` is the mean of."""
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices, and the same sums whoever else is at work
 def run(job: Job) -> None:
+    """The whole stage: job.inputs to job.out."""
     config = job.config
     check_device(job.device)
     clip = Clip.read(job.inputs["split/clip.json"])
@@ -69,13 +72,13 @@ def run(job: Job) -> None:
         usable &= ~params.lost
     if not usable.any():
         raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
-    held = spaced_in_yaw(params.global_orient, usable, config.holdout)
+    held = hold_out(params.global_orient, usable, config.holdout)
     if not len(held):
         job.warn(f"No frame is held out ({int(usable.sum())} usable frames, train.holdout is {config.holdout}): "
                  "the quality of this avatar is not measured.")
     choosing = held
-    if config.gaussians == AUTO and config.recipe == "fast":
-        choosing = to_choose_by(params.global_orient, usable, held, config.holdout)
+    if config.searches_size():
+        choosing = hold_out_for_choosing(params.global_orient, usable, held, config.holdout)
     trained = np.setdiff1d(np.flatnonzero(usable), np.union1d(held, choosing))
     turn = turn_seen(rotation.exp(params.global_orient[usable].astype(float)))
     if turn < LEAST_TURN:
@@ -95,18 +98,18 @@ def run(job: Job) -> None:
 
 
 def warm(device: str) -> None:
-    """Called while the stage before is at work: kernels are loaded, at the very first compiled, and the GPU wakes up."""
+    """Loads the kernels, or compiles them the very first time, and wakes the GPU; called while the stage before is at work."""
     if device == "cuda":
         Device()
-    rehearse()
+    warm_up()
 
 
 def without_lpips(config: TrainConfig, device: str, camera: Camera) -> str | None:
-    """Why LPIPS, which is wished for, cannot be in the loss, or None. camera: of the frames."""
+    """The reason why LPIPS cannot be in the loss of a configuration that wants it there, or None. camera: of the frames."""
     if min(camera.width, camera.height) < LEAST_SIDE:
         return f"frames of fewer than {LEAST_SIDE} px are too small for it"
     if device == "cuda":
-        return "on cuda it does where train.lpips is loss" if config.lpips == AUTO else perceptual.why_not()
+        return perceptual.why_not() if config.lpips == "loss" else "on cuda it does where train.lpips is loss"
     return None if config.recipe == "paper" else "on the CPU recipe paper alone has it there"
 
 
@@ -116,21 +119,21 @@ def check_device(device: str) -> None:
         raise BadInput(f"train is to run on cuda, but {why}; or set train.device to cpu")
 
 
-def now() -> np.ndarray:
-    """Wall and CPU seconds."""
+def read_clocks() -> np.ndarray:
+    """(2,) s, wall and CPU time."""
     return np.array([time.perf_counter(), time.process_time()])
 
 
 def due(step: int, steps: int, times: int) -> bool:
-    """Whether one of `times` even marks of a run is reached by this step (from 1)."""
+    """Whether this step (from 1) reaches one of `times` evenly spaced marks of a run."""
     return step * times // steps > (step - 1) * times // steps
 
 
 class Run:
-    """One training: the recipe under a clock, and what is written of it."""
+    """One training: the recipe under a clock with its curve and checkpoints, and the files and figures of its result."""
 
-    def __init__(self, job: Job, poses: Poses, views, trained: np.ndarray, held: np.ndarray, choosing: np.ndarray):
-        """held: frames that are judged; choosing: those that the recipe chooses by."""
+    def __init__(self, job: Job, poses: Poses, views: list[View], trained: np.ndarray, held: np.ndarray, choosing: np.ndarray):
+        """Indices of frames: trained (n,); held (m,), which are judged; choosing (c,), which the recipe chooses by."""
         self.job, self.poses, self.views, self.trained, self.held = job, poses, views, trained, held
         self.choosing = choosing
         self.curve: list[dict] = []
@@ -143,7 +146,8 @@ class Run:
         self.in_loss = self.lpips.get(NETWORKS[0]) if in_loss else None
 
     def fit(self) -> None:
-        self.began = now()
+        """Runs the recipe, from a checkpoint where there is one."""
+        self.began = read_clocks()
         task = Task(self.views, self.trained, self.choosing, self.poses, self.job.config, self.job.progress, self.checkpoint,
                     self.marks, self.keep, lpips=self.in_loss)
         state = self.checkpoints.read()
@@ -152,21 +156,22 @@ class Run:
             task.resumed = state["recipe"]
         self.result = RECIPES[self.job.config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
-        finite("after the last step", result(self.result.gaussians, self.poses))
+        require_finite("after the last step", named_result(self.result.gaussians, self.poses))
         for level in self.result.coarser:
-            finite("after the last step", values(level))
+            require_finite("after the last step", named_values(level))
 
     def clock(self) -> np.ndarray:
-        """Wall and CPU seconds of training, those before a stop among them."""
-        return now() - self.began - self.aside
+        """(2,) s, wall and CPU time of training, including that before a stop, without judging."""
+        return read_clocks() - self.began - self.aside
 
     def keep(self, step: int, steps: int, state: Callable[[], State]) -> None:
-        """A checkpoint, if it is time for one."""
+        """Writes a checkpoint if it is time for one."""
         if self.checkpoints.due(ends=step == steps):
             self.checkpoints.write({"step": step, "recipe": state(), "poses": self.poses.state(), "curve": self.curve,
                                     "losses": self.losses, "spent": self.clock()})
 
     def restore(self, state: State) -> None:
+        """Takes up where a stopped run's checkpoint stands."""
         self.resumed_at = state["step"]
         self.poses.restore(state["poses"])
         self.curve, self.losses = state["curve"], state["losses"]
@@ -176,7 +181,9 @@ class Run:
         """The steps that get a row of the curve."""
         return [step for step in range(1, steps + 1) if any(due(step, steps, n) for n in (LOSS_ROWS, self.job.config.curve))]
 
-    def checkpoint(self, step: int, steps: int, loss: float, gaussians, gpu_seconds: float | None = None) -> None:
+    def checkpoint(self, step: int, steps: int, loss: float, gaussians: Callable[[], Gaussians],
+                   gpu_seconds: float | None = None) -> None:
+        """Notes a step's loss; adds a row to the curve at its marks. gaussians: a function that returns them as they stand."""
         self.losses.append(loss)
         if not any(due(step, steps, n) for n in (LOSS_ROWS, self.job.config.curve)):
             return
@@ -188,40 +195,44 @@ class Run:
         self.losses.clear()
         if len(self.held) and due(step, steps, self.job.config.curve):
             shown = gaussians()
-            row |= {"psnr_fg": self.psnr_fg(shown, self.carried(), self.held), "n_gaussians": len(shown)}
+            row |= {"psnr_fg": self.psnr_fg(shown, self.poses_of_all(), self.held), "n_gaussians": len(shown)}
         self.curve.append(row)
         self.aside += self.clock() - before
 
-    def carried(self) -> Poses:
-        """The poses with every frame that was not trained on put between its neighbours."""
-        return carried(self.poses, self.trained)
+    def poses_of_all(self) -> Poses:
+        """The poses, those of frames that were not trained on interpolated between their neighbours."""
+        return carry_to_untrained(self.poses, self.trained)
 
-    def psnr_fg(self, gaussians, poses: Poses, frames) -> float | None:
+    def psnr_fg(self, gaussians: Gaussians, poses: Poses, frames: Iterable[int]) -> float | None:
+        """dB on the person, mean over some frames; None of no frame."""
         return summary(judge(gaussians, poses, frames, self.views))["psnr_fg"]
 
     def write(self) -> None:
+        """Writes the stage's outputs."""
         job, gaussians = self.job, self.result.gaussians
         folder = job.out / "heldout"
         folder.mkdir()
-        poses = self.carried()
+        poses = self.poses_of_all()
         gaussians.write(job.out / "avatar.npz", self.result.coarser)
-        poses.refined().write(job.out / "body.npz")
-        write_frame(folder / "views.png", turned(gaussians, poses))
+        poses.to_params().write(job.out / "body.npz")
+        write_frame(folder / "views.png", draw_all_round(gaussians, poses))
         (job.out / "metrics.json").write_text(json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n")
 
-    def metrics(self, gaussians, poses: Poses, folder) -> dict:
+    def metrics(self, gaussians: Gaussians, poses: Poses, folder: Path) -> dict:
+        """The content of metrics.json. folder: where the images of the held-out frames go."""
         config, held = self.job.config, self.held
         rows = judge(gaussians, poses, held, self.views, folder, config.flip, self.lpips)
         fitted = poses.copy()
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
         aligned = poses.copy()
         if config.pose_test_steps:
-            ALIGN[self.job.device](gaussians, aligned, held, self.views, config.pose_test_steps)
+            BACKENDS[self.job.device].align_poses(gaussians, aligned, held, self.views, config.pose_test_steps)
             ttpo = judge(gaussians, aligned, held, self.views, None, config.flip, self.lpips)
         else:
             ttpo = []
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
-        of_fit, of_trained = judge_all([Look(gaussians, fitted, held, self.views), Look(gaussians, poses, sample, self.views)])
+        of_fit, of_trained = judge_all([Candidate(gaussians, fitted, held, self.views),
+                                        Candidate(gaussians, poses, sample, self.views)])
         return summary(rows) | {
             **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips_net"},
             "psnr_fg_fit": summary(of_fit)["psnr_fg"],
@@ -243,7 +254,7 @@ class Run:
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
             "resumed_at_step": self.resumed_at, "lpips_in_loss": self.in_loss is not None,
-            "levels": judged(gaussians, self.result.coarser, poses, held, self.views),
+            "levels": judge_levels(gaussians, self.result.coarser, poses, held, self.views),
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
             "curve": self.curve,

@@ -1,4 +1,4 @@
-"""Frames as the trainer reads them: at its size, cut out with the mask, cropped to the person's box, 8 bit."""
+"""Frames as the trainer uses them: scaled, cut out with the mask, cropped to the person's box, 8 bit."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from gsac.avatar.threads import available_cores
 from gsac.stages.contract import StageError
 
 MARGIN = 0.06
-"""Room round the mask's box, in units of its height: where limbs may move while poses are refined."""
+"""Margin round the mask's box, in units of its height: limbs may move there while poses are refined."""
 LEAST_SHARE = 2e-4
 """A mask that covers less of the frame counts as empty."""
 
 
 @dataclass
 class View:
-    """One frame at one size."""
+    """A frame, or a crop of it, at one size."""
 
     camera: Camera
     """Of the crop: the frame's, with its centre moved."""
@@ -32,19 +32,21 @@ class View:
     """x, y of the crop in the frame, px."""
 
     def crop(self, x0: int, y0: int, x1: int, y1: int) -> View:
+        """Columns x0 to x1 and rows y0 to y1, px, the last ones excluded."""
         c = self.camera
         return View(Camera(c.focal, (c.center[0] - x0, c.center[1] - y0), x1 - x0, y1 - y0),
                     np.ascontiguousarray(self.pixels[y0:y1, x0:x1]), (self.corner[0] + x0, self.corner[1] + y0))
 
     def halved(self) -> View:
+        """The view at half its size, with corner (0, 0)."""
         w, h = max(1, self.camera.width // 2), max(1, self.camera.height // 2)
         return View(self.camera.scaled(w, h), cv2.resize(self.pixels, (w, h), interpolation=cv2.INTER_AREA), (0, 0))
 
 
 def read_views(frames: Path, alphas: Path, camera: Camera, height: int) -> tuple[list[View], list[int]]:
-    """All T frames, whole, at most `height` px high. camera: of the frames as they lie on disk.
+    """All T frames, whole, at most `height` px high. camera: of the frames on disk.
 
-    Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not belong.
+    Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not fit the frames.
     """
     masks = {p.stem: p for p in frame_paths(alphas)}
     paths = frame_paths(frames)

@@ -1,4 +1,4 @@
-"""A training in miniature: it calls the kernels of recipe `fast` as a real one does, so that they are compiled or loaded before."""
+"""Warm-up: a training in miniature that compiles or loads the CPU kernels of recipe `fast` before the real one needs them."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import numpy as np
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.stages.train.config import TrainConfig
-from gsac.stages.train.judge.heldout import align_poses, judge
+from gsac.stages.train.judge.heldout import judge
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses
-from gsac.stages.train.recipes import RECIPES
+from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
 
 FRAMES, STEPS, GAUSSIANS = 3, 6, 330
 WIDTH, HEIGHT, FOCAL, DISTANCE = 54, 96, 150.0, 3.2
-"""px and m of images that the body nearly fills."""
+"""px and m: images that the body nearly fills."""
 TURN = 0.2
-"""rad from frame to frame."""
+"""rad, the body's turn from frame to frame."""
 
 
-def rehearse() -> None:
-    """Takes what the compiler takes, some fifteen seconds, at the very first; one second once its cache holds everything."""
+def warm_up() -> None:
+    """Takes some fifteen seconds the very first time, when everything is compiled; one second from the compiler's cache."""
     body = Body.load()
     pose = np.zeros((FRAMES, len(body.parents), 3))
     for t in range(FRAMES):
@@ -35,6 +35,6 @@ def rehearse() -> None:
     config = TrainConfig(gaussians=GAUSSIANS, steps=STEPS, pose_rounds=1)
     gaussians = RECIPES["fast", "cpu"](Task(views, frames, frames[:1], poses, config, lambda done, total, unit: None)).gaussians
     converge(gaussians, poses, frames[:1], views, 1)
-    align_poses(gaussians, poses, frames[:1], views, 1)
+    BACKENDS["cpu"].align_poses(gaussians, poses, frames[:1], views, 1)
     judge(gaussians, poses, frames[:1], views)
-    poses.refined()
+    poses.to_params()

@@ -1,7 +1,7 @@
-"""Coarser levels of detail: each is the one before with neighbours merged, fitted to frames as small as it will be seen.
+"""Coarser levels of detail: each merges neighbours of the one before and is fitted to frames of the size it will be seen at.
 
-On the screen no gaussian is narrower than a pixel's blur: gaussians made for a near view are fat from afar, and a level fitted at
-its own size draws better there than they do.
+On the screen no gaussian is narrower than a pixel's blur, so gaussians made for a near view look fat from afar; a level fitted
+at its own size draws better there.
 """
 
 from __future__ import annotations
@@ -12,65 +12,71 @@ import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
-from gsac.stages.train.fast import trainer as fast
-from gsac.stages.train.fast.size_search import care, shown
-from gsac.stages.train.gaussians.merge import merged
-from gsac.stages.train.gaussians.unseen import levelled
-from gsac.stages.train.judge.heldout import Look, judge_all
+from gsac.stages.train.fast.backend import Backend
+from gsac.stages.train.fast.size_search import count_pixels, viewing_weight
+from gsac.stages.train.fast.start import crop_views
+from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.gaussians.merge import merge_to_size
+from gsac.stages.train.gaussians.unseen import level_heights
+from gsac.stages.train.judge.heldout import Candidate, judge_all
 from gsac.stages.train.poses.poses import Poses
-from gsac.stages.train.task import Fit, Loop, Task
+from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import View
 
 
 class Level(NamedTuple):
     members: int
-    """How many of the finest level's gaussians become one."""
+    """Gaussians of the finest level for each one of this level."""
     halvings: int
-    """Of the images that are trained on, to the size at which a viewer takes this level."""
+    """How often the training images are halved, to the size at which a viewer draws this level."""
 
 
 LEVELS = (Level(3, 1), Level(9, 2))
-"""A person fills most of a frame of 540 px: a third for those of about 200 px, a ninth for 100, as Unity's renderer takes them."""
+"""A person fills most of a frame of 540 px: a third is for persons of about 200 px, a ninth for 100, as in Unity's renderer."""
 LEAST = 100
-"""Gaussians below which there is no level."""
+"""Fewest gaussians of a level."""
 
 
-def coarser(task: Task, loop: Loop, fit: Fit) -> list[Gaussians]:
+def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
     """Levels below fit.gaussians, the finest of them first; fewer than `LEVELS` where an avatar has few gaussians."""
     rest = task.poses.rest(int(task.trained[0]))[0]
-    views, halvings = fast.crops(task)[0], 0
+    views, halvings = crop_views(task)[0], 0
     out, gaussians = [], fit.gaussians
     for level in LEVELS:
         size = len(fit.gaussians) // level.members
         if size < LEAST:
             break
-        views = {t: halved(view, level.halvings - halvings) for t, view in views.items()}
+        views = {t: halve(view, level.halvings - halvings) for t, view in views.items()}
         halvings = level.halvings
-        worth = shown(gaussians, task, views) * care(gaussians, task.poses.body)
-        fewer = merged(gaussians, worth, size, task.poses.body, rest)
+        worth = count_pixels(gaussians, task, views) * viewing_weight(gaussians, task.poses.body)
+        fewer = merge_to_size(gaussians, worth, size, task.poses.body, rest)
         if len(fewer) >= len(gaussians):
             break
-        trainer = fast.Trainer(levelled(fewer, rest, task.poses.body.faces), task, settled=True)
-        trainer.rest_unseen(views)
-        gaussians = loop.refit(task, trainer, views).recoloured(views)[0]
+        trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True)
+        trainer.freeze_unseen(views)
+        gaussians = backend.refit(task, trainer, views).finish(views)[0]
         out.append(gaussians)
     return out
 
 
-def judged(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View]) -> list[dict]:
-    """For each level its number of gaussians, the height of its images, its held-out psnr_fg and ssim there, and the finest's."""
-    rows, looks = [], []
+def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View]) -> list[dict]:
+    """Held-out psnr_fg and ssim of each level at its own image height, with its size and the same figures of the finest level.
+
+    held: (n,) indices of the frames; views: of all T.
+    """
+    rows, candidates = [], []
     for (_, halvings), level in zip(LEVELS, levels, strict=False):
-        small = {int(t): halved(views[t], halvings) for t in held}
-        rows.append({"n_gaussians": len(level), "image_height": halved(views[0], halvings).camera.height})
-        looks += [Look(gaussians, poses, held, small) for gaussians in (level, finest)]
-    for k, judged_rows in enumerate(judge_all(looks)):
+        small = {int(t): halve(views[t], halvings) for t in held}
+        rows.append({"n_gaussians": len(level), "image_height": halve(views[0], halvings).camera.height})
+        candidates += [Candidate(gaussians, poses, held, small) for gaussians in (level, finest)]
+    for k, judged_rows in enumerate(judge_all(candidates)):
         figures, name = summary(judged_rows), "_finest" if k % 2 else ""
         rows[k // 2] |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}
     return rows
 
 
-def halved(view: View, times: int) -> View:
+def halve(view: View, times: int) -> View:
+    """The view at half its size, `times` over."""
     for _ in range(times):
         view = view.halved()
     return view

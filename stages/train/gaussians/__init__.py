@@ -1,1 +1,1 @@
-"""The gaussians themselves: first colours, merging, what no frame shows, the offset to clothes."""
+"""The gaussians themselves: first colours, merging, those that no frame shows, the offset to clothes, kernels of a step."""

@@ -1,7 +1,7 @@
 """Clothes and hair: a smooth displacement of the rest vertices, learned first, then folded into the gaussians.
 
-Gaussians that each wander off a body that is too thin make a furry surface; moved together they stay a skin. Steps are
-smoothed by (1 + lambda L)^-1, L the mesh's uniform Laplacian, with one Adam scale for all vertices (Nicolet et al.
+The body is thinner than the clothed person. Gaussians that leave it one by one make a furry surface; moved together they stay a
+skin. Steps are smoothed by (1 + lambda L)^-1, L the mesh's uniform Laplacian, with one Adam scale for all vertices (Nicolet et al.
 2021, Large Steps in Inverse Rendering).
 """
 
@@ -14,21 +14,22 @@ from scipy.sparse import coo_matrix, diags, identity
 from scipy.sparse.linalg import splu
 
 from gsac.avatar.binding import bind, face_frames, unbind
+from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import FINGERS
 
 SMOOTHNESS = 30.0
-"""lambda: a step reaches about its root in edges."""
+"""lambda: a step spreads over about its square root of edges. Fingers are not displaced; they are thin, and their error is pose."""
 EVERY = 4
-"""Steps of which the gradients are gathered for one step of the offsets."""
+"""Steps whose gradients are gathered for one step of the offsets."""
 KEPT = ("offset", "first", "second", "gathered", "seen", "count")
-"""Attributes of Offsets that change."""
+"""Attributes of Offsets that training changes."""
 
 
 class Offsets:
-    """offset (V, 3) float32 m, added to the body at rest."""
+    """offset: (V, 3) float32 m, added to the body's vertices at rest, with Adam's state."""
 
-    def __init__(self, body):
+    def __init__(self, body: Body):
         faces, vertices = np.asarray(body.faces, np.int64), len(body.v_template)
         i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
         edges = coo_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (vertices, vertices)).tocsr()
@@ -46,11 +47,12 @@ class Offsets:
         return {name: getattr(self, name) for name in KEPT}
 
     def restore(self, state: dict) -> None:
+        """Takes the place of the Offsets that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])
 
     def gather(self, grad: np.ndarray, rate: float) -> None:
-        """grad: (V, 3) of a loss with respect to the rest vertices; every few calls the offsets take a step, m."""
+        """Adds a gradient of the rest vertices, grad (V, 3); each EVERY-th call takes a step of the offsets. rate: m."""
         self.gathered += grad
         self.seen += 1
         if self.seen < EVERY:
@@ -65,7 +67,10 @@ class Offsets:
 
 
 def fold(gaussians: Gaussians, rest: np.ndarray, offset: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians of the displaced body, bound to the plain one; at rest nothing changes."""
+    """Binds gaussians of the displaced body to the plain one; at rest they stay where they are.
+
+    rest, offset: (V, 3) m; faces: (F, 3).
+    """
     g = gaussians
     displaced = bind(face_frames(rest + offset, faces), g.face, g.mu, g.quat, g.log_scale)
     mu, quat, log_scale = unbind(face_frames(rest, faces), g.face, displaced)

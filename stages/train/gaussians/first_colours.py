@@ -1,6 +1,6 @@
-"""Colours to start from, and the light they were seen in, read off the frames.
+"""First colours, and the light they were seen in, read from the frames.
 
-What no frame sees takes the colour of what lies beside it.
+Gaussians that no frame shows take the colour of their neighbours.
 """
 
 from __future__ import annotations
@@ -18,15 +18,17 @@ from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
 
 TOLD = 10.0
-"""Independent values that a frame says of the light: what is wrong in it is wrong over large parts of the body."""
+"""Independent observations of the light in a frame: its errors are correlated over large parts of the body."""
 NOISE = 0.1
+"""Sigma of an observed colour, in 0..1."""
 EVEN = 0.3
-"""Spread of the light's directed part, before anything is seen."""
+"""Sigma of the prior on the light's directed part."""
 ROUNDS = 12
+"""Of colours and light in turns."""
 LEAST_FACING = 0.1
 """Cosine between the face's normal and the ray to the camera below which a colour is not read."""
 SURE = 200
-"""Mask value (of 255) from which on a pixel shows the person alone."""
+"""Mask value, of 255, above which a pixel shows the person alone."""
 
 
 @dataclass
@@ -40,7 +42,7 @@ class PosedFrame:
 
 @dataclass
 class Sight:
-    """What one frame shows of M gaussians' places."""
+    """The colours that one frame shows at the places of M gaussians."""
 
     which: np.ndarray
     """(M,) indices of the gaussians."""
@@ -49,11 +51,11 @@ class Sight:
     normal: np.ndarray
     """(M, 3) of the faces, in the light's axes."""
     weight: np.ndarray
-    """(M,): straight views count more."""
+    """(M,), larger for faces seen straight on."""
 
 
 def read_sights(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussians) -> list[Sight]:
-    """The colours that the frames show where gaussians are."""
+    """The colours that the frames show where the gaussians are. faces: (F, 3)."""
 
     def read(frame: PosedFrame, _: Workspace) -> Sight:
         posed = face_frames(frame.vertices, faces)
@@ -72,15 +74,15 @@ def read_sights(frames: list[PosedFrame], faces: np.ndarray, gaussians: Gaussian
 
 
 def mean_colours(sights: list[Sight], count: int, light: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Of `count` gaussians, what was seen of them with the light (4, 3) taken off.
+    """Mean colours of `count` gaussians over the sights, the light (4, 3) divided out.
 
     Returns rgb (N, 3) float32 in 0..1, grey where unseen, and seen (N,) bool.
     """
-    return _mean_colours(_joined(sights), count, light)
+    return _mean_colours(_concatenate(sights), count, light)
 
 
-def _joined(sights: list[Sight]) -> Sight:
-    """All that the frames show, as if one did."""
+def _concatenate(sights: list[Sight]) -> Sight:
+    """All sights as one."""
     parts = zip(*((s.which, s.colour, s.normal, s.weight) for s in sights), strict=True)
     return Sight(*map(np.concatenate, parts)) if sights else Sight(np.zeros(0, np.int64), *np.zeros((2, 0, 3)), np.zeros(0))
 
@@ -97,14 +99,14 @@ def _mean_colours(sight: Sight, count: int, light: np.ndarray | None) -> tuple[n
 
 
 def find_light(sights: list[Sight], count: int) -> np.ndarray:
-    """(4, 3) float32: the white light under which `count` gaussians, each of one colour, look most as they were seen.
+    """(4, 3) float32: the white light that explains the sights of `count` gaussians, each of one colour, best.
 
-    Colours and light in turns, each by least squares. How strong the light is as a whole cannot be told from how bright the
-    colours are: its mean over what was seen is 1. A clip that shows no turn says nothing of it, and it stays even. Coloured lamps
-    are not looked for: a turn seen in part takes them for stains, and whole turns are drawn as well without.
+    Solves for colours and light in turns, each by least squares. The light's strength cannot be separated from the brightness of
+    the colours, so its mean over the sights is set to 1. Without a turn of the person the prior keeps the light even. Coloured
+    lamps are not modelled: in a partial turn they absorb stains, and whole turns look as good without.
     """
     light = np.concatenate([np.ones((1, 3)), np.zeros((3, 3))])
-    every = _joined(sights)
+    every = _concatenate(sights)
     seen = float(every.weight.sum())
     if not seen:
         return light.astype(np.float32)
@@ -121,7 +123,7 @@ def find_light(sights: list[Sight], count: int) -> np.ndarray:
 
 
 def fill_unseen(rgb: np.ndarray, seen: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """rgb (N, 3) with the unseen rows replaced by the mean of the 4 nearest seen ones; places: (N, 3) m at rest."""
+    """rgb (N, 3) with unseen rows replaced by the mean of the 4 nearest seen ones. seen: (N,) bool; places: (N, 3) m at rest."""
     if seen.all() or not seen.any():
         return rgb
     out = rgb.copy()

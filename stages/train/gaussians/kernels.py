@@ -1,4 +1,4 @@
-"""Small fused numba kernels of the training loop: backgrounds and Adam."""
+"""Fused numba kernels of a training step: composition over a background, Adam, the gaussians' limits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba import njit
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def on_background(rgb, alpha, pixels, background, gain, image, target):
-    """Render and frame over one colour: image = gain * rgb + (1 - alpha) bg, target likewise from the cut-out frame.
+    """Composes render and frame over one colour: image = gain * rgb + (1 - alpha) bg, target likewise from the cut-out frame.
 
     rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8 premultiplied; background, gain: (3,).
     image, target: (h, w, 3), written.
@@ -27,9 +27,9 @@ def on_background(rgb, alpha, pixels, background, gain, image, target):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def through_background(grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, grad_gain):
-    """Gradients of `on_background`, and of mask_weight * mean((alpha - mask)^2), which it returns.
+    """Backward pass of `on_background` plus mask_weight * mean((alpha - mask)^2), whose value it returns.
 
-    grad_image: (h, w, 3). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
+    Other arguments as there; grad_image: (h, w, 3). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
     """
     byte = rgb.dtype.type(1 / 255)
     share = rgb.dtype.type(mask_weight / alpha.size)
@@ -52,7 +52,7 @@ def through_background(grad_image, rgb, alpha, pixels, background, gain, mask_we
 def adam_rows(value, grad, first, second, count, rate):
     """One Adam step (0.9, 0.99) of the rows of value (N, C) whose gradient is not zero; count: (N,) steps of each row.
 
-    A gaussian that a frame does not see keeps its place and its moments. count is advanced by `count_rows`.
+    A gaussian that a frame does not show keeps its value and its moments. `count_rows` advances count.
     """
     for i in range(value.shape[0]):
         touched = False
@@ -95,7 +95,7 @@ def count_rows(grad, count):
 
 @njit(cache=True, error_model="numpy")
 def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, largest, reach, pull):
-    """Keeps gaussians sane after a step, in place.
+    """Limits gaussians after a step, in place.
 
     quat (N, 4) is normalised; the longest axis is at most `needle` times the middle one and 10 times the shortest, and
     at most `largest` m; mu (N, 3) moves back to start (N, 3) by the share `pull` and stays within `reach` m of it;

@@ -1,7 +1,7 @@
-"""Fewer gaussians that look like many: neighbours of one colour become one, pair by pair.
+"""Merges neighbouring gaussians of similar colour, pair by pair, to fewer that look alike.
 
-A pair costs what its mean colour differs from the two (Ward's criterion, weighted with the pixels that each shows), and its
-distance. Nothing is left out: a merged gaussian covers what its two did, so that parts no frame shows keep their coverage.
+A pair's cost is the difference of colours it loses (Ward's criterion, weighted by the pixels that each shows) plus its distance.
+No gaussian is dropped: a merged one covers the area of both, so that parts no frame shows stay covered.
 
 The result is trained further. `stages/export/levels.py` merges by place alone, for avatars that were trained without levels: it has
 neither frames to weigh colours with nor training afterwards.
@@ -20,42 +20,46 @@ from gsac.avatar.mesh import distinct_pairs
 from gsac.avatar.rotation import to_wxyz
 
 NEIGHBOURS = 8
+"""Nearest gaussians that each may merge with."""
 EVEN = 0.06
-"""Difference of colour that costs as much as the width of a mean gaussian between the two: plain parts thin out evenly."""
+"""Difference of colour that costs as much as a distance of one mean gaussian's width: plain parts thin out evenly."""
 SAME_SIDE, SAME_PART = 0.5, 0.5
-"""Least cosine between the normals of a pair's faces, and most difference of their skin weights: fingers stay apart."""
+"""Least cosine between the normals of a pair's faces, and largest difference of their skin weights: fingers stay apart."""
 HIDDEN = 0.02
-"""Of the mean: what a gaussian that no frame shows is taken to show."""
+"""Pixels added to each gaussian's, as a share of their mean: those that no frame shows have a cost, too."""
 ROUND = 0.15
-"""Share of the gaussians that a round of merging takes away, at most; then the neighbours are looked for anew."""
+"""Largest share of the gaussians that a round of merging takes away; then the neighbours are searched anew."""
 OPAQUE = 0.95
-"""Opacity of a merged gaussian, at most."""
+"""Largest opacity of a merged gaussian."""
 
 
-def merged(gaussians: Gaussians, shown: np.ndarray, size: int, body: Body, rest: np.ndarray) -> Gaussians:
-    """`size` gaussians in the place of more, or as few as neighbours allow.
+def merge_to_size(gaussians: Gaussians, shown: np.ndarray, size: int, body: Body, rest: np.ndarray) -> Gaussians:
+    """Merges to `size` gaussians, or to as few as neighbours allow.
 
-    shown: (N,) pixels that each adds to the images, or what they are worth; rest: (V, 3) m, the body that they are merged on.
+    shown: (N,) pixels that each adds to the images, possibly weighted; rest: (V, 3) m, the body that they are merged on.
     """
     frames = face_frames(rest, body.faces)
     shown = np.asarray(shown, np.float64) + HIDDEN * np.mean(shown)
     while len(gaussians) > size:
         bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-        pairs = cheapest(gaussians, bound, shown, frames.R[gaussians.face, :, 1], body)
+        pairs = find_cheapest_pairs(gaussians, bound, shown, frames.R[gaussians.face, :, 1], body)
         if not len(pairs):
             break
         pairs = pairs[:min(len(gaussians) - size, max(int(ROUND * len(gaussians)), 1))]
-        gaussians, shown = joined(gaussians, bound, shown, pairs, frames)
+        gaussians, shown = merge_pairs(gaussians, bound, shown, pairs, frames)
     return gaussians
 
 
-def cheapest(gaussians: Gaussians, bound: Bound, shown: np.ndarray, normals: np.ndarray, body: Body) -> np.ndarray:
-    """(P, 2) neighbours, the cheapest pair first, no gaussian in two of them."""
+def find_cheapest_pairs(gaussians: Gaussians, bound: Bound, shown: np.ndarray, normals: np.ndarray, body: Body) -> np.ndarray:
+    """(P, 2) neighbours to merge, the cheapest pair first, no gaussian in two pairs.
+
+    bound: the gaussians at rest; shown: (N,) pixels; normals: (N, 3) of their faces.
+    """
     places = bound.means.astype(np.float64)
     near = cKDTree(places).query(places, k=min(NEIGHBOURS + 1, len(places)))[1][:, 1:]
     one, other = np.repeat(np.arange(len(places)), near.shape[1]), near.ravel()
     i, j = distinct_pairs(np.minimum(one, other), np.maximum(one, other), len(places))
-    skin = skin_of(gaussians.face, body)
+    skin = skin_weights(gaussians.face, body)
     fit = ((normals[i] * normals[j]).sum(1) > SAME_SIDE) & (0.5 * np.abs(skin[i] - skin[j]).sum(1) < SAME_PART)
     i, j = i[fit], j[fit]
     colour = ((gaussians.rgb[i].astype(np.float64) - gaussians.rgb[j]) ** 2).sum(1)
@@ -70,22 +74,24 @@ def cheapest(gaussians: Gaussians, bound: Bound, shown: np.ndarray, normals: np.
 
 
 def areas(bound: Bound) -> np.ndarray:
-    """(N,) m2: product of the two longer axes."""
+    """(N,) m2, product of the two longer axes."""
     return np.sort(bound.scales.astype(np.float64), 1)[:, 1:].prod(1)
 
 
-def skin_of(face: np.ndarray, body: Body) -> np.ndarray:
-    """(N, J) float32, the skin weights of the faces' first corners."""
+def skin_weights(face: np.ndarray, body: Body) -> np.ndarray:
+    """(N, J) float32, the skin weights of the faces' first corners. face: (N,) of the gaussians."""
     corner = np.asarray(body.faces)[face, 0]
     out = np.zeros((len(face), len(body.parents)), np.float32)
     np.add.at(out, (np.arange(len(face))[:, None], body.skin_index[corner]), body.skin_weight[corner])
     return out
 
 
-def joined(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndarray,
-           frames: FaceFrames) -> tuple[Gaussians, np.ndarray]:
-    """Each pair as one gaussian with the mean and the spread of both, as they show, bound as the one that shows more; and what it
-    shows."""
+def merge_pairs(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndarray,
+                frames: FaceFrames) -> tuple[Gaussians, np.ndarray]:
+    """Merges each of pairs (P, 2) to one gaussian with the mean and spread of both, on the face of the one that shows more.
+
+    bound, frames: gaussians and faces at rest; shown: (N,) pixels, by which the two are weighted. Returns M gaussians, (M,) pixels.
+    """
     first = shown[pairs[:, 0]] >= shown[pairs[:, 1]]
     keep, drop = np.where(first, *pairs.T), np.where(first, *pairs.T[::-1])
     mass, means = gaussians.opacity * areas(bound), bound.means.astype(np.float64)

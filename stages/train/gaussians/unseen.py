@@ -1,7 +1,7 @@
-"""Gaussians that no frame shows from their front: laid on the surface that their neighbours make, in their neighbours' colour.
+"""Gaussians that no frame shows from their front: finds them, and lays them on their neighbours' surface in their colour.
 
-Nothing in the images says where they belong, and training would leave them as fur at edges and ragged soles. What is shown from one
-side only says nothing of its depth either: no gaussian may stand off the surface that those around it make.
+The images do not constrain them, and training would leave them as fur at edges and ragged soles. Nor do images from one side
+constrain depth: no gaussian may stand off the surface that those around it make.
 """
 
 from __future__ import annotations
@@ -16,23 +16,25 @@ from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace
 
 BEHIND, FRONT = -0.2, 0.3
-"""Cosine between a face's normal and the way to the camera: up to the first a frame shows nothing of it, from the second on all.
-The first is below zero, since a limb's outline is made by what lies just behind its edge."""
+"""Cosine between a face's normal and the direction to the camera: up to the first a frame shows nothing of it, from the second on
+all. The first is below zero, since gaussians just behind a limb's edge make its outline."""
 LEAST_SHOWN = 0.05
-"""Pixels of a half-size frame, on average over the frames, that a gaussian must show of its front to be called seen."""
+"""Least pixels of a half-size frame, mean over the frames, that a seen gaussian shows of its front."""
 LEAST_SHARE = 0.15
-"""The same in pixels for its size, of what half of the seen ones show: in armpits frames show less, and at a slant."""
+"""Least pixels per area of a seen gaussian, as a share of the median: armpits are shown little, and at a slant."""
 NEIGHBOURS = 8
+"""Seen gaussians that an unseen one takes after."""
 AROUND, STEP = 24, 0.02
-"""How many gaussians tell the surface's height at a place, and m that one may lie above or below it."""
+"""Gaussians whose median height is the surface at a place, and m that one may lie above or below it."""
 SPARSE = 3000
-"""Gaussians of an avatar below which these m grow with the way from one to the next: shrunk, they would leave holes."""
+"""Gaussians of an avatar below which STEP grows with their spacing: shrunk, they would leave holes."""
 
 
-def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera, workspace: Workspace) -> np.ndarray:
-    """(N,) pixels that each gaussian adds to one image from its front. vertices: (V, 3).
+def front_pixels(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera,
+                 workspace: Workspace) -> np.ndarray:
+    """(N,) pixels that each gaussian adds to one image from its front. vertices: (V, 3) m, camera frame; faces: (F, 3).
 
-    What it adds to all pixels is the gradient of their sum with respect to its colour.
+    The pixels it adds are the gradient of the sum of all pixels by its colour.
     """
     rendering = render_bound(vertices, faces, gaussians, camera, workspace)
     added = render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0]
@@ -42,18 +44,18 @@ def shown(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera:
     return np.clip((facing - BEHIND) / (FRONT - BEHIND), 0, 1) * added
 
 
-def enough(pixels: np.ndarray, gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(N,) bool, whether gaussians are seen. pixels: (N,) that each shows of its front, mean over the frames; rest: (V, 3) m."""
+def find_seen(pixels: np.ndarray, gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(N,) bool, whether gaussians are seen. pixels: (N,) `front_pixels`, mean over the frames; rest: (V, 3) m; faces: (F, 3)."""
     bound = bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     share = pixels / np.maximum(np.sort(bound.scales, 1)[:, 1:].prod(1), 1e-12)
     seen = pixels > LEAST_SHOWN
     return seen & (share > LEAST_SHARE * np.median(share[seen])) if seen.any() else seen
 
 
-def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians, unseen ones as flat discs in the colour of their neighbours. seen: (N,) bool; rest: (V, 3) m.
+def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
+    """The gaussians, unseen ones as flat discs in the colour of their neighbours. seen: (N,) bool; rest: (V, 3) m; faces: (F, 3).
 
-    They lie no higher over the body than their neighbours and are no larger; opacity stays: the masks have told where nothing is.
+    They lie no higher over the body than their neighbours and are no larger. Opacity stays: it is learned from the masks.
     """
     poor = np.flatnonzero(~seen)
     if not len(poor) or not seen.any():
@@ -73,10 +75,10 @@ def laid(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.nda
     return out
 
 
-def levelled(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians, none of them more than STEP (few: `SPARSE`) above or below the middle height around it. rest: (V, 3) m.
+def level_heights(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
+    """The gaussians, moved to within STEP (`SPARSE`: more) of the median height around them. rest: (V, 3) m; faces: (F, 3).
 
-    Neither is one thicker than that, measured along the face's normal as a standard deviation: it shrinks.
+    One whose standard deviation along the face's normal is larger than that shrinks to it.
     """
     step = STEP * max(1, SPARSE / max(len(gaussians), 1)) ** 0.5
     frames = face_frames(rest, faces)

@@ -1,1 +1,1 @@
-"""What a finished avatar is worth: held-out frames, poses never seen, parts that no frame shows."""
+"""Judges a finished avatar: on held-out frames, in poses never seen, by the parts that no frame shows."""

@@ -1,4 +1,4 @@
-"""Parts of the body that no frame shows, by name: what stands there in the avatar is made up from what lies around."""
+"""Names the parts of the body that no frame shows: the avatar's colours there are guessed from their surroundings."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ import numpy as np
 
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body
-from gsac.stages.train.gaussians.merge import skin_of
+from gsac.stages.train.gaussians.merge import skin_weights
 
 HALVED = {"head": ("face", "back of the head"), "trunk": ("front of the trunk", "back")}
-"""Parts whose front and back are told apart."""
+"""Parts whose front and back are named separately."""
 LIMBS = {"upper arm": ("shoulder",), "forearm": ("elbow",), "hand": ("wrist", "index", "middle", "pinky", "ring", "thumb"),
          "thigh": ("hip",), "shin": ("knee",), "foot": ("ankle", "foot")}
-"""Limb -> what its joints' names begin with after their side."""
+"""Limb -> how its joints' names begin after their side."""
 HEAD = ("head", "jaw", "left_eye_smplhf", "right_eye_smplhf")
 TRUNK = ("pelvis", "spine1", "spine2", "spine3", "left_collar", "right_collar")
 FACING = 0.3
-"""Cosine between a face's normal and the way ahead from which on it belongs to the front, or to the back by minus that."""
+"""Cosine between a face's normal and the forward direction above which it belongs to the front; below minus that, to the back."""
 SHOWN, HALF_SHOWN = 0.2, 0.5
-"""Share of a limb's gaussians, and of those of a front or a back, below which it is called unseen. One side of a limb is enough;
-a rim is seen where its neighbours are: of a face 0.43 where only the chin is in the picture, and at least 0.78 where all is."""
+"""Share of seen gaussians below which a limb, and a front or a back, is called unseen. One side of a limb is enough; rims count as
+seen with their neighbours: 0.43 of a face where only the chin is in the picture, at least 0.78 where all of it is."""
 FEWEST = 10
-"""Gaussians of a part below which nothing is said of it."""
+"""Fewest gaussians of a part that is named."""
 
 
 def part_of(name: str) -> str | None:
-    """Of a joint; None for the neck, whose skin goes up to the chin and down to the shoulders."""
+    """The part that a joint belongs to; None for the neck, whose skin reaches from the chin to the shoulders."""
     if name in HEAD:
         return "head"
     if name in TRUNK:
@@ -35,9 +35,12 @@ def part_of(name: str) -> str | None:
 
 
 def unseen_parts(face: np.ndarray, seen: np.ndarray, body: Body) -> list[str]:
-    """face: (N,) of the gaussians; seen: (N,) bool. From head to foot; head and trunk by their halves where one of them is seen."""
+    """Names from head to foot; a half of head or trunk where the other half is seen.
+
+    face: (N,) of the gaussians; seen: (N,) bool.
+    """
     names = [part_of(name) for name in body.joint_names]
-    carried = np.array([name or "" for name in names])[skin_of(face, body).argmax(1)]
+    carried = np.array([name or "" for name in names])[skin_weights(face, body).argmax(1)]
     ahead = face_frames(np.asarray(body.v_template, np.float32), body.faces).R[face, 2, 1]
     found = []
 

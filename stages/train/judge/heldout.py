@@ -1,4 +1,4 @@
-"""Judging: renders of frames that were not trained on, beside the truth."""
+"""Judges renders of held-out frames against the truth, and aligns their poses at test time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.rotation import about_y
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
-from gsac.stages.train.finite import finite, pose
+from gsac.stages.train.finite import named_pose, require_finite
 from gsac.stages.train.gaussians.kernels import on_background, through_background
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View, person_crop
@@ -27,28 +27,29 @@ from gsac.stages.train.views import View, person_crop
 TEST_RATE = 1e-3
 """Adam rate of the test-time pose optimisation."""
 TEST_END, TEST_MASK = 0.05, 0.1
-"""What that rate falls to, and the weight of the mask beside the image."""
+"""Factor that this rate falls to, and the weight of the mask beside the image."""
 FACE_WIDTH, HAND_MARGIN = 1.3, 0.15
-"""Sides of the boxes that are judged apart: over the way from ear to ear; room round a hand's key points."""
+"""Boxes that are judged on their own: side of the face's over the distance of the ears; margin round a hand's key points."""
 BOX_SLACK, LEAST_VISIBLE = 0.03, 0.4
-"""m that a key point lies inside the body, and the share of them that must be in view."""
+"""m that a key point may lie inside the body, and the least share of them in view."""
 ERROR_FULL = 0.5
-"""Error that the error maps draw in their last colour."""
+"""Error at the last colour of the error maps."""
 
 
-def render_view(gaussians: Gaussians, poses: Poses, t: int, view: View, workspace: Workspace):
-    """rgb (H, W, 3) premultiplied and alpha (H, W) of frame t as it stands in poses; copies."""
+def render_view(gaussians: Gaussians, poses: Poses, t: int, view: View,
+                workspace: Workspace) -> tuple[np.ndarray, np.ndarray]:
+    """rgb (H, W, 3) premultiplied and alpha (H, W) of frame t in its pose; copies."""
     rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
     return rendering.rgb.copy(), rendering.alpha.copy()
 
 
 def truth(view: View) -> tuple[np.ndarray, np.ndarray]:
-    """(H, W, 3) premultiplied and mask (H, W), 0..1."""
+    """rgb (H, W, 3) premultiplied and mask (H, W) of the frame, 0..1."""
     return view.pixels[..., :3] / np.float32(255), view.pixels[..., 3] / np.float32(255)
 
 
-class Look(NamedTuple):
-    """What is to be judged: an avatar, posed, in some frames."""
+class Candidate(NamedTuple):
+    """An avatar with its poses, to be judged in some frames."""
 
     gaussians: Gaussians
     poses: Poses
@@ -56,23 +57,23 @@ class Look(NamedTuple):
     views: Mapping[int, View] | list[View]
 
 
-def judge(gaussians: Gaussians, poses: Poses, frames, views: list[View], folder: Path | None = None,
+def judge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: list[View], folder: Path | None = None,
           flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
     """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
-    return judge_all([Look(gaussians, poses, frames, views)], folder, flip, lpips)[0]
+    return judge_all([Candidate(gaussians, poses, frames, views)], folder, flip, lpips)[0]
 
 
-def judge_all(looks: list[Look], folder: Path | None = None, flip: bool = False,
+def judge_all(candidates: list[Candidate], folder: Path | None = None, flip: bool = False,
               lpips: Mapping[str, Lpips] | None = None) -> list[list[dict]]:
-    """`judge` of each look, all their frames side by side."""
+    """`judge` of each candidate, all their frames side by side."""
 
-    def row(frame: tuple[Look, int], workspace: Workspace) -> dict:
+    def row(frame: tuple[Candidate, int], workspace: Workspace) -> dict:
         (gaussians, poses, _, views), t = frame
-        finite("when it is judged", pose(poses, t))
+        require_finite("when it is judged", named_pose(poses, t))
         rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
-        finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
+        require_finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
         true_rgb, mask = truth(views[t])
-        scores = score(rgb, alpha, true_rgb, mask, boxes(poses, t, views[t].camera), flip, lpips)
+        scores = score(rgb, alpha, true_rgb, mask, find_boxes(poses, t, views[t].camera), flip, lpips)
         if folder is not None:
             render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
             error = np.abs(render - real).mean(2) / ERROR_FULL
@@ -82,14 +83,14 @@ def judge_all(looks: list[Look], folder: Path | None = None, flip: bool = False,
             write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(heat, cv2.COLOR_BGR2RGB))
         return scores
 
-    rows = iter(side_by_side(row, [(look, int(t)) for look in looks for t in look.frames]))
-    return [[next(rows) for _ in look.frames] for look in looks]
+    rows = iter(side_by_side(row, [(candidate, int(t)) for candidate in candidates for t in candidate.frames]))
+    return [[next(rows) for _ in candidate.frames] for candidate in candidates]
 
 
-def boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:
-    """x0, y0, x1, y1 px of face, left_hand and right_hand, of those that the body itself does not hide.
+def find_boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:
+    """x0, y0, x1, y1 px of face, left_hand and right_hand in frame t, of those that the body itself does not hide.
 
-    The face is a square between nose and ears, FACE_WIDTH times the way from ear to ear; a hand is the box of its key points.
+    The face is a square between nose and ears, FACE_WIDTH times the distance of the ears; a hand is the box of its key points.
     """
     vertices = poses.vertices(t)
     points = poses.body.keypoints(vertices)
@@ -112,14 +113,8 @@ def boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int
     return found
 
 
-def align_poses(gaussians: Gaussians, poses: Poses, frames, views: list[View], steps: int) -> None:
-    """`align_pose` of some frames; views: of all T."""
-    for t in map(int, frames):
-        align_pose(gaussians, poses, t, views[t], steps)
-
-
 def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: int) -> None:
-    """Test-time pose optimisation: moves the pose of frame t in `poses` to its own image; the avatar stays as it is."""
+    """Test-time pose optimisation: moves the pose of frame t in `poses` to its own image; the avatar stays."""
     view, workspace = person_crop(view), Workspace()
     background, gain, grad_gain = np.full(3, 1, np.float32), np.ones(3, np.float32), np.empty(3)
     for step in range(steps):
@@ -131,11 +126,11 @@ def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: in
         through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK, grad_rgb,
                            grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
-        finite(f"at step {step} of its pose at test time", {f"gradient of frame {t}": grads.vertices})
+        require_finite(f"at step {step} of its pose at test time", {f"gradient of frame {t}": grads.vertices})
         poses.step(t, grads.vertices, TEST_RATE * TEST_END ** (step / steps), 0.0)
 
 
-def turned(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:
+def draw_all_round(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:
     """(2 size, 3 size, 3) uint8: the avatar in its T-pose from the front, both sides, the back, below and above."""
     vertices, _ = poses.rest(0)
     middle = (vertices.min(0) + vertices.max(0)) / 2

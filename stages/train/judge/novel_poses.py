@@ -1,7 +1,7 @@
-"""The avatar in poses that no clip of a turning person shows: what stands off the body there, and needles.
+"""Judges the avatar in poses that no clip of a turning person shows: alpha off the body, and needles.
 
-Arms that hang beside the trunk while training are lifted, knees bend: gaussians that were hidden, or that hung on to a neighbour's
-image, show themselves as fur and floaters.
+Arms that hang beside the trunk while training are lifted, knees bend: gaussians that were hidden, or that painted a neighbouring
+part, appear as fur and floaters.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ POSES = {
 }
 """Degrees about a joint's own axes, on top of the T-pose."""
 TURNS = (0, 90, 180, 270, 45)
-"""Degrees about the upright axis from which each pose is looked at."""
+"""Degrees about the upright axis of the views of each pose."""
 SIZE = 240
+"""px, side of these images."""
 OFF = 0.06
 """m that cloth and hair may stand off the body."""
 NEEDLE, LONG = 4.5, 0.02
@@ -37,16 +38,16 @@ NEEDLE, LONG = 4.5, 0.02
 
 
 def judge_novel(gaussians: Gaussians, poses: Poses) -> dict[str, float]:
-    """`stray_alpha`: alpha farther than OFF outside of the body's silhouette, over the silhouette, worst view; `needle_share`:
-    share of gaussians that are needles in the worst pose."""
+    """`stray_alpha`: alpha farther than OFF outside of the body's silhouette, over the silhouette's area, in the worst view;
+    `needle_share`: share of gaussians that are needles, in the worst pose."""
 
     def of_pose(turns: dict, workspace: Workspace) -> tuple[float, float]:
-        posed = in_pose(poses, turns)
+        posed = pose_body(poses, turns)
         bound = bind(face_frames(posed, poses.body.faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
         axes = np.sort(bound.scales, 1)
         needles, stray = float(((axes[:, 2] > NEEDLE * axes[:, 1]) & (2 * axes[:, 2] > LONG)).mean()), 0.0
         for turn in TURNS:
-            vertices, camera, metre = before_camera(posed, turn)
+            vertices, camera, metre = turn_before_camera(posed, turn)
             body = rasterise(vertices, poses.body.faces, camera)[0] >= 0
             reach = int(np.ceil(OFF * metre))
             near = cv2.dilate(np.uint8(body), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
@@ -58,7 +59,7 @@ def judge_novel(gaussians: Gaussians, poses: Poses) -> dict[str, float]:
     return {"stray_alpha": stray, "needle_share": needles}
 
 
-def in_pose(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.ndarray:
+def pose_body(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.ndarray:
     """(V, 3) m, the canonical body with some joints turned by degrees about x, y and z."""
     body, (rest, joints) = poses.body, poses.rest(0)
     pose = np.zeros((1, len(body.parents), 3))
@@ -68,8 +69,11 @@ def in_pose(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.nd
     return skin(rest, transforms, body.skin_index, body.skin_weight)
 
 
-def before_camera(vertices: np.ndarray, degrees: float) -> tuple[np.ndarray, Camera, float]:
-    """The body turned about the upright axis before a camera that sees all of it: vertices (V, 3), camera, px for each m."""
+def turn_before_camera(vertices: np.ndarray, degrees: float) -> tuple[np.ndarray, Camera, float]:
+    """Turns the body, vertices (V, 3) m, about the upright axis before a camera that sees all of it.
+
+    Returns vertices (V, 3) m in the camera frame, the camera, and px for each m.
+    """
     turn = about_y(np.radians(degrees))
     middle = (vertices.min(0) + vertices.max(0)) / 2
     half = float(np.linalg.norm(vertices - middle, axis=1).max())

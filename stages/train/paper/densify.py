@@ -1,9 +1,11 @@
-"""Densification of recipe `paper`: gaussians whose image place is pulled at strongly are cloned or split.
+"""Densification of recipe `paper`: clones or splits gaussians with a large gradient of their place in the image.
 
 3DGS (Kerbl et al. 2023) as HAHA sets it: eleven events of a 3000-step run, nothing is pruned.
 """
 
 from __future__ import annotations
+
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,6 +22,19 @@ THRESHOLD = 5e-5
 SMALL = 0.005
 """Largest scale, in units of the face, up to which a gaussian is cloned and not split."""
 SHRINK, SHIFT = 1.6, 0.2
+"""Of a split: what the scales are divided by, and the share of the parent's deviation by which the halves are moved."""
+
+
+class Growable(Protocol):
+    """Gaussians that can grow in number."""
+
+    values: dict[str, np.ndarray]
+    """As `children` takes them, (N, C) each."""
+    face: np.ndarray
+    """(N,) index of each gaussian's face."""
+
+    def append(self, parents: np.ndarray, new: dict[str, np.ndarray]) -> None:
+        """Adds rows: new: name -> (n, C), bound as their parents (n,) are."""
 
 
 def due(step: int) -> bool:
@@ -28,36 +43,37 @@ def due(step: int) -> bool:
 
 
 class Densifier:
-    """Sums of gradient lengths since the last event."""
+    """Sums, since the last event, of the gradient lengths of N gaussians: length (N,) and hits (N,), the images they were in."""
 
     def __init__(self, count: int):
         self.reset(count)
 
     def reset(self, count: int) -> None:
+        """Empties the sums, for `count` gaussians."""
         self.length, self.hits = np.zeros(count), np.zeros(count, np.int64)
 
     def note(self, gradient: np.ndarray, visible: np.ndarray) -> None:
-        """gradient: (N, 2) of one image, -1..1 across the frame; visible: (N,) bool."""
+        """Adds one image. gradient: (N, 2), -1..1 across the frame; visible: (N,) bool."""
         self.length += np.where(visible, np.linalg.norm(gradient, axis=1), 0)
         self.hits += visible
 
-    def after(self, step: int, trainer, rng: np.random.Generator) -> None:
-        """Grows the trainer's gaussians where the step is an event. New ones start with empty Adam moments."""
+    def grow(self, step: int, gaussians: Growable, rng: np.random.Generator) -> None:
+        """Grows the gaussians where the step is an event. New ones start with empty Adam moments."""
         if not due(step):
             return
         chosen = np.flatnonzero(self.length / np.maximum(self.hits, 1) >= THRESHOLD)
-        trainer.append(chosen, children(trainer.values, chosen, rng))
-        self.reset(len(trainer.face))
+        gaussians.append(chosen, make_children(gaussians.values, chosen, rng))
+        self.reset(len(gaussians.face))
 
 
-def children(values: dict[str, np.ndarray], chosen: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Rows to append, one for each chosen (n,); parents that split are changed in place.
+def make_children(values: dict[str, np.ndarray], chosen: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Rows (n, C) to append, one for each chosen (n,); parents that split are changed in place.
 
-    values: mu (N, 3), quat (N, 4), scale (N, 3) logits, and others that are copied. Of a split both halves are
-    moved by samples of the parent, its deviation times SHIFT, away from the body along the face's normal (y).
+    values: mu (N, 3), quat (N, 4), scale_logit (N, 3), and others (N, C) that are copied. Both halves of a split are moved by
+    samples of the parent, its deviation times SHIFT, away from the body along the face's normal (y).
     """
     new = {name: value[chosen].copy() for name, value in values.items()}
-    act = LARGEST / (1 + np.exp(-new["scale"].astype(np.float64)))
+    act = LARGEST / (1 + np.exp(-new["scale_logit"].astype(np.float64)))
     split = act.max(1) > SMALL
     parents, act = chosen[split], act[split]
     if len(parents):
@@ -69,5 +85,5 @@ def children(values: dict[str, np.ndarray], chosen: np.ndarray, rng: np.random.G
         logits = logit(share).astype(np.float32)
         new["mu"][split] += shifts[0].astype(np.float32)
         values["mu"][parents] += shifts[1].astype(np.float32)
-        new["scale"][split] = values["scale"][parents] = logits
+        new["scale_logit"][split] = values["scale_logit"][parents] = logits
     return new

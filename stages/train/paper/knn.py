@@ -1,4 +1,4 @@
-"""The neighbour term of recipe `paper`: the gaussians of a neighbourhood shall look alike and lie close."""
+"""The neighbour term of recipe `paper`: pulls each gaussian towards the look and the place of its nearest ones."""
 
 from __future__ import annotations
 
@@ -7,27 +7,30 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 K = 3
-"""Gaussians of a neighbourhood, itself included."""
+"""Gaussians of a neighbourhood, the gaussian itself included."""
 RENEW = 50
-"""Steps after which the neighbours are searched anew; they hardly change."""
+"""Steps between two searches for the neighbours; they hardly change."""
 
 
 class Neighbours:
-    """index (N, K) int: the nearest gaussians of each, itself among them."""
+    """index: (N, K) int, the nearest gaussians of each, itself among them."""
 
     def __init__(self):
         self.index = np.zeros((0, K), np.int64)
 
-    def distances(self, places: np.ndarray, weight: float, step: int) -> np.ndarray:
-        """Gradient (N, 3) of weight * mean squared distance to the neighbours; places: (N, 3) m."""
+    def distance_gradient(self, places: np.ndarray, weight: float, step: int) -> np.ndarray:
+        """Gradient (N, 3) of weight * mean squared distance to the neighbours. places: (N, 3) m."""
         if len(self.index) != len(places) or step % RENEW == 0:
             self.index = cKDTree(places).query(places, k=K)[1]
         gradient = np.zeros((len(places), 3), np.float32)
         _distances(places.astype(np.float32), self.index, 2 * weight / self.index.size, gradient)
         return gradient
 
-    def spread(self, values: np.ndarray, weight: float) -> np.ndarray:
-        """Gradient (N, C) of weight * mean over gaussians and columns of the neighbourhood's standard deviation."""
+    def spread_gradient(self, values: np.ndarray, weight: float) -> np.ndarray:
+        """Gradient (N, C) of weight * mean over gaussians and columns of the neighbourhood's standard deviation.
+
+        values: (N, C).
+        """
         gradient = np.zeros_like(values)
         _spread(values, self.index, weight / values.size, gradient)
         return gradient

@@ -1,4 +1,4 @@
-"""Losses that only recipe `paper` has: the edges' strength in grey, Dice of what is not person, LPIPS of a window."""
+"""Losses that only recipe `paper` has: edge strength in grey, Dice of the background, LPIPS of a window."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from numba import njit
 from gsac.avatar.lpips import Lpips
 
 WINDOW = 256
+"""px, side of the window that LPIPS sees."""
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
 
 
 def sobel_magnitude(image: np.ndarray, target: np.ndarray, weight: float, gradient: np.ndarray) -> float:
-    """weight * sum of |m(image) - m(target)|, m = sqrt(gx^2 + gy^2 + 1e-6) of the grey image under [-1 0 1], both (h, w, 3).
+    """weight * sum of |m(image) - m(target)|, m = sqrt(gx^2 + gy^2 + 1e-6) of the grey image under [-1 0 1].
 
-    Adds the gradient with respect to the image to `gradient`; the outermost pixels carry no m.
+    image, target, gradient: (h, w, 3). Adds the gradient by the image to `gradient`; the outermost pixels carry no m.
     """
     grey = np.zeros(image.shape[:2], np.float32)
     loss = _magnitude(image @ GREY, target @ GREY, np.float32(weight), grey)
@@ -27,7 +28,7 @@ def sobel_magnitude(image: np.ndarray, target: np.ndarray, weight: float, gradie
 def dice(alpha: np.ndarray, pixels: np.ndarray, outside: int, weight: float, grad_alpha: np.ndarray) -> float:
     """weight * (1 - 2 sum(p t) / (sum p + sum t)) of p = 1 - alpha, t = 1 - mask, over the box and `outside` pixels more.
 
-    alpha: (h, w); pixels: (h, w, 4) uint8. Adds the gradient with respect to alpha to grad_alpha.
+    alpha, grad_alpha: (h, w); pixels: (h, w, 4) uint8. Adds the gradient by alpha to grad_alpha.
     """
     p, t = 1 - alpha, 1 - pixels[..., 3] * np.float32(1 / 255)
     both = float((p * t).sum(dtype=np.float64)) + outside
@@ -39,10 +40,10 @@ def dice(alpha: np.ndarray, pixels: np.ndarray, outside: int, weight: float, gra
 
 def perceptual(network: Lpips, image: np.ndarray, target: np.ndarray, background: np.ndarray, corner: np.ndarray,
                frame: tuple[int, int], centre: np.ndarray, weight: float, gradient: np.ndarray) -> float:
-    """weight * LPIPS of a window of the frame, WINDOW px or less a side, about `centre` and moved into the frame.
+    """weight * LPIPS of a window of the frame, WINDOW px or less a side, around `centre` and shifted to lie inside the frame.
 
-    image, target: (h, w, 3) of a box at `corner` (x, y px) of the frame (width, height px), which is `background` (3,) outside of
-    it. Images go to the network in 0..1. Adds the gradient with respect to the image to `gradient`.
+    image, target, gradient: (h, w, 3) of a box at corner (2,) x, y px of the frame (width, height px), which is background (3,)
+    outside of the box; centre: (2,) px. Images go to the network in 0..1. Adds the gradient by the image to `gradient`.
     """
     size = np.minimum(WINDOW, frame)
     x, y = np.floor(np.clip(centre - size / 2, 0, np.asarray(frame) - size)).astype(int) - corner

@@ -1,10 +1,10 @@
-"""Recipe `paper`: the first stage of HAHA (Svitov et al. 2024) as GSAC uses it; the baseline that `fast` is held against.
+"""Recipe `paper`: the first stage of HAHA (Svitov et al. 2024) as GSAC uses it; the baseline that `fast` is measured against.
 
-One gaussian a face, colours from noise, opacity fixed, four frames a step, densification by the gradient of the image
-places, pose and betas learned. Everything is worked out on the person's box but scaled to the whole frame: outside of the
-box render and frame are the same background. Known departures, all of them small: neighbours and their distances are taken at
-rest; jaw and expression stay as fitted (their rate could move them by 0.015 at most); each frame's pose has Adam moments
-of its own. LPIPS (weight 0.01) takes part where its network is here: no package has it, and it takes nearly all of the time.
+One gaussian a face, random colours, opacity fixed, four frames a step, densification by the gradient of the image places, pose
+and betas learned. Everything is computed on the person's box but scaled to the whole frame: outside of the box render and frame
+are the same background. Known departures, all of them small: neighbours and their distances are taken at rest; jaw and expression
+stay as fitted (their rate could move them by 0.015 at most); each frame's pose has Adam moments of its own. LPIPS is in the loss
+where the user has brought its network: no package has it, and it takes nearly all of the time.
 """
 
 from __future__ import annotations
@@ -17,31 +17,32 @@ from gsac.avatar import losses
 from gsac.avatar.binding import face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import sigmoid
-from gsac.avatar.raster import render_bound, render_bound_backward, screen_gradients
+from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backward, screen_gradients
 from gsac.avatar.threads import Workspace
-from gsac.stages.train.checkpoint import standing
-from gsac.stages.train.finite import finite, gradients, pose
+from gsac.stages.train.checkpoint import loop_state
+from gsac.stages.train.finite import named_gradients, named_pose, require_finite
 from gsac.stages.train.gaussians.kernels import adam, on_background, through_background
 from gsac.stages.train.paper.densify import LARGEST, Densifier
 from gsac.stages.train.paper.knn import Neighbours
 from gsac.stages.train.paper.losses import dice, perceptual, sobel_magnitude
-from gsac.stages.train.task import Fit, Task
+from gsac.stages.train.task import LPIPS_WEIGHT, Fit, Task
 from gsac.stages.train.views import View, person_crop
 
 STEPS = 3000
 BATCH = 4
 SCALE_LOGITS, OPACITY_LOGIT = (-1.0, -2.0, -1.0), 6.0
 MU_RATE, MU_DECAY = 1.6e-4, 0.01
-RATES = {"rgb": 5e-3, "quat": 5e-3, "scale": 5e-3}
+RATES = {"rgb": 5e-3, "quat": 5e-3, "scale_logit": 5e-3}
 POSE_RATE = 2e-4
 """Of orientation, body pose, translation and betas; the hands' is a tenth (`Poses`)."""
-SSIM, SOBEL, KNN, DICE, LPIPS = 0.1, 1.0, 0.01, 0.1, 0.01
+SSIM, SOBEL, KNN, DICE = 0.1, 1.0, 0.01, 0.1
+"""Weights of the losses beside L2."""
 KEPT = ("face", "values", "first", "second")
 """Attributes of Trainer that go into a checkpoint as they are."""
 
 
 def fit(task: Task) -> Fit:
-    """Raises StageError naming the step and the quantity that is no longer finite."""
+    """The whole training. Raises StageError that names the step and the quantity that is no longer finite."""
     steps = task.config.steps or STEPS
     rng = np.random.default_rng(task.config.seed)
     views = {int(t): person_crop(task.views[t]) for t in task.trained}
@@ -57,9 +58,9 @@ def fit(task: Task) -> Fit:
             order = [int(t) for t in rng.permutation(task.trained)]
         frames, order = order[:batch], order[batch:]
         loss = trainer.step({t: views[t] for t in frames}, step, steps)
-        trainer.densifier.after(step, trainer, rng)
+        trainer.densifier.grow(step, trainer, rng)
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
-        task.keep(step + 1, steps, partial(standing, step + 1, order, rng, trainer))
+        task.keep(step + 1, steps, partial(loop_state, step + 1, order, rng, trainer))
         task.progress(step + 1, steps, "steps")
     return Fit(trainer.gaussians(), np.ones(len(trainer.face), bool))
 
@@ -73,7 +74,7 @@ class Trainer:
         count = len(self.faces)
         self.face = np.arange(count, dtype=np.int32)
         self.values = {"mu": np.zeros((count, 3)), "quat": np.tile([1.0, 0, 0, 0], (count, 1)),
-                       "scale": np.tile(SCALE_LOGITS, (count, 1)), "rgb": rng.random((count, 3))}
+                       "scale_logit": np.tile(SCALE_LOGITS, (count, 1)), "rgb": rng.random((count, 3))}
         self.values = {name: value.astype(np.float32) for name, value in self.values.items()}
         self.first = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.second = {name: np.zeros_like(v) for name, v in self.values.items()}
@@ -85,64 +86,68 @@ class Trainer:
         self.rng = rng
 
     def state(self) -> dict:
-        """For a checkpoint; poses aside."""
+        """For a checkpoint, without the poses."""
         return {name: getattr(self, name) for name in KEPT} | {
             "frames": self.frames._asdict(), "neighbours": self.neighbours.index,
             "length": self.densifier.length, "hits": self.densifier.hits}
 
     def restore(self, state: dict) -> None:
+        """Takes the place of the trainer that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])
         self.frames, self.neighbours.index = self.frames._replace(**state["frames"]), state["neighbours"]
         self.densifier.length, self.densifier.hits = state["length"], state["hits"]
 
     def gaussians(self) -> Gaussians:
-        """As they stand, colours in range."""
+        """A copy as they stand: rotations of length one, colours in 0..1."""
         shown = self.shown()
         return Gaussians(self.face, shown.mu.copy(), shown.quat / np.linalg.norm(shown.quat, axis=1, keepdims=True),
                          shown.log_scale, np.clip(shown.rgb, 0, 1), shown.opacity)
 
     def shown(self) -> Gaussians:
+        """The gaussians as they are drawn while training."""
         v = self.values
         opacity = np.full(len(self.face), sigmoid(OPACITY_LOGIT), np.float32)
-        return Gaussians(self.face, v["mu"], v["quat"], np.log(LARGEST) - np.log1p(np.exp(-v["scale"])), v["rgb"], opacity)
+        return Gaussians(self.face, v["mu"], v["quat"], np.log(LARGEST) - np.log1p(np.exp(-v["scale_logit"])), v["rgb"],
+                         opacity)
 
     def step(self, views: dict[int, View], number: int, steps: int) -> float:
-        """One step on a batch: frame -> view. Returns its loss, the neighbours' part left out."""
+        """Step `number` of `steps` on a batch: frame -> view. Returns its loss without the neighbour term."""
         shown, share = self.shown(), 1 / len(views)
         total, loss = {name: np.zeros_like(v) for name, v in self.values.items()}, 0.0
         moves = {}
         for t, view in views.items():
             value, grads = self._image(t, view, shown, share)
-            finite(f"at step {number}", gradients(grads))
+            require_finite(f"at step {number}", named_gradients(grads))
             loss += value
             total["mu"] += grads.mu
             total["quat"] += grads.quat
-            total["scale"] += grads.log_scale / (1 + np.exp(self.values["scale"]))
+            total["scale_logit"] += grads.log_scale / (1 + np.exp(self.values["scale_logit"]))
             total["rgb"] += grads.rgb
             moves[t] = grads.vertices.copy()
         self._pull_together(total, number)
-        finite(f"at step {number}", {"loss": loss, **{f"gradient of {name}": gradient for name, gradient in total.items()}})
+        require_finite(f"at step {number}",
+                       {"loss": loss, **{f"gradient of {name}": gradient for name, gradient in total.items()}})
         rates = RATES | {"mu": MU_RATE * MU_DECAY ** (number / steps)}
         for name, rate in rates.items():
             adam(self.values[name], total[name], self.first[name], self.second[name], number + 1, rate)
         betas = np.zeros(len(self.poses.betas))
         for t, grad_vertices in moves.items():
             betas += self.poses.shape_gradient(*self.poses.step(t, grad_vertices, POSE_RATE, 0.0))
-            finite(f"after step {number}", pose(self.poses, t))
+            require_finite(f"after step {number}", named_pose(self.poses, t))
         self.poses.step_betas(betas, POSE_RATE)
-        finite(f"after step {number}", self.values | {"betas": self.poses.betas})
+        require_finite(f"after step {number}", self.values | {"betas": self.poses.betas})
         return float(loss)
 
     def append(self, parents: np.ndarray, new: dict[str, np.ndarray]) -> None:
-        """Grows by rows of `new`, bound as their parents (n,) are."""
+        """As `densify.Growable.append`. parents: (n,); new: name -> (n, C)."""
         self.face = np.concatenate([self.face, self.face[parents]])
         for name, rows in new.items():
             self.values[name] = np.concatenate([self.values[name], rows])
             for moments in (self.first, self.second):
                 moments[name] = np.concatenate([moments[name], np.zeros_like(rows)])
 
-    def _image(self, t: int, view: View, shown: Gaussians, share: float):
+    def _image(self, t: int, view: View, shown: Gaussians, share: float) -> tuple[float, BoundGradients]:
         """Loss of one frame times its share of the batch, and its gradients."""
         vertices = self.poses.vertices(t)
         rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
@@ -159,8 +164,8 @@ class Trainer:
         loss += sobel_magnitude(image, target, SOBEL * share / frame, gradient)
         if self.lpips is not None:
             centre = view.camera.project(vertices[[self.rng.integers(len(vertices))]])[0] + view.corner
-            loss += perceptual(self.lpips, image, target, background, np.array(view.corner), self.frame_size, centre, LPIPS * share,
-                               gradient)
+            loss += perceptual(self.lpips, image, target, background, np.array(view.corner), self.frame_size, centre,
+                               LPIPS_WEIGHT * share, gradient)
         grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(rendering.alpha)
         through_background(gradient, rendering.rgb, rendering.alpha, view.pixels, background, gain, 0.0, grad_rgb, grad_alpha,
                            grad_gain)
@@ -171,13 +176,13 @@ class Trainer:
         return loss, grads
 
     def _pull_together(self, total: dict[str, np.ndarray], number: int) -> None:
-        """Adds the neighbours' gradients."""
+        """Adds the gradients of the neighbour term."""
         v = self.values
         turn, k = self.frames.R[self.face], self.frames.k[self.face, None]
         places = self.frames.T[self.face] + k * np.einsum("nij,nj->ni", turn, v["mu"])
-        grad_places = self.neighbours.distances(places, KNN, number)
+        grad_places = self.neighbours.distance_gradient(places, KNN, number)
         total["mu"] += k * np.einsum("nji,nj->ni", turn, grad_places)
-        act = LARGEST / (1 + np.exp(-v["scale"]))
-        total["scale"] += self.neighbours.spread(act, KNN) * act * (1 - act / LARGEST)
+        act = LARGEST / (1 + np.exp(-v["scale_logit"]))
+        total["scale_logit"] += self.neighbours.spread_gradient(act, KNN) * act * (1 - act / LARGEST)
         for name in ("quat", "rgb"):
-            total[name] += self.neighbours.spread(v[name], KNN)
+            total[name] += self.neighbours.spread_gradient(v[name], KNN)

@@ -1,8 +1,7 @@
-"""How the model lies in each bone, which images cannot tell: taken as the body fit has it.
+"""Removes bone drift: a constant turn of a bone, undone by its gaussians, is invisible in the clip. The body fit's is kept.
 
-A bone turned a little in all frames, and what is painted on it turned back, show the same clip. Poses that follow the images drift
-that way, and angles that come from elsewhere then draw the avatar bent. So bones are turned back, with their gaussians and joints,
-until the fit's angles show the clip's person where the refined ones do; the clip itself looks as before.
+Poses that follow the images drift that way, and motion from elsewhere then draws the avatar bent. So bones are turned back, with
+their gaussians and joints, until the fit's angles show the person where the refined ones do; the clip itself looks as before.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import numpy as np
 
 from gsac.avatar import rotation
 from gsac.avatar.binding import bind, face_frames, unbind
+from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
 from gsac.avatar.mesh import vertex_normals
@@ -18,19 +18,21 @@ from gsac.avatar.skinning import joint_transforms, skin
 from gsac.stages.train.poses.poses import Poses
 
 BONES = BODY.stop
+"""Bones that may drift: those of the body joints."""
 POINTS, FRAMES = 800, 24
-"""Of the surface and the clip, that are compared."""
+"""Points of the surface, and frames, that are compared."""
 ROUNDS = 3
+"""Of Gauss-Newton."""
 TURN, MISS = 0.05, 1 / 560
-"""rad that a bone is taken to have drifted, and by how much of the focal length points miss: a pixel of 540."""
+"""Sigma of a bone's drift, rad, and of a point's place in the image, in focal lengths: a pixel of 540."""
 MOST = 0.08
-"""rad; what turns a bone farther was wrong with the fit."""
+"""rad, largest drift: a bone that is turned farther was fitted wrong."""
 
 
-def taken_back(gaussians: list[Gaussians], poses: Poses, trained: np.ndarray) -> list[Gaussians]:
-    """The gaussians on bones turned back; `poses` get the angles and joints to that. trained: indices of the frames."""
+def remove_drift(gaussians: list[Gaussians], poses: Poses, trained: np.ndarray) -> list[Gaussians]:
+    """The gaussians on bones turned back; changes the angles and joints in `poses` to match. trained: (n,) indices of frames."""
     rest, joints = poses.rest(int(trained[0]))
-    turns = drift(poses, trained, rest, joints)
+    turns = find_drift(poses, trained, rest, joints)
     moved = joints.copy()
     for joint in range(1, len(joints)):
         parent = poses.body.parents[joint]
@@ -39,7 +41,7 @@ def taken_back(gaussians: list[Gaussians], poses: Poses, trained: np.ndarray) ->
     turned = face_frames(skin(rest, transforms, poses.body.skin_index, poses.body.skin_weight), poses.body.faces)
     plain = face_frames(rest, poses.body.faces)
     for pose in (poses.pose, poses.base_pose):
-        pose[:] = turned_back(pose, turns, poses.body.parents)
+        pose[:] = turn_back(pose, turns, poses.body.parents)
     poses.joint_offset = poses.joint_offset + moved - joints
     out = []
     for g in gaussians:
@@ -48,8 +50,8 @@ def taken_back(gaussians: list[Gaussians], poses: Poses, trained: np.ndarray) ->
     return out
 
 
-def turned_back(pose: np.ndarray, turns: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """pose: (T, 55, 3); turns: (55, 3, 3) by which each bone is turned at rest. Returns the pose that then looks as before."""
+def turn_back(pose: np.ndarray, turns: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """(T, 55, 3) pose that looks as `pose` (T, 55, 3) did before turns (55, 3, 3) of the bones at rest. parents: (55,)."""
     local = rotation.exp(np.asarray(pose, np.float64))
     for joint in range(len(parents)):
         above = turns[parents[joint]] if parents[joint] >= 0 else np.eye(3)
@@ -57,17 +59,20 @@ def turned_back(pose: np.ndarray, turns: np.ndarray, parents: np.ndarray) -> np.
     return rotation.log(local)
 
 
-def drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.ndarray) -> np.ndarray:
-    """(55, 3, 3) by which each bone is turned in the avatar, as the images see it, against the body fit."""
+def find_drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.ndarray) -> np.ndarray:
+    """(55, 3, 3) rotation of each bone in the refined poses against the body fit, common to all frames.
+
+    trained: (n,) indices of frames; rest: (V, 3) m; joints: (55, 3) m at rest.
+    """
     body = poses.body
     frames = trained[::-(-len(trained) // FRAMES)]
     which = np.arange(0, len(rest), max(1, len(rest) // POINTS))
-    levers = carried_levers(body, which, rest, joints)
+    levers = bone_levers(body, which, rest, joints)
     normals = vertex_normals(rest, body.faces)[which]
-    own, fit = (world(body, angles[frames], joints)[:, :BONES] for angles in (poses.pose, poses.fit_pose))
+    own, fit = (world_rotations(body, angles[frames], joints)[:, :BONES] for angles in (poses.pose, poses.fit_pose))
     weight = np.asarray(body.weights)[which, :BONES]
-    seen = summed(own, weight[:, :, None] * normals[:, None])
-    places = summed(own, levers) + (poses.transl[frames] + joints[0])[:, None]
+    seen = sum_over_bones(own, weight[:, :, None] * normals[:, None])
+    places = sum_over_bones(own, levers) + (poses.transl[frames] + joints[0])[:, None]
     facing = np.clip(-(seen * places).sum(2) / np.linalg.norm(places, axis=2), 0, 1)
     goal = places[..., :2] / places[..., 2:]
     turns, shift = np.tile(np.eye(3), (BONES, 1, 1)), (poses.transl - poses.fit_transl)[frames].mean(0)
@@ -76,7 +81,7 @@ def drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.ndarra
     for _ in range(ROUNDS):
         hessian, gradient = known.copy(), known @ np.append(rotation.log(turns).ravel(), np.zeros(3))
         arms = np.einsum("jab,njb->nja", turns, levers)
-        for t, place in enumerate(summed(fit, arms) + start[:, None]):
+        for t, place in enumerate(sum_over_bones(fit, arms) + start[:, None]):
             z = place[:, 2]
             for axis in range(2):
                 image = place[:, axis] / z
@@ -93,13 +98,13 @@ def drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.ndarra
     return turns
 
 
-def summed(turns: np.ndarray, levers: np.ndarray) -> np.ndarray:
-    """(T, n, 3) of turns (T, BONES, 3, 3) and levers (n, BONES, 3): sums over the bones of turn times lever."""
+def sum_over_bones(turns: np.ndarray, levers: np.ndarray) -> np.ndarray:
+    """(T, n, 3) sums over the bones of turns (T, BONES, 3, 3) times levers (n, BONES, 3)."""
     return levers.reshape(len(levers), -1) @ turns.swapaxes(2, 3).reshape(len(turns), -1, 3)
 
 
 def slopes(covectors: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """(n, 3 BONES + 3): how much farther places lie along covectors when the bones turn at rest and the pelvis moves.
+    """(n, 3 BONES + 3) derivatives of the places along covectors by the bones' turns at rest and the pelvis' shift.
 
     covectors: (n, BONES, 3) in the axes of each bone; arms: (n, BONES, 3).
     """
@@ -108,8 +113,11 @@ def slopes(covectors: np.ndarray, arms: np.ndarray) -> np.ndarray:
     return np.concatenate([turned.reshape(len(arms), -1), covectors[:, 0]], 1)
 
 
-def carried_levers(body, which: np.ndarray, rest: np.ndarray, joints: np.ndarray) -> np.ndarray:
-    """(n, BONES, 3): a point's place from the pelvis is the sum of each bone's rotation times its lever."""
+def bone_levers(body: Body, which: np.ndarray, rest: np.ndarray, joints: np.ndarray) -> np.ndarray:
+    """(n, BONES, 3) m: a point's place relative to the pelvis is the sum of each bone's rotation times its lever.
+
+    which: (n,) indices of vertices; rest: (V, 3) m; joints: (55, 3) m at rest.
+    """
     weight = np.array(np.asarray(body.weights)[which], np.float64)
     levers = np.zeros((len(which), len(joints), 3))
     below = weight.copy()
@@ -124,6 +132,6 @@ def carried_levers(body, which: np.ndarray, rest: np.ndarray, joints: np.ndarray
     return levers[:, :BONES]
 
 
-def world(body, pose: np.ndarray, joints: np.ndarray) -> np.ndarray:
-    """(T, 55, 3, 3) rotations from rest."""
+def world_rotations(body: Body, pose: np.ndarray, joints: np.ndarray) -> np.ndarray:
+    """(T, 55, 3, 3) rotations of the bones from rest. pose: (T, 55, 3) axis-angle; joints: (55, 3) m at rest."""
     return joint_transforms(np.asarray(pose, np.float64), joints, body.parents)[..., :3]

@@ -1,7 +1,7 @@
-"""Corrections of all frames' poses, solved together by Gauss-Newton, the avatar held still.
+"""Bundle adjustment: corrects the poses of all frames together by Gauss-Newton, the avatar held still.
 
-The body fit's error is smooth in time and in part the same in all frames, so the corrections are a Gaussian process: frames that
-are not trained on are corrected as those around them are.
+The body fit's error is smooth in time and in part the same in all frames, so the prior of the corrections is a Gaussian process:
+untrained frames are corrected like those around them.
 """
 
 from __future__ import annotations
@@ -15,39 +15,40 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.contract import StageError
-from gsac.stages.train.finite import finite
-from gsac.stages.train.holdout import near
-from gsac.stages.train.poses.photometric import CORRELATED, TURNING, UNKNOWNS, Normal, carriers, normal_equations
-from gsac.stages.train.poses.poses import Poses, carried
+from gsac.stages.train.finite import require_finite
+from gsac.stages.train.holdout import is_near
+from gsac.stages.train.poses.photometric import CORRELATED, TURNING, UNKNOWNS, NormalEquations, joint_shares, normal_equations
+from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.views import View
 
 TURN, SHIFT = 0.1, 0.03
-"""rad and m by which the fit is taken to be off."""
+"""rad and m, sigma of the fit's error."""
 SAME, NEAR, OWN = 0.3, 0.6, 0.03
-"""Variance of what is the same in all frames, of what changes smoothly, and of a frame's own error."""
+"""Variance of the error's constant part, of its smooth part, and of a frame's own part, in units of that sigma."""
 SPAN = 0.038
-"""Length of the smooth part, as a share of the clip."""
+"""Length scale of the smooth part, as a share of the clip."""
 MOST = 0.15
-"""rad and m of a round's step, at most."""
+"""rad and m, largest step of a round."""
 WORSE = 1.1
-"""Growth of the squared error from round to round that is taken back."""
+"""Factor on the squared error from round to round above which the step is undone."""
 MOSTLY = 0.5
-"""Share of the trained frames that must be near to the next."""
+"""Least share of the trained frames that are near to the next one."""
 SOLVER_STEPS, SOLVED = 60, 1e-10
+"""Most steps of conjugate gradients, and the share of the squared residual at which they end."""
 MIDWAY_ROUNDS, MIDWAY_SHARE = 2, 0.3
-"""Rounds in the midst of a training, and the share of TURN and SHIFT by which its poses are still taken to be off."""
+"""Rounds midway through a training, and the share of TURN and SHIFT that is still their sigma."""
 
 
 def correct_midway(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaussians], face: np.ndarray,
                    views: dict[int, View]) -> bool:
-    """Corrects all poses in the midst of a training, when the avatar tells more of them than at its start.
+    """Corrects all poses midway through a training, when the avatar constrains them better than at the start.
 
-    trained: indices of the trained frames; gaussians, on the faces (N,): as they stand. Says whether it did: not where views
-    are `apart`.
+    trained: (n,) indices of frames; gaussians: returns them as they stand; face: (N,) of the gaussians. Returns whether it did:
+    not where views `are_apart`.
     """
-    if apart(poses.fit_pose[trained, 0]):
+    if are_apart(poses.fit_pose[trained, 0]):
         return False
-    everywhere = carried(poses, trained)
+    everywhere = carry_to_untrained(poses, trained)
     poses.pose[:], poses.transl[:] = everywhere.pose, everywhere.transl
     corrections = Corrections(poses, gaussians, face, views, MIDWAY_SHARE)
     for _ in range(MIDWAY_ROUNDS):
@@ -57,22 +58,22 @@ def correct_midway(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Ga
 
 
 class Corrections:
-    """turns (T, TURNING, 3) rad after the rotations as they are at first and shifts (T, 3) m, as one array (T, U)."""
+    """The corrections of T frames, as one array (T, U): turns (TURNING, 3) rad after the first rotations, and shifts (3,) m."""
 
     def __init__(self, poses: Poses, gaussians: Callable[[], Gaussians], face: np.ndarray, views: dict[int, View],
                  share: float = 1.0):
-        """share: of `TURN` and `SHIFT` by which the poses are taken to be off."""
+        """gaussians: returns them as they stand; face: (N,) of them; views: frame -> view; share: of TURN and SHIFT."""
         self.poses, self.gaussians, self.views = poses, gaussians, views
         self.first_pose, self.first_transl = poses.pose.copy(), poses.transl.copy()
         frames = len(poses.pose)
-        self.share = carriers(poses.body, face)
+        self.share = joint_shares(poses.body, face)
         self.root = np.linalg.cholesky(covariance(frames))
         self.spread = share * np.append(np.full(3 * TURNING, TURN), np.full(3, SHIFT))
         self.values = np.zeros((frames, UNKNOWNS))
         self.kept, self.error = self.values, np.inf
 
     def solve(self) -> None:
-        """One Gauss-Newton step of all frames. A step that made the images worse is taken back instead."""
+        """One Gauss-Newton step of all frames; or undoes the last step, where it made the images worse."""
         gradient, hessian = np.zeros(self.values.shape), np.zeros((*self.values.shape, UNKNOWNS))
         gaussians, error, pixels = self.gaussians(), 0.0, 0
         for t, normal in self.equations(gaussians):
@@ -89,46 +90,46 @@ class Corrections:
         known = 1 / (max(error, 1e-6) * CORRELATED)
         root, spread, before = self.root, self.spread, self.values
 
-        def pulled(y):
+        def pulled(y: np.ndarray) -> np.ndarray:
             return root.T @ (y * spread)
 
-        def apply(z):
+        def apply(z: np.ndarray) -> np.ndarray:
             return z + known * pulled(np.einsum("tab,tb->ta", hessian, (root @ z) * spread))
 
         z = conjugate_gradients(apply, -known * pulled(gradient - np.einsum("tab,tb->ta", hessian, before)))
         self.values = before + np.clip((root @ z) * spread - before, -MOST, MOST)
-        finite("after a round of poses", {"correction of the poses": self.values})
+        require_finite("after a round of poses", {"correction of the poses": self.values})
         self.place()
 
-    def equations(self, gaussians: Gaussians) -> list[tuple[int, Normal]]:
-        """Of every frame, in the order of the views."""
+    def equations(self, gaussians: Gaussians) -> list[tuple[int, NormalEquations]]:
+        """Frame and its normal equations, in the order of the views."""
 
-        def of_frame(frame: tuple[int, View], workspace: Workspace) -> tuple[int, Normal]:
+        def of_frame(frame: tuple[int, View], workspace: Workspace) -> tuple[int, NormalEquations]:
             t, view = frame
             return t, normal_equations(gaussians, self.share, self.poses, t, view, workspace)
 
         return side_by_side(of_frame, self.views.items())
 
     def place(self) -> None:
-        """Poses as corrected."""
+        """Sets the poses to the corrected ones."""
         poses, turns = self.poses, self.values[:, :-3].reshape(-1, TURNING, 3)
         poses.pose[:, BODY] = rotation.log(rotation.exp(self.first_pose[:, BODY]) @ rotation.exp(turns))
         poses.transl[:] = self.first_transl + self.values[:, -3:]
 
 
-def apart(global_orient: np.ndarray) -> bool:
-    """global_orient: (T, 3) axis-angle. Whether most views are not near to the next."""
-    return len(global_orient) > 1 and np.mean(near(global_orient[:-1], global_orient[1:])) < MOSTLY
+def are_apart(global_orient: np.ndarray) -> bool:
+    """Whether most views are not near to the next one. global_orient: (T, 3) axis-angle."""
+    return len(global_orient) > 1 and np.mean(is_near(global_orient[:-1], global_orient[1:])) < MOSTLY
 
 
 def covariance(frames: int) -> np.ndarray:
-    """(T, T) of the corrections, in units of their spread."""
+    """(T, T) of the corrections, in units of their sigma."""
     apart = np.arange(frames)[:, None] - np.arange(frames)
     return SAME + NEAR * np.exp(-0.5 * (apart / (SPAN * frames)) ** 2) + OWN * (apart == 0)
 
 
-def conjugate_gradients(apply, b: np.ndarray) -> np.ndarray:
-    """x of apply(x) = b, apply linear, symmetric and positive."""
+def conjugate_gradients(apply: Callable[[np.ndarray], np.ndarray], b: np.ndarray) -> np.ndarray:
+    """x (...) that solves apply(x) = b; b: (...); apply: linear, symmetric and positive."""
     x, rest = np.zeros_like(b), b.copy()
     way, square = rest.copy(), float((rest**2).sum())
     goal = SOLVED * square

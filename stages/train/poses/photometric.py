@@ -1,47 +1,49 @@
-"""One frame's pose against its image: gradient and Gauss-Newton Hessian, the avatar held still.
+"""Photometric normal equations of one frame's pose: gradient and Gauss-Newton Hessian, the avatar held still.
 
-The gradient is exact. The Hessian is that of Lucas and Kanade (1981): the rendered image's slope times the motion, in the
-image, of the surface that shows in a pixel; gaussians stand for the surface by their blend weights, and what a gaussian adds to
-all pixels, weighted, is the gradient of that weighted sum with respect to its colour.
+The gradient is exact. The Hessian is that of Lucas and Kanade (1981): the rendered image's slope times the motion, in the image,
+of the surface that a pixel shows. Gaussians represent the surface by their blend weights; a gaussian's part of a weighted sum of
+pixels is the gradient of that sum by its colour.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from gsac.avatar import rotation
+from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
 from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, side_by_side
-from gsac.stages.train.finite import finite
+from gsac.stages.train.finite import require_finite
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View, person_crop
 
 TURNING = BODY.stop
-"""Joints that turn: pelvis and body."""
+"""Number of joints that turn: pelvis and body."""
 UNKNOWNS = 3 * TURNING + 3
 """Turns of the joints, each about its own axes after its rotation, and the translation."""
 MASK = 1.0
 """Weight of the alpha channel beside the three of colour."""
 CURVATURE = 1.7
-"""By how much the Hessian is taken to be steeper, so that a full step does not overshoot (measured: 1.2 to 1.7)."""
+"""Factor on the Hessian, so that a full step does not overshoot (measured: 1.2 to 1.7)."""
 CLEAR = 0.1
-"""Least alpha that a pixel's slope is shared by."""
+"""Least alpha by which a pixel's slope is divided."""
 FLAT = 1e-8
-"""Slope below which a gaussian says nothing."""
+"""Slope below which a gaussian is left out."""
 CORRELATED = 40.0
-"""Values (pixels times channels) that are wrong together."""
+"""Values (pixels times channels) whose errors are correlated: they count as one."""
 SPREAD_TURN, SPREAD_SHIFT = 0.27, 0.09
-"""rad and m of a round's step that images which say nothing allow (`converge`)."""
+"""rad and m, sigma of the prior on a round's step (`converge`)."""
 MOST = 0.12
-"""rad and m of a round's step, at most."""
+"""rad and m, largest step of a round."""
 
 
-class Normal(NamedTuple):
+class NormalEquations(NamedTuple):
     """Half the squared error of a frame around its pose as it stands, summed over pixels and channels."""
 
     gradient: np.ndarray
@@ -51,16 +53,16 @@ class Normal(NamedTuple):
     error: float
     """Squared error on the person."""
     pixels: int
-    """That show the person in render or mask."""
+    """Number of pixels that show the person in render or mask."""
 
     @property
     def mean(self) -> float:
-        """Squared error of a pixel's channel."""
+        """Squared error of one channel of one pixel."""
         return self.error / max(4 * self.pixels, 1)
 
 
-def carriers(body, face: np.ndarray) -> np.ndarray:
-    """(N, TURNING) float32: how much a turn of each joint carries the faces (N,) along."""
+def joint_shares(body: Body, face: np.ndarray) -> np.ndarray:
+    """(N, TURNING) float32, the share of each joint's turn that moves the gaussians' faces, face (N,)."""
     below = np.zeros((len(body.parents), TURNING))
     for joint in range(len(body.parents)):
         above = joint
@@ -71,14 +73,15 @@ def carriers(body, face: np.ndarray) -> np.ndarray:
     return (body.weights[body.faces[face]].mean(1) @ below).astype(np.float32)
 
 
-def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: int, view: View, workspace: Workspace) -> Normal:
-    """Of frame t in its view. share: `carriers` of the gaussians' faces."""
+def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: int, view: View,
+                     workspace: Workspace) -> NormalEquations:
+    """Of frame t in its view. share: (N, TURNING) `joint_shares` of the gaussians."""
     vertices = poses.vertices(t)
     rendering = render_bound(vertices, poses.body.faces, gaussians, view.camera, workspace)
     height, width = rendering.alpha.shape
     colour, mask = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
     slope, squares = np.empty((height, width, 3), np.float32), np.empty((height * width, 4), np.float32)
-    pixels = compared(rendering.rgb, rendering.alpha, view.pixels, np.float32(np.sqrt(MASK)), colour, mask, slope, squares)
+    pixels = compare(rendering.rgb, rendering.alpha, view.pixels, np.float32(np.sqrt(MASK)), colour, mask, slope, squares)
     means = rendering.state.means.copy()
     grads = render_bound_backward(rendering.state, colour, mask)
     grad_pose, grad_transl, _, _ = poses.gradients(t, grads.vertices)
@@ -87,16 +90,16 @@ def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: i
     used = np.flatnonzero(tensors[:, 0] + tensors[:, 2] > FLAT)
     rows = np.empty((2 * len(used), UNKNOWNS), np.float32)
     _rows(used, means, tensors, share, *_axes(poses, t), np.array(view.camera.focal, np.float32), rows)
-    return Normal(np.concatenate([turns.ravel(), grad_transl]), CURVATURE * (rows.T @ rows).astype(np.float64),
-                  float(squares[:pixels].sum()), pixels)
+    return NormalEquations(np.concatenate([turns.ravel(), grad_transl]), CURVATURE * (rows.T @ rows).astype(np.float64),
+                           float(squares[:pixels].sum()), pixels)
 
 
-def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], rounds: int) -> None:
-    """Moves the poses of some frames to their images, the avatar held still; views: of all T.
+def converge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: list[View], rounds: int) -> None:
+    """Moves the poses of some frames to their images, the avatar held still. views: of all T.
 
-    Levenberg and Marquardt: a round that draws the frame worse is taken back, and the next one steps shorter.
+    Levenberg and Marquardt: a round that draws the frame worse is undone, and the next one steps shorter.
     """
-    share = carriers(poses.body, gaussians.face)
+    share = joint_shares(poses.body, gaussians.face)
     spread = np.diag(np.append(np.full(3 * TURNING, SPREAD_TURN**-2), np.full(3, SPREAD_SHIFT**-2)))
 
     def one(t: int, workspace: Workspace) -> None:
@@ -106,7 +109,7 @@ def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], roun
         for number in range(rounds):
             known = 1 / (max(normal.mean, 1e-5) * CORRELATED)
             move = np.linalg.solve(known * normal.hessian + damping * spread, -known * normal.gradient)
-            finite(f"in round {number} of its pose", {f"move of frame {t}": move})
+            require_finite(f"in round {number} of its pose", {f"move of frame {t}": move})
             move = np.clip(move, -MOST, MOST)
             turns = rotation.exp(move[:-3].reshape(TURNING, 3))
             poses.pose[t, BODY], poses.transl[t] = rotation.log(rotation.exp(pose[BODY]) @ turns), transl + move[-3:]
@@ -122,19 +125,19 @@ def converge(gaussians: Gaussians, poses: Poses, frames, views: list[View], roun
 
 
 def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:
-    """Axes (TURNING, 3, 3), columns, and places (TURNING, 3) of the joints in the camera frame."""
+    """Axes (TURNING, 3, 3), as columns, and places (TURNING, 3) m of the joints in the camera frame."""
     transforms, joints = poses.transforms(t)[BODY], poses.rest(t)[1][BODY]
     places = np.einsum("jab,jb->ja", transforms[:, :, :3], joints) + transforms[:, :, 3] + poses.transl[t]
     return transforms[:, :, :3].astype(np.float32), places.astype(np.float32)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def compared(rgb, alpha, pixels, weight, colour, mask, slope, squares):
-    """What a render (h, w, 3), (h, w) is off by from its frame, pixels (h, w, 4), the mask counted `weight` times.
+def compare(rgb, alpha, pixels, weight, colour, mask, slope, squares):
+    """Residuals of a render, rgb (h, w, 3) and alpha (h, w), against its frame, pixels (h, w, 4); weight: of the mask's.
 
-    Written: colour and mask, the residuals, that of the mask weighted once more; slope (h, w, 3), products of the render's slopes
-    (across twice, across and down, down twice) by alpha; squares (h w, 4), of the residuals of the pixels that show the person, as
-    many as it returns.
+    Writes colour (h, w, 3) and mask (h, w), the residuals, that of the mask weighted once more; slope (h, w, 3), products of the
+    render's slopes (across twice, across and down, down twice) over alpha; squares (h w, 4), squared residuals of the pixels that
+    show the person, whose number it returns.
     """
     height, width = alpha.shape
     byte, byte_mask, half = np.float32(1 / 255), np.float32(weight / np.float32(255)), np.float32(0.5)

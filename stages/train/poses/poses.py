@@ -1,4 +1,4 @@
-"""The poses of all frames while they are refined: vertices from poses, and poses from the vertices' gradients."""
+"""The poses of all frames while they are refined: vertices from poses, and steps of the poses from the vertices' gradients."""
 
 from __future__ import annotations
 
@@ -7,25 +7,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from gsac.avatar.body import split_pose
+from gsac.avatar.body import Body, BodyParams, split_pose
 from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.skinning import joint_transforms, skin, skin_backward
 from gsac.stages.train.holdout import carry_corrections
 from gsac.stages.train.poses.interpolate import follow_neighbours
 
 HAND_SHARE = 0.1
-"""Rate of the fingers, relative to the body's: an image says little about them."""
+"""Rate of the fingers relative to the body's: images constrain them weakly."""
 TURN, SHIFT = 0.05, 0.02
-"""rad and m in which the distance from the start is measured."""
+"""rad and m, units of a pose's distance from its start."""
 EXPRESSION, JOINT = 0.3, 0.01
-"""Coefficient and m, likewise."""
+"""Coefficient and m, units of an expression's and a joint's distance from theirs."""
 KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "beta_moments", "beta_count",
         "expression", "expression_moments", "joint_offset", "joint_moments", "joint_count")
 """Attributes of Poses that training changes."""
 
 
-def carried(poses: Poses, trained: np.ndarray) -> Poses:
-    """A copy in which frames that are not among `trained` (indices) follow their trained neighbours, or are corrected alike."""
+def carry_to_untrained(poses: Poses, trained: np.ndarray) -> Poses:
+    """A copy in which untrained frames are interpolated between trained neighbours, or corrected like them.
+
+    trained: (n,) indices of frames.
+    """
     is_trained = np.zeros(len(poses.pose), bool)
     is_trained[trained] = True
     out = poses.copy()
@@ -38,8 +41,8 @@ def carried(poses: Poses, trained: np.ndarray) -> Poses:
     return out
 
 
-def adam(moments: np.ndarray, count: int, grad: np.ndarray, rate: float) -> np.ndarray:
-    """How far to step back (...) at the count-th gradient (...); moments (2, ...) are moved on in place."""
+def adam_move(moments: np.ndarray, count: int, grad: np.ndarray, rate: float) -> np.ndarray:
+    """(...) to subtract at the count-th gradient, grad (...); moments (2, ...) are updated in place."""
     first, second = moments
     first += 0.1 * (grad - first)
     second += 0.01 * (grad**2 - second)
@@ -47,15 +50,15 @@ def adam(moments: np.ndarray, count: int, grad: np.ndarray, rate: float) -> np.n
 
 
 class Poses:
-    """Poses of T frames with Adam's state; a frame's count of steps is its own."""
+    """Poses of T frames with Adam's state; each frame counts its own steps."""
 
-    def __init__(self, body, params):
-        """body: avatar.body.Body; params: BodyParams of T frames, left as they are."""
+    def __init__(self, body: Body, params: BodyParams):
+        """params: of T frames, left as they are."""
         self.body, self.params = body, params
         self.fit_pose = np.array(params.pose, np.float64)
         self.fit_transl = np.array(params.transl, np.float64)
         self.base_pose, self.base_transl = self.fit_pose.copy(), self.fit_transl.copy()
-        """Where the corrections of single frames start from; the fit, until `settle`."""
+        """Where the corrections of single frames start from: the fit, until `settle`."""
         self.pose, self.transl = self.fit_pose.copy(), self.fit_transl.copy()
         self.share = np.full((self.pose.shape[1], 1), HAND_SHARE)
         self.share[BODY] = 1
@@ -69,7 +72,7 @@ class Poses:
         self.shaped: tuple[np.ndarray, np.ndarray] | None = None
         self.moved: dict[int, np.ndarray] = {}
         self.expression = np.zeros((frames, body.exprdirs.shape[2]))
-        """(T, E), what has been learned on top of the fit's; as `joint_offset` (55, 3) m of the joints at rest."""
+        """(T, E), learned on top of the fit's, as is `joint_offset` (55, 3) m on top of the joints at rest."""
         self.expression_moments = np.zeros((2, *self.expression.shape))
         self.joint_offset, self.joint_moments, self.joint_count = np.zeros((55, 3)), np.zeros((2, 55, 3)), 0
         self.joint_share = self.share.copy()
@@ -77,7 +80,7 @@ class Poses:
         self.betas, self.beta_moments, self.beta_count = np.array(params.betas, np.float64), np.zeros((2, len(params.betas))), 0
 
     def copy(self) -> Poses:
-        """The same poses, to be changed apart; Adam starts anew."""
+        """An independent copy; Adam starts anew."""
         other = copy.copy(self)
         other.pose, other.transl = self.pose.copy(), self.transl.copy()
         other.moments, other.count = np.zeros_like(self.moments), np.zeros_like(self.count)
@@ -85,10 +88,11 @@ class Poses:
         return other
 
     def state(self) -> dict:
-        """What training has changed, for a checkpoint."""
+        """All that training changes, for a checkpoint."""
         return {name: getattr(self, name) for name in KEPT}
 
     def restore(self, state: dict) -> None:
+        """Takes the place of the Poses that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])
         self.forget_rests()
@@ -103,7 +107,7 @@ class Poses:
         self.rests, self.moved = {}, {}
 
     def rest(self, t: int) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (V, 3) float32 and joints (55, 3) at rest, with the frame's expression."""
+        """Vertices (V, 3) float32 m and joints (55, 3) m at rest, with the frame's expression."""
         if t not in self.rests:
             p = self.params
             if self.shaped is None:
@@ -117,59 +121,59 @@ class Poses:
         return vertices, joints + self.joint_offset
 
     def vertices(self, t: int) -> np.ndarray:
-        """(V, 3) float32 m, camera frame, posed as the frame stands now."""
+        """(V, 3) float32 m, camera frame, in the frame's pose as it is now."""
         rest, joints = self.rest(t)
         transforms = joint_transforms(self.pose[t:t + 1], joints, self.body.parents)[0].astype(np.float32)
         posed = skin(rest + self.offset, transforms, self.body.skin_index, self.body.skin_weight)
         return posed + self.transl[t].astype(np.float32)
 
     def settle(self) -> None:
-        """The poses as they stand become the base that single frames are corrected from; Adam starts anew."""
+        """Makes the poses as they stand the base that single frames are corrected from; Adam starts anew."""
         self.base_pose, self.base_transl = self.pose.copy(), self.transl.copy()
         self.moments, self.count = np.zeros_like(self.moments), np.zeros_like(self.count)
         self.expression_moments = np.zeros_like(self.expression_moments)
 
     def transforms(self, t: int) -> np.ndarray:
-        """(55, 3, 4) rest to posed, without transl."""
+        """(55, 3, 4) from rest to posed, without transl."""
         return joint_transforms(self.pose[t:t + 1], self.rest(t)[1], self.body.parents)[0]
 
     def gradients(self, t: int, grad_vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Of a loss with gradient grad_vertices (V, 3): of pose (55, 3), transl (3,), rest vertices (V, 3), joints (55, 3)."""
+        """Gradients of pose (55, 3), transl (3,), rest vertices (V, 3) and joints (55, 3) from grad_vertices (V, 3)."""
         rest, joints = self.rest(t)
         return skin_backward(np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest + self.offset, joints,
                              self.body.parents, self.body.skin_index, self.body.skin_weight)
 
-    def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> np.ndarray:
+    def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> tuple[np.ndarray, np.ndarray]:
         """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradients of rest vertices (V, 3) and joints (55, 3)."""
         grad_pose, grad_transl, grad_rest, grad_joints = self.gradients(t, grad_vertices)
         grad = np.concatenate([grad_pose, grad_transl[None]]).astype(np.float64)
         grad[:-1] += 2 * pull * (self.pose[t] - self.base_pose[t]) / TURN**2
         grad[-1] += 2 * pull * (self.transl[t] - self.base_transl[t]) / SHIFT**2
         self.count[t] += 1
-        move = adam(self.moments[:, t], self.count[t], grad, rate)
+        move = adam_move(self.moments[:, t], self.count[t], grad, rate)
         self.pose[t] -= self.share * move[:-1]
         self.transl[t] -= move[-1]
         return grad_rest, grad_joints
 
     def shape_gradient(self, grad_rest: np.ndarray, grad_joints: np.ndarray) -> np.ndarray:
-        """(B,) gradient of the betas from those of the rest vertices (V, 3) and joints (55, 3)."""
+        """(B,) gradient of the betas from grad_rest (V, 3), of the rest vertices, and grad_joints (55, 3)."""
         on_vertices = grad_rest + self.body.J_regressor.T @ grad_joints
         return np.tensordot(on_vertices, self.body.shapedirs[:, :, :len(self.betas)], 2)
 
     def step_betas(self, grad: np.ndarray, rate: float) -> None:
-        """One Adam step of the betas (B,), which all frames share."""
+        """One Adam step of the betas, which all frames share. grad: (B,)."""
         self.beta_count += 1
-        self.betas -= adam(self.beta_moments, self.beta_count, grad, rate)
+        self.betas -= adam_move(self.beta_moments, self.beta_count, grad, rate)
         self.forget_rests()
 
     def expression_gradient(self, grad_rest: np.ndarray) -> np.ndarray:
-        """(E,) gradient of a frame's expression from that of its rest vertices (V, 3)."""
+        """(E,) gradient of a frame's expression from grad_rest (V, 3), of its rest vertices."""
         return np.tensordot(grad_rest, self.body.exprdirs, 2)
 
     def step_expression(self, t: int, grad: np.ndarray, rate: float, pull: float) -> None:
         """One Adam step of the expression of frame t, after `step`. grad: (E,)."""
         grad = grad + 2 * pull * self.expression[t] / EXPRESSION**2
-        self.expression[t] -= adam(self.expression_moments[:, t], self.count[t], grad, rate)
+        self.expression[t] -= adam_move(self.expression_moments[:, t], self.count[t], grad, rate)
         self.rests.pop(t, None)
         self.moved.pop(t, None)
 
@@ -177,10 +181,10 @@ class Poses:
         """One Adam step of the joints at rest, which all frames share. grad: (55, 3)."""
         grad = grad + 2 * pull * self.joint_offset / JOINT**2
         self.joint_count += 1
-        self.joint_offset -= self.joint_share * adam(self.joint_moments, self.joint_count, grad, rate)
+        self.joint_offset -= self.joint_share * adam_move(self.joint_moments, self.joint_count, grad, rate)
 
-    def refined(self):
-        """BodyParams with the poses as they stand; `joints` computed anew."""
+    def to_params(self) -> BodyParams:
+        """The parameters with the poses as they stand; `joints` computed anew."""
         params = replace(self.params, betas=self.betas.astype(np.float32), **split_pose(self.pose),
                          transl=self.transl.astype(np.float32),
                          expression=(self.params.expression + self.expression).astype(np.float32),

@@ -151,11 +151,11 @@ def test_scales_of_recipe_paper_and_their_slope_are_those_of_the_cpu_path(host):
 def test_likeness_of_neighbours_is_that_of_the_cpu_path(host):
     rng = np.random.default_rng(6)
     values, around = rng.normal(size=(40, 4)), Neighbours()
-    around.distances(rng.normal(size=(40, 3)), 1.0, 0)
+    around.distance_gradient(rng.normal(size=(40, 3)), 1.0, 0)
     values[around.index[7]] = values[7]  # no deviation, no slope
     got = np.zeros_like(values)
     host("spread_all", 40, 4, values, np.ascontiguousarray(around.index, np.int64), 0.3 / values.size, got)
-    expected = around.spread(values, 0.3)
+    expected = around.spread_gradient(values, 0.3)
     assert around.index.shape == (40, K) and np.linalg.norm(expected) > 0
     np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-15)
 

@@ -4,17 +4,17 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags
 
 from gsac.avatar.body import Body
-from gsac.avatar.cuda.smoothing import series
+from gsac.avatar.cuda.smoothing import smoothing_series
 from gsac.stages.train.gaussians.cloth_offsets import SMOOTHNESS, Offsets
 
 
 def test_the_series_are_the_smoothing_once_and_twice_over():
-    from gsac.avatar.cuda.adjacency import neighbours
+    from gsac.avatar.cuda.adjacency import vertex_neighbours
 
     body = Body.load()
     count, solve = len(body.v_template), Offsets(body).solve
-    found = series(body.faces, count, SMOOTHNESS)
-    start, near = neighbours(np.asarray(body.faces), count)
+    found = smoothing_series(body.faces, count, SMOOTHNESS)
+    start, near = vertex_neighbours(np.asarray(body.faces), count)
     laplacian = diags(np.diff(start).astype(float)) - csr_matrix((np.ones(len(near)), near, start), (count, count))
     rng = np.random.default_rng(0)
     bump = np.exp(-np.linalg.norm(body.v_template - body.v_template[5000], axis=1) / 0.03)

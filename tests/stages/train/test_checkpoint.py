@@ -36,7 +36,7 @@ run(Job({port: Path(path) for port, path in inputs.items()}, Path(out), make_con
 """
 
 
-FEW = {"fast.size_search.SIZES": (2000, 1000), "fast.size_search.REFIT": 0.4}
+FEW = {"fast.size_search.SIZES": (2000, 1000), "fast.refit.SHARE": 0.4}
 GROWS_SOON = {"paper.densify.FIRST": 1, "paper.densify.EVERY": 4, "paper.densify.PHASE": 2}
 
 
@@ -44,7 +44,7 @@ GROWS_SOON = {"paper.densify.FIRST": 1, "paper.densify.EVERY": 4, "paper.densify
 @pytest.mark.parametrize("values, stop, constants", [
     ({"steps": 40, "exposure": True}, 13, {}), ({"steps": 40}, 31, {}), ({"steps": 30, "gaussians": "auto"}, 30, FEW),
     ({"recipe": "paper", "steps": 12}, 9, GROWS_SOON)],
-    ids=["fast, while the surface moves", "fast, after that", "fast, before the ladder", "paper, after it has grown"])
+    ids=["fast, while the surface moves", "fast, after that", "fast, before the size search", "paper, after it has grown"])
 def test_a_training_that_was_killed_and_goes_on_gives_the_bytes_of_an_unbroken_one(job, tmp_path, monkeypatch, values, stop,
                                                                                   constants):
     for name, value in constants.items():

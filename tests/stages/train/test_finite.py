@@ -5,12 +5,12 @@ import pytest
 
 from gsac.stages.contract import StageError
 from gsac.stages.train.fast import trainer as fast
-from gsac.stages.train.fast.trainer import start
-from gsac.stages.train.finite import finite
+from gsac.stages.train.fast.start import crop_views, init_gaussians
+from gsac.stages.train.finite import require_finite
 from gsac.stages.train.judge import heldout
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.poses import bundle_adjust
-from gsac.stages.train.poses.photometric import Normal
+from gsac.stages.train.poses.photometric import NormalEquations
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.stage import run
 
@@ -59,7 +59,7 @@ def bad_betas(result, poses, *arguments):
 @pytest.mark.parametrize("owner, name, spoil, words", [
     (fast, "render_bound_backward", bad_vertices, "gradient of vertices is not finite at step 2"),
     (fast.Trainer, "_move", bad_value("mu"), "mu is not finite after step 2"),
-    (fast.Trainer, "_move", bad_value("opacity"), "opacity is not finite after step 2"),
+    (fast.Trainer, "_move", bad_value("opacity_logit"), "opacity_logit is not finite after step 2"),
     (Poses, "step", bad_pose, r"pose of frame \d is not finite after step 2")])
 def test_recipe_fast_stops_with_step_and_quantity(job, monkeypatch, owner, name, spoil, words):
     spoiled(monkeypatch, owner, name, spoil)
@@ -81,7 +81,7 @@ def test_recipe_paper_stops_with_step_and_quantity(job, monkeypatch, owner, name
 
 def test_the_rounds_of_poses_stop(job, monkeypatch):
     def bad_equations(normal, *arguments):
-        return Normal(normal.gradient * np.nan, *normal[1:])
+        return NormalEquations(normal.gradient * np.nan, *normal[1:])
 
     spoiled(monkeypatch, bundle_adjust, "normal_equations", bad_equations)
     with pytest.raises(StageError, match="poses' equations are not finite"):
@@ -94,7 +94,7 @@ def test_a_frame_that_cannot_be_judged_or_aligned_stops_instead_of_being_left_ou
     with pytest.raises(AttributeError):  # nothing is trained: all that is wanted is the task
         run(job(frames=2, **quiet()))
     task = made[0]
-    gaussians = start(task, fast.crops(task)[1], 300)
+    gaussians = init_gaussians(task, crop_views(task)[1], 300)
     poses = task.poses.copy()
     assert len(heldout.judge(gaussians, poses, [0], task.views)) == 1
     with monkeypatch.context() as patch:
@@ -107,12 +107,12 @@ def test_a_frame_that_cannot_be_judged_or_aligned_stops_instead_of_being_left_ou
 
 
 def test_what_comes_out_is_looked_at_once_more(job, monkeypatch):
-    spoiled(monkeypatch, fast.Trainer, "recoloured", lambda result, *arguments: (nan_in(result[0].rgb), result)[1], at=1)
+    spoiled(monkeypatch, fast.Trainer, "finish", lambda result, *arguments: (nan_in(result[0].rgb), result)[1], at=1)
     with pytest.raises(StageError, match="rgb is not finite after the last step"):
         run(job(frames=2, **quiet(steps=2)))
 
 
 def test_none_and_what_is_finite_pass():
-    finite("now", {"a": None, "b": 1.0, "c": np.zeros(3), "d": np.zeros((0, 3))})
+    require_finite("now", {"a": None, "b": 1.0, "c": np.zeros(3), "d": np.zeros((0, 3))})
     with pytest.raises(StageError, match="c is not finite now"):
-        finite("now", {"b": 1.0, "c": np.array([0, np.inf])})
+        require_finite("now", {"b": 1.0, "c": np.array([0, np.inf])})

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsac.stages.train.holdout import carry_corrections, spaced_in_yaw, to_choose_by
+from gsac.stages.train.holdout import carry_corrections, hold_out, hold_out_for_choosing
 
 
 def turning(yaws):
@@ -14,7 +14,7 @@ def turning(yaws):
 def test_held_out_frames_are_spaced_in_yaw_not_in_time():
     rng = np.random.default_rng(0)
     yaws = rng.permutation(np.linspace(-3, 3, 64))
-    held = spaced_in_yaw(turning(yaws), np.ones(64, bool), 8)
+    held = hold_out(turning(yaws), np.ones(64, bool), 8)
     assert len(held) == 8
     gaps = np.diff(np.sort(yaws[held]))
     np.testing.assert_allclose(gaps, gaps[0])
@@ -24,11 +24,11 @@ def test_unusable_frames_are_never_held_out_short_clips_keep_one_and_the_shortes
     orient = turning(np.linspace(-3, 3, 20))
     usable = np.ones(20, bool)
     usable[::2] = False
-    assert not set(spaced_in_yaw(orient, usable, 4)) & set(range(0, 20, 2))
-    assert len(spaced_in_yaw(orient[:7], np.ones(7, bool), 8)) == 1
-    assert not len(spaced_in_yaw(orient[:4], np.ones(4, bool), 8))
-    assert not len(spaced_in_yaw(orient, usable, 0))
-    assert not len(spaced_in_yaw(orient[:1], np.ones(1, bool), 8))
+    assert not set(hold_out(orient, usable, 4)) & set(range(0, 20, 2))
+    assert len(hold_out(orient[:7], np.ones(7, bool), 8)) == 1
+    assert not len(hold_out(orient[:4], np.ones(4, bool), 8))
+    assert not len(hold_out(orient, usable, 0))
+    assert not len(hold_out(orient[:1], np.ones(1, bool), 8))
 
 
 def test_a_correction_shared_by_all_frames_reaches_the_held_out_ones():
@@ -61,8 +61,8 @@ def test_frames_to_choose_by_are_others_only_where_the_clip_is_long():
     def both(frames, usable=None):
         orient = turning(np.linspace(-3, 3, frames))
         usable = np.ones(frames, bool) if usable is None else usable
-        held = spaced_in_yaw(orient, usable, 8)
-        return held, to_choose_by(orient, usable, held, 8)
+        held = hold_out(orient, usable, 8)
+        return held, hold_out_for_choosing(orient, usable, held, 8)
 
     held, choosing = both(60)
     np.testing.assert_array_equal(choosing, held)

@@ -1,4 +1,4 @@
-"""The rehearsal calls every compiled kernel as a training does, so that none is left to be compiled under the clock."""
+"""The warm-up calls every compiled kernel as a training does, so that none is left to be compiled under the clock."""
 
 import json
 import subprocess
@@ -30,7 +30,7 @@ print(json.dumps(sorted(compiled() - before)))
 
 
 @pytest.mark.slow
-def test_after_the_rehearsal_a_training_compiles_nothing(job):
+def test_after_the_warm_up_a_training_compiles_nothing(job):
     made = job(steps=6, gaussians="auto")
     order = [{port: str(path) for port, path in made.inputs.items()}, str(made.out),
              {"steps": 6, "gaussians": "auto", "height": 96, "device": "cpu"}]

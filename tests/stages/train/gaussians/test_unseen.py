@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.threads import Workspace
-from gsac.stages.train.fast import trainer
+from gsac.stages.train.fast.start import centres_at_rest
 from gsac.stages.train.gaussians import unseen
 from gsac.stages.train.judge import heldout, novel_poses
 from gsac.stages.train.poses.poses import Poses
@@ -20,7 +21,7 @@ def body():
 
 def covering(body, count=4000):
     gaussians = Gaussians.area(body.v_template, body.faces, count, 0)
-    return gaussians, trainer.places(gaussians, body.v_template, body.faces)
+    return gaussians, centres_at_rest(gaussians, body.v_template, body.faces)
 
 
 def standing(body):
@@ -33,8 +34,8 @@ def standing(body):
 def test_a_front_view_shows_the_chest_and_neither_back_nor_soles(body):
     gaussians, at = covering(body)
     vertices, camera = standing(body)
-    pixels = unseen.shown(gaussians, vertices, body.faces, camera, Workspace(1))
-    normal = trainer.face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
+    pixels = unseen.front_pixels(gaussians, vertices, body.faces, camera, Workspace(1))
+    normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
     height = (at[:, 1] - at[:, 1].min()) / np.ptp(at[:, 1])
     trunk, soles = (np.abs(at[:, 0]) < 0.1) & (height > 0.55) & (height < 0.75), (height < 0.01) & (normal[:, 1] < -0.8)
     assert np.median(pixels[trunk & (normal[:, 2] > 0.5)]) > 0.5
@@ -50,7 +51,7 @@ def test_unseen_gaussians_lie_flat_no_higher_and_coloured_as_their_neighbours_an
     gaussians.rgb[~seen] = rng.random((int((~seen).sum()), 3))
     gaussians.mu[~seen] += rng.normal(0, 2, (int((~seen).sum()), 3)).astype(np.float32)
     gaussians.quat[~seen] = rng.normal(size=(int((~seen).sum()), 4))
-    out = unseen.laid(gaussians, seen, body.v_template, body.faces)
+    out = unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces)
     np.testing.assert_allclose(out.rgb[~seen], [[0.9, 0.1, 0.1]] * int((~seen).sum()), atol=1e-5)
     np.testing.assert_array_equal(out.quat[~seen], [[1, 0, 0, 0]] * int((~seen).sum()))
     assert out.mu[~seen, 1].max() < 1e-3, "the neighbours lie on the surface"
@@ -62,7 +63,7 @@ def test_unseen_gaussians_lie_flat_no_higher_and_coloured_as_their_neighbours_an
 def test_where_nothing_or_everything_is_seen_nothing_changes(body):
     gaussians, _ = covering(body, 300)
     for seen in (np.zeros(300, bool), np.ones(300, bool)):
-        assert unseen.laid(gaussians, seen, body.v_template, body.faces) is gaussians
+        assert unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces) is gaussians
 
 
 def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
@@ -73,7 +74,7 @@ def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
     clean = novel_poses.judge_novel(gaussians, poses)
     assert clean["stray_alpha"] < 1e-4 and clean["needle_share"] == 0
     armpit = int(np.argmin(np.linalg.norm(at - body.keypoint_matrix[5] @ body.v_template, axis=1)))
-    gaussians.mu[armpit, 1] += 0.2 / trainer.face_frames(body.v_template, body.faces).k[gaussians.face[armpit]]
+    gaussians.mu[armpit, 1] += 0.2 / face_frames(body.v_template, body.faces).k[gaussians.face[armpit]]
     gaussians.log_scale[armpit] += 1.5
     assert novel_poses.judge_novel(gaussians, poses)["stray_alpha"] > 10 * max(clean["stray_alpha"], 1e-4)
     gaussians.log_scale[7] += [3, 0, 0]
@@ -85,7 +86,7 @@ def test_the_face_has_a_box_from_the_front_and_none_from_behind(body):
                                   np.tile([0, 0, 4.0], (2, 1)), np.zeros(4), np.zeros((2, body.exprdirs.shape[2])), 300.0,
                                   (110.0, 110.0))
     poses, camera = Poses(body, params), Camera((300.0, 300.0), (110.0, 110.0), 220, 220)
-    front, back = (heldout.boxes(poses, t, camera) for t in (0, 1))
+    front, back = (heldout.find_boxes(poses, t, camera) for t in (0, 1))
     x0, y0, x1, y1 = front["face"]
     assert 5 < x1 - x0 < 30 and 5 < y1 - y0 < 30
     assert "face" not in back
@@ -94,9 +95,9 @@ def test_the_face_has_a_box_from_the_front_and_none_from_behind(body):
 def test_no_gaussian_stands_off_those_around_it_and_the_others_stay(body):
     gaussians, at = covering(body)
     off = np.arange(len(gaussians)) % 50 == 0
-    size = trainer.face_frames(body.v_template, body.faces).k[gaussians.face]
+    size = face_frames(body.v_template, body.faces).k[gaussians.face]
     gaussians.mu[off, 1] += 0.06 / size[off]
-    out = unseen.levelled(gaussians, body.v_template, body.faces)
+    out = unseen.level_heights(gaussians, body.v_template, body.faces)
     assert (size * out.mu[:, 1])[off].max() < unseen.STEP + 0.005
     np.testing.assert_allclose(out.mu[~off], gaussians.mu[~off], atol=1e-6)
     np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
@@ -104,30 +105,30 @@ def test_no_gaussian_stands_off_those_around_it_and_the_others_stay(body):
 
 def test_a_disc_that_sticks_out_of_the_surface_shrinks(body):
     gaussians, _ = covering(body)
-    size = trainer.face_frames(body.v_template, body.faces).k[gaussians.face]
+    size = face_frames(body.v_template, body.faces).k[gaussians.face]
     out_of = np.arange(len(gaussians)) % 50 == 0
     gaussians.quat[out_of] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
     gaussians.log_scale[out_of, 2] = np.log(0.05 / size[out_of])
-    out = unseen.levelled(gaussians, body.v_template, body.faces)
+    out = unseen.level_heights(gaussians, body.v_template, body.faces)
     assert (size * np.exp(out.log_scale[:, 2]))[out_of].max() == pytest.approx(unseen.STEP, rel=1e-4)
 
 
 def test_the_discs_of_a_coarse_level_keep_the_width_that_covers_the_body(body):
-    gaussians = trainer.Gaussians.area(body.v_template, body.faces, unseen.SPARSE // 4)
-    size = trainer.face_frames(body.v_template, body.faces).k[gaussians.face]
+    gaussians = Gaussians.area(body.v_template, body.faces, unseen.SPARSE // 4)
+    size = face_frames(body.v_template, body.faces).k[gaussians.face]
     gaussians.quat[:] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
     gaussians.log_scale[:, 2] = np.log(1.8 * unseen.STEP / size)
-    out = unseen.levelled(gaussians, body.v_template, body.faces)
+    out = unseen.level_heights(gaussians, body.v_template, body.faces)
     np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
 
 
 def test_what_is_shown_little_for_its_size_is_not_seen(body):
     gaussians, at = covering(body)
-    frames = trainer.face_frames(body.v_template, body.faces)
+    frames = face_frames(body.v_template, body.faces)
     area = (frames.k[gaussians.face] * np.exp(gaussians.log_scale[:, 0])) ** 2
     pixels = 4000 * area
     pixels[:100] *= 0.1
     assert pixels[:100].max() > unseen.LEAST_SHOWN
-    seen = unseen.enough(pixels, gaussians, body.v_template, body.faces)
+    seen = unseen.find_seen(pixels, gaussians, body.v_template, body.faces)
     assert not seen[:100].any() and seen[100:][pixels[100:] > unseen.LEAST_SHOWN].all()
-    assert not unseen.enough(np.zeros(len(gaussians)), gaussians, body.v_template, body.faces).any()
+    assert not unseen.find_seen(np.zeros(len(gaussians)), gaussians, body.v_template, body.faces).any()

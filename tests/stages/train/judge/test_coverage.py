@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.train.fast import trainer
+from gsac.stages.train.fast.start import centres_at_rest
 from gsac.stages.train.judge.coverage import part_of, unseen_parts
 
 
@@ -14,7 +15,7 @@ from gsac.stages.train.judge.coverage import part_of, unseen_parts
 def covering():
     body = Body.load()
     gaussians = Gaussians.area(body.v_template, body.faces, 6000, 0)
-    return body, gaussians.face, trainer.places(gaussians, body.v_template, body.faces)
+    return body, gaussians.face, centres_at_rest(gaussians, body.v_template, body.faces)
 
 
 def test_every_joint_but_the_neck_belongs_to_a_part(covering):
@@ -45,7 +46,7 @@ def test_a_head_of_which_only_the_chin_is_in_the_picture_is_named_as_well(coveri
 
 def test_views_from_one_side_name_the_other(covering):
     body, face, _ = covering
-    ahead = trainer.face_frames(body.v_template, body.faces).R[face, 2, 1]
+    ahead = face_frames(body.v_template, body.faces).R[face, 2, 1]
     assert unseen_parts(face, ahead > -0.2, body) == ["back of the head", "back"]
     assert unseen_parts(face, ahead < 0.2, body) == ["face", "front of the trunk"]
 

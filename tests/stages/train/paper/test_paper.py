@@ -10,7 +10,7 @@ from gsac.avatar.camera import Camera
 from gsac.avatar.lpips import NETS, shapes
 from gsac.avatar.raster import render, render_backward, screen_gradients
 from gsac.stages.train.paper import densify, knn, trainer
-from gsac.stages.train.paper.densify import Densifier, children
+from gsac.stages.train.paper.densify import Densifier, make_children
 from gsac.stages.train.paper.losses import dice, perceptual, sobel_magnitude
 from gsac.stages.train.stage import run
 
@@ -85,7 +85,7 @@ def test_the_neighbour_term_has_the_gradient_of_its_definition():
     rng = np.random.default_rng(2)
     places, values = rng.random((40, 3)), rng.random((40, 4))
     near = knn.Neighbours()
-    gradient = near.distances(places, 0.01, 0)
+    gradient = near.distance_gradient(places, 0.01, 0)
     index = near.index
     assert (index[:, 0] == np.arange(40)).all()
 
@@ -98,8 +98,8 @@ def test_the_neighbour_term_has_the_gradient_of_its_definition():
     direction = rng.normal(size=(40, 3))
     assert (gradient * direction).sum() == pytest.approx(slope(distance, places, direction, 1e-6), rel=1e-3)
     direction = rng.normal(size=(40, 4))
-    assert (near.spread(values, 0.01) * direction).sum() == pytest.approx(slope(spread, values, direction, 1e-6), rel=1e-3)
-    assert not near.spread(np.ones((40, 2)), 0.01).any()
+    assert (near.spread_gradient(values, 0.01) * direction).sum() == pytest.approx(slope(spread, values, direction, 1e-6), rel=1e-3)
+    assert not near.spread_gradient(np.ones((40, 2)), 0.01).any()
 
 
 def test_the_gradient_of_the_image_places_is_that_of_a_shift_along_the_image_plane():
@@ -124,19 +124,20 @@ def test_the_gradient_of_the_image_places_is_that_of_a_shift_along_the_image_pla
 
 def rows(count, scale_logit):
     return {"mu": np.zeros((count, 3), np.float32), "quat": np.tile(np.float32([1, 0, 0, 0]), (count, 1)),
-            "scale": np.full((count, 3), scale_logit, np.float32), "rgb": np.random.default_rng(0).random((count, 3)).astype("f4")}
+            "scale_logit": np.full((count, 3), scale_logit, np.float32),
+            "rgb": np.random.default_rng(0).random((count, 3)).astype("f4")}
 
 
 def test_a_large_gaussian_is_split_outwards_and_a_small_one_cloned():
     rng = np.random.default_rng(4)
     large, small = rows(5, -1.0), rows(5, -4.0)
-    new = children(large, np.array([1, 3]), rng)
+    new = make_children(large, np.array([1, 3]), rng)
     assert (new["mu"][:, 1] > 0).all() and (large["mu"][[1, 3], 1] > 0).all() and not large["mu"][[0, 2, 4]].any()
-    act = densify.LARGEST / (1 + np.exp(-new["scale"]))
+    act = densify.LARGEST / (1 + np.exp(-new["scale_logit"]))
     np.testing.assert_allclose(act, densify.LARGEST / (1 + np.exp(1)) / 1.6, rtol=1e-5)
     np.testing.assert_array_equal(new["rgb"], large["rgb"][[1, 3]])
-    new = children(small, np.array([2]), rng)
-    assert not new["mu"].any() and not small["mu"].any() and (small["scale"] == -4).all()
+    new = make_children(small, np.array([2]), rng)
+    assert not new["mu"].any() and not small["mu"].any() and (small["scale_logit"] == -4).all()
 
 
 def test_densification_happens_eleven_times_and_only_above_the_threshold():
@@ -158,7 +159,7 @@ def test_densification_happens_eleven_times_and_only_above_the_threshold():
         visible[2] = False
         densifier.note(gradient, visible)
         before = len(grown.events)
-        densifier.after(step, grown, np.random.default_rng(step))
+        densifier.grow(step, grown, np.random.default_rng(step))
         if len(grown.events) > before:
             at.append(step)
     assert at[:2] == [300, 501] and at[-1] == 2310 and len(at) == 11

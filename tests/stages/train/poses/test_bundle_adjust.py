@@ -10,11 +10,13 @@ from gsac.avatar.joints import BODY
 from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.fast import prealign
-from gsac.stages.train.fast import trainer as fast
+from gsac.stages.train.fast.cpu import Cpu
+from gsac.stages.train.fast.start import init_gaussians
+from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.poses import bundle_adjust, photometric
-from gsac.stages.train.poses.poses import Poses, carried
+from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import read_views
+from gsac.stages.train.views import person_crop, read_views
 
 TRUE_SHIFT = 0.03
 """m by which conftest's fit stands too far right."""
@@ -41,7 +43,7 @@ def test_a_render_is_compared_with_its_frame_as_plain_arrays_are():
     pixels = rng.integers(0, 256, (h, w, 4), np.uint8)
     colour, mask = np.empty((h, w, 3), np.float32), np.empty((h, w), np.float32)
     slope, squares = np.empty((h, w, 3), np.float32), np.empty((h * w, 4), np.float32)
-    count = photometric.compared(rgb, alpha, pixels, weight, colour, mask, slope, squares)
+    count = photometric.compare(rgb, alpha, pixels, weight, colour, mask, slope, squares)
     image = np.dstack([rgb, weight * alpha])
     off = image - pixels / np.float32([255, 255, 255, 255 / weight])
     person = (alpha > 0.5) | (pixels[..., 3] > 127)
@@ -55,9 +57,10 @@ def test_a_render_is_compared_with_its_frame_as_plain_arrays_are():
 
 def test_the_equations_of_a_frame_are_its_slope_and_nearly_its_curvature(job):
     task, workspace = task_of(job(frames=2)), Workspace(1)
-    poses, view = task.poses, fast.person_crop(task.views[0])
-    gaussians = fast.start(task, {0: view, 1: fast.person_crop(task.views[1])}, 3000)
-    normal = photometric.normal_equations(gaussians, photometric.carriers(poses.body, gaussians.face), poses, 0, view, workspace)
+    poses, view = task.poses, person_crop(task.views[0])
+    gaussians = init_gaussians(task, {0: view, 1: person_crop(task.views[1])}, 3000)
+    share = photometric.joint_shares(poses.body, gaussians.face)
+    normal = photometric.normal_equations(gaussians, share, poses, 0, view, workspace)
     rng = np.random.default_rng(0)
     pose, transl = poses.pose[0].copy(), poses.transl[0].copy()
     for _ in range(3):
@@ -74,18 +77,18 @@ def test_the_equations_of_a_frame_are_its_slope_and_nearly_its_curvature(job):
 
 def test_rounds_bring_trained_and_held_out_frames_nearer_the_truth(job):
     task = task_of(job(pose_rounds=4), held=(3, 8))
-    prealign.adjust(task, prealign.learning_on_cpu)
+    prealign.adjust(task, Cpu())
     off = np.abs(task.poses.transl[:, 0])
-    assert off[task.trained].max() < 0.6 * TRUE_SHIFT and off[task.held].max() < 0.6 * TRUE_SHIFT
-    after = carried(task.poses, task.trained)
+    assert off[task.trained].max() < 0.6 * TRUE_SHIFT and off[task.choosing].max() < 0.6 * TRUE_SHIFT
+    after = carry_to_untrained(task.poses, task.trained)
     np.testing.assert_allclose(after.transl, task.poses.transl, atol=1e-6)
     np.testing.assert_array_equal(task.poses.fit_transl[:, 0], np.float32(TRUE_SHIFT))
 
 
 def test_a_step_that_made_the_images_worse_is_taken_back(job):
     task = task_of(job(frames=3))
-    views = {t: fast.person_crop(task.views[t]).halved() for t in range(3)}
-    trainer = fast.Trainer(fast.start(task, views, 600), task)
+    views = {t: person_crop(task.views[t]).halved() for t in range(3)}
+    trainer = Trainer(init_gaussians(task, views, 600), task)
     solving = bundle_adjust.Corrections(task.poses, trainer.gaussians, trainer.face, views)
     solving.solve()
     good = solving.kept.copy()
@@ -98,34 +101,34 @@ def test_a_step_that_made_the_images_worse_is_taken_back(job):
 
 def test_rounds_in_the_midst_correct_held_out_frames_too_and_become_the_base_of_what_follows(job):
     task = task_of(job(), held=(3, 8))
-    poses, views = task.poses, {int(t): fast.person_crop(task.views[t]).halved() for t in task.trained}
+    poses, views = task.poses, {int(t): person_crop(task.views[t]).halved() for t in task.trained}
     poses.transl[:, 0] -= TRUE_SHIFT
-    trainer = fast.Trainer(fast.start(task, views, 3000), task)
+    trainer = Trainer(init_gaussians(task, views, 3000), task)
     trainer.pose_rate = 0.0
     for step, t in enumerate(np.tile(task.trained, 6)):
         trainer.step(int(t), views[int(t)], 0.3, np.ones(3), step)
     poses.transl[:, 0] += TRUE_SHIFT / 2
     bundle_adjust.correct_midway(poses, task.trained, trainer.gaussians, trainer.face, views)
     off = np.abs(poses.transl[:, 0]) / (TRUE_SHIFT / 2)
-    assert off.max() < 0.9 and off[task.held].mean() < 0.85, "they are taken to be off by little, and so move little"
+    assert off.max() < 0.9 and off[task.choosing].mean() < 0.85, "they are taken to be off by little, and so move little"
     np.testing.assert_array_equal(poses.base_transl, poses.transl)
     np.testing.assert_array_equal(poses.base_pose, poses.pose)
 
 
 def test_no_round_leaves_the_fit_as_it_came(job):
     task = task_of(job(frames=2, pose_rounds=0))
-    prealign.adjust(task, prealign.learning_on_cpu)
+    prealign.adjust(task, Cpu())
     np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
     assert not task.poses.offset.any()
 
 
 def test_photos_far_apart_keep_the_poses_of_the_fit(job):
     task = task_of(job(frames=6))
-    prealign.adjust(task, prealign.learning_on_cpu)
+    prealign.adjust(task, Cpu())
     np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
     bundle_adjust.correct_midway(task.poses, task.trained, None, None, {})
     np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
-    assert not bundle_adjust.apart(task.poses.fit_pose[:1, 0])
+    assert not bundle_adjust.are_apart(task.poses.fit_pose[:1, 0])
 
 
 def test_photos_far_apart_share_only_what_is_the_same_in_all():
@@ -135,10 +138,10 @@ def test_photos_far_apart_share_only_what_is_the_same_in_all():
 
 def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
     task = task_of(job(frames=3))
-    views = {t: fast.person_crop(task.views[t]) for t in range(3)}
+    views = {t: person_crop(task.views[t]) for t in range(3)}
     poses = task.poses
     poses.transl[:, 0] -= TRUE_SHIFT
-    gaussians = fast.start(task, views, 3000)
+    gaussians = init_gaussians(task, views, 3000)
     right = half_error(gaussians, poses, 0, views[0], Workspace(1))
     poses.transl[0, 0] += TRUE_SHIFT
     poses.pose[0, 16, 2] += 0.2
@@ -153,11 +156,11 @@ def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
 
 def test_no_round_makes_a_frame_worse_than_it_was(job, monkeypatch):
     task = task_of(job(frames=2))
-    views = {t: fast.person_crop(task.views[t]) for t in range(2)}
-    gaussians, poses = fast.start(task, views, 600), task.poses
+    views = {t: person_crop(task.views[t]) for t in range(2)}
+    gaussians, poses = init_gaussians(task, views, 600), task.poses
 
     def error():
-        return photometric.normal_equations(gaussians, photometric.carriers(poses.body, gaussians.face), poses, 0, views[0],
+        return photometric.normal_equations(gaussians, photometric.joint_shares(poses.body, gaussians.face), poses, 0, views[0],
                                           Workspace(1)).mean
 
     before, fitted = error(), poses.pose[0].copy()

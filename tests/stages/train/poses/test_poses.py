@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import Body, BodyParams
-from gsac.stages.train.poses.poses import Poses, carried
+from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.stage import run
 
 
@@ -56,9 +56,9 @@ def test_steps_lead_to_the_expression_and_the_joints_that_were_and_what_is_writt
         poses.step_joints(grad_joints, 1e-3, 0.0)
     assert np.abs(poses.vertices(1) - aim).mean() < 0.2 * before
     assert not poses.expression[[0, 2]].any() and not poses.joint_offset[[0, 22, 23, 24]].any()
-    written = poses.refined()
+    written = poses.to_params()
     np.testing.assert_allclose(body.posed(written, [1])[0][0], poses.vertices(1), atol=2e-6)
-    between = carried(poses, np.array([1, 2]))
+    between = carry_to_untrained(poses, np.array([1, 2]))
     assert np.array_equal(between.expression[0], poses.expression[1]) and between.expression[1].any()
 
 

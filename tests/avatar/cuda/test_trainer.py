@@ -12,9 +12,9 @@ LIGHT = np.float32([[0.7, 0.8, 0.7], [0.5, 0.3, 0.3], [-0.2, 0, 0.1], [0.3, 0.2,
 def fast(count=12000, **more):
     """Recipe `fast` without the displaced surface."""
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import make_recipe
 
-    return recipe_of(TrainConfig(), count, **({"offset_rate": 0.0} | more))
+    return make_recipe(TrainConfig(), count, **({"offset_rate": 0.0} | more))
 
 
 @pytest.fixture(scope="module")

@@ -35,9 +35,9 @@ def trainer_of(figure, network, **more):
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import make_recipe
 
-    recipe = recipe_of(TrainConfig(), 4000, **({"offset_rate": 0.0, "frame_size": FRAME, "perceptual": WEIGHT} | more))
+    recipe = make_recipe(TrainConfig(), 4000, **({"offset_rate": 0.0, "frame_size": FRAME, "perceptual": WEIGHT} | more))
     shots = [shot._replace(corner=CORNER) for shot in figure.shots]
     return CudaTrainer(figure.body, [shots], figure.pose, figure.transl, start(figure.body, 4000), recipe, network=network)
 

@@ -1,4 +1,4 @@
-"""The ladder of sizes: the rule on made-up figures, the whole on the small person."""
+"""The search for a size: the rule on made-up figures, the whole on the small person."""
 
 import json
 from dataclasses import replace
@@ -10,39 +10,40 @@ import pytest
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.train import STAGE, holdout
-from gsac.stages.train.fast import size_search, trainer
-from gsac.stages.train.fast.size_rule import Rung, choose, optimism, standard_error
+from gsac.stages.train.fast import refit, size_search, trainer
+from gsac.stages.train.fast.cpu import Cpu
+from gsac.stages.train.fast.size_rule import SizeScore, choose, optimism, standard_error
 from gsac.stages.train.stage import run
 
 
-def rung(count, psnr, detail=0.9, spread=0.1):
+def score(count, psnr, detail=0.9, spread=0.1):
     wobble = np.array([-1, 0, 1, 0])
-    return Rung(count, list(psnr + spread * wobble), list(detail + 0.02 * wobble))
+    return SizeScore(count, list(psnr + spread * wobble), list(detail + 0.02 * wobble))
 
 
 def test_the_smallest_size_within_one_standard_error_of_the_best_is_chosen():
-    error = standard_error(rung(1, 0.0).psnr_fg)
-    rungs = [rung(8000, 26.0), rung(4000, 26.01), rung(2000, 26.01 - 0.9 * error), rung(1000, 26.01 - 1.1 * error)]
-    assert choose(rungs).n_gaussians == 2000
+    error = standard_error(score(1, 0.0).psnr_fg)
+    scores = [score(8000, 26.0), score(4000, 26.01), score(2000, 26.01 - 0.9 * error), score(1000, 26.01 - 1.1 * error)]
+    assert choose(scores).n_gaussians == 2000
 
 
 def test_a_blurred_size_is_not_chosen_however_good_its_psnr():
-    assert choose([rung(8000, 26.0), rung(4000, 26.0, detail=0.8)]).n_gaussians == 8000
+    assert choose([score(8000, 26.0), score(4000, 26.0, detail=0.8)]).n_gaussians == 8000
 
 
 def test_frames_that_differ_much_excuse_no_loss_above_the_bar():
-    rungs = [rung(8000, 26.0, spread=4), rung(4000, 25.8, spread=4), rung(2000, 25.7, spread=4)]
-    assert choose(rungs).n_gaussians == 4000
+    scores = [score(8000, 26.0, spread=4), score(4000, 25.8, spread=4), score(2000, 25.7, spread=4)]
+    assert choose(scores).n_gaussians == 4000
 
 
 def test_frames_that_would_have_chosen_as_the_others_do_flatter_nothing():
-    assert optimism([rung(8000, 26.0), rung(4000, 26.01), rung(2000, 25.0)]) == 0
+    assert optimism([score(8000, 26.0), score(4000, 26.01), score(2000, 25.0)]) == 0
 
 
 def test_a_choice_that_hangs_on_one_frame_flatters_it():
-    rungs = [Rung(8000, [26.0, 26.0, 26.0, 26.0], [0.9] * 4), Rung(4000, [25.9, 25.9, 25.9, 26.4], [0.9] * 4)]
-    assert choose(rungs).n_gaussians == 4000
-    assert optimism(rungs) == pytest.approx((26.4 - 26.0) / 4)
+    scores = [SizeScore(8000, [26.0, 26.0, 26.0, 26.0], [0.9] * 4), SizeScore(4000, [25.9, 25.9, 25.9, 26.4], [0.9] * 4)]
+    assert choose(scores).n_gaussians == 4000
+    assert optimism(scores) == pytest.approx((26.4 - 26.0) / 4)
 
 
 def test_text_that_is_not_auto_is_refused():
@@ -60,26 +61,26 @@ def test_a_size_is_the_mean_of_its_last_steps(monkeypatch):
             self.values = {"mu": self.values["mu"] + np.float32(number)}
             places.append(self.values["mu"])
 
-    monkeypatch.setattr(size_search, "REFIT", 0.4)
-    monkeypatch.setattr(size_search, "AVERAGED", 0.1)
-    refitted = size_search.refit(SimpleNamespace(config=config, trained=np.arange(3)), Steps(), dict.fromkeys(range(3)))
+    monkeypatch.setattr(refit, "SHARE", 0.4)
+    monkeypatch.setattr("gsac.stages.train.fast.cpu.AVERAGED", 0.1)
+    refitted = Cpu().refit(SimpleNamespace(config=config, trained=np.arange(3)), Steps(), dict.fromkeys(range(3)))
     assert len(places) == 40
     np.testing.assert_allclose(refitted.values["mu"], np.mean(places[-4:], 0))
 
 
 @pytest.mark.slow
 def test_sizes_are_judged_as_they_are_handed_out(job_anywhere, monkeypatch):
-    levelled, judge, judged = trainer.levelled, size_search.judge, []
+    level_heights, judge, judged = trainer.level_heights, size_search.judge, []
 
     def marked(gaussians, rest, faces):
-        return replace(levelled(gaussians, rest, faces), rgb=np.full_like(gaussians.rgb, 0.25))
+        return replace(level_heights(gaussians, rest, faces), rgb=np.full_like(gaussians.rgb, 0.25))
 
     def watched(gaussians, *rest):
         judged.append(gaussians)
         return judge(gaussians, *rest)
 
     monkeypatch.setattr(size_search, "SIZES", (400, 40))
-    monkeypatch.setattr(trainer, "levelled", marked)
+    monkeypatch.setattr(trainer, "level_heights", marked)
     monkeypatch.setattr(size_search, "judge", watched)
     run(job_anywhere(gaussians="auto", frames=6, steps=12, pose_rounds=0, pose_test_steps=0))
     assert len(judged) == 2 and all((gaussians.rgb == 0.25).all() for gaussians in judged)
@@ -88,7 +89,7 @@ def test_sizes_are_judged_as_they_are_handed_out(job_anywhere, monkeypatch):
 @pytest.mark.slow
 def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywhere, monkeypatch):
     monkeypatch.setattr(size_search, "SIZES", (1200, 600, 60, 30))
-    monkeypatch.setattr(size_search, "REFIT", 0.13)
+    monkeypatch.setattr(refit, "SHARE", 0.13)
     made = job_anywhere(gaussians="auto", pose_test_steps=0)
     run(made)
     figures = json.loads((made.out / "metrics.json").read_text())
@@ -120,14 +121,14 @@ def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules
     run(made)
     curve = json.loads((made.out / "metrics.json").read_text())["size_curve"]
     assert [row["n_gaussians"] for row in curve] == [400, 40, 20]
-    rungs = [Rung(row["n_gaussians"], row["psnr_fg"], row["detail"]) for row in curve]
-    assert [row["n_gaussians"] for row in curve if row["chosen"]] == [choose(rungs).n_gaussians]
-    assert len(Gaussians.read(made.out / "avatar.npz")) == pytest.approx(choose(rungs).n_gaussians, abs=1)
+    scores = [SizeScore(row["n_gaussians"], row["psnr_fg"], row["detail"]) for row in curve]
+    assert [row["n_gaussians"] for row in curve if row["chosen"]] == [choose(scores).n_gaussians]
+    assert len(Gaussians.read(made.out / "avatar.npz")) == pytest.approx(choose(scores).n_gaussians, abs=1)
 
 
 @pytest.mark.slow
-def test_auto_without_held_out_frames_takes_a_fixed_size(job_anywhere, monkeypatch):
-    monkeypatch.setattr(size_search, "UNJUDGED", 700)
+def test_auto_without_held_out_frames_takes_the_largest_size(job_anywhere, monkeypatch):
+    monkeypatch.setattr(size_search, "SIZES", (700, 300))
     made = job_anywhere(gaussians="auto", frames=3, steps=5)
     run(made)
     assert json.loads((made.out / "metrics.json").read_text())["n_gaussians"] == 700

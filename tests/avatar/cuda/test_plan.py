@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.cuda import adjacency, structs, why_not
-from gsac.avatar.cuda.recipe import Recipe, draw
+from gsac.avatar.cuda.recipe import FROM_CONFIG, Recipe, draw_plan
 
 
 def test_importing_the_cuda_path_loads_nothing_heavy():
@@ -42,7 +42,7 @@ def test_structs_are_laid_out_alike_for_host_and_kernels(tmp_path):
 
 
 def test_the_plan_draws_what_the_cpu_recipe_draws():
-    drawn = draw(Recipe(steps=30, seed=5, coarse_share=0.5, mu_rate=1.5e-3), 7, 2)
+    drawn = draw_plan(Recipe(steps=30, seed=5, coarse_share=0.5, mu_rate=1.5e-3), 7, 2)
     random, left = np.random.default_rng(5), []
     for step in range(30):
         if not left:
@@ -55,11 +55,22 @@ def test_the_plan_draws_what_the_cpu_recipe_draws():
 
 def test_a_recipe_that_is_told_nothing_learns_nothing_counts_nothing_and_limits_nothing():
     plain = Recipe(steps=3)
-    drawn = draw(plain, 2, 1)
+    drawn = draw_plan(plain, 2, 1)
     assert (drawn.rates["centre"] == -1).all()
     assert not any(drawn.rates[name].any() for name in drawn.rates.dtype.names if name != "centre")
     assert (plain.ssim, plain.sobel, plain.mask, plain.pose_pull) == (0, 0, 0, 0)
     assert np.isinf([plain.needle, plain.largest, plain.reach]).all()
+
+
+def test_a_recipe_names_the_fields_that_a_configuration_lacks_instead_of_learning_without_them():
+    from types import SimpleNamespace
+
+    config = SimpleNamespace(**{name: 0.5 for name in FROM_CONFIG})
+    made = Recipe.of(config, steps=3, ssim=0.2)
+    assert (made.steps, made.ssim) == (3, 0.2) and all(getattr(made, name) == 0.5 for name in FROM_CONFIG if name != "ssim")
+    del config.mu_rate, config.reach
+    with pytest.raises(AttributeError, match="SimpleNamespace has no mu_rate, reach"):
+        Recipe.of(config, steps=3)
 
 
 def test_plans_of_the_other_trainers_hold_their_frames_and_rates():
@@ -70,7 +81,7 @@ def test_plans_of_the_other_trainers_hold_their_frames_and_rates():
     from gsac.avatar.cuda.rounds import Round, RoundsRecipe, RoundsTrainer
 
     def plan(kind, recipe, frames):
-        return kind.plan(SimpleNamespace(recipe=recipe, frames=frames), [None])
+        return kind.plan(SimpleNamespace(recipe=recipe, frames=frames), 1)
 
     still = plan(Aligner, AlignRecipe(steps=12, pose_rate=1e-3, pose_end=0.05), 3)
     assert still.order[:, 0].tolist() == [0] * 4 + [1] * 4 + [2] * 4 and (still.background == 1).all()
@@ -93,24 +104,24 @@ def test_plans_of_the_other_trainers_hold_their_frames_and_rates():
 
 
 def test_a_step_never_holds_a_frame_twice():
-    order = draw(Recipe(steps=50, batch=4), 6, 1).order
+    order = draw_plan(Recipe(steps=50, batch=4), 6, 1).order
     assert all(len(set(row)) == 4 for row in order)
-    assert draw(Recipe(steps=2, batch=4), 3, 1).order.shape == (2, 3)
+    assert draw_plan(Recipe(steps=2, batch=4), 3, 1).order.shape == (2, 3)
 
 
 def test_lists_hold_every_corner_weight_and_child_once():
     random = np.random.default_rng(0)
     faces, face = random.integers(0, 9, (20, 3)), random.integers(0, 20, 50)
-    start, item = adjacency.vertices_of(faces, face, 9)
+    start, item = adjacency.face_corners(faces, face, 9)
     assert sorted(item) == list(range(150))
     for v in range(9):
         mine = item[start[v]:start[v + 1]]
         assert (faces[face].reshape(-1)[mine] == v).all() and (np.diff(mine) > 0).all()
     index, weight = random.integers(0, 5, (30, 4)), random.random((30, 4)) * (random.random((30, 4)) > 0.3)
-    start, vertex, kept = adjacency.joints_of(index, weight, 5)
+    start, vertex, kept = adjacency.joint_vertices(index, weight, 5)
     for j in range(5):
         np.testing.assert_allclose(kept[start[j]:start[j + 1]].sum(), weight[index == j].sum())
     assert start[-1] == (weight != 0).sum() and len(vertex) == start[-1]
-    start, child = adjacency.children(np.array([-1, 0, 0, 1, 3]))
+    start, child = adjacency.joint_children(np.array([-1, 0, 0, 1, 3]))
     assert [list(child[start[j]:start[j + 1]]) for j in range(5)] == [[1, 2], [3], [], [4], []]
     assert list(adjacency.joint_levels(np.array([-1, 0, 0, 1, 3]))) == [0, 1, 1, 2, 3]

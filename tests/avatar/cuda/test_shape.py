@@ -17,7 +17,8 @@ def both():
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.figure import figure, start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast.cuda import body_arrays, recipe_of
+    from gsac.stages.train.fast.cuda import make_recipe
+    from gsac.stages.train.gpu import body_arrays
     from gsac.stages.train.poses.poses import Poses
 
     opened = []
@@ -30,7 +31,7 @@ def both():
         params = BodyParams.from_pose(pose, made.transl, np.zeros(body.num_betas), expression, camera.focal, camera.center)
         config = TrainConfig(steps=steps, expression_rate=1e-2, joint_rate=1e-3)
         task = SimpleNamespace(config=config, poses=Poses(body, params), trained=np.arange(4))
-        gaussians, recipe = start(made.body, 3000), recipe_of(config, 3000, batch=batch, offset_rate=0.0)
+        gaussians, recipe = start(made.body, 3000), make_recipe(config, 3000, batch=batch, offset_rate=0.0)
         arrays = body_arrays(task.poses, task.trained, recipe)
         trainer = CudaTrainer(arrays, [made.shots], task.poses.pose, task.poses.transl, gaussians, recipe)
         opened.append(trainer)

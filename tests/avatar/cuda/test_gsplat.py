@@ -20,10 +20,10 @@ def test_image_loss_and_gradients_are_those_of_gsplat(size, count):
     from gsac.benchmarks.gpu.check import LIMIT, PER_GAUSSIAN, SWAPS, cuda_step, relative
     from gsac.benchmarks.gpu.figure import figure, start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast.cuda import recipe_of
+    from gsac.stages.train.fast.cuda import make_recipe
 
     made = figure(3, *size, 3000)
-    gaussians, recipe = start(made.body, count), recipe_of(TrainConfig(sobel=0.1), count, steps=1, offset_rate=0.0)
+    gaussians, recipe = start(made.body, count), make_recipe(TrainConfig(sobel=0.1), count, steps=1, offset_rate=0.0)
     gaussians.light = np.float32([[0.7, 0.8, 0.7], [0.5, 0.3, 0.3], [-0.2, 0, 0.1], [0.3, 0.2, 0.2]])
     trainer = CudaTrainer(made.body, [made.shots], made.pose, made.transl, gaussians, recipe)
     shown, t, background = trainer.gaussians(), int(trainer.order[0, 0]), trainer.buffers["background"].read()[0, 0]

@@ -27,8 +27,9 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     from gsac.benchmarks.gpu.check import relative
     from gsac.benchmarks.gpu.figure import start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast.cuda import recipe_of
-    from gsac.stages.train.fast.trainer import GAIN_RATE, OFFSET_SHARE, Trainer
+    from gsac.stages.train.fast.cuda import make_recipe
+    from gsac.stages.train.fast.schedule import GAIN_RATE, OFFSET_SHARE
+    from gsac.stages.train.fast.trainer import Trainer
     from gsac.stages.train.gaussians.cloth_offsets import fold
     from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.views import View
@@ -45,7 +46,7 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     task = SimpleNamespace(config=TrainConfig(steps=steps, exposure=exposure), poses=Poses(body, params), trained=np.arange(4))
     gaussians = start(still.body, 2000)
     gaussians.light = LIGHT
-    cpu, recipe = Trainer(gaussians, task), recipe_of(task.config, 2000)
+    cpu, recipe = Trainer(gaussians, task), make_recipe(task.config, 2000)
     cuda = CudaTrainer(still.body, [still.shots], task.poses.pose, task.poses.transl, gaussians, recipe)
     backgrounds, losses = cuda.buffers["background"].read()[:, 0], []
     for step in range(steps):
@@ -78,8 +79,8 @@ def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_s
     from gsac.avatar.body import Body, BodyParams
     from gsac.benchmarks.gpu.check import relative
     from gsac.benchmarks.gpu.figure import start
-    from gsac.stages.train.fast import cuda
-    from gsac.stages.train.judge import heldout
+    from gsac.stages.train.fast.cpu import Cpu
+    from gsac.stages.train.fast.cuda import Cuda
     from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.views import View
 
@@ -90,9 +91,9 @@ def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_s
                                   camera.focal, camera.center)
     views, gaussians, moved = [View(camera, shot.pixels, (0, 0)) for shot in figure.shots], start(figure.body, 3000), []
     gaussians.log_scale[:, 0] += 3  # beyond recipe fast's limits, which must not touch a finished avatar
-    for align in (cuda.align_poses, heldout.align_poses):
+    for backend in (Cuda(), Cpu()):
         poses = Poses(body, params)
-        align(gaussians, poses, np.array([0, 1, 3]), views, 15)
+        backend.align_poses(gaussians, poses, np.array([0, 1, 3]), views, 15)
         assert (poses.pose[2] == poses.fit_pose[2]).all() and (poses.transl[2] == poses.fit_transl[2]).all()
         moved.append((poses.pose - poses.fit_pose, poses.transl - poses.fit_transl))
     for got, expected in zip(*moved, strict=True):
@@ -119,27 +120,29 @@ def turning(holdout=(), size=(101, 67), **values):
 
 def test_rounds_that_move_the_poses_end_as_with_the_cpus_learning():
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train.fast import cuda, prealign
+    from gsac.stages.train.fast import prealign
+    from gsac.stages.train.fast.cpu import Cpu
+    from gsac.stages.train.fast.cuda import Cuda
 
     found = []
-    for learning in (cuda.learning, prealign.learning_on_cpu):
+    for backend in (Cuda(), Cpu()):
         task = turning((2, 7), pose_rounds=4)
-        prealign.adjust(task, learning)
+        prealign.adjust(task, backend)
         found.append((task.poses.pose - task.poses.fit_pose, task.poses.transl - task.poses.fit_transl, task.poses.offset))
     for got, expected in zip(*found, strict=True):
         assert np.linalg.norm(expected) > 1e-3 and relative(got, expected) < 0.1
 
 
 def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_cpus():
-    from gsac.stages.train.fast import cuda
-    from gsac.stages.train.fast import trainer as fast
+    from gsac.stages.train.fast.cpu import Cpu
+    from gsac.stages.train.fast.cuda import Cuda
     from gsac.stages.train.judge.heldout import judge
 
     found = []
-    for train in (cuda.train, fast.train):
+    for backend in (Cuda(), Cpu()):
         task = turning(size=(160, 240), steps=300, gaussians=3000)
-        trainer, _, coarse = train(task, 3000)
-        gaussians, seen = trainer.recoloured(coarse)
+        trainer, _, coarse = backend.train(task, 3000)
+        gaussians, seen = trainer.finish(coarse)
         rows = judge(gaussians, task.poses, range(12), task.views)
         found.append((gaussians, seen, 10 * np.log10(1 / np.mean([row["mse_fg"] for row in rows]))))
     (ours, seen, quality), (theirs, expected, target) = found
@@ -152,17 +155,17 @@ def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_
 
 def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu():
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train.fast import cuda
-    from gsac.stages.train.fast import trainer as fast
+    from gsac.stages.train.fast.cpu import Cpu
+    from gsac.stages.train.fast.cuda import Cuda
     from gsac.stages.train.judge.heldout import judge
 
     found = []
-    for train in (cuda.train, fast.train):
+    for backend in (Cuda(), Cpu()):
         task = turning((5,), steps=300, gaussians=2000)
-        trainer, _, coarse = train(task, 2000)
+        trainer, _, coarse = backend.train(task, 2000)
         poses, moved = task.poses, task.poses.base_pose - task.poses.fit_pose
         assert np.abs(moved[5]).max() > 1e-4  # a frame that is not trained on is corrected with those around it
-        rows = judge(trainer.recoloured(coarse)[0], poses, task.trained, task.views)
+        rows = judge(trainer.finish(coarse)[0], poses, task.trained, task.views)
         found.append((moved, poses.base_transl - poses.fit_transl, 10 * np.log10(1 / np.mean([row["mse_fg"] for row in rows]))))
     (pose, transl, quality), (expected_pose, expected_transl, target) = found
     assert relative(pose, expected_pose) < 0.3 and relative(transl, expected_transl) < 0.3

@@ -1,4 +1,4 @@
-"""What the GPU's side of `train` refuses and promises without a GPU, and, where there is one, the stage's bytes."""
+"""The configuration of `train`: recipes and devices, what it tells the GPU, what it refuses; on a GPU, the bytes of the stage."""
 
 import json
 from dataclasses import fields
@@ -6,17 +6,37 @@ from dataclasses import fields
 import pytest
 
 from gsac.avatar.cuda import why_not
+from gsac.pipeline.keys import AUTO, DEVICES
+from gsac.pipeline.params import meanings
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.train import STAGE, config
 from gsac.stages.train.config import TrainConfig
-from gsac.stages.train.fast import trainer
-from gsac.stages.train.fast.cuda import STEPS, recipe_of
-from gsac.stages.train.recipes import RECIPES
+from gsac.stages.train.fast import schedule, size_search
+from gsac.stages.train.fast.cuda import STEPS, make_recipe
+from gsac.stages.train.paper import trainer as paper
+from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.stage import check_device, run
 
 
 def test_every_recipe_has_an_entry_for_every_device():
     assert set(RECIPES) == {(name, device) for name in config.RECIPES for device in config.DEVICES if device != config.AUTO}
+    assert {config.AUTO, *BACKENDS} == set(config.DEVICES) == {AUTO, *DEVICES}, "and the engine has the same devices"
+
+
+def test_the_docstrings_of_the_parameters_tell_the_full_size():
+    told = [text for text in meanings(TrainConfig).values() if f"{config.FULL_SIZE:,}" in text]
+    assert len(told) == 2 and size_search.SIZES[0] == config.FULL_SIZE == TrainConfig().budget()
+
+
+def test_the_docstring_of_the_steps_tells_those_of_each_recipe():
+    told = meanings(TrainConfig)["steps"]
+    assert all(str(steps) in told for steps in (schedule.STEPS, STEPS, paper.STEPS))
+
+
+def test_a_configuration_tells_whether_the_size_is_searched_and_with_how_many_it_begins():
+    assert TrainConfig().searches_size() and not TrainConfig(recipe="paper").searches_size()
+    given = TrainConfig(gaussians=700)
+    assert not given.searches_size() and given.budget() == 700
 
 
 @pytest.mark.parametrize("device", ["auto", "cpu", "cuda"])
@@ -33,16 +53,16 @@ def test_cuda_without_a_gpu_says_what_is_missing_and_what_to_do():
 
 
 def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
-    made = recipe_of(TrainConfig(mask=0.5, mu_rate=2e-3, exposure=True), 3000, batch=3)
+    made = make_recipe(TrainConfig(mask=0.5, mu_rate=2e-3, exposure=True), 3000, batch=3)
     assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, STEPS)
-    assert made.largest == trainer.largest(TrainConfig(), 3000) == TrainConfig().largest * 2
-    assert made.coarse_share * STEPS == trainer.coarse_steps(STEPS)
-    assert trainer.coarse_steps(STEPS) == trainer.coarse_steps(trainer.STEPS) > trainer.coarse_steps(400)
-    assert (made.offset_share, made.gain_rate) == (trainer.OFFSET_SHARE, trainer.GAIN_RATE)
-    assert recipe_of(TrainConfig(steps=7), 12000).steps == 7 and recipe_of(TrainConfig(), 12000).gain_rate == 0
+    assert made.largest == schedule.longest_axis(TrainConfig(), 3000) == TrainConfig().largest * 2
+    assert made.coarse_share * STEPS == schedule.coarse_steps(STEPS)
+    assert schedule.coarse_steps(STEPS) == schedule.coarse_steps(schedule.STEPS) > schedule.coarse_steps(400)
+    assert (made.offset_share, made.gain_rate) == (schedule.OFFSET_SHARE, schedule.GAIN_RATE)
+    assert make_recipe(TrainConfig(steps=7), 12000).steps == 7 and make_recipe(TrainConfig(), 12000).gain_rate == 0
     shared = {f.name for f in fields(TrainConfig)} & {f.name for f in fields(made)}
     config = TrainConfig(steps=9)
-    assert {n: getattr(recipe_of(config, 12000), n) for n in shared} == {n: getattr(config, n) for n in shared}
+    assert {n: getattr(make_recipe(config, 12000), n) for n in shared} == {n: getattr(config, n) for n in shared}
 
 
 def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_able(monkeypatch):

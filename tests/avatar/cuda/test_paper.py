@@ -39,9 +39,8 @@ def task_of(figure, **values):
 @pytest.fixture
 def trainers(figure):
     """trainers(batch, steps): the same start in a PaperTrainer and in the CPU's Trainer, and the CPU's views."""
-    from gsac.avatar.cuda.paper import PaperTrainer
-    from gsac.avatar.gaussians import Gaussians
-    from gsac.stages.train.fast.cuda import training
+    from gsac.avatar.cuda.paper import PaperGaussians, PaperTrainer
+    from gsac.stages.train.gpu import open_trainer
     from gsac.stages.train.paper import cuda as paper_cuda
     from gsac.stages.train.paper import trainer
     from gsac.stages.train.views import person_crop
@@ -54,14 +53,14 @@ def trainers(figure):
         cpu = trainer.Trainer(other, rng)
         shape = {name: v.shape for name, v in cpu.values.items()}
         cpu.values = {"mu": rng.normal(0, 0.1, shape["mu"]), "quat": rng.normal(size=shape["quat"]),
-                      "scale": rng.normal(-1.5, 0.7, shape["scale"]), "rgb": rng.normal(0.5, 0.3, shape["rgb"])}
+                      "scale_logit": rng.normal(-1.5, 0.7, shape["scale_logit"]), "rgb": rng.normal(0.5, 0.3, shape["rgb"])}
         cpu.values = {name: v.astype(np.float32) for name, v in cpu.values.items()}
-        v, start = cpu.values, paper_cuda.start(len(cpu.face), rng)
-        recipe = paper_cuda.recipe_of(task)
+        v, start = cpu.values, paper_cuda.init_gaussians(len(cpu.face), rng)
+        recipe = paper_cuda.make_recipe(task)
         recipe.batch = batch
         views = {t: person_crop(view) for t, view in enumerate(task.views)}
-        gaussians = Gaussians(cpu.face, v["mu"], v["quat"], v["scale"], v["rgb"], start.opacity)
-        context = training(task.poses, task.trained, [views], gaussians, recipe, PaperTrainer)
+        gaussians = PaperGaussians(cpu.face, v["mu"], v["quat"], v["scale_logit"], v["rgb"], start.opacity)
+        context = open_trainer(PaperTrainer, task.poses, task.trained, [views], gaussians, recipe)
         cuda = context.__enter__()
         opened.append(context)
         cpu.rng = SimpleNamespace(random=iter(cuda.buffers["background"].read().reshape(-1, 3)).__next__)

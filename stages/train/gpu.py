@@ -1,0 +1,97 @@
+"""What recipes `fast` and `paper` share of driving the GPU: opening a trainer, following its steps, taking back what it learned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+import numpy as np
+
+from gsac.avatar.cuda.arrays import BodyArrays, Shot
+from gsac.avatar.cuda.device import DeviceError
+from gsac.avatar.cuda.kernels import CompileError
+from gsac.avatar.cuda.paper import PaperGaussians
+from gsac.avatar.cuda.recipe import Recipe
+from gsac.avatar.cuda.trainer import CudaTrainer
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.lpips import Lpips
+from gsac.stages.contract import StageError
+from gsac.stages.train.finite import require_finite
+from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.task import Task
+from gsac.stages.train.views import View
+
+LPIPS_STEPS = 200
+"""Steps, the last of a training or a refit, that have LPIPS of a window where it is in the loss: 2.3 ms more each."""
+
+Kind = TypeVar("Kind", bound=CudaTrainer)
+
+
+@contextmanager
+def open_trainer(kind: type[Kind], poses: Poses, frames: np.ndarray, levels: list[dict[int, View]],
+                 gaussians: Gaussians | PaperGaussians, recipe: Recipe, network: Lpips | None = None) -> Iterator[Kind]:
+    """A trainer over frames, (n,) indices, that is closed at the end. Raises StageError where the GPU fails.
+
+    levels: frame -> view, coarse first; network: for the loss.
+    """
+    trainer = None
+    try:
+        shots = [[Shot(view.pixels, view.camera, view.corner) for view in (views[int(t)] for t in frames)] for views in levels]
+        trainer = kind(body_arrays(poses, frames, recipe), shots, poses.pose[frames], poses.transl[frames], gaussians,
+                       recipe, network=network)
+        yield trainer
+    except (DeviceError, CompileError) as error:
+        raise StageError(f"train on the GPU: {error}; or set train.device to cpu") from error
+    finally:
+        if trainer is not None:
+            trainer.close()
+
+
+def body_arrays(poses: Poses, frames: np.ndarray, recipe: Recipe) -> BodyArrays:
+    """The body for frames, (n,) indices: each rest shape once, the first frame's first, with what the recipe learns of it."""
+    body, rests, rest_of, known = poses.body, [], [], {}
+    for t in frames:
+        vertices, joints = poses.rest(int(t))
+        vertices = vertices + poses.offset
+        at = known.setdefault(vertices.tobytes(), len(rests))
+        if at == len(rests):
+            rests.append(vertices)
+        rest_of.append(at)
+    arrays = BodyArrays(np.stack(rests), np.array(rest_of), joints, np.asarray(body.parents), body.skin_index, body.skin_weight,
+                        np.asarray(body.faces), expression=body.exprdirs if recipe.expression_rate else None)
+    if not recipe.beta_rate:
+        return arrays
+    shape = body.shapedirs[:, :, :len(poses.betas)]
+    return arrays._replace(shape=shape, joint_shape=np.tensordot(body.J_regressor, shape, 1))
+
+
+def train_until(trainer: CudaTrainer, task: Task, until: int) -> None:
+    """Trains up to a step, and stops at every mark on the way to report the losses and hand back the poses."""
+    steps, done = trainer.recipe.steps, trainer.state().step
+    if done == until:
+        return  # of very few steps none may be left
+    for stop in [*(mark for mark in task.marks(steps) if done < mark < until), until]:
+        trainer.train(stop - done)
+        losses = trainer.losses()[done:].mean(1)
+        require_finite(f"at step {done + int(np.argmin(np.isfinite(losses)))}", {"loss": losses})
+        hand_back(trainer, task)
+        for step, loss in enumerate(losses, done + 1):
+            task.checkpoint(step, steps, float(loss), trainer.gaussians, task.gpu_seconds + trainer.seconds)
+        task.progress(stop, steps, "steps")
+        done = stop
+
+
+def hand_back(trainer: CudaTrainer, task: Task) -> None:
+    """Copies poses, and what else of the body is learned, from the GPU into task.poses."""
+    poses = task.poses
+    poses.pose[task.trained], poses.transl[task.trained] = trainer.poses()
+    poses.offset = trainer.offset()
+    if trainer.recipe.beta_rate:
+        poses.betas = np.array(poses.params.betas, np.float64) + trainer.betas()
+        poses.forget_rests()
+    if trainer.recipe.expression_rate:
+        poses.expression[task.trained] = trainer.expressions()
+        poses.forget_expressions()
+    if trainer.recipe.joint_rate:
+        poses.joint_offset = trainer.joint_offset()
