@@ -16,7 +16,8 @@ from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/**/*.md"), ROOT / "unity" / "README.md"})
+PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/**/*.md"), *ROOT.glob("tools/*.md"),
+                ROOT / "unity" / "README.md"})
 REFERENCE = ROOT / "docs" / "cli.md"
 """Written from the commands themselves; `[...]` in it is no command line."""
 GUIDES = [page for page in PAGES if page.parent in (ROOT, ROOT / "docs", ROOT / "docs" / "lab") and page != REFERENCE]
