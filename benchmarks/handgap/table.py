@@ -7,7 +7,8 @@ from pathlib import Path
 
 import matplotlib
 
-from gsac.stages.handgap.config import METHODS, HandgapConfig
+from gsac.stages.handgap.config import HandgapConfig
+from gsac.stages.handgap.fill import METHODS
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402

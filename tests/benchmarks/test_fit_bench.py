@@ -10,7 +10,7 @@ from gsac.benchmarks.fit import bench, chart, hidden, table
 from gsac.benchmarks.fit.clips import prepare_case
 from gsac.benchmarks.fit.trial import FitTrial
 from gsac.stages.contract import BadInput
-from gsac.stages.handgap.config import METHODS
+from gsac.stages.handgap.fill import METHODS
 
 
 def trial(clip, method, given, seconds, mm):
