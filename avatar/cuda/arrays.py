@@ -56,6 +56,7 @@ class OnFaces(Protocol):
 
     def __len__(self) -> int:
         """N."""
+        ...
 
 
 class Arrays:
