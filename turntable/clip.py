@@ -17,6 +17,7 @@ from gsac.avatar import wholebody
 from gsac.avatar.artifacts import write_arrays, write_frame
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
+from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, WRISTS, J
 from gsac.avatar.skinning import joint_transforms
 from gsac.avatar.zbuffer import visible_points
 from gsac.turntable.appearance import make_appearance
@@ -27,7 +28,7 @@ from gsac.turntable.render import SHADOW, Picture, Studio
 from gsac.turntable.room import make_lighting, make_room
 from gsac.turntable.viewpoint import Viewpoint, look_at
 
-FEET = [7, 8, 10, 11]
+FEET = [INDEX["left_ankle"], INDEX["right_ankle"], INDEX["left_foot"], INDEX["right_foot"]]
 """Joints of ankles and balls of the feet."""
 HIDDEN_SHARE = 0.10
 """A hand counts as hidden when a smaller share of its vertices is visible."""
@@ -152,9 +153,8 @@ class TruthRecorder:
         self.keypoints = np.empty((frames, 133, 2), np.float32)
         self.visible = np.zeros((frames, 133), bool)
         self.hidden = np.zeros((frames, 2), bool)
-        first = {"left": (20, 25), "right": (21, 40)}
-        self.hands = [np.flatnonzero(person.body.weights[:, [wrist, *range(j, j + 15)]].sum(1) > 0.6)
-                      for wrist, j in first.values()]
+        self.hands = [np.flatnonzero(person.body.weights[:, [wrist, *range(J)[fingers]]].sum(1) > 0.6)
+                      for wrist, fingers in zip(WRISTS, (LEFT_HAND, RIGHT_HAND), strict=True)]
 
     def add(self, t: int, bare: np.ndarray, joints: np.ndarray, picture: Picture) -> None:
         """Records frame t. bare: (V, 3) m, bare body; joints: (55, 3) m; both in the camera frame."""

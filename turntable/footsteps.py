@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gsac.avatar.joints import INDEX
+
 STEPS = 8
 """Steps of each foot in a full turn."""
 SWING = 0.4
@@ -18,16 +20,15 @@ BEND = 0.005
 """m by which the hips are lower than on straight legs."""
 
 
-def plant_feet(pose: np.ndarray, index: dict[str, int], joints: np.ndarray, yaw: np.ndarray, place: np.ndarray,
-               turns: np.ndarray) -> None:
+def plant_feet(pose: np.ndarray, joints: np.ndarray, yaw: np.ndarray, place: np.ndarray, turns: np.ndarray) -> None:
     """Sets hips, knees and ankles of pose (T, 55, 3), in place.
 
-    index: joint by name; joints: (55, 3) m, T-pose; yaw: (T,) rad; place: (T, 2) m, world x and z of the pelvis;
+    joints: (55, 3) m, T-pose; yaw: (T,) rad; place: (T, 2) m, world x and z of the pelvis;
     turns: (T, 3, 3), the pelvis' rotation in the world.
     """
-    pelvis = joints[index["pelvis"]]
-    legs = {side: [joints[index[f"{side}_{part}"]] for part in ("hip", "knee", "ankle")] for side in ("left", "right")}
-    stance = {side: _find_stance(pose[0], index, leg, pelvis, side) for side, leg in legs.items()}
+    pelvis = joints[INDEX["pelvis"]]
+    legs = {side: [joints[INDEX[f"{side}_{part}"]] for part in ("hip", "knee", "ankle")] for side in ("left", "right")}
+    stance = {side: _find_stance(pose[0], leg, pelvis, side) for side, leg in legs.items()}
     height = min(_reach(leg, stance[side][1], pelvis) for side, leg in legs.items()) - BEND
     for (side, leg), phase in zip(legs.items(), (0.0, 0.5), strict=True):
         foot, rise = _steps(yaw, phase)
@@ -40,14 +41,14 @@ def plant_feet(pose: np.ndarray, index: dict[str, int], joints: np.ndarray, yaw:
             thigh, shank = _two_bones(leg, hip, target, toes[:, 2])
             local = turns[t].T @ thigh, thigh.T @ shank, shank.T @ toes
             for part, turn in zip(("hip", "knee", "ankle"), local, strict=True):
-                pose[t, index[f"{side}_{part}"]] = Rotation.from_matrix(turn).as_rotvec()
+                pose[t, INDEX[f"{side}_{part}"]] = Rotation.from_matrix(turn).as_rotvec()
 
 
-def _find_stance(pose: np.ndarray, index: dict[str, int], leg: list, pelvis: np.ndarray, side: str) -> tuple[float, np.ndarray]:
+def _find_stance(pose: np.ndarray, leg: list, pelvis: np.ndarray, side: str) -> tuple[float, np.ndarray]:
     """A foot in the A-pose: its outward turn, rad, and x and z (2,) m of its ankle from the pelvis."""
-    hip = Rotation.from_rotvec(pose[index[f"{side}_hip"]])
+    hip = Rotation.from_rotvec(pose[INDEX[f"{side}_hip"]])
     ankle = leg[0] - pelvis + hip.apply(leg[2] - leg[0])
-    return float(pose[index[f"{side}_hip"], 1]), ankle[[0, 2]]
+    return float(pose[INDEX[f"{side}_hip"], 1]), ankle[[0, 2]]
 
 
 def _reach(leg: list, ankle: np.ndarray, pelvis: np.ndarray) -> float:

@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.body import Body
+from gsac.avatar.joints import INDEX, J
 from gsac.avatar.skinning import joint_transforms
 from gsac.turntable.footsteps import plant_feet
 from gsac.turntable.options import TurntableOptions
@@ -39,61 +40,58 @@ def make_motion(body: Body, joints: np.ndarray, options: TurntableOptions, rng: 
 def _make_turn(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
     """One uneven turn in the A-pose."""
     T = options.frames
-    index = {name: i for i, name in enumerate(body.joint_names)}
     s = np.arange(T) / T
     uneven = options.sway * (0.018 * np.sin(2 * np.pi * (2 * s + rng.random())) + 0.009 * np.sin(
         2 * np.pi * (5 * s + rng.random())))
     yaw = 2 * np.pi * (s + uneven - uneven[0])
-    pose = np.repeat(make_a_pose(body, rng)[None], T, 0)
-    stir(pose, index, options.arm_swing, rng)
+    pose = np.repeat(make_a_pose(rng)[None], T, 0)
+    stir(pose, options.arm_swing, rng)
     if options.feet == "turning":
-        lift_feet(pose, index, yaw, options.sway)
+        lift_feet(pose, yaw, options.sway)
     if options.hidden_hand != "none":
-        hide_hand(pose, index, body.parents, joints, options)
+        hide_hand(pose, body.parents, joints, options)
     turns = Rotation.from_euler("YX", np.stack([yaw, smooth_noise(rng, T, 0.015 * options.sway)], 1))
     pose[:, 0] = turns.as_rotvec()
     place = np.stack([smooth_noise(rng, T, 0.03 * options.sway), smooth_noise(rng, T, 0.03 * options.sway)], 1)
     if options.feet == "planted":
-        plant_feet(pose, index, joints, yaw, place, turns.as_matrix())
+        plant_feet(pose, joints, yaw, place, turns.as_matrix())
     return Motion(pose, place, yaw, make_expressions(body, options, rng))
 
 
 def _make_novel(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
     """`NOVEL_POSES` one after another, smoothly blended, while the yaw swings slowly."""
     T = options.frames
-    index = {name: i for i, name in enumerate(body.joint_names)}
-    rest = make_a_pose(body, rng)
-    keys = [_change_pose(rest, index, change) for change in NOVEL_POSES]
+    rest = make_a_pose(rng)
+    keys = [_change_pose(rest, change) for change in NOVEL_POSES]
     at = np.linspace(0, len(keys), T, endpoint=False)
     first = at.astype(int)
     blend = _smooth(np.clip((at - first - 0.35) / 0.65, 0, 1))[:, None, None]
     keys = np.stack(keys)
     pose = keys[first] * (1 - blend) + keys[(first + 1) % len(keys)] * blend
-    stir(pose, index, options.arm_swing, rng)
+    stir(pose, options.arm_swing, rng)
     yaw = 0.9 * np.sin(2 * np.pi * np.arange(T) / T * 2 + rng.random())
     lean = pose[:, 0].copy()
     pose[:, 0] = (Rotation.from_euler("Y", yaw[:, None]) * Rotation.from_rotvec(lean)).as_rotvec()
     return Motion(pose, np.zeros((T, 2)), yaw, make_expressions(body, options, rng))
 
 
-def make_a_pose(body: Body, rng: np.random.Generator) -> np.ndarray:
+def make_a_pose(rng: np.random.Generator) -> np.ndarray:
     """A-pose (55, 3) axis-angle: arms 25-35 degrees from the body, elbows and fingers slightly bent, feet apart."""
-    index = {name: i for i, name in enumerate(body.joint_names)}
-    pose = np.zeros((len(index), 3))
+    pose = np.zeros((J, 3))
     away = np.radians(rng.uniform(25, 35))
     feet = np.radians(rng.uniform(-4, -2))  # the T-pose stands astride
     for side, sign in SIDES.items():
-        pose[index[f"{side}_collar"]] = [0, 0, -sign * 0.06]
-        pose[index[f"{side}_shoulder"]] = (
+        pose[INDEX[f"{side}_collar"]] = [0, 0, -sign * 0.06]
+        pose[INDEX[f"{side}_shoulder"]] = (
             Rotation.from_euler("z", -sign * (np.pi / 2 - away - 0.06)) * Rotation.from_euler("x", 0.1)).as_rotvec()
-        pose[index[f"{side}_elbow"]] = [0, -sign * rng.uniform(0.22, 0.34), 0]
-        pose[index[f"{side}_hip"]] = [0, sign * 0.1, sign * feet]
-        pose[index[f"{side}_ankle"]] = [0, 0.05 * sign, -sign * feet]
+        pose[INDEX[f"{side}_elbow"]] = [0, -sign * rng.uniform(0.22, 0.34), 0]
+        pose[INDEX[f"{side}_hip"]] = [0, sign * 0.1, sign * feet]
+        pose[INDEX[f"{side}_ankle"]] = [0, 0.05 * sign, -sign * feet]
         for finger, curl in (("index", 0.16), ("middle", 0.2), ("ring", 0.24), ("pinky", 0.26)):
             for k, share in ((1, 1.0), (2, 1.5), (3, 0.8)):
-                pose[index[f"{side}_{finger}{k}"]] = [0, 0, -sign * curl * share * rng.uniform(0.8, 1.2)]
-        pose[index[f"{side}_thumb2"]] = [0, -sign * 0.15, 0]
-        pose[index[f"{side}_thumb3"]] = [0, -sign * 0.2, 0]
+                pose[INDEX[f"{side}_{finger}{k}"]] = [0, 0, -sign * curl * share * rng.uniform(0.8, 1.2)]
+        pose[INDEX[f"{side}_thumb2"]] = [0, -sign * 0.15, 0]
+        pose[INDEX[f"{side}_thumb3"]] = [0, -sign * 0.2, 0]
     return pose
 
 
@@ -102,29 +100,28 @@ STIR = {"spine1": 1.0, "spine2": 1.0, "spine3": 1.2, "neck": 1.6, "head": 2.4, "
 """Joint -> standard deviation of its small motion about each axis, degrees."""
 
 
-def stir(pose: np.ndarray, index: dict[str, int], amount: float, rng: np.random.Generator) -> None:
-    """Adds smooth small motion to pose (T, 55, 3), in place. index: joint by name; amount: factor on `STIR`."""
-    for name, i in index.items():
+def stir(pose: np.ndarray, amount: float, rng: np.random.Generator) -> None:
+    """Adds smooth small motion to pose (T, 55, 3), in place. amount: factor on `STIR`."""
+    for name, i in INDEX.items():
         degrees = STIR.get(name.removeprefix("left_").removeprefix("right_"))
         if degrees:
             for axis in range(3):
                 pose[:, i, axis] += smooth_noise(rng, len(pose), np.radians(degrees) * amount)
 
 
-def lift_feet(pose: np.ndarray, index: dict[str, int], yaw: np.ndarray, amount: float) -> None:
+def lift_feet(pose: np.ndarray, yaw: np.ndarray, amount: float) -> None:
     """Adds small steps on the spot, one every 30 degrees, left and right alternately.
 
     pose: (T, 55, 3), changed in place; yaw: (T,) rad; amount: factor on the height of the steps.
     """
     for side, phase in (("left", 0.0), ("right", np.pi)):
         lift = amount * np.clip(np.sin(6 * yaw + phase), 0, None) ** 2
-        pose[:, index[f"{side}_hip"], 0] -= 0.16 * lift
-        pose[:, index[f"{side}_knee"], 0] += 0.34 * lift
-        pose[:, index[f"{side}_ankle"], 0] -= 0.10 * lift
+        pose[:, INDEX[f"{side}_hip"], 0] -= 0.16 * lift
+        pose[:, INDEX[f"{side}_knee"], 0] += 0.34 * lift
+        pose[:, INDEX[f"{side}_ankle"], 0] -= 0.10 * lift
 
 
-def hide_hand(pose: np.ndarray, index: dict[str, int], parents: np.ndarray, joints: np.ndarray,
-              options: TurntableOptions) -> None:
+def hide_hand(pose: np.ndarray, parents: np.ndarray, joints: np.ndarray, options: TurntableOptions) -> None:
     """Moves one hand behind the back, or in front of the belly, between the times `options.hidden`.
 
     pose: (T, 55, 3), changed in place; parents: (55,) of the joints; joints: (55, 3) m, T-pose.
@@ -133,15 +130,15 @@ def hide_hand(pose: np.ndarray, index: dict[str, int], parents: np.ndarray, join
     sign = SIDES[side]
     back = where == "back"
     depth = -0.12 if back else 0.19
-    target = joints[index["spine1"]] + [sign * 0.10, 0.0, depth]
-    chain = [index[f"{side}_{name}"] for name in ("shoulder", "elbow", "wrist")]
-    hand, knuckle, elbow = chain[2], index[f"{side}_middle1"], chain[1]
+    target = joints[INDEX["spine1"]] + [sign * 0.10, 0.0, depth]
+    chain = [INDEX[f"{side}_{name}"] for name in ("shoulder", "elbow", "wrist")]
+    hand, knuckle, elbow = chain[2], INDEX[f"{side}_middle1"], chain[1]
     start = pose[0].copy()
     start[0] = 0
     aim = start[chain].copy()
     aim[0] = Rotation.from_euler("zy", [-sign * 1.15, sign * (0.4 if back else -0.3)]).as_rotvec()
     aim[1] = [0, -sign * 1.6, 0] if not back else [0, -sign * 1.2, 0]
-    shoulder = joints[index[f"{side}_shoulder"]]
+    shoulder = joints[INDEX[f"{side}_shoulder"]]
     elbow_goal = shoulder + [sign * 0.17, -0.22, -0.12 if back else 0.02]
 
     def residuals(x: np.ndarray) -> np.ndarray:
@@ -208,16 +205,16 @@ def _smooth(x: np.ndarray) -> np.ndarray:
     return x * x * (3 - 2 * x)
 
 
-def _change_pose(rest: np.ndarray, index: dict[str, int], change: dict[str, tuple]) -> np.ndarray:
+def _change_pose(rest: np.ndarray, change: dict[str, tuple]) -> np.ndarray:
     """rest (55, 3) with the named joints set; a name without a side sets both, mirrored."""
     pose = rest.copy()
     for name, rotvec in change.items():
         rotvec = np.radians(np.asarray(rotvec, float))
-        if name in index:
-            pose[index[name]] = rotvec
+        if name in INDEX:
+            pose[INDEX[name]] = rotvec
             continue
-        pose[index[f"left_{name}"]] = rotvec
-        pose[index[f"right_{name}"]] = rotvec * [1, -1, -1]
+        pose[INDEX[f"left_{name}"]] = rotvec
+        pose[INDEX[f"right_{name}"]] = rotvec * [1, -1, -1]
     return pose
 
 

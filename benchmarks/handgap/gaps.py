@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,7 +62,7 @@ def fill_window(clip: HandClip, window: Window, method: str) -> tuple[np.ndarray
     return out, np.hypot(full, drift)
 
 
-def measure(clips: dict[str, HandClip], methods: Sequence[str] = METHODS, gaps: Sequence[int] = GAPS, inside: int = 3,
+def measure(clips: dict[str, HandClip], methods: Collection[str] = METHODS, gaps: Sequence[int] = GAPS, inside: int = 3,
             seed: int = 0) -> list[dict]:
     """One row a clip, window, hand and method: palm errors against the truth, and jumps at the gap's start and end."""
     rows = []

@@ -10,6 +10,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.blend import BLUR, MAX_ALPHA, MIN_ALPHA
 from gsac.avatar.camera import Camera
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.joints import INDEX
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.gpu import Gpu, Job, Parameters, projection
 from gsac.benchmarks.unity.packing import pack_avatar
@@ -110,7 +111,7 @@ class Frame:
         views = []
         for side in (-.5, .5):
             view = np.eye(4)
-            view[:3, 3] = side * -EYES_APART, -self.avatar.joints[9, 1], -distance
+            view[:3, 3] = side * -EYES_APART, -self.avatar.joints[INDEX["spine3"], 1], -distance
             views.append(view.T)
         rule = [BLUR, MAX_ALPHA, MIN_ALPHA, 0]
         return {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(camera).T] * 2,
