@@ -52,8 +52,8 @@ def vertex_neighbours(faces: np.ndarray, vertices: int) -> tuple[np.ndarray, np.
 
 @lru_cache(maxsize=2)  # a fit asks for those of its body time and again
 def _vertex_neighbours(faces: bytes, vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    faces = np.frombuffer(faces, np.int64).reshape(-1, 3)
-    i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
+    corners = np.frombuffer(faces, np.int64).reshape(-1, 3)
+    i, j = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]).T
     owner, near = distinct_pairs(np.r_[i, j], np.r_[j, i], vertices)
     start = _starts(owner, vertices)
     start.flags.writeable = near.flags.writeable = False

@@ -57,6 +57,7 @@ class OnFaces(Protocol):
 
     def __len__(self) -> int:
         """N."""
+        ...
 
 
 class Arrays:

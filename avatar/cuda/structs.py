@@ -61,12 +61,22 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
 five are LPIPS' (perceptual.cuh), the last three belong to expressions and joints at rest (shape.cuh)."""
 
 
-def _struct(name: str, fields: dict) -> type[ctypes.Structure]:
-    return type(name, (ctypes.Structure,), {"_fields_": list(fields.items())})
+class Frame(ctypes.Structure):
+    _fields_ = list(FRAME.items())
 
 
-Frame, Plan, State = _struct("Frame", FRAME), _struct("Plan", PLAN), _struct("State", STATE)
-Scene = _struct("Scene", {name: ctypes.c_void_p for name in POINTERS} | NUMBERS)
+class Plan(ctypes.Structure):
+    _fields_ = list(PLAN.items())
+
+
+class State(ctypes.Structure):
+    _fields_ = list(STATE.items())
+
+
+class Scene(ctypes.Structure):
+    """What every kernel is given, by value: addresses of the buffers, sizes and weights."""
+
+    _fields_ = [(name, ctypes.c_void_p) for name in POINTERS] + list(NUMBERS.items())
 
 
 def declarations() -> str:

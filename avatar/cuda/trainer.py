@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from typing import Any
 
 import numpy as np
 
@@ -213,8 +214,8 @@ class CudaTrainer:
     def _upload_gaussians(self, values: dict[str, np.ndarray]) -> None:
         upload_gaussians(self.arrays, values, self.face, self.light, self.body)
 
-    def _values(self, gaussians: Gaussians) -> dict[str, np.ndarray]:
-        """Buffer's name -> its content, (N, ...)."""
+    def _values(self, gaussians: Any) -> dict[str, np.ndarray]:
+        """Buffer's name -> its content, (N, ...). gaussians: those that this kind of trainer starts from."""
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
                 "logit": opacity_logit(gaussians.opacity), "start": gaussians.mu}
 

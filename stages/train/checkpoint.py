@@ -80,6 +80,7 @@ class HasState(Protocol):
 
     def state(self) -> State:
         """The state, to be restored from."""
+        ...
 
 
 def loop_state(step: int, order: list[int], rng: np.random.Generator, trainer: HasState) -> State:

@@ -103,7 +103,7 @@ class TrainConfig:
 
     def budget(self) -> int:
         """Gaussians of recipe `fast`: as many as asked for, or those that the size search starts from."""
-        return FULL_SIZE if self.gaussians == AUTO else self.gaussians
+        return self.gaussians if isinstance(self.gaussians, int) else FULL_SIZE
 
     def check(self) -> None:
         """Raises BadInput that names the first value that cannot be."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from gsac.avatar.gaussians import FIELDS, Gaussians
@@ -10,7 +12,7 @@ from gsac.stages.contract import StageError
 from gsac.stages.train.poses.poses import Poses
 
 
-def require_finite(when: str, quantities: dict[str, np.ndarray | float | None]) -> None:
+def require_finite(when: str, quantities: Mapping[str, np.ndarray | float | None]) -> None:
     """Raises StageError that names the first quantity with a number that is not finite.
 
     when: `at step 3`; quantities: name -> (...), a scalar, or None, which passes.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ class Fit:
     """(N,) bool, whether training frames show the gaussian; the colour of the others is a guess."""
     gains: dict[int, np.ndarray] = field(default_factory=dict)
     """Frame -> (3,) learned gain per channel, where exposure is learned."""
-    figures: dict = field(default_factory=dict)
+    figures: dict[str, Any] = field(default_factory=dict)
     """The recipe's own entries of metrics.json."""
     coarser: list[Gaussians] = field(default_factory=list)
     """Coarser levels of detail, the finest of them first."""

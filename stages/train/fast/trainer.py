@@ -17,6 +17,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import logit, sigmoid
 from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, side_by_side
+from gsac.stages.train.checkpoint import State
 from gsac.stages.train.fast.schedule import GAIN_RATE, LATE_REACH, OFFSET_RATE, OFFSET_SHARE, longest_axis
 from gsac.stages.train.fast.start import centres_at_rest
 from gsac.stages.train.finite import named_gradients, named_pose, require_finite
@@ -69,14 +70,14 @@ class Trainer:
         """m at rest that a gaussian may move away from its start."""
         return self.config.reach * (1 if self.seen is None else LATE_REACH)
 
-    def state(self) -> dict:
+    def state(self) -> State:
         """For a checkpoint, without the poses."""
         return {name: getattr(self, name) for name in KEPT} | {
             "gains": {str(t): gain for t, gain in self.gains.items()},
             "offsets": self.offsets and self.offsets.state()}
 
     @classmethod
-    def from_state(cls, state: dict, task: Task) -> Trainer:
+    def from_state(cls, state: State, task: Task) -> Trainer:
         """The trainer that `state` was called on."""
         v = state["values"]
         made = cls(Gaussians(state["face"], v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity_logit"][:, 0])), task)
@@ -103,9 +104,9 @@ class Trainer:
         if not self.frozen_body:
             grad_rest, grad_joints = self.poses.step(t, grads.vertices, self.pose_rate * 0.01**done, config.pose_pull)
             self._shape_body(t, grad_rest, grad_joints, done)
-        if self.offsets:
-            self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
-            self.poses.offset = self.offsets.offset
+            if self.offsets:
+                self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
+                self.poses.offset = self.offsets.offset
         if config.exposure:
             gain = self.gains.get(t, np.ones(3))
             self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)

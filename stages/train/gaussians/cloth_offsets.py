@@ -17,6 +17,7 @@ from gsac.avatar.binding import bind, face_frames, unbind
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import FINGERS
+from gsac.stages.train.checkpoint import State
 
 SMOOTHNESS = 30.0
 """lambda: a step spreads over about its square root of edges. Fingers are not displaced; they are thin, and their error is pose."""
@@ -42,11 +43,11 @@ class Offsets:
         self.first, self.second = np.zeros((vertices, 3)), 0.0
         self.gathered, self.seen, self.count = np.zeros((vertices, 3)), 0, 0
 
-    def state(self) -> dict:
+    def state(self) -> State:
         """For a checkpoint."""
         return {name: getattr(self, name) for name in KEPT}
 
-    def restore(self, state: dict) -> None:
+    def restore(self, state: State) -> None:
         """Takes the place of the Offsets that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])

@@ -19,7 +19,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import sigmoid
 from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backward, screen_gradients
 from gsac.avatar.threads import Workspace
-from gsac.stages.train.checkpoint import loop_state
+from gsac.stages.train.checkpoint import State, loop_state
 from gsac.stages.train.finite import named_gradients, named_pose, require_finite
 from gsac.stages.train.gaussians.kernels import adam, on_background, through_background
 from gsac.stages.train.paper.densify import LARGEST, Densifier
@@ -85,13 +85,13 @@ class Trainer:
         self.workspace, self.losses = Workspace(), Workspace()
         self.rng = rng
 
-    def state(self) -> dict:
+    def state(self) -> State:
         """For a checkpoint, without the poses."""
         return {name: getattr(self, name) for name in KEPT} | {
             "frames": self.frames._asdict(), "neighbours": self.neighbours.index,
             "length": self.densifier.length, "hits": self.densifier.hits}
 
-    def restore(self, state: dict) -> None:
+    def restore(self, state: State) -> None:
         """Takes the place of the trainer that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])

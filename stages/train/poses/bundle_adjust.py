@@ -119,7 +119,7 @@ class Corrections:
 
 def are_apart(global_orient: np.ndarray) -> bool:
     """Whether most views are not near to the next one. global_orient: (T, 3) axis-angle."""
-    return len(global_orient) > 1 and np.mean(is_near(global_orient[:-1], global_orient[1:])) < MOSTLY
+    return len(global_orient) > 1 and bool(np.mean(is_near(global_orient[:-1], global_orient[1:])) < MOSTLY)
 
 
 def covariance(frames: int) -> np.ndarray:

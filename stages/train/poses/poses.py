@@ -10,6 +10,7 @@ import numpy as np
 from gsac.avatar.body import Body, BodyParams, split_pose
 from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.skinning import joint_transforms, skin, skin_backward
+from gsac.stages.train.checkpoint import State
 from gsac.stages.train.holdout import carry_corrections
 from gsac.stages.train.poses.interpolate import follow_neighbours
 
@@ -87,11 +88,11 @@ class Poses:
         other.expression_moments = np.zeros_like(self.expression_moments)
         return other
 
-    def state(self) -> dict:
+    def state(self) -> State:
         """All that training changes, for a checkpoint."""
         return {name: getattr(self, name) for name in KEPT}
 
-    def restore(self, state: dict) -> None:
+    def restore(self, state: State) -> None:
         """Takes the place of the Poses that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])
