@@ -186,8 +186,7 @@ def smoothing_sigma(names: tuple[str, ...], lids: float, mouth: float, slow: flo
 
 
 def smooth(c: np.ndarray, times: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """c: (T, E); times: (T,) s, rising; sigma: (E,) s. Returns (T, E): the mean over time, weighted by Gaussians of these
-    sigmas."""
+    """c: (T, E); times: (T,) s, rising; sigma: (E,) s. Returns (T, E): the mean over time, weighted by Gaussians of sigma."""
     out = c.copy()
     for one in np.unique(sigma[sigma > 0]):
         same = sigma == one

@@ -28,8 +28,7 @@ OPENING = 5, 3
 CAMOUFLAGE = 0.06
 """Largest share of the sure person that may look like the plate: more than that is clothing, gaps between limbs are less."""
 STRUCTURE, WINDOW = 4.0, 3.0
-"""A shadow darkens evenly: where the difference varies by more than STRUCTURE (L*) about its mean over WINDOW (px), it is an
-object."""
+"""A shadow darkens evenly: a difference that varies by more than STRUCTURE (L*) about its mean over WINDOW (px) is an object."""
 
 
 @dataclass

@@ -27,13 +27,11 @@ SIZES = (0.03, 0.06, 0.12, 0.25, 0.5)
 SHARES = (0.4, 1.0, 1.0, 1.0)
 """Factors on it for trunk, shoulder, elbow and wrist."""
 LOOSE, LOOSE_SHARE = 0.01, 0.1
-"""Standard deviation of each point's own motion, in torsos, and its growth with the rotations' size: large rotations are not
-linear."""
+"""Standard deviation of each point's own motion, in torsos, and its growth a rad of rotation: large ones are not linear."""
 LINKS = np.array((0.45, 0.6, 0.55, 0.25))
 """Prior lengths, in torsos: body's centre to shoulder, upper arm, forearm, palm."""
 TILT, BEND, OFFSET = np.array((0.05, 0.07, 0.1, 0.1)), 0.05, 0.02
-"""Standard deviations of what perspective adds, in torsos: up and down with the turn, on both axes with twice the turn, and
-constant in the image."""
+"""Standard deviations of perspective's part, in torsos: up and down with the turn, with twice the turn, constant in the image."""
 SYSTEMATIC = np.array((0.02, 0.02, 0.02, 0.01))
 """Standard deviation of the detector's systematic error, in torsos; it changes smoothly with the turn."""
 LEAST_NOISE = 0.002
