@@ -84,6 +84,8 @@ def _parameters(stage: Stage) -> str:
 
 def _kind(hint: Any) -> str:
     """`float or null`"""
+    if typing.get_origin(hint) is typing.Literal:
+        return " or ".join(f"`{choice}`" for choice in typing.get_args(hint))
     kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
     return " or ".join("null" if kind is type(None) else getattr(kind, "__name__", str(kind)) for kind in kinds)
 
