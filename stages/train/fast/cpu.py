@@ -95,11 +95,9 @@ class CpuRounds(Rounds):
         self.face = self._trainer.face
 
     def learn(self, number: int) -> None:
-        """As `Rounds.learn`."""
         frames, backgrounds, done = self._plan[number]
         for step, (t, background) in enumerate(zip(frames, backgrounds, strict=True)):
             self._trainer.step(int(t), self._views[int(t)], done, background, step)
 
     def gaussians(self) -> Gaussians:
-        """As `Rounds.gaussians`."""
         return self._trainer.gaussians()

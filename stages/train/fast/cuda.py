@@ -108,14 +108,12 @@ class CudaRounds(Rounds):
         self._trainer, self._task, self.face = trainer, task, gaussians.face
 
     def learn(self, number: int) -> None:
-        """As `Rounds.learn`."""
         poses, trained = self._task.poses, self._task.trained
         self._trainer.place(poses.pose[trained], poses.transl[trained])
         self._trainer.train(len(self._trainer.recipe.rounds[number].frames))
         poses.offset = self._trainer.offset()
 
     def gaussians(self) -> Gaussians:
-        """As `Rounds.gaussians`."""
         return self._trainer.gaussians()
 
 
