@@ -43,7 +43,7 @@ def test_every_argument_of_every_command_is_named_with_its_meaning(name, made):
 
 def test_every_parameter_stands_on_its_stages_page_with_default_and_meaning(made):
     page = made["stages/split.md"]
-    assert "| `split.count` | int or null | `120` | Frames kept in all" in page
+    assert "| `split.count` | int or null | `120` | Most frames kept in all" in page
     assert "`frames`" in page and "[keypoints](keypoints.md)" in page
 
 
