@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import tempfile
 from pathlib import Path
@@ -49,10 +50,8 @@ class Video:
         try:
             if kind is not None:
                 self.process.kill()
-            try:
+            with contextlib.suppress(BrokenPipeError):
                 self.process.stdin.close()
-            except BrokenPipeError:
-                pass
             if self.process.wait() and kind is None:
                 raise VideoError(self._why())
             if kind is None:

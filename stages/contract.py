@@ -8,6 +8,7 @@ which prepares what does not depend on the inputs; it is called in the process t
 
 from __future__ import annotations
 
+import contextlib
 import math
 import typing
 from collections.abc import Callable, Iterable
@@ -108,10 +109,8 @@ def _typed(name: str, value: Any, hint: Any) -> Any:
             raise BadInput(f"{name} is {value!r}; choices: {', '.join(map(str, kinds))}")
         return value
     if float in kinds and isinstance(value, (int, str)) and not isinstance(value, bool):
-        try:
+        with contextlib.suppress(ValueError):
             value = float(value)
-        except ValueError:
-            pass
     if isinstance(value, float) and not math.isfinite(value):
         raise BadInput(f"parameter {name} is {value!r}; expected a finite number")
     if type(value) in kinds:

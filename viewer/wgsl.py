@@ -85,7 +85,7 @@ def parse_places(text: str) -> tuple[dict[str, int], dict[str, int]]:
             bindings[re.sub(r"_\d+$", "", name)] = int(number)
             continue
         bindings["parameters"], at = int(number), 0
-        for member, type_ in re.findall(r"(\w+): ([^,]+),", re.search(rf"struct {block} {{(.*?)}}", text, re.S)[1]):
+        for member, type_ in re.findall(r"(\w+): ([^,]+),", re.search(rf"struct {block} {{(.*?)}}", text, re.DOTALL)[1]):
             size = _SIZES[type_]
             at = -(-at // size) * size
             parameters[member.rstrip("_")] = at

@@ -18,9 +18,9 @@ PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLO
 """Of one step. level: size of the images; place_pull: share of its way that a gaussian is pulled back; offset: m of a step of the
 displacement; centre: vertex in the middle of the window that LPIPS sees, -1 for no LPIPS; the others: Adam rates."""
 
-STATE = {name: INT for name in (
+STATE = dict.fromkeys((
     "step", "stop", "overflow", "needed", "most", "pairs", "listed", "checkpoints", "heavy", "light", "near", "segments",
-    "blend_ticket", "back_ticket", "frames_done", "shape_done", "barrier", "peak")} | {"joints_done": INT * MOST_BATCH}
+    "blend_ticket", "back_ticket", "frames_done", "shape_done", "barrier", "peak"), INT) | {"joints_done": INT * MOST_BATCH}
 """Counters on the device. overflow: the lists were too short, and nothing moves until they have the length `needed`."""
 
 POINTERS = {

@@ -135,7 +135,7 @@ def evaluations(figure: Figure, gaussians: Gaussians, t: int = 0) -> float:
     """(Gaussian, pixel) pairs of frame t, in the 4x4 blocks that the CPU path composites."""
     vertices = figure.vertices(figure.pose[t], figure.transl[t])
     rendering = render_bound(vertices, figure.body.faces, gaussians, figure.shots[t].camera)
-    return 16.0 * sum(bin(int(mask)).count("1") for mask in rendering.state.pair_mask)
+    return 16.0 * sum(int(mask).bit_count() for mask in rendering.state.pair_mask)
 
 
 def least_bytes(trainer: CudaTrainer) -> dict[str, float]:

@@ -62,11 +62,9 @@ def curve_chart(curve: list, key: str, title: str, unit: str, log: bool = False)
     x, y = Axis(0.0, max(xs), LEFT, W - RIGHT), Axis(low, high, H - BOTTOM, TOP, log)
     out = [f'<svg class="chart" viewBox="0 0 {W} {H}" role="img" aria-label="{escape(title)} over seconds of training">',
            f'<text class="title" x="{LEFT}" y="16">{escape(title)}{f" ({escape(unit)})" if unit else ""}</text>']
-    for v in y.ticks():
-        out.append(f'<line class="grid" x1="{LEFT}" x2="{W - RIGHT}" y1="{y(v):.1f}" y2="{y(v):.1f}"/>'
-                   f'<text class="end" x="{LEFT - 6}" y="{y(v) + 4:.1f}">{v:.3g}</text>')
-    for v in x.ticks():
-        out.append(f'<text class="mid" x="{x(v):.1f}" y="{H - BOTTOM + 18}">{v:.3g}</text>')
+    out += [f'<line class="grid" x1="{LEFT}" x2="{W - RIGHT}" y1="{y(v):.1f}" y2="{y(v):.1f}"/>'
+            f'<text class="end" x="{LEFT - 6}" y="{y(v) + 4:.1f}">{v:.3g}</text>' for v in y.ticks()]
+    out += [f'<text class="mid" x="{x(v):.1f}" y="{H - BOTTOM + 18}">{v:.3g}</text>' for v in x.ticks()]
     out.append(f'<text class="mid" x="{(LEFT + W - RIGHT) / 2}" y="{H - 6}">seconds of training</text>')
     path = " ".join(f"{x(a):.1f},{y(b):.1f}" for a, b in points)
     out.append(f'<polyline class="line" points="{path}"/>')
@@ -101,7 +99,7 @@ def strip_chart(k: dict[str, np.ndarray], face_valid: np.ndarray | None) -> Mark
                 span = f"frame {a}" if b == a + 1 else f"frames {a} to {b - 1}"
                 out.append(f'<rect class="{words[a]}" x="{x(a):.1f}" y="{i * ROW + 2}" width="{x(b) - x(a):.1f}" '
                            f'height="{ROW - 5}"><title>{name} {words[a]}, {span}</title></rect>')
-    for v in sorted({0, *(int(t) for t in Axis(0, max(count - 1, 1), 0, 1).ticks()), count - 1}):
-        if v == count - 1 or v <= (count - 1) * 0.94:
-            out.append(f'<text class="mid" x="{x(v + 0.5):.1f}" y="{high - 6}">{v}</text>')
+    ticks = sorted({0, *(int(t) for t in Axis(0, max(count - 1, 1), 0, 1).ticks()), count - 1})
+    out += [f'<text class="mid" x="{x(v + 0.5):.1f}" y="{high - 6}">{v}</text>'
+            for v in ticks if v == count - 1 or v <= (count - 1) * 0.94]
     return Markup("".join(out) + "</svg>")

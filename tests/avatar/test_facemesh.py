@@ -46,4 +46,4 @@ def test_the_meshs_own_region_levels_the_eyes_and_holds_every_point():
 
 
 def test_each_ibug_point_has_one_mesh_point():
-    assert len(set(IBUG68)) == 68 and 0 <= IBUG68.min() and IBUG68.max() < POINTS
+    assert len(set(IBUG68)) == 68 and IBUG68.min() >= 0 and IBUG68.max() < POINTS

@@ -15,7 +15,7 @@ def test_equal_images_do_not_differ_and_order_does_not_matter():
     a, b = rng.random((40, 50, 3)), rng.random((40, 50, 3))
     assert flip(a, a).max() == 0
     np.testing.assert_allclose(flip(a, b), flip(b, a))
-    assert 0 < flip(a, b).min() and flip(a, b).max() <= 1
+    assert flip(a, b).min() > 0 and flip(a, b).max() <= 1
 
 
 def test_green_against_blue_is_the_largest_difference():

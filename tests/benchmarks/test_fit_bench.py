@@ -46,7 +46,7 @@ def test_the_gain_is_said_in_wall_and_cpu_time():
 
 def test_the_csv_holds_every_score_unrounded(tmp_path):
     table.write_csv(TRIALS, tmp_path / "fit.csv")
-    rows = list(csv.DictReader(open(tmp_path / "fit.csv")))
+    rows = list(csv.DictReader((tmp_path / "fit.csv").read_text().splitlines()))
     assert [(r["clip"], r["method"]) for r in rows] == [("a", "lm"), ("a", "paper"), ("b", "lm"), ("b", "paper")]
     assert float(rows[1]["joints_mean_mm"]) == 30 and float(rows[1]["cpu_s"]) == 80
 

@@ -52,11 +52,12 @@ def test_spread_of_seeds_and_unreached_qualities_are_in_the_table():
 
 def test_charts_and_csv_are_written(tmp_path):
     table.write_csv([FAST, PAPER], tmp_path / "s.csv")
-    assert len(list(csv.reader(open(tmp_path / "s.csv")))) == 6
+    assert len(list(csv.reader((tmp_path / "s.csv").read_text().splitlines()))) == 6
     rungs = [{"n_gaussians": n, "psnr_fg_mean": 25.0, "psnr_fg_error": 0.1, "detail_mean": 0.9, "detail_error": 0.01,
               "chosen": n == 400} for n in (1000, 400)]
     size.write_csv({"a": rungs}, tmp_path / "n.csv")
-    assert list(csv.reader(open(tmp_path / "n.csv")))[2][1] == "400" and size.text({"a": rungs}).splitlines()[2].endswith("*")
+    assert list(csv.reader((tmp_path / "n.csv").read_text().splitlines()))[2][1] == "400"
+    assert size.text({"a": rungs}).splitlines()[2].endswith("*")
     for path in chart.draw([FAST, PAPER], tmp_path) + size_chart.draw({"a": rungs}, {"a": [(400, 24.0)]}, tmp_path):
         assert path.stat().st_size > 5000
 

@@ -125,7 +125,7 @@ def test_an_entry_point_that_cannot_be_loaded_is_a_sentence(shout):
 
 
 def test_bench_in_an_environment_that_was_installed_before_it_names_make_setup(monkeypatch, capsys):
-    monkeypatch.setattr(commands, "load_added", lambda: {})
+    monkeypatch.setattr(commands, "load_added", dict)
     assert execute(["bench", "size"]) == ExitCode.USAGE
     assert "the command bench" in (said := capsys.readouterr().err) and "run `make setup`" in said
     with pytest.raises(SystemExit):

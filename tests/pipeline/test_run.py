@@ -5,6 +5,7 @@ import os
 import pty
 import re
 import subprocess
+from pathlib import Path
 
 import pytest
 import yaml
@@ -50,7 +51,7 @@ def test_json_is_one_object_on_the_last_line_with_stages_outputs_and_metrics(toy
     for stage in done.json["stages"]:
         assert re.fullmatch("[0-9a-f]{64}", stage["key"]) and stage["seconds"] > 0
     assert done.json["metrics"] == {"length": 10}
-    assert open(done.json["outputs"]["join/out.txt"]).read() == "ALPHA ALPHA"
+    assert Path(done.json["outputs"]["join/out.txt"]).read_text() == "ALPHA ALPHA"
 
 
 def test_the_output_folder_shows_every_stage_and_what_was_run(toy):

@@ -1,5 +1,7 @@
 """`gsac stage`: replay on fixture artifacts, and one stage in the folder of a run."""
 
+from pathlib import Path
+
 
 def make_fixture(toy):
     folder = toy.root / "fixtures"
@@ -12,7 +14,7 @@ def make_fixture(toy):
 def test_a_stage_is_replayed_on_fixture_artifacts(toy):
     done = toy.gsac("stage", "join", "--inputs", make_fixture(toy), "--out", toy.root / "replay", "--json")
     assert done.code == 0 and done.statuses == {"join": "ran"} and done.json["metrics"] == {"length": 9}
-    assert open(done.json["outputs"]["join/out.txt"]).read() == "left right"
+    assert Path(done.json["outputs"]["join/out.txt"]).read_text() == "left right"
     assert toy.runs == ["join"]
 
 

@@ -34,7 +34,7 @@ def unitypackage(exported):
 
 
 def guid_of(meta):
-    return re.search(r"^guid: ([0-9a-f]{32})$", meta, re.M)[1]
+    return re.search(r"^guid: ([0-9a-f]{32})$", meta, re.MULTILINE)[1]
 
 
 def metas(upm):
@@ -82,7 +82,7 @@ def test_the_unitypackage_holds_what_the_folder_holds(upm, unitypackage):
 def test_a_scenes_references_resolve_inside_the_package(upm, scene):
     text = upm[f"Samples~/Demo/{scene}.unity"].decode()
     known = {guid_of(meta): path for path, meta in metas(upm).items()}
-    documents = {int(n): body for n, body in re.findall(r"^--- !u!\d+ &(\d+)\n(.*?)(?=^--- |\Z)", text, re.M | re.S)}
+    documents = {int(n): body for n, body in re.findall(r"^--- !u!\d+ &(\d+)\n(.*?)(?=^--- |\Z)", text, re.MULTILINE | re.DOTALL)}
     used = set()
     for file_id, guid in re.findall(r"\{fileID: (-?\d+)(?:, guid: ([^,}]+), type: 3)?\}", text):
         if guid:
@@ -97,9 +97,9 @@ def test_a_scenes_references_resolve_inside_the_package(upm, scene):
         source = upm[path].decode()
         body = next(b for b in documents.values() if guid_of(metas(upm)[path]) in b)
         fields = body.split("m_EditorClassIdentifier: \n")[1]
-        for field in re.findall(r"^  (\w+): ", fields, re.M):
+        for field in re.findall(r"^  (\w+): ", fields, re.MULTILINE):
             declared = rf"SerializeField[^\n]*\n?[^\n]* {field}( = [^;\n]+)?;$"
-            assert re.search(declared, source, re.M), f"{path} has no serialized {field}"
+            assert re.search(declared, source, re.MULTILINE), f"{path} has no serialized {field}"
 
 
 def test_the_person_in_the_demo_is_the_exported_one(exported, upm):
@@ -155,7 +155,7 @@ def test_the_readme_names_methods_buttons_and_files_that_exist(upm, exported):
     for call in re.findall(r"avatar\.(\w+)\(", readme) + ["Load"]:
         assert re.search(rf"public (?:static )?\w+ {call}\(", source), call
     for menu in ("Gsac Pose Stream", "Any Address", "Smoothing"):
-        assert menu in readme and re.search(menu.replace(" ", " ?"), source, re.I), menu
+        assert menu in readme and re.search(menu.replace(" ", " ?"), source, re.IGNORECASE), menu
     for name in ("gsac-avatar.unitypackage",):
         assert name in readme and (exported / "unity" / name).is_file()
     assert (exported / "unity" / "README.md").read_bytes() == upm["README.md"]

@@ -205,7 +205,7 @@ def test_hostile_osc_is_refused_by_name_and_leaves_the_pose(play, mono, files, t
 
 def test_the_senders_of_the_readme_are_understood(play, mono, files, tmp_path, package):
     readme = (package / "README.md").read_text()
-    sender = re.search(r"```python\n(.*?)```", readme, re.S)[1]
+    sender = re.search(r"```python\n(.*?)```", readme, re.DOTALL)[1]
     sent = []
 
     class Socket:
@@ -224,6 +224,6 @@ def test_the_senders_of_the_readme_are_understood(play, mono, files, tmp_path, p
     elbow = [got[f"{which}.rotation"].reshape(-1, 4)[names.index("left_elbow")] for which in ("first", "later")]
     assert abs(elbow[0][1]) > .3 and abs(elbow[0] - elbow[1]).max() > .1 and got["later.weights"][0] > 0
     form = json.loads(re.sub(r"\[(\d+) numbers\]|\[(\d+)\]", lambda m: json.dumps([0] * int(m[1] or m[2])),
-                             re.search(r"```json\n(.*?)```", readme, re.S)[1]))
+                             re.search(r"```json\n(.*?)```", readme, re.DOTALL)[1]))
     (tmp_path / "form").mkdir()
     assert read(play, mono, files, tmp_path / "form", {"form": json.dumps(form).encode()})[1] == {"form": "None"}

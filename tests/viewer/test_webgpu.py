@@ -43,7 +43,7 @@ def test_the_other_browsers_compiler_takes_them_too():
     if not adapters:
         pytest.skip("needs a Vulkan device (Debian package mesa-vulkan-drivers)")
     device = adapters[0].request_device_sync()
-    shaders = re.findall(r"^  (\w+): \{ bindings.*?code: `\n(.*?)` \},$", wgsl.WRITTEN.read_text(), re.S | re.M)
+    shaders = re.findall(r"^  (\w+): \{ bindings.*?code: `\n(.*?)` \},$", wgsl.WRITTEN.read_text(), re.DOTALL | re.MULTILINE)
     assert [entry for entry, _ in shaders] == list(wgsl.ENTRIES)
     for entry, code in shaders:
         module = device.create_shader_module(code=code)

@@ -65,7 +65,7 @@ def test_a_recipe_that_is_told_nothing_learns_nothing_counts_nothing_and_limits_
 def test_a_recipe_names_the_fields_that_a_configuration_lacks_instead_of_learning_without_them():
     from types import SimpleNamespace
 
-    config = SimpleNamespace(**{name: 0.5 for name in FROM_CONFIG})
+    config = SimpleNamespace(**dict.fromkeys(FROM_CONFIG, 0.5))
     made = Recipe.of(config, steps=3, ssim=0.2)
     assert (made.steps, made.ssim) == (3, 0.2) and all(getattr(made, name) == 0.5 for name in FROM_CONFIG if name != "ssim")
     del config.mu_rate, config.reach

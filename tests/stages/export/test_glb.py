@@ -122,7 +122,7 @@ def test_points_keep_the_rules_of_the_extensions_release_candidate(figure, gltf)
         assert (accessor["type"], accessor["componentType"]) == (kind, 5126), name
     a = {name: gltf.attributes(1)[f"KHR_gaussian_splatting:{name}"] for name in kinds}
     np.testing.assert_allclose(np.linalg.norm(a["ROTATION"], axis=1), 1, atol=1e-5)
-    assert a["SCALE"].min() >= 0 and 0 <= a["OPACITY"].min() and a["OPACITY"].max() <= 1
+    assert a["SCALE"].min() >= 0 and a["OPACITY"].min() >= 0 and a["OPACITY"].max() <= 1
     np.testing.assert_allclose(a["SH_DEGREE_0_COEF_0"] * .2820947917738781 + .5, figure.gaussians.rgb, atol=1e-6)
     node = gltf.doc["nodes"][gltf.node["gaussians"]]
     assert not {"scale", "matrix", "rotation"} & node.keys()

@@ -56,7 +56,7 @@ def test_each_frame_gets_its_alpha(folder):
     assert len(alphas) == 3 and not warnings
     for alpha in alphas:
         assert ((alpha > 0.5) & (disc() > 0)).sum() / ((alpha > 0.5) | (disc() > 0)).sum() > 0.95
-        assert 0 <= alpha.min() and alpha.max() <= 1
+        assert alpha.min() >= 0 and alpha.max() <= 1
 
 
 def test_a_frame_without_a_person_gets_an_empty_alpha_and_a_warning(folder):
