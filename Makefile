@@ -45,3 +45,4 @@ shaders: setup
 
 lint: setup
 	$(BIN)/ruff check
+	$(BIN)/basedpyright
