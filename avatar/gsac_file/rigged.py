@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar import blend
+from gsac.avatar import draw_rule
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.container import pack, read_bytes, unpack
@@ -20,7 +20,7 @@ UNIT = 65535
 SKIN_SCALE = 1 / UNIT
 QUAT_SCALE = 1 / 32767
 LOG_SCALE_SCALE = 1 / 2048
-BLEND = {"low_pass_px2": blend.BLUR, "alpha_max": blend.MAX_ALPHA, "alpha_min": blend.MIN_ALPHA}
+BLEND = {"low_pass_px2": draw_rule.BLUR, "alpha_max": draw_rule.MAX_ALPHA, "alpha_min": draw_rule.MIN_ALPHA}
 """The draw rule under the file's names."""
 
 

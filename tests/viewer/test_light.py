@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import face_frames
-from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import DARKEST
 from gsac.avatar.film import FOV, PITCH, look_at
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.light import shade
