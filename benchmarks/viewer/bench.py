@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.stages.contract import BadInput, StageError
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def prepare(options: argparse.Namespace) -> RiggedAvatar:
     if "walk" not in avatar.clips:
         raise BadInput(f"{options.avatar}: it carries no clip walk; export it with export.animations=walk")
     splats = pose_gaussians(avatar, avatar.pose("A"))
-    (options.out / "viewer.html").write_bytes(page_bytes(avatar.to_bytes()))
+    (options.out / "viewer.html").write_bytes(page_bytes(avatar_bytes(avatar)))
     (options.out / "avatar.ply").write_bytes(ply_bytes(*splats, avatar.gaussians.rgb, avatar.gaussians.opacity))
     shutil.copy(PAGE, options.out)
     if not (options.out / "node_modules" / "playcanvas").is_dir():
