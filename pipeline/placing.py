@@ -10,7 +10,6 @@ import contextlib
 import fcntl
 import itertools
 import os
-import re
 import shutil
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from gsac.cache import objects
 from gsac.cache.digest import tree_digest, tree_files
 from gsac.cache.errors import CacheError
 from gsac.cache.record import Record
+from gsac.cache.roots import object_of
 from gsac.cache.store import Store
 
 OWNED = "export"
@@ -37,7 +37,7 @@ def place(store: Store, record: Record, folder: Path, placed: dict[str, str]) ->
         owned = record.parts.stage == OWNED
         if not owned and is_link_to(path, source):
             continue
-        if os.path.lexists(path) and not leads_to_store(path):
+        if os.path.lexists(path) and object_of(path) is None:
             found = None if path.is_symlink() else content(path, store)
             if found == digest:
                 placed[port] = digest
@@ -59,11 +59,6 @@ def place(store: Store, record: Record, folder: Path, placed: dict[str, str]) ->
 def is_link_to(path: Path, target: Path) -> bool:
     """Whether `path` is a link with exactly this target."""
     return path.is_symlink() and os.readlink(path) == str(target)
-
-
-def leads_to_store(path: Path) -> bool:
-    """Whether `path` is a link to an object of some store, which may be gone."""
-    return path.is_symlink() and re.search(r"/objects/([0-9a-f]{2})/\1[0-9a-f]{62}(\.[^/]+)?$", os.readlink(path)) is not None
 
 
 def content(path: Path, store: Store) -> str | None:

@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.digest import tree_digest
+from gsac.cache.objects import object_name
 from gsac.cache.record import Record
+from gsac.cache.roots import find_links, register
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.params import to_yaml
@@ -54,6 +56,11 @@ class RunFolder:
     def clip(self) -> Path:
         """The link to the source clip."""
         return self.root / CLIP
+
+    @property
+    def clip_name(self) -> str:
+        """File or folder name of the source clip, be it there or gone."""
+        return Path(os.readlink(self.clip)).name if self.clip.is_symlink() else self.clip.name
 
     @property
     def params(self) -> Path | None:
@@ -102,11 +109,16 @@ class RunFolder:
             raise BadInput(f"{self.clip} is there and is not a link; move it away or choose another --out")
 
     def place(self, store: Store, record: Record, into: Path | None = None) -> None:
-        """Shows a finished stage's outputs in `<stage>/`, or in the folder `into`."""
+        """Shows a finished stage's outputs in `<stage>/`, or in the folder `into`; gc then keeps what is shown."""
+        register(store, self.root)
         before = self._placed()
         after = place(store, record, into or self.root / record.parts.stage, before)
         if after != before:
             self.write_json(PLACED, after)
+
+    def objects(self) -> set[str]:
+        """Names of the store's objects that this folder shows, as links or as copies."""
+        return {*find_links(self.root).values(), *(object_name(digest, port) for port, digest in self._placed().items())}
 
     def _placed(self) -> dict[str, str]:
         with contextlib.suppress(OSError, ValueError):
