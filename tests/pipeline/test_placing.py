@@ -155,10 +155,7 @@ def test_a_folder_without_links_gets_copies_which_are_known_again(monkeypatch, s
 @pytest.fixture
 def exporting(toy):
     """The toy project, whose last stage is called export."""
-    (toy.package / "join").rename(toy.package / "export")
-    toy.edit("dvc.yaml", "join", "export")
-    for file in ("__init__.py", "stage.py"):
-        toy.edit(f"export/{file}", '"join"', '"export"')
+    toy.call_last_stage_export()
     return toy
 
 
