@@ -48,7 +48,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    folder = arguments.folder.resolve()
+    folder = Path(os.path.realpath(arguments.folder))
     out = (arguments.out or Path(f"{folder.name}.zip")).absolute()
     if out.suffix.lower() != ".zip" or not out.parent.is_dir():
         raise BadInput(f"--out {out}: expected a file .zip in a folder that exists")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run_folder import RunFolder
@@ -120,12 +121,15 @@ def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
 
 
 def find_avatar(path: Path) -> Path:
-    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none."""
+    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none, or a link that leads to
+    nothing."""
     if path.is_file():
         return path
     for folder in (path / "export", path):
         if (folder / FILE).is_file():
             return folder / FILE
+        require_file(folder / FILE)
+    require_file(path)
     raise BadInput(f"{path}: no {FILE} here; give the file, or the folder of a run whose stage export is done")
 
 
