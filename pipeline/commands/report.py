@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from gsac.pipeline.lost_files import require_files
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.run_folder import RUN
 from gsac.stages.contract import BadInput
@@ -18,6 +19,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     if not (arguments.folder / RUN).is_file():
         raise BadInput(f"{arguments.folder}: not the folder of a run (no {RUN}); `gsac run CLIP --out DIR` makes one")
+    require_files(arguments.folder)
     from gsac.pipeline.report.page import write_report
     from gsac.pipeline.report.results import Results
 

@@ -20,7 +20,7 @@ from gsac.pipeline.plan import plan_stage
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import StageResult
-from gsac.pipeline.run_folder import LOGS, OWN_STORE, link
+from gsac.pipeline.run_folder import LOGS, OWN_STORE, RunFolder
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
@@ -47,8 +47,10 @@ class Task:
     """Port -> tree digest of an input."""
     paths: dict[str, Path]
     """Port -> path of an input."""
+    folder: RunFolder
+    """Knows what was placed in it."""
     out: Path
-    """Folder for the outputs."""
+    """Folder for the outputs, below it or itself."""
     logs: Path
 
 
@@ -77,7 +79,7 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -
     ports = project.graph.step(arguments.name).deps
     return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
                 {port: run_folder.path(port).resolve() for port in ports},
-                run_folder.root / arguments.name, run_folder.root / LOGS)
+                run_folder, run_folder.root / arguments.name, run_folder.root / LOGS)
 
 
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
@@ -88,11 +90,11 @@ def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) ->
     paths = fixture_paths(project, arguments.name, arguments.inputs)
     digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
     out = arguments.out.absolute()
-    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, out, out / LOGS)
+    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, RunFolder(out), out, out / LOGS)
 
 
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
-    """Runs the stage through the store; links its outputs to `out/<output>`."""
+    """Runs the stage through the store; shows its outputs as `out/<output>`."""
     store, name = task.store, task.name
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
@@ -106,8 +108,7 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
                 raise StageFailedError(name, error, task.logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:
             reporter.ends(name, outcome, record.info.seconds)
-        for output in record.outputs:
-            link(store.path(record, output), task.out / output)
+        task.folder.place(store, record, task.out)
     return StageResult.of(plan, outcome, record, task.keys.configs[name])
 
 

@@ -10,8 +10,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gsac.pipeline import run_folder
-
 
 def test_until_stops_after_a_stage_and_runs_only_what_it_needs(toy):
     assert toy.ran("--until", "left") == ["cut", "left"]
@@ -75,20 +73,6 @@ def test_warnings_of_a_cached_stage_are_still_told(toy):
 def test_without_out_the_folder_is_named_after_the_clip(toy):
     assert toy.gsac("run", toy.clip).code == 0
     assert (toy.root / "clip-avatar" / "join" / "out.txt").read_text() == "ALPHA ALPHA"
-
-
-def test_a_folder_without_links_gets_copies(monkeypatch, tmp_path):
-    def no_links(self, target, target_is_directory=False):
-        raise OSError("no links here")
-
-    monkeypatch.setattr(run_folder.Path, "symlink_to", no_links)
-    source = tmp_path / "frames"
-    source.mkdir()
-    (source / "1.txt").write_text("one")
-    run_folder.link(source, tmp_path / "shown" / "frames")
-    run_folder.link(source / "1.txt", tmp_path / "shown" / "1.txt")
-    assert not (tmp_path / "shown" / "frames").is_symlink()
-    assert (tmp_path / "shown" / "frames" / "1.txt").read_text() == (tmp_path / "shown" / "1.txt").read_text() == "one"
 
 
 @pytest.mark.parametrize(("trouble", "code", "words"), [
