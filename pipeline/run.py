@@ -23,7 +23,8 @@ from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run_folder import LOGS, METRICS, RUN, RunFolder
+from gsac.pipeline.rows import write_rows
+from gsac.pipeline.run_folder import LOGS, RunFolder
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
@@ -46,6 +47,10 @@ class StageResult:
     warnings: list[str] = field(default_factory=list)
     params: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
+    inputs: dict[str, str] = field(default_factory=dict)
+    """Port -> tree digest."""
+    outputs: dict[str, str] = field(default_factory=dict)
+    """Port -> tree digest."""
     error: str | None = None
 
     @classmethod
@@ -53,14 +58,15 @@ class StageResult:
         """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, config_values(config), info.metrics)
+                   info.peak_rss_mb, info.warnings, config_values(config), info.metrics, record.parts.inputs, _ports(record))
 
     def to_json(self) -> dict[str, Any]:
         """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
-            "reason": self.reason, "warnings": self.warnings, "params": self.params,
+            "reason": self.reason, "warnings": self.warnings, "params": self.params, "inputs": self.inputs,
+            "outputs": self.outputs,
         }
         return row | ({"error": self.error} if self.error else {})
 
@@ -132,7 +138,7 @@ class ClipRun:
         digests = {CLIP: source}
         paths = {CLIP: clip}
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
-        with in_use(self.store) as lease, self._writing_results(clip), runner:
+        with in_use(self.store) as lease, self._writing_results(clip, source), runner:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]
                 runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
@@ -171,13 +177,13 @@ class ClipRun:
             raise StageFailedError(plan.stage, error, runner.logs / f"{plan.stage}.log") from error
 
     @contextlib.contextmanager
-    def _writing_results(self, clip: Path) -> Iterator[None]:
+    def _writing_results(self, clip: Path, digest: str) -> Iterator[None]:
         """run.json, metrics.json and dvc.lock are written however the run ends."""
         try:
             yield
         finally:
-            self.folder.write_json(RUN, {"clip": str(clip), **self.summary()})
-            self.folder.write_json(METRICS, self.metrics)
+            write_rows(self.folder, self.graph, self.store, [result.to_json() for result in self.results],
+                       {"clip": str(clip), "clip_digest": digest})
             done = [r.name for r in self.results if r.outcome is not Outcome.FAILED]
             dvc_sync.write_lock(self.folder, self.graph, done, self.configs, self.store)
 

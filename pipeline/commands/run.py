@@ -68,7 +68,7 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
 
 def write_report(clip_run: ClipRun, reporter: PlainReporter, early: EarlySections | None = None) -> None:
     """Writes report.html if it is due; a failure is only a warning."""
-    if (warning := refresh_report(clip_run.folder, clip_run.results, early)) is not None:
+    if (warning := refresh_report(clip_run.folder, early)) is not None:
         reporter.note(f"gsac: warning: {warning}")
 
 

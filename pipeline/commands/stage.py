@@ -18,9 +18,11 @@ from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.plan import plan_stage
 from gsac.pipeline.project import Project
+from gsac.pipeline.report.refresh import refresh_report
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.rows import clip_entries, write_rows
 from gsac.pipeline.run import StageResult
-from gsac.pipeline.run_folder import LOGS, OWN_STORE, link
+from gsac.pipeline.run_folder import LOGS, OWN_STORE, REPORT, RunFolder, link
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
@@ -50,6 +52,8 @@ class Task:
     out: Path
     """Folder for the outputs."""
     logs: Path
+    folder: RunFolder | None = None
+    """The folder of a run, where the stage runs in one."""
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
@@ -62,7 +66,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         except StageFailedError as error:
             failed = StageResult(task.name, Outcome.FAILED, "", error=str(error.cause))
             attach_summary(error, {"stages": [failed.to_json()]})
+            note_in_folder(task, failed, reporter)
             raise
+        note_in_folder(task, result, reporter)
     if arguments.json:
         outputs = task.keys.project.stage(task.name).outputs
         emit({"stages": [result.to_json()], "outputs": {f"{task.name}/{o.path}": str(task.out / o.path) for o in outputs},
@@ -77,7 +83,7 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -
     ports = project.graph.step(arguments.name).deps
     return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
                 {port: run_folder.path(port).resolve() for port in ports},
-                run_folder.root / arguments.name, run_folder.root / LOGS)
+                run_folder.root / arguments.name, run_folder.root / LOGS, run_folder)
 
 
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
@@ -109,6 +115,15 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
         for output in record.outputs:
             link(store.path(record, output), task.out / output)
     return StageResult.of(plan, outcome, record, task.keys.configs[name])
+
+
+def note_in_folder(task: Task, result: StageResult, reporter: PlainReporter) -> None:
+    """Brings run.json, metrics.json and a report that is there up to what lies in the folder of the run."""
+    if task.folder is None:
+        return
+    write_rows(task.folder, task.keys.project.graph, task.store, [result.to_json()], clip_entries(task.folder, task.store))
+    if (task.folder.root / REPORT).exists() and (warning := refresh_report(task.folder)) is not None:
+        reporter.note(f"gsac: warning: {warning}")
 
 
 def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:
