@@ -184,13 +184,16 @@ class ClipRun:
         finally:
             write_rows(self.folder, self.graph, self.store, [result.to_json() for result in self.results],
                        {"clip": str(clip), "clip_digest": digest})
-            done = [r.name for r in self.results if r.outcome is not Outcome.FAILED]
-            dvc_sync.write_lock(self.folder, self.graph, done, self.configs, self.store)
+            dvc_sync.write_lock(self.folder, self.graph, self.finished, self.configs, self.store)
+
+    @property
+    def finished(self) -> list[str]:
+        """Stages whose results this run has found or made."""
+        return [result.name for result in self.results if result.outcome is not Outcome.FAILED]
 
     def summary(self) -> dict[str, Any]:
         """The object of --json."""
-        done = {r.name for r in self.results if r.outcome is not Outcome.FAILED}
-        ports = [port for name in self.graph.steps if name in done for port in self.graph.step(name).outs]
+        ports = [port for name in self.graph.steps if name in self.finished for port in self.graph.step(name).outs]
         return {
             "stages": [result.to_json() for result in self.results],
             "outputs": self.folder.outputs(ports),

@@ -36,6 +36,7 @@ class RunFolder:
 
     def __init__(self, root: Path):
         self.root = Path(root).absolute()
+        self._made: list[Path] = []
 
     @classmethod
     def around(cls, start: Path) -> RunFolder:
@@ -89,6 +90,7 @@ class RunFolder:
         if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
             raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
                            "folder elsewhere")
+        self._made = [folder for folder in (self.root, *self.root.parents) if not folder.exists()]
         self.root.mkdir(parents=True, exist_ok=True)
         write_text(self.root / DAG, project.dag.read_text())
         write_text(self.root / PARAMS, to_yaml(configs, notes=False))
@@ -97,6 +99,12 @@ class RunFolder:
                 link(clip, self.clip)
         elif not self.clip.samefile(clip):
             raise BadInput(f"{self.clip} is there and is not a link; move it away or choose another --out")
+
+    def discard(self) -> None:
+        """Removes the folder with all in it, where `prepare` has made it, and the folders above that it made."""
+        for folder in self._made:
+            with contextlib.suppress(OSError):
+                shutil.rmtree(folder) if folder == self.root else folder.rmdir()
 
     def place(self, store: Store, record: Record) -> None:
         """Links a finished stage's outputs into this folder."""
