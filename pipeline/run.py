@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import re
+import textwrap
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from gsac.cache.digest import tree_digest
 from gsac.cache.errors import CacheError
+from gsac.cache.key import KeyParts
 from gsac.cache.lease import in_use
 from gsac.cache.record import Record
 from gsac.cache.store import Store
@@ -23,13 +26,16 @@ from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.rows import write_rows
+from gsac.pipeline.rows import read_rows, result_row, write_rows
 from gsac.pipeline.run_folder import LOGS, RunFolder
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
 """Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
+
+RECALLED = 110
+"""Characters of a cached stage's warning at most."""
 
 
 @dataclass
@@ -120,7 +126,7 @@ class ClipRun:
                 plans.append(plan_waiting(name, [maker for maker in self.graph.steps if maker in makers]))
                 continue
             parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
-            plan = plan_stage(self.store, parts, forced=name in options.force)
+            plan = self._plan(parts, options)
             plans.append(plan)
             if plan.cached is not None:
                 digests |= _ports(plan.cached)
@@ -145,7 +151,7 @@ class ClipRun:
                 inputs = self.graph.step(name).deps
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
                 lease.add(parts.key)
-                plan = plan_stage(self.store, parts, forced=name in options.force)
+                plan = self._plan(parts, options)
                 outcome, record = Outcome.CACHED, plan.cached
                 if record is None:
                     if name in required:
@@ -157,9 +163,20 @@ class ClipRun:
                             still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
+                    for message in record.info.warnings:
+                        self.reporter.warning(name, first_sentence(message))
                 self._record(plan, outcome, record)
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
+
+    @cached_property
+    def _shown(self) -> dict[str, str]:
+        """Stage -> key of the result that the folder showed before this run."""
+        results = {name: result_row(row) for name, row in read_rows(self.folder).items()}
+        return {name: str(row.get("key")) for name, row in results.items() if row is not None}
+
+    def _plan(self, parts: KeyParts, options: Options) -> StagePlan:
+        return plan_stage(self.store, parts, parts.stage in options.force, self._shown.get(parts.stage))
 
     def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))
@@ -215,6 +232,11 @@ def clip_digest(clip: Path, store: Store) -> str:
         raise BadInput(f"{clip}: cannot be read ({e.strerror})") from e
     except CacheError as e:
         raise BadInput(f"the clip cannot be read: {e}; take it out of the folder") from e
+
+
+def first_sentence(message: str) -> str:
+    """A warning that was told in full when its stage ran, cut to its first sentence."""
+    return textwrap.shorten(re.split(r"(?<=[.;])\s", message, maxsplit=1)[0], RECALLED, placeholder=" …")
 
 
 def _ports(record: Record) -> dict[str, str]:

@@ -20,7 +20,7 @@ from gsac.pipeline.plan import plan_stage
 from gsac.pipeline.project import Project
 from gsac.pipeline.report.refresh import refresh_report
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.rows import clip_entries, write_rows
+from gsac.pipeline.rows import clip_entries, read_rows, result_row, write_rows
 from gsac.pipeline.run import StageResult
 from gsac.pipeline.run_folder import LOGS, OWN_STORE, REPORT, RunFolder, link
 from gsac.pipeline.stage_runner import StageRunner
@@ -102,7 +102,7 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     store, name = task.store, task.name
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
-        plan = plan_stage(store, parts, force)
+        plan = plan_stage(store, parts, force, shown_key(task))
         outcome, record = Outcome.CACHED, plan.cached
         if record is None:
             try:
@@ -115,6 +115,12 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
         for output in record.outputs:
             link(store.path(record, output), task.out / output)
     return StageResult.of(plan, outcome, record, task.keys.configs[name])
+
+
+def shown_key(task: Task) -> str | None:
+    """Key of the result that the folder of the run shows; None outside of one."""
+    row = result_row(read_rows(task.folder).get(task.name)) if task.folder is not None else None
+    return row.get("key") if row is not None else None
 
 
 def note_in_folder(task: Task, result: StageResult, reporter: PlainReporter) -> None:
