@@ -167,12 +167,13 @@ class Run:
     def keep(self, step: int, steps: int, state: Callable[[], State]) -> None:
         """Writes a checkpoint if it is time for one."""
         if self.checkpoints.due(ends=step == steps):
-            self.checkpoints.write({"step": step, "recipe": state(), "poses": self.poses.state(), "curve": self.curve,
-                                    "losses": self.losses, "spent": self.clock()})
+            self.checkpoints.write({"step": step, "steps": steps, "recipe": state(), "poses": self.poses.state(),
+                                    "curve": self.curve, "losses": self.losses, "spent": self.clock()})
 
     def restore(self, state: State) -> None:
         """Takes up where a stopped run's checkpoint stands."""
         self.resumed_at = state["step"]
+        self.job.resumed(state["step"], state["steps"], "steps")
         self.poses.restore(state["poses"])
         self.curve, self.losses = state["curve"], state["losses"]
         self.began -= state["spent"]
