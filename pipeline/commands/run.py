@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from gsac.cache.store import Store
+from gsac.pipeline.closing import closing_lines
 from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
 from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.json_output import emit
@@ -50,7 +51,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
-    """The run and its report; the JSON object lists the stages done whether it ends well or not."""
+    """The run, its report and the last lines; stdout gets the folder, or the JSON object, which lists the stages done whether it
+    ends well or not."""
     early = EarlySections(clip_run.folder)
     try:
         clip_run.run(clip, options, early.start)
@@ -60,9 +62,12 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
         if isinstance(error, StageFailedError):
             write_report(clip_run, reporter)
         raise
+    for line in closing_lines(clip_run.folder, clip_run.metrics):
+        reporter.note(line)
     if json:
         emit(clip_run.summary())
-    reporter.result(f"results: {clip_run.folder.root}")
+    else:
+        print(clip_run.folder.root, flush=True)
     return ExitCode.OK
 
 
@@ -99,11 +104,10 @@ def default_out(clip: Path) -> Path:
     return Path.cwd() / f"{clip.stem}-avatar"
 
 
-def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> RunFolder:
-    """All stages with their defaults; returns the folder that shows the results."""
+def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> None:
+    """All stages with their defaults."""
     project = Project.at_hand()
     configs = resolve(project)
     run_folder = RunFolder(out)
     run_folder.prepare(find_clip(clip), project, configs)
     carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(), reporter, json=False)
-    return run_folder

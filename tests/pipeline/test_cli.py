@@ -19,7 +19,7 @@ def test_version_prints_the_installed_version(toy):
 @pytest.mark.parametrize("order", [("-q", "run"), ("run", "--quiet")])
 def test_quiet_tells_only_the_result(toy, order):
     done = toy.gsac(*order, toy.clip, "--out", toy.out, "--set", "left.trouble=warning")
-    assert done.code == 0 and done.out == "" and done.err == f"results: {toy.out}\n"
+    assert done.code == 0 and done.out == f"{toy.out}\n" and done.err == ""
 
 
 def test_quiet_still_tells_an_error(toy):

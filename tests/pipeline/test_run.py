@@ -217,7 +217,7 @@ def test_the_logs_of_stages_hold_only_what_the_stages_said(toy):
 
 def test_plain_lines_without_a_terminal_and_no_control_codes(toy):
     done = toy.gsac("run", toy.clip, "--out", toy.out)
-    assert "cut: starts" in done.err and "join: ran in" in done.err and "\x1b" not in done.err and done.out == ""
+    assert "cut: starts" in done.err and "join: ran in" in done.err and "\x1b" not in done.err and done.out == f"{toy.out}\n"
 
 
 def test_a_bar_in_a_terminal(toy):
