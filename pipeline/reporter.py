@@ -28,7 +28,7 @@ class Verbosity(Enum):
 
 _SENTENCES = {
     Verbosity.QUIET: "only errors and the result",
-    Verbosity.NORMAL: "each stage as it starts and ends, its progress and its warnings",
+    Verbosity.NORMAL: "each stage as it starts and ends, its progress, warnings and notes",
     Verbosity.VERBOSE: "also the lines that stages print into their logs",
 }
 
@@ -76,6 +76,10 @@ class PlainReporter(AbstractContextManager):
 
     def warning(self, stage: str, message: str) -> None:
         self.note(f"{stage}: warning: {message}")
+
+    def remark(self, stage: str, message: str) -> None:
+        """A stage's note."""
+        self.note(f"{stage}: note: {message}")
 
     def log(self, stage: str, line: str) -> None:
         """A line that the stage printed; only asked for where `verbose`."""
@@ -135,6 +139,9 @@ class TerminalReporter(PlainReporter):
 
     def warning(self, stage: str, message: str) -> None:
         self._console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
+
+    def remark(self, stage: str, message: str) -> None:
+        self._console.print(f"{stage}: note: {message}", style="dim", markup=False, soft_wrap=True)
 
     def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
         self._close()

@@ -51,6 +51,10 @@ class EventStream:
         """Sends a warning for the user."""
         self.send("warning", message=str(message))
 
+    def note(self, message: str) -> None:
+        """Sends a note for the user."""
+        self.send("note", message=str(message))
+
 
 def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
@@ -91,6 +95,7 @@ def _work(order: dict[str, Any], events: EventStream) -> None:
         device=order["device"],
         progress=events.progress,
         warn=events.warn,
+        note=events.note,
     ))
     check_outputs(stage, out)
 

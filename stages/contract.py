@@ -69,6 +69,8 @@ class Job:
     """Reports progress: done, total, unit (`frames`, `steps`)."""
     warn: Callable[[str], None] = lambda message: None
     """Warns the user: a sentence that names the frame, file or parameter; kept in the cache record and the report."""
+    note: Callable[[str], None] = lambda message: None
+    """Tells the user what holds for nearly every clip and is no fault of this one; kept as warnings are."""
 
 
 class StageError(Exception):

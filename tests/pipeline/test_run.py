@@ -72,6 +72,13 @@ def test_warnings_of_a_cached_stage_are_still_told(toy):
     assert rows[1]["status"] == "cached" and rows[1]["warnings"] == ["word 2 is short"]
 
 
+def test_a_note_is_told_and_kept_and_is_no_warning(toy):
+    done = toy.run("--set", "left.trouble=note")
+    assert "left: note: words are taken as they come" in done.err and "warning" not in done.err
+    left = toy.run("--set", "left.trouble=note").json["stages"][1]
+    assert left["status"] == "cached" and left["warnings"] == [] and left["notes"] == ["words are taken as they come"]
+
+
 def test_without_out_the_folder_is_named_after_the_clip(toy):
     assert toy.gsac("run", toy.clip).code == 0
     assert (toy.root / "clip-avatar" / "join" / "out.txt").read_text() == "ALPHA ALPHA"
