@@ -19,6 +19,7 @@ from gsac.pipeline.errors import NotUpToDateError, StageFailedError
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.pace import Course
 from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
@@ -133,6 +134,7 @@ class ClipRun:
         digests = {CLIP: source}
         paths = {CLIP: clip}
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
+        self.reporter.follows(Course(steps, self.graph.above, self.store.usual_seconds))
         with in_use(self.store) as lease, self._writing_results(clip), runner:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]

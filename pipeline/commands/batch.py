@@ -12,9 +12,9 @@ from gsac.pipeline.executors import EXECUTORS, make_executor
 from gsac.pipeline.executors.executor import ClipResult
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.pace import duration
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import duration
 from gsac.stages.contract import BadInput
 
 
