@@ -135,14 +135,14 @@ class TerminalReporter(PlainReporter):
         from rich.console import Console
 
         super().__init__(stream, verbose)
-        self._console = Console(file=self._stream, highlight=False)
+        self.console = Console(file=self._stream, highlight=False)
         self._bar = None
 
     def __exit__(self, *exc) -> None:
         self._close()
 
     def note(self, message: str) -> None:
-        self._console.print(message, markup=False, soft_wrap=True)
+        self.console.print(message, markup=False, soft_wrap=True)
 
     def starts(self, stage: str, why: str) -> None:
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
@@ -153,8 +153,8 @@ class TerminalReporter(PlainReporter):
         cut = Column(no_wrap=True, overflow="ellipsis", ratio=1)
         self._bar = Progress(
             SpinnerColumn(), TextColumn("{task.fields[stage]:<14}", markup=False),
-            BarColumn(BAR if self._console.width >= NARROW else NARROW_BAR),
-            TextColumn("{task.fields[words]}", markup=False, table_column=cut), console=self._console, transient=True,
+            BarColumn(BAR if self.console.width >= NARROW else NARROW_BAR),
+            TextColumn("{task.fields[words]}", markup=False, table_column=cut), console=self.console, transient=True,
             expand=True,
         )
         self._bar.add_task("", total=None, stage=self._titled(stage), words=f"reading and loading ({why})")
@@ -169,16 +169,16 @@ class TerminalReporter(PlainReporter):
         task.fields["words"] = words if going_on or not total else f"{done} {unit}; {FINISHING}"
 
     def warning(self, stage: str, message: str) -> None:
-        self._console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
+        self.console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
 
     def remark(self, stage: str, message: str) -> None:
-        self._console.print(f"{stage}: note: {message}", style="dim", markup=False, soft_wrap=True)
+        self.console.print(f"{stage}: note: {message}", style="dim", markup=False, soft_wrap=True)
 
     def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
         self._close()
         took = f"{seconds:8.1f} s" if outcome is not Outcome.FAILED else " " * 10
-        self._console.print(f"{self._titled(stage):<14} {took}  ", end="", markup=False)
-        self._console.print(f"{outcome.value}{': ' + detail if detail else ''}", style=outcome.style, markup=False,
+        self.console.print(f"{self._titled(stage):<14} {took}  ", end="", markup=False)
+        self.console.print(f"{outcome.value}{': ' + detail if detail else ''}", style=outcome.style, markup=False,
                             soft_wrap=True)
 
     def _close(self) -> None:

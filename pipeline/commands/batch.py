@@ -7,8 +7,9 @@ import os
 from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
+from gsac.pipeline.batch_reporter import open_batch_reporter
 from gsac.pipeline.commands.options import add_json, add_params, progress_reporter
-from gsac.pipeline.executors import EXECUTORS, make_executor
+from gsac.pipeline.executors import EXECUTORS, check_executor
 from gsac.pipeline.executors.executor import ClipResult
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
@@ -36,14 +37,16 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     workers = max(1, (os.cpu_count() or 1) // 2) if arguments.jobs is None else arguments.jobs
     if workers < 1:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
-    executor = make_executor(arguments.executor, workers)
+    check_executor(arguments.executor)
     project = Project.at_hand()
     resolve(project, arguments.params, arguments.set)  # one error now, not one a clip
     if arguments.until:
         project.graph.step(arguments.until)
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
     reporter.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
-    results = run_batch(jobs, executor, lambda result: reporter.note(describe(result)))
+    with open_batch_reporter(reporter, len(jobs)) as table:
+        executor = EXECUTORS[arguments.executor](workers, lambda job, line: table.hear(job.name, line))
+        results = run_batch(jobs, executor, lambda result: table.end(result.job.name, describe(result)))
     failed = [result for result in results if result.code != ExitCode.OK]
     reporter.result(f"{len(results) - len(failed)} of {len(results)} clips are done")
     for result in failed:
@@ -67,5 +70,5 @@ def describe(result: ClipResult) -> str:
     rows = result.summary.get("stages", [])
     ran = sum(row["status"] == "ran" for row in rows)
     warnings = sum(len(row["warnings"]) for row in rows)
-    end = f"failed: {result.error}" if result.code else f"done, {ran} of {len(rows)} stages ran"
-    return f"{result.job.clip.name}: {end}, {warnings} warnings, {duration(result.seconds)}"
+    end = "failed" if result.code else f"done, {ran} of {len(rows)} stages ran"
+    return f"{result.job.name}: {end}, {warnings} warnings, {duration(result.seconds)}"
