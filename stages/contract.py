@@ -43,6 +43,10 @@ class Stage:
     """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
     wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of model files that are used if the user has brought them; then their digests are part of the key too."""
+    any_of: Callable[[Any], tuple[str, ...]] = lambda config: ()
+    """Names among the wishes of which this configuration needs at least one."""
+    check_on: Callable[[Any, str], None] = lambda config, device: None
+    """Raises BadInput where this configuration cannot be met on a device class (cpu, cuda); called before anything runs."""
     uses_device: bool = False
     """Whether the device class (cpu, cuda) is part of the key."""
     code: tuple[str, ...] = ()

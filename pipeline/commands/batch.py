@@ -8,10 +8,11 @@ from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
 from gsac.pipeline.batch_reporter import open_batch_reporter
-from gsac.pipeline.commands.options import add_json, add_params, progress_reporter
+from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
 from gsac.pipeline.executors import EXECUTORS, check_executor
 from gsac.pipeline.executors.executor import ClipResult
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.pace import duration
 from gsac.pipeline.params import resolve
@@ -39,9 +40,11 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
     check_executor(arguments.executor)
     project = Project.at_hand()
-    resolve(project, arguments.params, arguments.set)  # one error now, not one a clip
+    configs, stages = resolve(project, arguments.params, arguments.set), set(project.graph.steps)
     if arguments.until:
         project.graph.step(arguments.until)
+        stages = project.graph.above(arguments.until) | {arguments.until}
+    Keys(project, configs, open_store(reporter)).check(stages)  # one error now, not one a clip
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
     reporter.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
     with open_batch_reporter(reporter, len(jobs)) as table:

@@ -43,9 +43,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     with progress_reporter(arguments) as reporter:
         store = open_store(reporter, None if arguments.dry_run else run_folder.root / OWN_STORE)
         clip_run = ClipRun(project, configs, store, run_folder, reporter)
+        clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
             return dry_run(clip_run, clip, options, reporter, arguments.json)
-        clip_run.select(options)
         run_folder.prepare(clip, project, configs)
         return carry_out(clip_run, clip, options, reporter, arguments.json)
 

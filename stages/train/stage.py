@@ -87,6 +87,8 @@ def run(job: Job) -> None:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
     if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].camera)):
+        if config.lpips == "loss":
+            raise BadInput(f"train.lpips is loss, but {why}; set train.lpips to judge")
         job.warn(f"LPIPS takes no part in the loss: {why}.")
 
     run = Run(job, Poses(body, params), views, trained, held, choosing)
