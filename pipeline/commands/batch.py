@@ -8,7 +8,14 @@ from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
 from gsac.pipeline.batch_reporter import open_batch_reporter
-from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
+from gsac.pipeline.commands.options import (
+    add_json,
+    add_params,
+    add_person,
+    open_store,
+    progress_reporter,
+    values_of_person,
+)
 from gsac.pipeline.executors import EXECUTORS, check_executor
 from gsac.pipeline.executors.executor import ClipResult
 from gsac.pipeline.json_output import emit
@@ -28,6 +35,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--executor", default="local", metavar="NAME", help=f"one of: {', '.join(EXECUTORS)}")
     command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
+    add_person(command)
     add_params(command)
     add_json(command)
     command.set_defaults(do=do)
@@ -40,7 +48,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
     check_executor(arguments.executor)
     project = Project.at_hand()
-    configs, stages = resolve(project, arguments.params, arguments.set), set(project.graph.steps)
+    configs = resolve(project, arguments.params, arguments.set, options=values_of_person(arguments, project))
+    stages = set(project.graph.steps)
     if arguments.until:
         project.graph.step(arguments.until)
         stages = project.graph.above(arguments.until) | {arguments.until}
@@ -64,6 +73,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
     """Arguments of every clip's `gsac run`."""
     told = ["--params", str(arguments.params.absolute())] if arguments.params else []
+    told += [] if arguments.height is None else ["--height", str(arguments.height)]
+    told += [] if arguments.body is None else ["--body", arguments.body]
     told += [word for text in arguments.set for word in ("--set", text)]
     return tuple(told + (["--until", arguments.until] if arguments.until else []))
 

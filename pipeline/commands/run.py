@@ -7,7 +7,14 @@ from pathlib import Path
 
 from gsac.cache.store import Store
 from gsac.pipeline.closing import closing_lines
-from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
+from gsac.pipeline.commands.options import (
+    add_json,
+    add_params,
+    add_person,
+    open_store,
+    progress_reporter,
+    values_of_person,
+)
 from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
@@ -28,6 +35,7 @@ def declare(command: argparse.ArgumentParser) -> None:
                          help="what this stage needs must be in the cache already")
     command.add_argument("--force", action="append", default=[], metavar="STAGE",
                          help="run this stage again; may be repeated")
+    add_person(command)
     add_params(command)
     command.add_argument("--dry-run", action="store_true", help="say what would run and why")
     add_json(command)
@@ -36,7 +44,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     project = Project.at_hand()
-    configs = resolve(project, arguments.params, arguments.set)
+    configs = resolve(project, arguments.params, arguments.set, options=values_of_person(arguments, project))
     clip = find_clip(arguments.clip)
     run_folder = RunFolder(arguments.out or default_out(clip))
     options = Options(arguments.until, arguments.start, tuple(arguments.force))
