@@ -29,7 +29,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     one.add_argument("--force", action="store_true", help="also where another file has that name")
     one.set_defaults(do=do_add)
     one = does.add_parser("remove", help="forget a model file that was added, and drop it from the store")
-    one.add_argument("name", metavar="NAME")
+    one.add_argument("name", metavar="NAME", help="the name that it was added under")
     one.set_defaults(do=do_remove)
 
 
