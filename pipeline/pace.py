@@ -34,7 +34,7 @@ class Pace:
         rate = self._rate()
         words = f"{done}/{total} {self._unit}" if total else f"{done} {self._unit}"
         if rate is not None:
-            words += f", {rate:.3g} {self._unit}/s"
+            words += f", {rate:.3g} {self._unit}/s" if " " not in self._unit else ""
             if total > done:
                 words += f", {duration((total - done) / rate)} left"
         return words
@@ -56,14 +56,22 @@ class Course:
         """above: what a stage needs; seconds: s that a stage usually takes, None where it never ran."""
         self._steps, self._above, self._seconds = steps, above, cache(seconds)
         self._begun: set[str] = set()
+        self._usual = self._spent = 0.0
 
     def place(self, stage: str) -> str:
         """`7/8`"""
         return f"{self._steps.index(stage) + 1}/{len(self._steps)}"
 
     def begin(self, stage: str) -> None:
-        """Notes that a stage is at work: those that need it will be, too."""
+        """Notes that a stage is at work: those that need it will be, too. Its usual time is read now, before it is replaced."""
         self._begun.add(stage)
+        self._seconds(stage)
+
+    def end(self, stage: str, spent: float) -> None:
+        """Notes how long a stage took, s: the later ones are expected to be as much faster or slower than usual."""
+        usual = self._seconds(stage)
+        if usual is not None:
+            self._usual, self._spent = self._usual + usual, self._spent + spent
 
     def seconds_left(self, stage: str, elapsed: float, of_phase: float) -> float | None:
         """s, from a stage that is at work to the end of the run; None where a stage that is still to come never ran.
@@ -75,7 +83,8 @@ class Course:
         known = [time for time in times if time is not None]
         if len(known) < len(times):
             return None
-        return max(known[0] - elapsed, of_phase) + sum(known[1:])
+        ratio = self._spent / self._usual if self._usual else 1.0
+        return max(known[0] * ratio - elapsed, of_phase) + sum(known[1:]) * ratio
 
 
 def duration(seconds: float) -> str:

@@ -17,8 +17,8 @@ BAR = 20
 """Columns of the bar."""
 NARROW, NARROW_BAR = 80, 6
 """Below so many columns of the terminal the bar has so many."""
-FINISHING = "checking and keeping the result"
-"""Shown where all is counted and the stage is still at work: a full bar would look hung."""
+COUNTED = "done; still at work"
+"""Shown where all of a phase is counted and the stage goes on: a full bar would look hung."""
 
 
 class Verbosity(Enum):
@@ -85,6 +85,10 @@ class PlainReporter(AbstractContextManager):
         if self._course is not None:
             self._course.begin(stage)
 
+    def _end(self, stage: str, outcome: Outcome, seconds: float) -> None:
+        if self._course is not None and outcome is Outcome.RAN:
+            self._course.end(stage, seconds)
+
     def _titled(self, stage: str) -> str:
         """`7/8 train`"""
         return f"{self._course.place(stage)} {stage}" if self._course is not None else stage
@@ -110,6 +114,7 @@ class PlainReporter(AbstractContextManager):
         self.note(f"{stage}: | {line}")
 
     def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
+        self._end(stage, outcome, seconds)
         time_words = f" in {seconds:.1f} s" if outcome is Outcome.RAN else ""
         time_words = f" (took {seconds:.1f} s when it ran)" if outcome is Outcome.CACHED else time_words
         self.note(f"{self._titled(stage)}: {outcome.value}{time_words}{': ' + detail if detail else ''}")
@@ -166,7 +171,7 @@ class TerminalReporter(PlainReporter):
         words, task = self._words(stage, done, total, unit, time.monotonic()), self._bar.tasks[0]
         going_on = done < total
         task.total, task.completed = (total, done) if going_on else (None, 0)  # a bar without a total pulses
-        task.fields["words"] = words if going_on or not total else f"{done} {unit}; {FINISHING}"
+        task.fields["words"] = words if going_on or not total else f"{done} {unit} {COUNTED}"
 
     def warning(self, stage: str, message: str) -> None:
         self.console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
@@ -176,6 +181,7 @@ class TerminalReporter(PlainReporter):
 
     def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
         self._close()
+        self._end(stage, outcome, seconds)
         took = f"{seconds:8.1f} s" if outcome is not Outcome.FAILED else " " * 10
         self.console.print(f"{self._titled(stage):<14} {took}  ", end="", markup=False)
         self.console.print(f"{outcome.value}{': ' + detail if detail else ''}", style=outcome.style, markup=False,

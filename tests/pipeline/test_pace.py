@@ -5,7 +5,7 @@ import io
 import pytest
 
 from gsac.pipeline.pace import Course, Pace
-from gsac.pipeline.reporter import BAR, FINISHING, NARROW_BAR, PlainReporter, TerminalReporter
+from gsac.pipeline.reporter import BAR, COUNTED, NARROW_BAR, PlainReporter, TerminalReporter
 
 ABOVE = {"split": set(), "smplx": {"split"}, "face": {"split"}, "train": {"split", "smplx"}}
 
@@ -44,6 +44,14 @@ def test_the_time_left_of_the_whole_run_is_that_of_earlier_runs():
     assert whole.seconds_left("train", 50.0, 7.0) == pytest.approx(7), "longer than last time"
 
 
+def test_a_clip_that_goes_slower_than_the_last_one_is_expected_to_go_on_so():
+    whole = course({"split": 2.0, "smplx": 5.0, "face": 3.0, "train": 40.0})
+    whole.begin("split")
+    whole.end("split", 6.0)
+    whole.begin("smplx")
+    assert whole.seconds_left("smplx", 1.0, 0.0) == pytest.approx(3 * (5 + 3 + 40) - 1)
+
+
 def test_nothing_is_promised_of_a_run_with_a_stage_that_never_ran():
     whole = course({"split": 2.0})
     whole.begin("split")
@@ -79,5 +87,5 @@ def test_the_bar_keeps_its_width_and_never_stands_full_while_work_goes_on(monkey
         task = shown.tasks[0]
         words.append(task.fields["words"])
         assert not task.finished and shown.columns[2].bar_width == bar
-    assert words == ["reading and loading (first run)", "3/1400 steps", f"1400 steps; {FINISHING}", "0/4 parts of judging"]
+    assert words == ["reading and loading (first run)", "3/1400 steps", f"1400 steps {COUNTED}", "0/4 parts of judging"]
     reporter.__exit__()
