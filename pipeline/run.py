@@ -240,7 +240,7 @@ def clip_digest(clip: Path, store: Store) -> str:
 
 def first_sentence(message: str) -> str:
     """A warning that was told in full when its stage ran, cut to its first sentence."""
-    return textwrap.shorten(re.split(r"(?<=[.;])\s", message, maxsplit=1)[0], RECALLED, placeholder=" …")
+    return textwrap.shorten(re.split(r"(?<=\.)\s", message, maxsplit=1)[0], RECALLED, placeholder=" …")
 
 
 def _ports(record: Record) -> dict[str, str]:

@@ -40,5 +40,5 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 def dead_link(results: Results) -> Path | None:
     """The first output that is a link to nothing; None where all are there or truly absent."""
-    paths = [results.root / port for step in results.project.graph.steps.values() for port in step.outs]
+    paths = [results.root / port for ports in results.ports.values() for port in ports]
     return next((path for path in paths if path.is_symlink() and not path.exists()), None)

@@ -17,7 +17,7 @@ from gsac.pipeline.commands.options import (
 )
 from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
 from gsac.pipeline.json_output import emit
-from gsac.pipeline.other_clip import make_room
+from gsac.pipeline.other_clip import find_other_clip, forget_results
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
@@ -59,8 +59,13 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
             return dry_run(clip_run, clip, options, reporter, arguments.json)
-        make_room(run_folder, clip, store, arguments.replace)
+        other = find_other_clip(run_folder, clip, store)
+        if other is not None and not arguments.replace:
+            raise BadInput(f"{run_folder.root} holds the avatar of {other}; give another --out, or --replace to put this clip's "
+                           "there")
         run_folder.prepare(clip, project, configs)
+        if other is not None:
+            forget_results(run_folder)
         return carry_out(clip_run, clip, options, reporter, arguments.json)
 
 

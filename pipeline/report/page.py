@@ -99,7 +99,8 @@ def make_sections(results: Results, drawn: dict[str, Section] | None = None, wit
             return draw()
 
     def section(ident: str, title: str, lead: str, port: str, *how: Callable | None) -> Section:
-        return (drawn or {}).get(ident) or make_section(results, drawing, ident, title, lead, port, *how)
+        known = (drawn or {}).get(ident) if results.done(port.partition("/")[0]) else None
+        return known or make_section(results, drawing, ident, title, lead, port, *how)
 
     with ThreadPoolExecutor() as pool:
         return list(pool.map(lambda parts: section(*parts), [parts for parts in SECTIONS if parts[3].split("/")[0] != without]))

@@ -161,6 +161,29 @@ def test_sections_drawn_while_the_last_stage_runs_are_those_of_the_stages_before
     assert all(page.images(section) == Page(whole / "report.html").images(section) for section in PICTURES)
 
 
+def test_a_section_that_was_drawn_early_is_shown_only_if_its_stage_is_of_this_folder(copied):
+    early = draw_sections(copied, "train")
+    write_run(copied, [stage_row("split"), stage_row("keypoints")])
+    page = Page(write_report(copied, early))
+    assert page.images("clip") and not page.images("body") and not page.images("alpha")
+
+
+def test_a_folder_whose_dvc_yaml_is_torn_gives_a_page(copied):
+    (copied / "dvc.yaml").write_text("stages: [")
+    assert page_of(copied).images("clip")
+
+
+def test_a_section_of_a_stale_result_says_what_it_was_made_from(copied):
+    rows = [stage_row(name) for name in STAGES]
+    rows[5] |= {"stale": True, "stale_reason": "made from an earlier split/frames; run again"}
+    rows[6] = stage_row("train", status="failed", error="no room", earlier=stage_row("train"))
+    write_run(copied, rows)
+    page = page_of(copied)
+    assert "This result was made from an earlier split/frames; run again." in page.text("body") and page.images("body")
+    assert "Stage train failed in the last run: this is an earlier result." in page.text("heldout") and page.images("heldout")
+    assert "Not of the last run's inputs: smplx." in page.text("head") and "failed" in page.text("stages")
+
+
 def test_the_page_asks_for_nothing_outside_itself(whole):
     page = Page(whole / "report.html")
     addresses = [a[name] for _, a in page.tags for name in ("src", "href", "srcset", "poster", "data") if a.get(name)]
