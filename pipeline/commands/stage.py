@@ -47,11 +47,11 @@ class Task:
     """Port -> tree digest of an input."""
     paths: dict[str, Path]
     """Port -> path of an input."""
-    folder: RunFolder
-    """Knows what was placed in it."""
     out: Path
-    """Folder for the outputs, below it or itself."""
+    """Folder for the outputs."""
     logs: Path
+    folder: RunFolder | None = None
+    """The folder of a run, where the stage runs in one."""
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
@@ -79,7 +79,7 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -
     ports = project.graph.step(arguments.name).deps
     return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
                 {port: run_folder.path(port).resolve() for port in ports},
-                run_folder, run_folder.root / arguments.name, run_folder.root / LOGS)
+                run_folder.root / arguments.name, run_folder.root / LOGS, run_folder)
 
 
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
@@ -90,7 +90,7 @@ def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) ->
     paths = fixture_paths(project, arguments.name, arguments.inputs)
     digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
     out = arguments.out.absolute()
-    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, RunFolder(out), out, out / LOGS)
+    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, out, out / LOGS)
 
 
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
@@ -108,7 +108,7 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
                 raise StageFailedError(name, error, task.logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:
             reporter.ends(name, outcome, record.info.seconds)
-        task.folder.place(store, record, task.out)
+        (task.folder or RunFolder(task.out)).place(store, record, task.out)
     return StageResult.of(plan, outcome, record, task.keys.configs[name])
 
 
