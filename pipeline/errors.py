@@ -25,7 +25,8 @@ class StageFailedError(Exception):
     """A stage failed with the error `cause`; stages that were finished before it are kept."""
 
     def __init__(self, stage: str, cause: Exception, log: Path):
-        seen = f" (log: {log})" if log.is_file() and log.stat().st_size else ""
+        told = isinstance(cause, BadInput)  # the sentence says all
+        seen = f" (log: {log})" if not told and log.is_file() and log.stat().st_size else ""
         super().__init__(f"stage {stage} failed: {cause}{seen}")
         self.stage = stage
         self.cause = cause

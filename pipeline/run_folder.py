@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from gsac.pipeline.placing import is_link_to, link, place
 from gsac.pipeline.project import Project
 from gsac.stages.contract import BadInput
 
-DAG, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "params.yaml", "run.json", "metrics.json", "report.html"
+DAG, LOCK, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "dvc.lock", "params.yaml", "run.json", "metrics.json", "report.html"
 LOGS = "logs"
 PLACED = ".placed.json"
 """Port -> tree digest, of the real files that were placed here."""
@@ -41,6 +42,7 @@ class RunFolder:
 
     def __init__(self, root: Path):
         self.root = Path(root).absolute()
+        self._made: list[Path] = []
 
     @classmethod
     def around(cls, start: Path) -> RunFolder:
@@ -99,6 +101,7 @@ class RunFolder:
         if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
             raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
                            "folder elsewhere")
+        self._made = [folder for folder in (self.root, *self.root.parents) if not folder.exists()]
         self.root.mkdir(parents=True, exist_ok=True)
         write_text(self.root / DAG, project.dag.read_text())
         write_text(self.root / PARAMS, to_yaml(configs, notes=False))
@@ -107,6 +110,16 @@ class RunFolder:
                 link(clip, self.clip)
         elif not self.clip.samefile(clip):
             raise BadInput(f"{self.clip} is there and is not a link; move it away or choose another --out")
+
+    def discard(self) -> None:
+        """Removes the folder, where `prepare` has made it and it holds nothing but what a run writes, and those made above it."""
+        ours = {CLIP, DAG, LOCK, PARAMS, RUN, METRICS, REPORT, LOGS, PLACED}
+        for folder in self._made:
+            with contextlib.suppress(OSError):
+                if folder == self.root and {entry.name for entry in folder.iterdir()} <= ours:
+                    shutil.rmtree(folder)
+                else:
+                    folder.rmdir()
 
     def place(self, store: Store, record: Record, into: Path | None = None) -> None:
         """Shows a finished stage's outputs in `<stage>/`, or in the folder `into`; gc then keeps what is shown."""

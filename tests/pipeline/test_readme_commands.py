@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.pipeline.project import shipped_dag
 from gsac.viewer.page import page_bytes
 from support import dances
@@ -47,8 +48,8 @@ def user(toy, tmp_path, monkeypatch):
     toy.write("export/stage.py", MAKE)
     figure, avatar = tmp_path / "figure", make_figure()
     figure.mkdir()
-    (figure / "avatar.gsac").write_bytes(avatar.to_bytes())
-    (figure / "viewer.html").write_bytes(page_bytes(avatar.to_bytes()))
+    (figure / "avatar.gsac").write_bytes(avatar_bytes(avatar))
+    (figure / "viewer.html").write_bytes(page_bytes(avatar_bytes(avatar)))
     monkeypatch.setenv("TOY_FIGURE", str(figure))
     home = tmp_path / "home"
     home.mkdir()

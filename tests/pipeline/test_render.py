@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.pipeline.cli import execute
 from support import dances
 from support.figure import make_figure
@@ -16,7 +17,7 @@ def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     (folder / "export").mkdir()
     figure = make_figure()
-    (folder / "export" / "avatar.gsac").write_bytes(figure.to_bytes())
+    (folder / "export" / "avatar.gsac").write_bytes(avatar_bytes(figure))
     clip = figure.clips["walk"]
     rotation = np.zeros((len(clip.rotation), len(figure.joints), 3), np.float32)
     rotation[:, [figure.joint_names.index(name) for name in clip.joints]] = clip.rotation

@@ -220,3 +220,17 @@ def test_a_bar_in_a_terminal(toy):
         seen += piece
     assert process.wait(60) == 0
     assert "1/2 words" in seen.decode() and "left" in seen.decode() and "\x1b[" in seen.decode()
+
+
+def test_a_rerun_recalls_the_warnings_of_cached_stages_by_their_first_sentence(toy):
+    toy.edit("common.py", "word 2 is short", "Word 2 is short. Write a longer one in its place.")
+    toy.ran("--set", "left.trouble=warning")
+    done = toy.gsac("run", toy.clip, "--out", toy.out, "--set", "left.trouble=warning")
+    assert "left: warning: left: Word 2 is short.\n" in done.err or "left: warning: Word 2 is short.\n" in done.err
+
+
+def test_ctrl_c_says_that_the_same_command_goes_on(toy):
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "left.pause_s=30")
+    toy.wait_for(lambda: "left" in toy.runs)
+    process.terminate()
+    assert "the same command goes on from there" in process.communicate(timeout=30)[1]
