@@ -45,6 +45,8 @@ MOST_UNSEEN = 0.2
 """Share of gaussians that no frame shows above which the user is warned."""
 TRAIN_SAMPLE = 8
 """Trained frames, at most, that `psnr_fg_train` is the mean of."""
+JUDGING = 4, "parts of judging"
+"""What the progress of judging is counted in."""
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices, and the same sums whoever else is at work
@@ -85,6 +87,8 @@ def run(job: Job) -> None:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
     if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].camera)):
+        if config.lpips == "loss":
+            raise BadInput(f"train.lpips is loss, but {why}; set train.lpips to judge")
         job.warn(f"LPIPS takes no part in the loss: {why}.")
 
     run = Run(job, Poses(body, params), views, trained, held, choosing)
@@ -213,6 +217,7 @@ class Run:
         job, gaussians = self.job, self.result.gaussians
         folder = job.out / "heldout"
         folder.mkdir()
+        job.progress(0, *JUDGING)
         poses = self.poses_of_all()
         gaussians.write(job.out / "avatar.npz", self.result.coarser)
         poses.to_params().write(job.out / "body.npz")
@@ -223,6 +228,7 @@ class Run:
         """The content of metrics.json. folder: where the images of the held-out frames go."""
         config, held = self.job.config, self.held
         rows = judge(gaussians, poses, held, self.views, folder, config.flip, self.lpips)
+        self.job.progress(1, *JUDGING)
         fitted = poses.copy()
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
         aligned = poses.copy()
@@ -231,9 +237,11 @@ class Run:
             ttpo = judge(gaussians, aligned, held, self.views, None, config.flip, self.lpips)
         else:
             ttpo = []
+        self.job.progress(2, *JUDGING)
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
         of_fit, of_trained = judge_all([Candidate(gaussians, fitted, held, self.views),
                                         Candidate(gaussians, poses, sample, self.views)])
+        self.job.progress(3, *JUDGING)
         return summary(rows) | {
             **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips_net"},
             "psnr_fg_fit": summary(of_fit)["psnr_fg"],
