@@ -72,7 +72,7 @@ def run(toy, home: Path, words: list[str]) -> tuple[int, str]:
     if words[0] != OPENS:
         done = toy.gsac(*words, cwd=home)
         return done.code, done.out + done.err
-    started = toy.start(OPENS, home / words[1], *words[2:])
+    started = toy.start(OPENS, home / words[1], *words[2:], DISPLAY="", WAYLAND_DISPLAY="")
     address = next(word for line in started.stdout for word in line.split() if word.startswith("http"))
     assert urllib.request.urlopen(address).read() == (home / words[1] / "export" / "viewer.html").read_bytes()
     started.send_signal(signal.SIGINT)
