@@ -8,10 +8,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gsac.pipeline.commands.options import add_json, progress_reporter
+from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput, StageError
 
 if TYPE_CHECKING:
@@ -31,7 +33,9 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--motion", metavar="FILE",
                          help="a .bvh or AMASS-style .npz file, or the name of a clip in the avatar (walk, wave); "
                               "without it the avatar is seen from all sides")
-    command.add_argument("--out", type=Path, default=Path("clip.mp4"), metavar="FILE", help="default: clip.mp4")
+    command.add_argument("--out", type=Path, metavar="FILE",
+                         help="default: <avatar>-<motion>.mp4 here, without a motion <avatar>-turn.mp4")
+    add_force(command)
     command.add_argument("--size", default="720x960", metavar="WxH", help="pixels, even numbers; default: 720x960")
     command.add_argument("--fps", type=float, default=30.0, metavar="N", help="default: 30")
     command.add_argument("--seconds", type=float, metavar="N",
@@ -48,10 +52,12 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--fps {arguments.fps:g}: expected 1 to 240")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 3600:
         raise BadInput(f"--seconds {arguments.seconds:g}: expected more than 0, at most 3600")
-    out = arguments.out.absolute()
-    if out.suffix.lower() != ".mp4" or out.is_dir() or not out.parent.is_dir():
-        raise BadInput(f"--out {arguments.out}: expected a file .mp4 in a folder that exists")
     file = find_avatar(arguments.avatar)
+    out = (arguments.out or Path(default_name(file, arguments.motion))).absolute()
+    if out.suffix.lower() != ".mp4" or out.is_dir() or not out.parent.is_dir():
+        raise BadInput(f"--out {out}: expected a file .mp4 in a folder that exists")
+    refuse_footage(out, file)
+    require_free(out, arguments.force)
     with progress_reporter(arguments) as reporter:
         frames, seconds = film(file, arguments, out, (width, height), background, reporter)
     if arguments.json:
@@ -115,13 +121,34 @@ def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
 
 
 def find_avatar(path: Path) -> Path:
-    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none."""
+    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none, or a link that leads to
+    nothing."""
     if path.is_file():
         return path
     for folder in (path / "export", path):
         if (folder / FILE).is_file():
             return folder / FILE
+        require_file(folder / FILE)
+    require_file(path)
     raise BadInput(f"{path}: no {FILE} here; give the file, or the folder of a run whose stage export is done")
+
+
+def default_name(file: Path, motion: str | None) -> str:
+    """`<avatar>-turn.mp4` or `<avatar>-<motion>.mp4`. The avatar has the name of the run's folder, or where it lies alone its own.
+
+    file: the avatar.gsac; motion: a file's path or a clip's name.
+    """
+    folder = file.absolute().parent
+    name = folder.parent.name if folder.name == "export" else file.stem
+    return f"{name}-{Path(motion).stem if motion else 'turn'}.mp4"
+
+
+def refuse_footage(out: Path, file: Path) -> None:
+    """BadInput where the video would take the place of the clip, or of a photo of it, that the avatar was made from."""
+    folder = RunFolder(file.absolute().parent.parent)
+    clip = folder.clip.resolve()
+    if out.exists() and clip.exists() and (clip.samefile(out) or clip in out.resolve().parents):
+        raise BadInput(f"{out} is the clip that {folder.root} was made from, which is never written over; give another --out")
 
 
 def parse_size(words: str) -> tuple[int, int]:

@@ -9,6 +9,7 @@ import http.server
 import tempfile
 from pathlib import Path
 
+from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput
 
@@ -32,11 +33,13 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 def find_page(path: Path, spare: Path) -> Path:
     """viewer.html of a run's folder, of an export folder, or beside a file; a .gsac file without one gets its page in the
-    folder `spare`. BadInput where there is none."""
+    folder `spare`. BadInput where there is none, or where its link leads to nothing."""
     folders = [path / "export", path] if path.is_dir() else [path.parent]
     for folder in folders:
         if (folder / PAGE).is_file():
             return folder / PAGE
+        require_file(folder / PAGE)
+    require_file(path)
     if path.is_file() and path.suffix.lower() == ".gsac":
         return make_page(path, spare)
     raise BadInput(f"{path}: no {PAGE} here; give the folder of a run whose stage export is done")

@@ -4,6 +4,7 @@ import urllib.request
 
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.pipeline.commands.demo import make_truth_clip
 from gsac.pipeline.commands.view import address, find_page, serve
 from gsac.pipeline.reporter import PlainReporter
@@ -43,7 +44,7 @@ def test_the_page_is_found_from_the_run_from_its_export_and_from_a_file_beside_i
 
 
 def test_an_avatar_file_that_lies_alone_gets_a_page_and_a_damaged_one_is_named(tmp_path):
-    whole = make_figure().to_bytes()
+    whole = avatar_bytes(make_figure())
     (tmp_path / "me.gsac").write_bytes(whole)
     (tmp_path / "spare").mkdir()
     page = find_page(tmp_path / "me.gsac", tmp_path / "spare")

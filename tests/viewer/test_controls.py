@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer.page import page_bytes
 from support.page_modules import expose
@@ -45,7 +46,7 @@ Object.defineProperty(navigator, 'xr', { value: {
 @pytest.fixture(scope="module")
 def address(figure, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "viewer.html"
-    path.write_bytes(page_bytes(figure.to_bytes()))
+    path.write_bytes(page_bytes(avatar_bytes(figure)))
     return path.as_uri()
 
 
