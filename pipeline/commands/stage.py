@@ -112,6 +112,7 @@ def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) ->
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     """Runs the stage through the store; shows its outputs as `out/<output>`."""
     store, name = task.store, task.name
+    task.keys.check([name])
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
         plan = plan_stage(store, parts, force, shown_key(task))

@@ -1,11 +1,13 @@
 """How fast a stage goes and how long a run still takes."""
 
 import io
+import json
 
 import pytest
 
 from gsac.pipeline.pace import Course, Pace
 from gsac.pipeline.reporter import BAR, COUNTED, NARROW_BAR, PlainReporter, TerminalReporter
+from gsac.pipeline.worker import EventStream
 
 ABOVE = {"split": set(), "smplx": {"split"}, "face": {"split"}, "train": {"split", "smplx"}}
 
@@ -73,6 +75,14 @@ def test_a_piped_run_tells_what_is_left_of_the_whole(monkeypatch):
     for done in (100, 200):
         reporter.progress("smplx", done, 300, "steps")
     assert lines.getvalue().splitlines()[-1] == "2/4 smplx: 200/300 steps, 5 steps/s, 20 s left; whole run: about 1 min 40 s left"
+
+
+def test_the_first_word_of_a_new_phase_is_sent_at_once():
+    sent = io.StringIO()
+    events = EventStream(sent)
+    for done, total, unit in ((1, 1400, "steps"), (2, 1400, "steps"), (0, 4, "parts of judging"), (1, 4, "parts of judging")):
+        events.progress(done, total, unit)
+    assert [json.loads(line)["unit"] for line in sent.getvalue().splitlines()] == ["steps", "parts of judging"]
 
 
 @pytest.mark.parametrize(("columns", "bar"), [(100, BAR), (40, NARROW_BAR)])
