@@ -29,8 +29,8 @@ export class OrbitCamera {
     this.pitch = PITCH;
     this.target = [0, 0, 0];
     this.distance = 3;
-    // Offset from the framing that a glide still has to lose: target (m), pitch (degrees), distance (m).
-    this.behind = [0, 0, 0, 0, 0];
+    // Offset from the framing that a glide still has to lose: target (m), pitch (degrees), distance (m), yaw (degrees).
+    this.behind = [0, 0, 0, 0, 0, 0];
     // Whether the user or the address moved it: a new size of the page does not frame the figure again then.
     this.moved = false;
   }
@@ -39,7 +39,7 @@ export class OrbitCamera {
   frame(low, high, aspect) {
     this.pitch = PITCH;
     this.moved = false;
-    this.behind = [0, 0, 0, 0, 0];
+    this.behind = [0, 0, 0, 0, 0, 0];
     this.target = low.map((l, i) => (l + high[i]) / 2);
     const tall = (high[1] - low[1]) * MARGIN_TALL / (1 - this.covered), wide = (high[0] - low[0]) * MARGIN_WIDE / aspect;
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
@@ -52,16 +52,23 @@ export class OrbitCamera {
     this.behind = this.place().map((to, i) => from[i] - to);
   }
 
+  // Turns gradually to a yaw, degrees, by the shorter way; a glide to another framing goes on from there.
+  glideTo(yaw) {
+    this.behind[5] += (this.yaw - yaw) % 360;
+    if (Math.abs(this.behind[5]) > 180) this.behind[5] -= 360 * Math.sign(this.behind[5]);
+    this.yaw = yaw;
+  }
+
   // Goes on with a glide by some seconds.
   settle(seconds) {
     const left = Math.exp(-seconds / GLIDE_S);
     this.behind = this.behind.map((x) => (Math.abs(x) < 1e-4 ? 0 : x * left));
   }
 
-  // Where it is now: target (m), pitch (degrees), distance (m).
+  // Where it is now: target (m), pitch (degrees), distance (m), yaw (degrees).
   place() {
     const at = this.target.map((t, i) => t + this.walked[i]);
-    return [...at, this.pitch, this.distance].map((x, i) => x + this.behind[i]);
+    return [...at, this.pitch, this.distance, this.yaw].map((x, i) => x + this.behind[i]);
   }
 
   // Focal length, px, for a picture of this height.
@@ -81,8 +88,8 @@ export class OrbitCamera {
 
   // Fills this.view.
   update() {
-    const place = this.place(), target = place.slice(0, 3), [pitch, distance] = place.slice(3);
-    const y = this.yaw * Math.PI / 180, p = pitch * Math.PI / 180;
+    const place = this.place(), target = place.slice(0, 3), [pitch, distance, yaw] = place.slice(3);
+    const y = yaw * Math.PI / 180, p = pitch * Math.PI / 180;
     const back = [Math.sin(y) * Math.cos(p), Math.sin(p), Math.cos(y) * Math.cos(p)];
     const right = [Math.cos(y), 0, -Math.sin(y)], forward = back.map((v) => -v);
     const down = [forward[1] * right[2] - forward[2] * right[1], forward[2] * right[0] - forward[0] * right[2],

@@ -16,8 +16,8 @@ export class Controls {
   /** @param {import("./viewer.js").Viewer} viewer */
   constructor(viewer) {
     this.viewer = viewer;
-    for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
     for (const pose of Object.keys(viewer.avatar.poses).sort()) this.addButton(`${pose}-pose`, { pose });
+    for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
     this.onClick("turntable", () => { viewer.turntable = !viewer.turntable; });
     this.onClick("light", () => { viewer.binding.lit = !viewer.binding.lit; });
     find("light").hidden = viewer.avatar.light === null;

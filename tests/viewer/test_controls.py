@@ -139,6 +139,25 @@ def test_time_stands_still_on_pause_goes_where_the_slider_is_and_on(page):
     page.until("document.getElementById('timeline').hidden")
 
 
+def test_the_page_opens_on_a_slow_turn_in_a_pose_until_something_is_picked(page, address):
+    page.call("Page.navigate", url="about:blank")
+    page.open(address)
+    assert page.run("gsac.playing") == {"pose": "A"}
+    page.until("gsac.camera.yaw > 3")
+    page.run("document.querySelector('[data-clip=walk]').click()")
+    page.until("!gsac.turntable && Math.abs(gsac.camera.place()[5]) < 1e-3")
+    assert page.run("gsac.camera.yaw") == 0, "the walk is seen from the front"
+    for words in ("pose=T", "clip=walk", "yaw=0", "still", "turntable=off"):
+        page.run(f"location.hash = '{words}'")
+        page.until("!gsac.turntable")
+        page.run("location.hash = ''")
+        page.until("gsac.turntable")
+    page.run("location.hash = 'clip=wave&turntable'")
+    page.until("gsac.playing.clip === 'wave'")
+    page.run("document.querySelector('[data-clip=walk]').click()")
+    assert page.run("gsac.turntable"), "it was asked to turn"
+
+
 def test_the_rate_is_frames_over_time_and_the_95th_slowest_frame(page):
     expose(page, "FrameRate")
     told = page.run("""(() => {
