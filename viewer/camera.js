@@ -8,6 +8,9 @@ const PITCH = 4;
 const MARGIN_TALL = 0.57;
 const MARGIN_WIDE = 0.58;
 
+// A press that moves less than this is a click, px.
+const STILL = 5;
+
 /**
  * What a renderer draws from. view: 3x4, row by row, world to camera; focal: px; centre: px from the middle of the box to the
  * optical axis; box: x, y, width, height of the picture on the canvas, px.
@@ -116,20 +119,32 @@ export class OrbitCamera {
     for (let i = 0; i < 3; i++) this.target[i] -= step * (dx * this.view[i] + dy * this.view[4 + i]);
   }
 
-  // onMove is called with each gesture.
-  listen(element, onMove) {
+  /**
+   * @param {HTMLElement} element
+   * @param {() => void} onMove called with each gesture
+   * @param {(x: number, y: number) => void} onClick called with the place of a click or tap that moved nothing, px of the page
+   */
+  listen(element, onMove, onClick) {
     const fingers = new Map();
+    let pressed = null;
     element.addEventListener("contextmenu", (e) => e.preventDefault());
     element.addEventListener("pointerdown", (e) => {
       element.setPointerCapture(e.pointerId);
       fingers.set(e.pointerId, [e.clientX, e.clientY]);
+      pressed = fingers.size === 1 && e.button === 0 ? [e.clientX, e.clientY] : null;
     });
     const lift = (e) => fingers.delete(e.pointerId);
-    element.addEventListener("pointerup", lift);
+    element.addEventListener("pointerup", (e) => {
+      lift(e);
+      if (pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < STILL) onClick(e.clientX, e.clientY);
+      pressed = null;
+    });
     element.addEventListener("pointercancel", lift);
     element.addEventListener("pointermove", (e) => {
       const old = fingers.get(e.pointerId);
       if (!old) return;
+      if (pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < STILL) return;
+      pressed = null;
       const dx = e.clientX - old[0], dy = e.clientY - old[1];
       if (fingers.size === 2) {
         const other = [...fingers].find(([id]) => id !== e.pointerId)[1];
