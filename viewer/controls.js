@@ -40,7 +40,7 @@ export class Controls {
     this.onClick("share", async () => this.note(await shareLink(describeView(viewer), document.title)));
     this.onClick("save", () => saveFile(new Blob([file]), `${this.name}.gsac`));
     this.onClick("fold", () => document.body.classList.toggle("folded"));
-    document.body.classList.toggle("folded", matchMedia("(max-width: 600px)").matches);
+    document.body.classList.toggle("folded", matchMedia("(max-width: 600px) and (pointer: coarse)").matches);
     document.addEventListener("fullscreenchange", () => this.show());
     find("fullscreen").hidden = !document.fullscreenEnabled;
     this.onClick("open", () => find("file").click());
