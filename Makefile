@@ -21,8 +21,10 @@ $(READY): pyproject.toml
 demo: setup
 	$(BIN)/gsac demo
 
+# Slow tests run alone: some measure time.
 test: setup debian lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m 'not slow' -n 2
+	$(BIN)/python -m pytest -m slow
 
 test-fast: setup
 	$(BIN)/python -m pytest -m 'not slow' -n 2

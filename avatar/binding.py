@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 from scipy.spatial.transform import Rotation
 
-from gsac.avatar.kernel import kernel
+from gsac.avatar.numba_kernel import kernel
 from gsac.avatar.rotation import to_wxyz
 from gsac.avatar.threads import Share, Workspace
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.blend import BRIGHTEST, DARKEST
+from gsac.avatar.draw_rule import BRIGHTEST, DARKEST
 
 TERMS = 4
 FROM_CAMERA = np.float32([1, -1, -1])

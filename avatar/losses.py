@@ -13,7 +13,7 @@ import numpy as np
 
 from gsac.avatar import sobel as _sobel
 from gsac.avatar import ssim as _ssim
-from gsac.avatar.kernel import kernel
+from gsac.avatar.numba_kernel import kernel
 from gsac.avatar.simd import WIDTH, load, spread, store, total
 from gsac.avatar.ssim import MARGIN
 from gsac.avatar.threads import Workspace

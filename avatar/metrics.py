@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gsac.avatar.flip import flip
+from gsac.avatar.flip_metric import flip
 from gsac.avatar.lpips import Lpips
 
 WHITE, BLACK = 1.0, 0.0

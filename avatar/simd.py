@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, overload, register_model
 
-from gsac.avatar.blend import ALPHA_LEVELS
+from gsac.avatar.draw_rule import ALPHA_LEVELS
 
 WIDTH = 16
 

@@ -6,7 +6,7 @@ smoothing sums to one, so a response has the scale of a central difference.
 
 from __future__ import annotations
 
-from gsac.avatar.kernel import kernel
+from gsac.avatar.numba_kernel import kernel
 from gsac.avatar.simd import WIDTH, load, spread, store, total
 from gsac.avatar.ssim import MARGIN
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from gsac.avatar.kernel import kernel
+from gsac.avatar.numba_kernel import kernel
 from gsac.avatar.simd import WIDTH, load, spread, store, total
 
 REACH = 5

@@ -84,8 +84,8 @@ class Video:
 
 
 class Pictures:
-    """`with Pictures(folder) as pictures: pictures.add(frame)` writes folder/000000.png and so on; the folder is new or empty. Where
-    the block raises, no folder is left."""
+    """`with Pictures(folder) as pictures: pictures.add(frame)` writes folder/000000.png and so on; the folder is new or empty.
+    Where the block raises, none is left."""
 
     def __init__(self, folder: Path):
         self.folder, self.count = Path(folder), 0

@@ -15,7 +15,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from gsac.benchmarks.truth_clips import render_clip, run_clip
+from gsac.benchmarks.clip_runs import render_clip, run_clip
 from gsac.cache.store import Store
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, Job, make_config
@@ -123,7 +123,7 @@ def _find_networks(config: TrainConfig) -> dict[str, Path]:
 def _with_truth(case: Case, out: Path) -> Case:
     """The case with the true body in place of the fitted one."""
     from gsac.avatar.body import Body
-    from gsac.benchmarks.speed_accuracy.novel import read_true_params
+    from gsac.benchmarks.speed_accuracy.novel_poses import read_true_params
 
     name = f"{case.name}_exact"
     path = out / "runs" / name / "smplx" / "body.npz"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from gsac.cache.objects import object_name
 from gsac.cache.store import Store
 
 
@@ -19,6 +20,8 @@ class Row:
     """s since it was last used."""
     seconds: float
     """Of the run that computed it."""
+    objects: list[str]
+    """Names of its outputs in the store."""
 
 
 def ls(store: Store) -> list[Row]:
@@ -28,5 +31,6 @@ def ls(store: Store) -> list[Row]:
         record = store.read(file)
         if record is not None:
             age = max(0.0, now - file.stat().st_mtime)
-            rows.append(Row(record.parts.stage, record.key, record.bytes, age, record.info.seconds))
+            names = [object_name(digest, output) for output, digest in record.outputs.items()]
+            rows.append(Row(record.parts.stage, record.key, record.bytes, age, record.info.seconds, names))
     return sorted(rows, key=lambda row: row.age_s)

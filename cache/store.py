@@ -6,6 +6,7 @@ actions/<stage>/<key>.<ns>.json  records of results that a forced run has replac
 tmp/ leases/ quarantine/         work in progress, locks, what was found damaged
 partial/<key>/                   work of a stopped run, for the next run of the same key
 models/<sha256>/<name>           model files, which gc leaves alone
+roots/                           folders that show results, which gc keeps
 memo.sqlite lock                 stat memo; lock held by publishers together, by gc alone
 """
 
@@ -25,7 +26,7 @@ from gsac.cache.memo import Memo, memo_in
 from gsac.cache.record import Record
 from gsac.cache.root import default_root
 
-FOLDERS = ("objects", "actions", "tmp", "leases", "quarantine", "partial", "models")
+FOLDERS = ("objects", "actions", "tmp", "leases", "quarantine", "partial", "models", "roots")
 USED_AGAIN_S = 3600
 """s: a hit renews the record's time, by which gc decides, at most this often."""
 

@@ -35,7 +35,8 @@ def execute(argv: list[str]) -> ExitCode:
         arguments = make_parser(argv).parse_args(argv)
         return arguments.do(arguments)
     except KeyboardInterrupt as error:
-        return _give_up("interrupted; finished stages are kept", ExitCode.INTERRUPTED, arguments, error)
+        said = "interrupted; finished stages are kept, and the same command goes on from there"
+        return _give_up(said, ExitCode.INTERRUPTED, arguments, error)
     except BrokenPipeError:  # the reader of the answer has gone: the rest is dropped
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.INTERRUPTED

@@ -16,10 +16,9 @@ from gsac.cache.digest import tree_files
 from gsac.cache.store import Store
 from gsac.pipeline.graph import Graph, Step, read_yaml
 from gsac.pipeline.params import config_values
-from gsac.pipeline.run_folder import PARAMS, RunFolder, write_text
+from gsac.pipeline.run_folder import LOCK, PARAMS, RunFolder, write_text
 from gsac.stages.contract import BadInput
 
-LOCK = "dvc.lock"
 MEMO_KIND = "md5"
 
 

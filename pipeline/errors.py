@@ -10,8 +10,10 @@ from gsac.cache.errors import CacheError, CacheReadOnlyError, IntegrityError
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput, StageError
 
-PATH_ERRORS = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
+PATH_ERRORS = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG,
+               errno.ELOOP, errno.EINVAL, errno.ENODEV, errno.ENXIO, errno.EOPNOTSUPP)
 """errno of a path from the user that cannot be read or written as it should."""
+NO_FOLDER = "the folder in which you are is gone; change to one that is there"
 NO_ROOM = {errno.ENOSPC: "no room left on the disk", errno.EDQUOT: "the disk quota is used up"}
 
 
@@ -23,7 +25,8 @@ class StageFailedError(Exception):
     """A stage failed with the error `cause`; stages that were finished before it are kept."""
 
     def __init__(self, stage: str, cause: Exception, log: Path):
-        seen = f" (log: {log})" if log.is_file() and log.stat().st_size else ""
+        told = isinstance(cause, BadInput)  # the sentence says all
+        seen = f" (log: {log})" if not told and log.is_file() and log.stat().st_size else ""
         super().__init__(f"stage {stage} failed: {cause}{seen}")
         self.stage = stage
         self.cause = cause
@@ -61,6 +64,8 @@ def exit_code(error: BaseException) -> ExitCode | None:
 def sentence(error: Exception) -> str:
     """The line that the user reads."""
     if isinstance(error, OSError):
+        if error.errno == errno.ENOENT and not error.filename:
+            return NO_FOLDER  # only the current folder is asked for without a name
         reason = NO_ROOM.get(error.errno or 0, error.strerror)
         return f"{error.filename}: {reason}" if error.filename else str(reason)
     return str(error)

@@ -1,7 +1,8 @@
 """dvc.yaml as a graph: steps in running order, and which needs which.
 
 Reads the part of DVC's format that one clip needs, and refuses the rest by name:
-`cmd: gsac stage NAME`, `deps`, `params` (whole sections), `outs` (optionally `cache: false`), `desc`.
+`cmd: gsac stage NAME`, `deps`, `params` (whole sections), `outs` (optionally `cache: false`), `desc`. Beside the stages
+`metrics` and `plots` may say what DVC shows; gsac leaves those to DVC.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from gsac.stages.contract import BadInput, did_you_mean
 
 CLIP = "clip"
 """The port of the source clip; no step makes it."""
+TOP_KEYS = ("stages", "metrics", "plots")
 STEP_KEYS = ("cmd", "deps", "params", "outs", "desc")
 OUT_OPTIONS = ("cache",)
 
@@ -124,7 +126,7 @@ def parse_yaml(text: str, source: str) -> Any:
 def _parse(document: Any, source: str) -> list[Step]:
     if not isinstance(document, dict) or not isinstance(document.get("stages"), dict):
         raise BadInput(f"{source}: expected a mapping with `stages`")
-    _only(document, ("stages",), source, "the file")
+    _only(document, TOP_KEYS, source, "the file")
     return [_step(name, body, source) for name, body in document["stages"].items()]
 
 

@@ -24,6 +24,8 @@ class Reason(Enum):
     DEVICE = "device changed"
     UPSTREAM = "upstream"
     OUTPUT = "output changed"
+    LOST = "result lost"
+    STOPPED = "stopped before"
 
     @property
     def sentence(self) -> str:
@@ -42,6 +44,8 @@ _SENTENCES = {
     Reason.DEVICE: "the device class is another",
     Reason.UPSTREAM: "it runs if the result of a stage above changes",
     Reason.OUTPUT: "the output in the folder is not the one in the cache",
+    Reason.LOST: "its result was there and is no longer in the cache: damaged, or removed",
+    Reason.STOPPED: "a run of it was stopped; it goes on from what that left",
 }
 _BY_CHANGE = {
     ChangeKind.INPUT: Reason.INPUT, ChangeKind.PARAM: Reason.PARAM, ChangeKind.CODE: Reason.CODE,
@@ -83,13 +87,21 @@ class StagePlan:
         return self.reason.sentence
 
 
-def plan_stage(store: Store, parts: KeyParts, forced: bool = False) -> StagePlan:
-    """Whether the result of this key is in the cache; if not, what differs from the most similar earlier run."""
+def plan_stage(store: Store, parts: KeyParts, forced: bool = False, shown: str | None = None) -> StagePlan:
+    """Whether the result of this key is in the cache; if not, what differs from the most similar earlier run.
+
+    shown: key of the result that the folder of the run showed last.
+    """
+    known = shown == parts.key or store.record_path(parts.stage, parts.key).is_file()
     record = store.lookup(parts.key)
     if forced:
         return StagePlan(parts.stage, Reason.FORCED, parts, record)
     if record is not None:
         return StagePlan(parts.stage, Reason.UP_TO_DATE, parts, record)
+    if store.partial(parts.key).exists():
+        return StagePlan(parts.stage, Reason.STOPPED, parts)
+    if known:
+        return StagePlan(parts.stage, Reason.LOST, parts)
     before = store.previous(parts.stage, parts)
     changes = before.parts.diff(parts) if before is not None else []
     if not changes:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import re
+import textwrap
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from gsac.cache.digest import tree_digest
 from gsac.cache.errors import CacheError
+from gsac.cache.key import KeyParts
 from gsac.cache.lease import in_use
 from gsac.cache.record import Record
 from gsac.cache.store import Store
@@ -23,12 +26,16 @@ from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run_folder import LOGS, METRICS, RUN, RunFolder
+from gsac.pipeline.rows import read_rows, result_row, write_rows
+from gsac.pipeline.run_folder import LOGS, RunFolder
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
 """Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
+
+RECALLED = 110
+"""Characters of a cached stage's warning at most."""
 
 
 @dataclass
@@ -46,6 +53,10 @@ class StageResult:
     warnings: list[str] = field(default_factory=list)
     params: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
+    inputs: dict[str, str] = field(default_factory=dict)
+    """Port -> tree digest."""
+    outputs: dict[str, str] = field(default_factory=dict)
+    """Port -> tree digest."""
     error: str | None = None
 
     @classmethod
@@ -53,14 +64,15 @@ class StageResult:
         """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, config_values(config), info.metrics)
+                   info.peak_rss_mb, info.warnings, config_values(config), info.metrics, record.parts.inputs, _ports(record))
 
     def to_json(self) -> dict[str, Any]:
         """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
-            "reason": self.reason, "warnings": self.warnings, "params": self.params,
+            "reason": self.reason, "warnings": self.warnings, "params": self.params, "inputs": self.inputs,
+            "outputs": self.outputs,
         }
         return row | ({"error": self.error} if self.error else {})
 
@@ -114,7 +126,7 @@ class ClipRun:
                 plans.append(plan_waiting(name, [maker for maker in self.graph.steps if maker in makers]))
                 continue
             parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
-            plan = plan_stage(self.store, parts, forced=name in options.force)
+            plan = self._plan(parts, options)
             plans.append(plan)
             if plan.cached is not None:
                 digests |= _ports(plan.cached)
@@ -132,14 +144,14 @@ class ClipRun:
         digests = {CLIP: source}
         paths = {CLIP: clip}
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
-        with in_use(self.store) as lease, self._writing_results(clip), runner:
+        with in_use(self.store) as lease, self._writing_results(clip, source), runner:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]
                 runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
                 inputs = self.graph.step(name).deps
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
                 lease.add(parts.key)
-                plan = plan_stage(self.store, parts, forced=name in options.force)
+                plan = self._plan(parts, options)
                 outcome, record = Outcome.CACHED, plan.cached
                 if record is None:
                     if name in required:
@@ -151,9 +163,20 @@ class ClipRun:
                             still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
+                    for message in record.info.warnings:
+                        self.reporter.warning(name, first_sentence(message))
                 self._record(plan, outcome, record)
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
+
+    @cached_property
+    def _shown(self) -> dict[str, str]:
+        """Stage -> key of the result that the folder showed before this run."""
+        results = {name: result_row(row) for name, row in read_rows(self.folder).items()}
+        return {name: str(row.get("key")) for name, row in results.items() if row is not None}
+
+    def _plan(self, parts: KeyParts, options: Options) -> StagePlan:
+        return plan_stage(self.store, parts, parts.stage in options.force, self._shown.get(parts.stage))
 
     def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))
@@ -171,20 +194,23 @@ class ClipRun:
             raise StageFailedError(plan.stage, error, runner.logs / f"{plan.stage}.log") from error
 
     @contextlib.contextmanager
-    def _writing_results(self, clip: Path) -> Iterator[None]:
+    def _writing_results(self, clip: Path, digest: str) -> Iterator[None]:
         """run.json, metrics.json and dvc.lock are written however the run ends."""
         try:
             yield
         finally:
-            self.folder.write_json(RUN, {"clip": str(clip), **self.summary()})
-            self.folder.write_json(METRICS, self.metrics)
-            done = [r.name for r in self.results if r.outcome is not Outcome.FAILED]
-            dvc_sync.write_lock(self.folder, self.graph, done, self.configs, self.store)
+            write_rows(self.folder, self.graph, self.store, [result.to_json() for result in self.results],
+                       {"clip": str(clip), "clip_digest": digest})
+            dvc_sync.write_lock(self.folder, self.graph, self.finished, self.configs, self.store)
+
+    @property
+    def finished(self) -> list[str]:
+        """Stages whose results this run has found or made."""
+        return [result.name for result in self.results if result.outcome is not Outcome.FAILED]
 
     def summary(self) -> dict[str, Any]:
         """The object of --json."""
-        done = {r.name for r in self.results if r.outcome is not Outcome.FAILED}
-        ports = [port for name in self.graph.steps if name in done for port in self.graph.step(name).outs]
+        ports = [port for name in self.graph.steps if name in self.finished for port in self.graph.step(name).outs]
         return {
             "stages": [result.to_json() for result in self.results],
             "outputs": self.folder.outputs(ports),
@@ -206,6 +232,11 @@ def clip_digest(clip: Path, store: Store) -> str:
         raise BadInput(f"{clip}: cannot be read ({e.strerror})") from e
     except CacheError as e:
         raise BadInput(f"the clip cannot be read: {e}; take it out of the folder") from e
+
+
+def first_sentence(message: str) -> str:
+    """A warning that was told in full when its stage ran, cut to its first sentence."""
+    return textwrap.shorten(re.split(r"(?<=[.;])\s", message, maxsplit=1)[0], RECALLED, placeholder=" …")
 
 
 def _ports(record: Record) -> dict[str, str]:

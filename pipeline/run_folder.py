@@ -1,7 +1,8 @@
-"""The folder of one clip: dvc.yaml, params.yaml, `clip`, and the outputs of every stage as links into the store.
+"""The folder of one clip: dvc.yaml, params.yaml, `clip`, and the outputs of every stage.
 
     clip  dvc.yaml  params.yaml  dvc.lock
     <stage>/<output>        link into the store (a copy where links cannot be made)
+    export/<output>         the user's own files; .placed.json knows them as they were placed
     logs/<stage>.log        what the stage printed
     run.json  metrics.json  report.html
 """
@@ -17,15 +18,20 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.digest import tree_digest
+from gsac.cache.objects import object_name
 from gsac.cache.record import Record
+from gsac.cache.roots import find_links, register
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.params import to_yaml
+from gsac.pipeline.placing import is_link_to, link, place
 from gsac.pipeline.project import Project
 from gsac.stages.contract import BadInput
 
-DAG, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "params.yaml", "run.json", "metrics.json", "report.html"
+DAG, LOCK, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "dvc.lock", "params.yaml", "run.json", "metrics.json", "report.html"
 LOGS = "logs"
+PLACED = ".placed.json"
+"""Port -> tree digest, of the real files that were placed here."""
 
 OWN_STORE = ".store"
 """Holds the results of a run whose cache cannot be written."""
@@ -36,6 +42,7 @@ class RunFolder:
 
     def __init__(self, root: Path):
         self.root = Path(root).absolute()
+        self._made: list[Path] = []
 
     @classmethod
     def around(cls, start: Path) -> RunFolder:
@@ -51,6 +58,11 @@ class RunFolder:
     def clip(self) -> Path:
         """The link to the source clip."""
         return self.root / CLIP
+
+    @property
+    def clip_name(self) -> str:
+        """File or folder name of the source clip, be it there or gone."""
+        return Path(os.readlink(self.clip)).name if self.clip.is_symlink() else self.clip.name
 
     @property
     def params(self) -> Path | None:
@@ -89,6 +101,7 @@ class RunFolder:
         if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
             raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
                            "folder elsewhere")
+        self._made = [folder for folder in (self.root, *self.root.parents) if not folder.exists()]
         self.root.mkdir(parents=True, exist_ok=True)
         write_text(self.root / DAG, project.dag.read_text())
         write_text(self.root / PARAMS, to_yaml(configs, notes=False))
@@ -98,10 +111,33 @@ class RunFolder:
         elif not self.clip.samefile(clip):
             raise BadInput(f"{self.clip} is there and is not a link; move it away or choose another --out")
 
-    def place(self, store: Store, record: Record) -> None:
-        """Links a finished stage's outputs into this folder."""
-        for output in record.outputs:
-            link(store.path(record, output), self.root / record.parts.stage / output)
+    def discard(self) -> None:
+        """Removes the folder, where `prepare` has made it and it holds nothing but what a run writes, and those made above it."""
+        ours = {CLIP, DAG, LOCK, PARAMS, RUN, METRICS, REPORT, LOGS, PLACED}
+        for folder in self._made:
+            with contextlib.suppress(OSError):
+                if folder == self.root and {entry.name for entry in folder.iterdir()} <= ours:
+                    shutil.rmtree(folder)
+                else:
+                    folder.rmdir()
+
+    def place(self, store: Store, record: Record, into: Path | None = None) -> None:
+        """Shows a finished stage's outputs in `<stage>/`, or in the folder `into`; gc then keeps what is shown."""
+        register(store, self.root)
+        before = self._placed()
+        after = place(store, record, into or self.root / record.parts.stage, before)
+        if after != before:
+            self.write_json(PLACED, after)
+
+    def objects(self) -> set[str]:
+        """Names of the store's objects that this folder shows, as links or as copies."""
+        return {*find_links(self.root).values(), *(object_name(digest, port) for port, digest in self._placed().items())}
+
+    def _placed(self) -> dict[str, str]:
+        with contextlib.suppress(OSError, ValueError):
+            placed = json.loads((self.root / PLACED).read_text())
+            return placed if isinstance(placed, dict) else {}
+        return {}
 
     def shows(self, store: Store, record: Record) -> bool:
         """Whether the outputs in this folder are those of the record."""
@@ -109,7 +145,7 @@ class RunFolder:
 
     def _shows(self, store: Store, record: Record, output: str) -> bool:
         path = self.root / record.parts.stage / output
-        if path.is_symlink() and os.readlink(path) == str(store.path(record, output)):
+        if is_link_to(path, store.path(record, output)):
             return True
         return path.exists() and tree_digest(path.resolve(), store.memo)[0] == record.outputs[output]
 
@@ -152,21 +188,3 @@ def write_text(path: Path, text: str) -> None:
         with contextlib.suppress(OSError):
             temp.unlink()
         raise OSError(error.errno, error.strerror, str(path)) from error
-
-
-def link(target: Path, path: Path) -> None:
-    """Makes `path` a link to `target`, or a copy where the filesystem has no links; replaces what was there."""
-    if path.is_symlink() and os.readlink(path) == str(target):
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temp = path.with_name(f".{path.name}-{os.getpid()}")
-    try:
-        temp.symlink_to(target)
-    except (OSError, NotImplementedError):
-        if target.is_dir():
-            shutil.copytree(target, temp, copy_function=shutil.copyfile)
-        else:
-            shutil.copyfile(target, temp)
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    os.replace(temp, path)

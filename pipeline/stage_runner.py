@@ -151,6 +151,8 @@ class StageRunner:
             self._show_log(name, log)
             if event["event"] == "progress":
                 self.reporter.progress(name, event["done"], event["total"], event["unit"])
+            elif event["event"] == "resumed":
+                self.reporter.note(f"{name}: goes on from {event['unit'].removesuffix('s')} {event['done']} of {event['total']}")
             else:
                 message = event["message"].removeprefix(f"{name}: ")  # the reporter names the stage
                 info.warnings.append(message)

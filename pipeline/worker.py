@@ -40,6 +40,10 @@ class EventStream:
             self._stream.write(json.dumps({"event": event, **fields}) + "\n")
             self._stream.flush()
 
+    def resumed(self, done: int, total: int, unit: str) -> None:
+        """Sends that the stage goes on from a stopped run's work."""
+        self.send("resumed", done=int(done), total=int(total), unit=str(unit))
+
     def progress(self, done: int, total: int, unit: str) -> None:
         """Sends progress, not too often; the last always."""
         now = time.monotonic()
@@ -86,6 +90,7 @@ def _work(order: dict[str, Any], events: EventStream) -> None:
         inputs={port: Path(path) for port, path in order["inputs"].items()},
         out=out,
         scratch=Path(order["scratch"]),
+        resumed=events.resumed,
         config=_config(stage, order["params"]),
         models={name: Path(path) for name, path in order["models"].items()},
         device=order["device"],

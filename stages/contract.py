@@ -64,6 +64,8 @@ class Job:
     scratch: Path | None = None
     """Folder that is kept when a run is killed or stopped, for the next run of the same key; the stage makes it when it has
     something to keep. None: nothing is kept."""
+    resumed: Callable[[int, int, str], None] = lambda done, total, what: None
+    """Tells that it goes on from what a stopped run left in `scratch`: done, total, unit."""
     device: str = "cpu"
     progress: Callable[[int, int, str], None] = lambda done, total, what: None
     """Reports progress: done, total, unit (`frames`, `steps`)."""

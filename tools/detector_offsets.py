@@ -25,7 +25,7 @@ from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import BODY_NAMES, FACE, FEET_NAMES, INDEX, LEFT_HAND, RIGHT_HAND
 from gsac.avatar.yaw import yaw
-from gsac.stages.smplx.detector import HARMONICS, PERSONAL, UNKNOWN, Detector, harmonics
+from gsac.stages.smplx.detector_errors import HARMONICS, PERSONAL, UNKNOWN, Detector, harmonics
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.symmetry import mirror_directions
 

@@ -1,6 +1,6 @@
 // Formulas of one gaussian, one pixel and one joint, forward and backward: binding, EWA projection, compositing, rotation
 // vectors, Adam. The kernels and the host test (float64) compile this same text; avatar/binding.py, avatar/raster/ and
-// avatar/skinning.py are the same on the CPU. The draw rule's constants stand before this text: avatar/blend.py writes them.
+// avatar/skinning.py are the same on the CPU. The draw rule's constants stand before this text: avatar/draw_rule.py writes them.
 #pragma once
 
 #ifdef __CUDACC__

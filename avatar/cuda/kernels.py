@@ -7,8 +7,8 @@ import os
 import tempfile
 from pathlib import Path
 
-from gsac.avatar.blend import cuda_constants
 from gsac.avatar.cuda.structs import declarations
+from gsac.avatar.draw_rule import cuda_constants
 
 SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "perceptual.cuh", "update.cuh",
            "offsets.cuh", "shape.cuh", "paper.cuh")

@@ -1,4 +1,4 @@
-"""The avatar that every export format is written from: rest mesh, skeleton, skin, expressions, gaussians; its `.gsac` file.
+"""The avatar that every export format is written from: rest mesh, skeleton, skin, expressions, gaussians.
 
 Canonical axes: right-handed, y up, facing +z, left = +x, metres; T-pose at zero rotation.
 """
@@ -10,18 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar import blend
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.animation import Animation
-from gsac.avatar.gsac_file.container import pack, read_bytes, unpack
+from gsac.avatar.gsac_file.container import read_bytes, unpack
 from gsac.avatar.gsac_file.read import Reader
-
-UNIT = 65535
-SKIN_SCALE = 1 / UNIT
-QUAT_SCALE = 1 / 32767
-LOG_SCALE_SCALE = 1 / 2048
-BLEND = {"low_pass_px2": blend.BLUR, "alpha_max": blend.MAX_ALPHA, "alpha_min": blend.MIN_ALPHA}
-"""The draw rule under the file's names."""
 
 
 @dataclass
@@ -79,48 +71,6 @@ class RiggedAvatar:
         transforms = joint_transforms(pose[None].astype(np.float32), self.joints, self.parents)[0]
         return skin(self.vertices, transforms, self.skin_index, self.skin_weight)
 
-    def to_bytes(self) -> bytes:
-        """The `.gsac` file (docs/gsac-format.md)."""
-        vertex_type = np.uint16 if len(self.vertices) <= 1 << 16 else np.uint32
-        face_type = np.uint16 if len(self.faces) <= 1 << 16 else np.uint32
-        blocks = {
-            "rest.vertices": self.vertices.astype(np.float32),
-            "rest.faces": self.faces.astype(vertex_type),
-            "rest.joints": self.joints.astype(np.float32),
-            "skin.index": self.skin_index.astype(np.uint8),
-            "skin.weight": _weights_u16(self.skin_weight),
-            "expression.start": self.expression_start.astype(np.uint32),
-            "expression.vertex": self.expression_vertex.astype(vertex_type),
-            "expression.delta": self.expression_delta.astype(np.float16),
-            "expression.jaw": self.jaw_actions.astype(np.float32),
-        }
-        scales, levels, clips = {"skin.weight": SKIN_SCALE}, [], []
-        for n, g in enumerate([self.gaussians, *self.coarser]):
-            prefix = f"gaussian{n or ''}"
-            blocks |= {
-                f"{prefix}.face": g.face.astype(face_type),
-                f"{prefix}.mu": g.mu.astype(np.float16),
-                f"{prefix}.quat": np.rint(_unit(g.quat) / QUAT_SCALE).astype(np.int16),
-                f"{prefix}.log_scale": np.rint(np.clip(g.log_scale, -15.9, 15.9) / LOG_SCALE_SCALE).astype(np.int16),
-                f"{prefix}.rgb": g.rgb.astype(np.float16),
-                f"{prefix}.opacity": np.rint(np.clip(g.opacity, 0, 1) * UNIT).astype(np.uint16),
-            }
-            scales |= {f"{prefix}.quat": QUAT_SCALE, f"{prefix}.log_scale": LOG_SCALE_SCALE, f"{prefix}.opacity": 1 / UNIT}
-            levels.append({"prefix": prefix, "count": len(g)})
-        if self.gaussians.light is not None:
-            blocks["light"] = self.gaussians.light.astype(np.float32)
-        for name, clip in self.clips.items():
-            blocks[f"clip.{name}.rotation"] = clip.rotation.astype(np.float32)
-            blocks[f"clip.{name}.transl"] = clip.transl.astype(np.float32)
-            clips.append({"name": name, "fps": clip.fps, "loop": clip.loop, "joints": clip.joints})
-        head = {
-            "format": "gsac", "axes": "right-handed, metres, y up, facing +z, left +x", "ground": self.ground,
-            "joints": {"names": self.joint_names, "parents": self.parents.tolist()},
-            "expressions": self.expression_names, "poses": self.poses, "clips": clips, "blend": BLEND,
-            "levels": levels, "licence": self.licence, "provenance": self.provenance,
-        }
-        return pack(head, blocks, scales)
-
     @classmethod
     def from_bytes(cls, data: bytes, where: str = "avatar.gsac") -> RiggedAvatar:
         """From the bytes of a file; where: its name in messages. Raises `GsacError`."""
@@ -131,17 +81,3 @@ class RiggedAvatar:
     def read(cls, path: Path) -> RiggedAvatar:
         """From a file. Raises `GsacError`."""
         return cls.from_bytes(read_bytes(path), str(path))
-
-
-def _unit(quat: np.ndarray) -> np.ndarray:
-    """(N, 4) unit quaternions; those that are unit but for rounding stay as they are, zero becomes no rotation."""
-    length = np.linalg.norm(quat, axis=1, keepdims=True)
-    divisor = np.where(abs(length - 1) < 1e-4, 1, np.maximum(length, 1e-12))
-    return np.where(length < 1e-12, (1, 0, 0, 0), quat / divisor)
-
-
-def _weights_u16(weight: np.ndarray) -> np.ndarray:
-    """(V, 4) weights as integers whose rows sum to exactly 65535; the largest weight takes the rounding."""
-    out = np.rint(weight / weight.sum(1, keepdims=True) * UNIT).astype(np.int64)
-    out[np.arange(len(out)), weight.argmax(1)] += UNIT - out.sum(1)
-    return out.astype(np.uint16)

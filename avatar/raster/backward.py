@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.blend import MAX_ALPHA, STOP
-from gsac.avatar.kernel import kernel
+from gsac.avatar.draw_rule import MAX_ALPHA, STOP
+from gsac.avatar.numba_kernel import kernel
 from gsac.avatar.raster.forward import BLOCK, BLOCKS, LANES
 from gsac.avatar.raster.project import BLUE, GREEN, HA, HC, OPACITY, RED, S_MAX, TILE, B, X, Y
 from gsac.avatar.simd import below_or_equal, falloff, load, lowest_bit, spread, store, store_totals, total

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.blend import MAX_ALPHA, STOP
-from gsac.avatar.kernel import kernel
+from gsac.avatar.draw_rule import MAX_ALPHA, STOP
+from gsac.avatar.numba_kernel import kernel
 from gsac.avatar.raster.project import (
     BLUE,
     CHORD,

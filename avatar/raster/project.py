@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.blend import ALPHA_LEVELS, BLUR, FRUSTUM, MIN_ALPHA, NEAR
-from gsac.avatar.kernel import kernel
+from gsac.avatar.draw_rule import ALPHA_LEVELS, BLUR, FRUSTUM, MIN_ALPHA, NEAR
+from gsac.avatar.numba_kernel import kernel
 
 X, Y, HA, B, HC, S_MAX, OPACITY, RED, GREEN, BLUE, HALF_WIDTH, HALF_HEIGHT, RIGHTMOST, CHORD, SLOPE, RIM = range(16)
 """Columns of a splat. HALF_*: px from the centre to the rim; RIGHTMOST: dy of the rim's rightmost point;

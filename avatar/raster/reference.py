@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import torch
 
-from gsac.avatar.blend import BLUR, FRUSTUM, MAX_ALPHA, MIN_ALPHA, NEAR, STOP
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import BLUR, FRUSTUM, MAX_ALPHA, MIN_ALPHA, NEAR, STOP
 
 
 def render(means: torch.Tensor, rotations: torch.Tensor, scales: torch.Tensor, rgb: torch.Tensor, opacity: torch.Tensor,

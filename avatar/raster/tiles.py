@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.kernel import kernel
+from gsac.avatar.numba_kernel import kernel
 
 RADIX_BITS = 11
 

@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
-    from gsac.benchmarks.fit import chart, clips, hidden, table, trial
+    from gsac.benchmarks.fit import chart, clips, hidden_wrist, table, trial
     from gsac.benchmarks.handgap import gaps
     from gsac.benchmarks.handgap import table as gap_table
     from gsac.benchmarks.handgap.clips import make_turning_body
@@ -57,14 +57,14 @@ def main(argv: list[str] | None = None) -> int:
             for method in options.methods:
                 trials.append(trial.fit(case, method, focal == "given"))
                 say.note(f"{case.name}, focal {focal}, {method}: {trials[-1].wall_s:.1f} s")
-    wrists = [h for case in cases for h in hidden.measure(case)]
+    wrists = [h for case in cases for h in hidden_wrist.measure(case)]
     say.note("hand gaps, every method")
     filled = gaps.summarise(gaps.measure({f"seed {s}": make_turning_body(s) for s in options.gap_seeds}))
     parts = [table.text(trials), *table.compare_speed(trials)]
     table.write_csv(trials, options.out / "fit.csv")
     if wrists:
-        parts.append("\n" + hidden.text(wrists))
-        hidden.write_csv(wrists, options.out / "hidden-wrist.csv")
+        parts.append("\n" + hidden_wrist.text(wrists))
+        hidden_wrist.write_csv(wrists, options.out / "hidden-wrist.csv")
     if filled:
         parts.append(gap_table.text(filled, "hand gaps"))
         gap_table.write_csv(filled, options.out / "hand-gaps.csv")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from gsac.benchmarks.clip_runs import render_clip, run_clip
 from gsac.benchmarks.fit.truth import Truth, read_truth
-from gsac.benchmarks.truth_clips import render_clip, run_clip
 from gsac.cache.store import Store
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput

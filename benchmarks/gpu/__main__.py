@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gsac.avatar.cuda.device import Device
     from gsac.avatar.cuda.recipe import Recipe
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import Figure
+    from gsac.benchmarks.gpu.synthetic_clip import Figure
 
 
 def make_bench_recipe(count: int = 25000, **more: Any) -> Recipe:
@@ -34,7 +34,7 @@ def main() -> None:
     from gsac.avatar.cuda.device import Device
     from gsac.benchmarks.gpu import perceptual
     from gsac.benchmarks.gpu.check import LIMIT, errors
-    from gsac.benchmarks.gpu.figure import figure, start
+    from gsac.benchmarks.gpu.synthetic_clip import figure, start
     from gsac.benchmarks.gpu.timing import copy_bandwidth, float_rate
 
     began = time.perf_counter()
@@ -86,7 +86,7 @@ def compare(figure: Figure) -> None:
     """Times the same loop in torch + gsplat if these are installed."""
     from importlib.util import find_spec
 
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     if find_spec("torch") is None or find_spec("gsplat") is None:
         print("torch + gsplat: not installed, not measured")
@@ -128,7 +128,7 @@ def measure_paper(device: Device, figure: Figure, ceilings: tuple[float, float])
 def measure_rounds(device: Device, figure: Figure) -> None:
     """Times a step of the rounds that move the poses: 3000 gaussians at an eighth of the size, displaced surface learned."""
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.benchmarks.gpu.timing import kernel_microseconds, step_milliseconds
     from gsac.stages.train.fast import prealign
     from gsac.stages.train.fast.schedule import OFFSET_RATE
@@ -147,7 +147,7 @@ def measure_body(device: Device, figure: Figure, ceilings: tuple[float, float]) 
     """Times the kernels that learn expression and joints at rest."""
     from gsac.avatar.body import Body
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.benchmarks.gpu.timing import kernel_microseconds, least_bytes
 
     recipe = make_bench_recipe(steps=600, expression_rate=1e-3, joint_rate=1e-4)
@@ -162,17 +162,17 @@ def measure_body(device: Device, figure: Figure, ceilings: tuple[float, float]) 
 
 
 def measure_tails(device: Device, figure: Figure) -> None:
-    """Times `blend` with long lists of gaussians, see `tails`."""
+    """Times `blend` with long lists of gaussians, see `long_lists`."""
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu import tails
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu import long_lists
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     for count, batch, smaller in ((25000, 1, 1), (25000, 4, 1), (12000, 1, 2)):
         shots = figure.shots if smaller == 1 else figure.scaled(smaller)
         trainer = CudaTrainer(figure.body, [shots], figure.pose, figure.transl, start(figure.body, count),
                               make_bench_recipe(count, steps=900, batch=batch), device)
         trainer.train(300)
-        tails.measure(trainer, device)
+        long_lists.measure(trainer, device)
         trainer.close()
 
 
@@ -191,7 +191,7 @@ def print_kernels(trainer: CudaTrainer, kernels: dict[str, float], pairs: float,
 def measure(device: Device, figure: Figure, quick: bool, ceilings: tuple[float, float]) -> None:
     """Times steps, kernels and, unless quick, whole trainings of recipe `fast`, each twice."""
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.benchmarks.gpu.timing import (
         evaluations,
         kernel_microseconds,

@@ -12,18 +12,18 @@ import torch
 from numpy.typing import ArrayLike
 from torch.nn import functional
 
-from gsac.avatar.blend import BRIGHTEST, DARKEST
 from gsac.avatar.cuda.adjacency import joint_levels
 from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.cuda.recipe import Recipe, draw_plan
+from gsac.avatar.draw_rule import BRIGHTEST, DARKEST
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.light import FROM_CAMERA
 from gsac.avatar.logistic import logit, sigmoid
-from gsac.benchmarks.gpu.figure import Figure
+from gsac.benchmarks.gpu.synthetic_clip import Figure
 from gsac.stages.train.fast import prealign
 from gsac.stages.train.fast.cuda import Cuda, make_recipe
-from gsac.stages.train.fast.start import crop_views, init_gaussians
+from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gpu import body_arrays
 from gsac.stages.train.poses.poses import HAND_SHARE

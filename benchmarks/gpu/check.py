@@ -12,7 +12,7 @@ from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.skinning import skin_backward
-from gsac.benchmarks.gpu.figure import Figure
+from gsac.benchmarks.gpu.synthetic_clip import Figure
 
 NAMES = ("image", "loss", "mu", "quat", "log_scale", "rgb", "logit", "pose", "transl")
 PER_GAUSSIAN = ("mu", "quat", "log_scale", "rgb", "logit")

@@ -29,7 +29,7 @@ def main() -> None:
     options = parser.parse_args()
     if why := why_not():
         raise SystemExit(f"benchmarks.gpu.people: {why}")
-    from gsac.benchmarks.speed_accuracy.novel import judge_poses
+    from gsac.benchmarks.speed_accuracy.novel_poses import judge_poses
     from gsac.pipeline.reporter import PlainReporter
 
     def one(case: training.Case, recipe: str, cores: list[int] | None) -> dict:

@@ -12,7 +12,7 @@ from gsac.avatar.cuda.paper import PaperTrainer
 from gsac.avatar.cuda.trainer import REPLAY, CudaTrainer
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
-from gsac.benchmarks.gpu.figure import Figure
+from gsac.benchmarks.gpu.synthetic_clip import Figure
 
 
 def step_milliseconds(trainer: CudaTrainer, replays: int = 30, warm: int = 3) -> list[float]:

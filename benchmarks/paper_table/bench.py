@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from gsac.benchmarks import training
-from gsac.benchmarks.truth_clips import render_clip
+from gsac.benchmarks.clip_runs import render_clip
 
 FILLS = {"no fill": ("handgap.max_gap_s=0", "handgap.max_hold_s=0"), "paper's fill": ("handgap.method=paper",), "our fill": ()}
 """Row -> settings of the run up to the body fit."""

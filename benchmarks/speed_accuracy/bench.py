@@ -54,7 +54,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def measure(cases: list[training.Case], options: argparse.Namespace, say: PlainReporter) -> list[Trial]:
     """Runs all trainings of the cases. Long ones start first, so that jobs side by side end together."""
-    from gsac.benchmarks.speed_accuracy import novel
+    from gsac.benchmarks.speed_accuracy import novel_poses
     from gsac.benchmarks.speed_accuracy.trial import make_trial
 
     def one(case: training.Case, recipe: str, steps: int, seed: int, cores: list[int] | None) -> Trial:
@@ -62,7 +62,7 @@ def measure(cases: list[training.Case], options: argparse.Namespace, say: PlainR
         metrics = training.train(case, folder, cores, recipe=recipe, steps=steps, seed=seed, height=options.height, curve=CURVE,
                                  flip=True)
         if case.novel:
-            metrics |= novel.judge_poses(folder, case.novel, options.height, folder / "novel")
+            metrics |= novel_poses.judge_poses(folder, case.novel, options.height, folder / "novel")
         say.note(f"{folder.name}: {metrics['psnr_fg']:.2f} dB after {metrics['cpu_seconds']:.1f} CPU s")
         return make_trial(case.name, metrics)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsac.avatar.binding import bind, face_frames
-from gsac.avatar.blend import BLUR, MAX_ALPHA, MIN_ALPHA
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import BLUR, MAX_ALPHA, MIN_ALPHA
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.joints import INDEX
 from gsac.avatar.skinning import joint_transforms, skin

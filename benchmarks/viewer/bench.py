@@ -14,13 +14,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.stages.contract import BadInput, StageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
-    from gsac.benchmarks.viewer.race import FrameRate
+    from gsac.benchmarks.viewer.frame_rate import FrameRate
 
 PACKAGE = "playcanvas@2.23.3"
 PAGE = Path(__file__).with_name("playcanvas.html")
@@ -45,18 +46,18 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
-    from gsac.benchmarks.viewer import browser, race
+    from gsac.benchmarks.viewer import browser, frame_rate
 
     if browser.find_chromium() is None or not shutil.which("npm"):
         raise BadInput("gsac bench viewer needs chromium and npm (Debian packages of those names)")
     options.out.mkdir(parents=True, exist_ok=True)
     avatar = prepare(options)
-    rates: dict[str, list[race.FrameRate]] = {}
-    with race.serve(options.out.absolute()) as address:
+    rates: dict[str, list[frame_rate.FrameRate]] = {}
+    with frame_rate.serve(options.out.absolute()) as address:
         for k in range(options.rounds):
             for name, page in pages(avatar, options.draw).items():
                 picture = options.out / f"{name.lower()}.png" if k == 0 else None
-                rates.setdefault(name, []).append(race.measure(f"{address}/{page}", options.size, options.seconds, picture))
+                rates.setdefault(name, []).append(frame_rate.measure(f"{address}/{page}", options.size, options.seconds, picture))
                 print(f"round {k + 1}: {name:11} {rates[name][-1].fps:6.2f} frames a second", file=sys.stderr)
     words = text(rates, len(avatar.gaussians), options.size)
     print(words)
@@ -76,7 +77,7 @@ def prepare(options: argparse.Namespace) -> RiggedAvatar:
     if "walk" not in avatar.clips:
         raise BadInput(f"{options.avatar}: it carries no clip walk; export it with export.animations=walk")
     splats = pose_gaussians(avatar, avatar.pose("A"))
-    (options.out / "viewer.html").write_bytes(page_bytes(avatar.to_bytes()))
+    (options.out / "viewer.html").write_bytes(page_bytes(avatar_bytes(avatar)))
     (options.out / "avatar.ply").write_bytes(ply_bytes(*splats, avatar.gaussians.rgb, avatar.gaussians.opacity))
     shutil.copy(PAGE, options.out)
     if not (options.out / "node_modules" / "playcanvas").is_dir():

@@ -25,6 +25,7 @@ COMMANDS = {
     "view": "show an avatar in the browser",
     "render": "make a video of an avatar, moving or from all sides",
     "report": "write report.html of a run's folder",
+    "pack": "make one zip of an avatar with viewer, report and exports, which opens anywhere",
 }
 """Name -> help, of the modules beside this file."""
 GROUP = "gsac.commands"

@@ -26,6 +26,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--executor", default="local", metavar="NAME", help=f"one of: {', '.join(EXECUTORS)}")
     command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
+    command.add_argument("--replace", action="store_true", help="put a clip's avatar in place of another clip's in its folder")
     add_params(command)
     add_json(command)
     command.set_defaults(do=do)
@@ -59,6 +60,7 @@ def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
     """Arguments of every clip's `gsac run`."""
     told = ["--params", str(arguments.params.absolute())] if arguments.params else []
     told += [word for text in arguments.set for word in ("--set", text)]
+    told += ["--replace"] if arguments.replace else []
     return tuple(told + (["--until", arguments.until] if arguments.until else []))
 
 

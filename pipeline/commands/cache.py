@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import re
+from collections.abc import Iterator
 
 from gsac.cache import gc, listing, verify
+from gsac.cache.roots import find_roots
 from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
 
 UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
@@ -17,7 +20,7 @@ UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 
 def declare(command: argparse.ArgumentParser) -> None:
     does = command.add_subparsers(dest="does", required=True, metavar="ls|verify|gc")
-    one = does.add_parser("ls", help="every result, the last used first")
+    one = does.add_parser("ls", help="every result with the clip and the folder that shows it, the last used first")
     add_json(one)
     one.set_defaults(do=do_ls)
     one = does.add_parser("verify", help="read every byte; what is damaged is moved to quarantine")
@@ -26,6 +29,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     one = does.add_parser("gc", help="remove rubbish, and with a bound the results that were not used for longest")
     one.add_argument("--keep-days", type=float, metavar="N", help="remove results not used for N days")
     one.add_argument("--max-size", metavar="SIZE", help="remove the longest unused until this much is left, e.g. 20G")
+    one.add_argument("--force", action="store_true", help="take also what folders of runs show")
     one.add_argument("--dry-run", action="store_true", help="say what would go")
     add_json(one)
     one.set_defaults(do=do_gc)
@@ -34,13 +38,18 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
     reporter = answer_reporter(arguments)
     store = open_store(progress_reporter(arguments))
-    rows = listing.ls(store)
+    rows, folders = listing.ls(store), [RunFolder(root.folder) for root in find_roots(store)]
+    shown = {folder: folder.objects() for folder in folders}
+    places = {row.key: [folder for folder in folders if not shown[folder].isdisjoint(row.objects)] for row in rows}
     for row in rows:
         age = f"{row.age_s / 86400:6.1f} d"
-        reporter.note(f"{row.stage:<10} {row.key[:16]}  {format_size(row.bytes):>9}  {age}  {row.seconds:8.1f} s")
+        reporter.note(f"{row.stage:<10} {row.key[:16]}  {format_size(row.bytes):>9}  {age}  {row.seconds:8.1f} s  "
+                      f"{describe_places(places[row.key])}")
     reporter.note(f"{len(rows)} results, {format_size(sum(row.bytes for row in rows))} in {store.root}")
     if arguments.json:
-        emit({"root": str(store.root), "results": [dataclasses.asdict(row) for row in rows]})
+        emit({"root": str(store.root), "results": [
+            dataclasses.asdict(row) | {"clips": sorted({folder.clip_name for folder in places[row.key]}),
+                                       "folders": [str(folder.root) for folder in places[row.key]]} for row in rows]})
     return ExitCode.OK
 
 
@@ -61,14 +70,38 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
     limit = parse_size(arguments.max_size) if arguments.max_size else None
     if arguments.keep_days is not None and arguments.keep_days < 0:
         raise BadInput(f"--keep-days {arguments.keep_days}: expected 0 or more")
-    report = gc.collect(open_store(reporter), arguments.keep_days, limit, arguments.dry_run)
+    report = gc.collect(open_store(reporter), arguments.keep_days, limit, arguments.dry_run, force=arguments.force)
     verb = "would remove" if arguments.dry_run else "removed"
     left = len(report.temps) + len(report.partial)
     reporter.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {left} left-overs of dead runs: "
                 f"{format_size(report.freed_bytes)}; {format_size(report.kept_bytes)} stay")
+    for line in reasons(report):
+        reporter.note(line)
     if arguments.json:
         emit(dataclasses.asdict(report))
     return ExitCode.OK
+
+
+def reasons(report: gc.GcReport) -> Iterator[str]:
+    """Lines on what stays although a bound would take it, and on what folders lose."""
+    if report.recent:
+        yield f"{len(report.recent)} results stay since they were used within the last hour"
+    if report.in_use:
+        yield f"{len(report.in_use)} results stay since a run in progress uses them"
+    if report.kept:
+        yield f"{len(report.kept)} folders keep what they show; --force takes it:"
+    for folder, links in report.kept.items():
+        yield f"  {folder} keeps {', '.join(links)}"
+    for folder, links in report.lost.items():
+        yield f"  {folder} {'would lose' if report.dry_run else 'loses'} {', '.join(links)}"
+
+
+def describe_places(folders: list[RunFolder]) -> str:
+    """Clip and folder of a result, and how many more there are; `-` where no folder shows it."""
+    if not folders:
+        return "-"
+    more = f" and {len(folders) - 1} more" if len(folders) > 1 else ""
+    return f"{folders[0].clip_name}  {folders[0].root}{more}"
 
 
 def format_size(count: float) -> str:

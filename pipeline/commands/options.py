@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter, open_reporter
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
+from gsac.stages.contract import BadInput
 
 
 def add_params(command: argparse.ArgumentParser) -> None:
@@ -24,6 +26,18 @@ def add_params(command: argparse.ArgumentParser) -> None:
 
 def add_json(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="one JSON object as the last line of stdout")
+
+
+def add_force(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--force", action="store_true", help="write over a file that is there already")
+
+
+def require_free(file: Path, force: bool) -> None:
+    """BadInput where a file would be written over without --force, or where a folder is in its place."""
+    if file.is_dir():
+        raise BadInput(f"{file} is a folder; give the name of a file")
+    if os.path.lexists(file) and not force:
+        raise BadInput(f"{file} is there already; give another --out, or --force to write over it")
 
 
 def add_run_folder(command: argparse.ArgumentParser) -> None:

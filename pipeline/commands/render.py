@@ -8,10 +8,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gsac.pipeline.commands.options import add_json, progress_reporter
+from gsac.avatar.video import TRANSPARENT
+from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput, StageError
 
 if TYPE_CHECKING:
@@ -33,8 +36,10 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--motion", metavar="FILE",
                          help="a .bvh or AMASS-style .npz file, or the name of a clip in the avatar (walk, wave); "
                               "without it the avatar is seen from all sides")
-    command.add_argument("--out", type=Path, default=Path("clip.mp4"), metavar="FILE",
-                         help="a .mp4, .webm or .gif, or a new folder for PNG pictures; default: clip.mp4")
+    command.add_argument("--out", type=Path, metavar="FILE",
+                         help="a .mp4, .webm or .gif, or a new folder for PNG pictures; "
+                              "default: <avatar>-<motion>.mp4 here, without a motion <avatar>-turn.mp4")
+    add_force(command)
     command.add_argument("--size", default="720x960", metavar="WxH", help="pixels, even numbers; default: 720x960")
     command.add_argument("--fps", type=float, default=30.0, metavar="N", help="default: 30")
     command.add_argument("--seconds", type=float, metavar="N",
@@ -50,16 +55,19 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     width, height = parse_size(arguments.size)
-    out = arguments.out.absolute()
-    check_out(arguments.out)
     background = None if arguments.background == "none" else parse_colour(arguments.background)
-    if background is None and out.suffix.lower() == ".mp4":
-        raise BadInput("--background none: .mp4 holds no transparency; expected --out with .webm, .gif or a folder of pictures")
     if not 1 <= arguments.fps <= 240:
         raise BadInput(f"--fps {arguments.fps:g}: expected 1 to 240")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 3600:
         raise BadInput(f"--seconds {arguments.seconds:g}: expected more than 0, at most 3600")
+    if not -360 <= arguments.yaw <= 360:
+        raise BadInput(f"--yaw {arguments.yaw:g}: expected degrees, -360 to 360")
     file = find_avatar(arguments.avatar)
+    out = (arguments.out or Path(default_name(file, arguments.motion))).absolute()
+    check_out(out, file, arguments.force)
+    if background is None and out.suffix.lower() not in ("", *TRANSPARENT):
+        raise BadInput(f"--background none: {out.suffix} holds no transparency; expected --out with {' or '.join(TRANSPARENT)}, "
+                       "or a folder for PNG pictures")
     with progress_reporter(arguments) as reporter:
         frames, seconds = film(file, arguments, out, (width, height), background, reporter)
     if arguments.json:
@@ -103,12 +111,17 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
     return len(plan), seconds
 
 
-def check_out(out: Path) -> None:
-    """Raises BadInput unless the film can be written there."""
-    if out.suffix and out.suffix.lower() not in FILMS or out.suffix and out.is_dir() or not out.absolute().parent.is_dir():
-        raise BadInput(f"--out {out}: expected a file {', '.join(FILMS)}, or a new folder for PNG pictures, in a folder that exists")
-    if not out.suffix and (out.is_file() or out.is_dir() and any(out.iterdir())):
-        raise BadInput(f"--out {out}: pictures are written to a new or empty folder, and this one is there; give another name")
+def check_out(out: Path, file: Path, force: bool) -> None:
+    """Raises BadInput unless the film of the avatar `file` can be written to `out` and takes nobody's place."""
+    if (out.suffix and out.suffix.lower() not in FILMS) or not out.parent.is_dir():
+        raise BadInput(f"--out {out}: expected a file {', '.join(FILMS)}, or a new folder for PNG pictures, "
+                       "in a folder that exists")
+    if not out.suffix:
+        if out.is_file() or (out.is_dir() and any(out.iterdir())):
+            raise BadInput(f"--out {out}: pictures go to a new or empty folder, and this is there already; give another name")
+        return
+    refuse_footage(out, file)
+    require_free(out, force)
 
 
 def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
@@ -132,13 +145,34 @@ def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
 
 
 def find_avatar(path: Path) -> Path:
-    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none."""
+    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none, or a link that leads to
+    nothing."""
     if path.is_file():
         return path
     for folder in (path / "export", path):
         if (folder / FILE).is_file():
             return folder / FILE
+        require_file(folder / FILE)
+    require_file(path)
     raise BadInput(f"{path}: no {FILE} here; give the file, or the folder of a run whose stage export is done")
+
+
+def default_name(file: Path, motion: str | None) -> str:
+    """`<avatar>-turn.mp4` or `<avatar>-<motion>.mp4`. The avatar has the name of the run's folder, or where it lies alone its own.
+
+    file: the avatar.gsac; motion: a file's path or a clip's name.
+    """
+    folder = file.absolute().parent
+    name = folder.parent.name if folder.name == "export" else file.stem
+    return f"{name}-{Path(motion).stem if motion else 'turn'}.mp4"
+
+
+def refuse_footage(out: Path, file: Path) -> None:
+    """BadInput where the video would take the place of the clip, or of a photo of it, that the avatar was made from."""
+    folder = RunFolder(file.absolute().parent.parent)
+    clip = folder.clip.resolve()
+    if out.exists() and clip.exists() and (clip.samefile(out) or clip in out.resolve().parents):
+        raise BadInput(f"{out} is the clip that {folder.root} was made from, which is never written over; give another --out")
 
 
 def parse_size(words: str) -> tuple[int, int]:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
-from gsac.pipeline.errors import StageFailedError, attach_summary
+from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.other_clip import make_room
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
@@ -17,6 +18,9 @@ from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
+
+MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
+"""Ends of a run that are the command line's or the clip's fault."""
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -27,6 +31,7 @@ def declare(command: argparse.ArgumentParser) -> None:
                          help="what this stage needs must be in the cache already")
     command.add_argument("--force", action="append", default=[], metavar="STAGE",
                          help="run this stage again; may be repeated")
+    command.add_argument("--replace", action="store_true", help="put this clip's avatar in place of another clip's in DIR")
     add_params(command)
     command.add_argument("--dry-run", action="store_true", help="say what would run and why")
     add_json(command)
@@ -45,6 +50,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         if arguments.dry_run:
             return dry_run(clip_run, clip, options, reporter, arguments.json)
         clip_run.select(options)
+        make_room(run_folder, clip, store, arguments.replace)
         run_folder.prepare(clip, project, configs)
         return carry_out(clip_run, clip, options, reporter, arguments.json)
 
@@ -57,7 +63,9 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
         write_report(clip_run, reporter, early)
     except BaseException as error:
         attach_summary(error, clip_run.summary())
-        if isinstance(error, StageFailedError):
+        if exit_code(error) in MISTAKES and not clip_run.finished:
+            clip_run.folder.discard()
+        elif isinstance(error, StageFailedError):
             write_report(clip_run, reporter)
         raise
     if json:
@@ -68,7 +76,7 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
 
 def write_report(clip_run: ClipRun, reporter: PlainReporter, early: EarlySections | None = None) -> None:
     """Writes report.html if it is due; a failure is only a warning."""
-    if (warning := refresh_report(clip_run.folder, clip_run.results, early)) is not None:
+    if (warning := refresh_report(clip_run.folder, early)) is not None:
         reporter.note(f"gsac: warning: {warning}")
 
 

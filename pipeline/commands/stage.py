@@ -18,9 +18,11 @@ from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.plan import plan_stage
 from gsac.pipeline.project import Project
+from gsac.pipeline.report.refresh import refresh_report
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.rows import clip_entries, read_rows, result_row, write_rows
 from gsac.pipeline.run import StageResult
-from gsac.pipeline.run_folder import LOGS, OWN_STORE, link
+from gsac.pipeline.run_folder import LOGS, OWN_STORE, REPORT, RunFolder
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
@@ -47,9 +49,13 @@ class Task:
     """Port -> tree digest of an input."""
     paths: dict[str, Path]
     """Port -> path of an input."""
+    folder: RunFolder
+    """Knows what was placed in it."""
     out: Path
-    """Folder for the outputs."""
+    """Folder for the outputs, below it or itself."""
     logs: Path
+    in_run: bool = False
+    """Whether `folder` is the folder of a run, whose run.json, metrics.json and report speak of the stage."""
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
@@ -62,7 +68,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         except StageFailedError as error:
             failed = StageResult(task.name, Outcome.FAILED, "", error=str(error.cause))
             attach_summary(error, {"stages": [failed.to_json()]})
+            note_in_folder(task, failed, reporter)
             raise
+        note_in_folder(task, result, reporter)
     if arguments.json:
         outputs = task.keys.project.stage(task.name).outputs
         emit({"stages": [result.to_json()], "outputs": {f"{task.name}/{o.path}": str(task.out / o.path) for o in outputs},
@@ -77,7 +85,7 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -
     ports = project.graph.step(arguments.name).deps
     return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
                 {port: run_folder.path(port).resolve() for port in ports},
-                run_folder.root / arguments.name, run_folder.root / LOGS)
+                run_folder, run_folder.root / arguments.name, run_folder.root / LOGS, in_run=True)
 
 
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
@@ -88,15 +96,15 @@ def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) ->
     paths = fixture_paths(project, arguments.name, arguments.inputs)
     digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
     out = arguments.out.absolute()
-    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, out, out / LOGS)
+    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, RunFolder(out), out, out / LOGS)
 
 
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
-    """Runs the stage through the store; links its outputs to `out/<output>`."""
+    """Runs the stage through the store; shows its outputs as `out/<output>`."""
     store, name = task.store, task.name
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
-        plan = plan_stage(store, parts, force)
+        plan = plan_stage(store, parts, force, shown_key(task))
         outcome, record = Outcome.CACHED, plan.cached
         if record is None:
             try:
@@ -106,9 +114,23 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
                 raise StageFailedError(name, error, task.logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:
             reporter.ends(name, outcome, record.info.seconds)
-        for output in record.outputs:
-            link(store.path(record, output), task.out / output)
+        task.folder.place(store, record, task.out)
     return StageResult.of(plan, outcome, record, task.keys.configs[name])
+
+
+def shown_key(task: Task) -> str | None:
+    """Key of the result that the folder of the run shows; None outside of one."""
+    row = result_row(read_rows(task.folder).get(task.name)) if task.in_run else None
+    return row.get("key") if row is not None else None
+
+
+def note_in_folder(task: Task, result: StageResult, reporter: PlainReporter) -> None:
+    """Brings run.json, metrics.json and a report that is there up to what lies in the folder of the run."""
+    if not task.in_run:
+        return
+    write_rows(task.folder, task.keys.project.graph, task.store, [result.to_json()], clip_entries(task.folder, task.store))
+    if (task.folder.root / REPORT).exists() and (warning := refresh_report(task.folder)) is not None:
+        reporter.note(f"gsac: warning: {warning}")
 
 
 def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:

@@ -10,6 +10,7 @@ import tempfile
 import webbrowser
 from pathlib import Path
 
+from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.page_server import PAGE, PageServer, find_network_address, make_certificate, serve
 from gsac.stages.contract import BadInput
@@ -62,24 +63,23 @@ def open_server(page: Path, name: str, arguments: argparse.Namespace, folder: Pa
 
 def find_page(path: Path, spare: Path) -> Path:
     """viewer.html of a run's folder, of an export folder, or beside a file; an avatar without one gets its page in the folder
-    `spare`. BadInput where there is none."""
+    `spare`. BadInput where there is none, or where its link leads to nothing."""
     if path.is_file() and path.suffix.lower() == ".gsac" and path.name != AVATAR:
         return make_page(path, spare)
     folders = [path / "export", path] if path.is_dir() else [path.parent]
     for folder in folders:
         if (folder / PAGE).is_file():
             return folder / PAGE
+        require_file(folder / PAGE)
+    require_file(path)
     for folder in folders:
         if (folder / AVATAR).is_file() and (path.is_dir() or path.name == AVATAR):
             return make_page(folder / AVATAR, spare)
-    raise BadInput(f"{path}: {why_not(path, folders)}; {EXPECTED}")
+    raise BadInput(f"{path}: {why_not(path)}; {EXPECTED}")
 
 
-def why_not(path: Path, folders: list[Path]) -> str:
+def why_not(path: Path) -> str:
     """What is wrong with a path that leads to no page."""
-    dead = next((folder / name for folder in folders for name in (PAGE, AVATAR) if (folder / name).is_symlink()), None)
-    if dead is not None:
-        return f"{dead.name} is a link to a file that is gone ({os.readlink(dead)}); `gsac run` with the same clip brings it back"
     if not path.exists():
         return "no such file or folder"
     return f"no {PAGE} and no {AVATAR} here" if path.is_dir() else f"no {PAGE} lies beside it, and it is no .gsac file"

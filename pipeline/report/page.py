@@ -14,8 +14,10 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from gsac.pipeline.report.results import AbsentError, Results, number, read_json, tree_size
+from gsac.pipeline.report.origin import drawn_from, shown_stages
+from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
 from gsac.pipeline.report.tables import parameters, provenance, stage_rows, totals
+from gsac.pipeline.rows import read_json
 from gsac.pipeline.run_folder import REPORT, RUN
 
 if TYPE_CHECKING:
@@ -35,6 +37,8 @@ class Section:
     charts: list = field(default_factory=list)
     absent: str = ""
     """Why there is nothing to see."""
+    stage: str = ""
+    """Whose result it shows."""
 
 
 def draw_sections(out_dir: Path, running: str) -> dict[str, Section]:
@@ -67,7 +71,8 @@ def render(results: Results, drawn: dict[str, Section]) -> str:
         clip=results.clip_name, when=run_date(results), headline=headline(results, facts), sections=sections,
         warnings=list_warnings(results), failed=results.failed, reached=explain_partial_run(results), stages=stage_rows(results),
         totals=totals(results), parameters=parameters(results), files=list_exports(results), foot=provenance(results),
-        viewer="export/viewer.html" if has_viewer(results) else "",
+        viewer="export/viewer.html" if has_viewer(results) else "", caveat=results.caveat,
+        drawn_from=drawn_from(results), shows=" ".join(shown_stages(results)),
     )
 
 
@@ -113,7 +118,7 @@ class Painter:
 def make_section(results: Results, drawing: Callable[[], Painter], ident: str, title: str, lead: str, port: str,
                  sheet: Callable | None, charts: Callable | None = None) -> Section:
     """Draws the result at a port; where that fails, the section holds the reason."""
-    made = Section(ident, title, lead)
+    made = Section(ident, title, lead, stage=port.partition("/")[0])
     try:
         results.path(port)
         made.sheet = sheet(drawing()) if sheet else None
@@ -183,17 +188,21 @@ def describe_person(results: Results, facts: dict[str, float]) -> str:
 
 def list_warnings(results: Results) -> list[tuple[str, str]]:
     """Stage and sentence, all of them."""
-    return [(name, str(text).removeprefix(f"{name}: ")) for name, row in results.rows.items() for text in row.get("warnings") or []]
+    rows = {name: results.result(name) or row for name, row in results.rows.items()}
+    return [(name, str(text).removeprefix(f"{name}: ")) for name, row in rows.items() for text in row.get("warnings") or []]
 
 
 def explain_partial_run(results: Results) -> str:
-    """A sentence on a run that ended early without failing; empty otherwise."""
+    """A sentence on a run that ended early without failing, and on results that it has left behind; empty otherwise."""
     if not results.has_run:
         return f"There is no readable {RUN} here: times, warnings and parameters of the run are unknown."
+    words = []
     left = [name for name in results.order if name not in results.rows]
     if left and not results.failed:
-        return f"This run ended before {', '.join(left)}, as it was told to or because it was interrupted."
-    return ""
+        words.append(f"This run ended before {', '.join(left)}, as it was told to or because it was interrupted.")
+    if stale := [name for name in results.order if (results.result(name) or {}).get("stale")]:
+        words.append(f"Not of the last run's inputs: {', '.join(stale)}. Run again without --until to bring all up to date.")
+    return " ".join(words)
 
 
 def has_viewer(results: Results) -> bool:

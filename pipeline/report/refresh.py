@@ -1,4 +1,4 @@
-"""When report.html is written: after a run that changed something, or where it is missing."""
+"""When report.html is written: where what lies in the folder is not what it was drawn from."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import contextlib
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.run import StageResult
+from gsac.pipeline.report.origin import drawn_from, read_origin
+from gsac.pipeline.report.results import Results
 from gsac.pipeline.run_folder import REPORT, RunFolder
 
 
@@ -33,12 +33,18 @@ class EarlySections:
         return {}
 
 
-def refresh_report(folder: RunFolder, results: list[StageResult], early: EarlySections | None = None) -> str | None:
-    """Writes the report if it is due. Returns a warning where that failed: it does not fail the run."""
+def refresh_report(folder: RunFolder, early: EarlySections | None = None) -> str | None:
+    """Draws the report anew if it is due. Returns a warning where that failed or would have cost parts of the page: neither
+    fails the run."""
     page = folder.root / REPORT
-    if page.exists() and all(result.outcome is Outcome.CACHED for result in results):
-        return None
     try:
+        results, shown = Results(folder.root), read_origin(page)
+        if shown is not None:
+            if shown.digest == drawn_from(results):
+                return None
+            if lost := [stage for stage in shown.stages if not results.holds(stage)]:
+                return (f"{page} stays as it is: it shows results of {', '.join(lost)}, which are no longer in the folder; "
+                        f"`gsac report {folder.root}` draws what is left")
         from gsac.pipeline.report.page import write_report
 
         write_report(folder.root, early.sections() if early else None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from functools import cached_property
 from pathlib import Path
@@ -11,10 +10,9 @@ from typing import Any
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.project import Project
+from gsac.pipeline.rows import Row, read_json, result_row, rows_of
 from gsac.pipeline.run_folder import DAG, RUN
 from gsac.stages.contract import StageError
-
-DONE = (Outcome.RAN.value, Outcome.CACHED.value)
 
 
 class AbsentError(Exception):
@@ -29,9 +27,7 @@ class Results:
         run = read_json(self.root / RUN)
         self.has_run = isinstance(run, dict)
         self.run: dict[str, Any] = run if isinstance(run, dict) else {}
-        rows = self.run.get("stages")
-        self.rows = {str(row["name"]): row for row in (rows if isinstance(rows, list) else [])
-                     if isinstance(row, dict) and "name" in row}
+        self.rows = rows_of(run)
 
     @cached_property
     def project(self) -> Project:
@@ -76,14 +72,33 @@ class Results:
         return content
 
     def done(self, stage: str) -> bool:
-        """Whether the run has a result of the stage; without run.json it counts as done."""
-        return not self.has_run or self.rows.get(stage, {}).get("status") in DONE
+        """Whether there is a result of the stage, of the last run or an earlier one; without run.json it counts as done."""
+        return not self.has_run or self.result(stage) is not None
+
+    def result(self, stage: str) -> Row | None:
+        """The row of the stage's result, which is an earlier one where the stage failed in the last run."""
+        return result_row(self.rows.get(stage))
+
+    def holds(self, stage: str) -> bool:
+        """Whether the stage's result is recorded and its files are there."""
+        step = self.project.graph.steps.get(stage)
+        return self.result(stage) is not None and step is not None and all((self.root / port).exists() for port in step.outs)
+
+    def caveat(self, stage: str) -> str:
+        """What is to be known of a result that is not of the last run, or not made from what lies in the folder; else empty."""
+        row, result = self.rows.get(stage), self.result(stage)
+        if row is None or result is None:
+            return ""
+        words = [f"Stage {stage} failed in the last run: this is an earlier result."] if row is not result else []
+        if result.get("stale"):
+            words.append(f"This result was {result.get('stale_reason')}.")
+        return " ".join(words)
 
     def path(self, port: str) -> Path:
         """File or folder of a port that this run made; without run.json whatever lies there. AbsentError says why not."""
         stage = port.partition("/")[0]
         path = self.root / port
-        if self.failed and self.failed[0] == stage:
+        if self.failed and self.failed[0] == stage and not self.done(stage):
             raise AbsentError(f"Stage {stage} failed: {self.failed[1]}")
         if not self.done(stage):
             why = f"not reached: stage {self.failed[0]} failed" if self.failed else "not part of this run"
@@ -107,14 +122,6 @@ def tree_size(path: Path) -> int:
     if path.is_dir():
         return sum(p.lstat().st_size for p in path.rglob("*") if p.is_file())
     return path.stat().st_size if path.exists() else 0
-
-
-def read_json(path: Path) -> Any:
-    """None where it cannot be read."""
-    try:
-        return json.loads(path.read_text())
-    except (OSError, ValueError):
-        return None
 
 
 def number(value: Any) -> float | None:

@@ -25,7 +25,7 @@ def stage_rows(results: Results) -> list[dict[str, Any]]:
             rows.append(BLANK | {"name": name, "status": "not run" if results.has_run else "unknown",
                                  "bytes": results.size(name)})
             continue
-        done = results.done(name)
+        done = results.result(name) is row
         rows.append(BLANK | {
             "name": name, "status": str(row.get("status")),
             "seconds": number(row.get("seconds")) if done else None,

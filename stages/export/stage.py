@@ -13,6 +13,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.avatar.rotation import to_wxyz
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
@@ -47,7 +48,7 @@ def run(job: Job) -> None:
     add_motion(avatar, job.config.clip_names())
     avatar.coarser = trained or [merge_level(avatar, members) for members in MEMBERS]
 
-    container = avatar.to_bytes()
+    container = avatar_bytes(avatar)
     pose = avatar.pose(job.config.ply_pose.upper())
     splats = (*pose_gaussians(avatar, pose), avatar.gaussians.rgb, avatar.gaussians.opacity)
     rest = pose_gaussians(avatar, avatar.pose("T"))

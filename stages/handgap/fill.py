@@ -6,11 +6,11 @@ from functools import partial
 
 import numpy as np
 
+from gsac.stages.handgap.arm_segments import fill_by_segments
 from gsac.stages.handgap.config import HandgapConfig, Method
 from gsac.stages.handgap.method import Detections, FillArm, Filled, HiddenArm
 from gsac.stages.handgap.methods import gp, hermite, paper, paper_literal, turning
 from gsac.stages.handgap.missing_hands import SIDES, MissingHands
-from gsac.stages.handgap.segments import fill_by_segments
 
 METHODS: dict[Method, FillArm] = {
     "turning": turning.fill_arm,

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gsac.stages.handgap.body_turn import SEEN_SCORE, estimate_turn, locate_centre, smooth_centre
 from gsac.stages.handgap.config import HandgapConfig
 from gsac.stages.handgap.missing_hands import runs
+from gsac.stages.handgap.turn_estimate import SEEN_SCORE, estimate_turn, locate_centre, smooth_centre
 
 LENGTHS_S = (0.25, 0.4, 0.6, 0.9, 1.4)
 """Grid of the time constant of a point's motion in the body's frame, s."""

@@ -1,4 +1,7 @@
-"""What all detectors do: they follow one person, write BlazePose's body points and find the face mesh."""
+"""What all detectors do: they follow one person, write BlazePose's body points and find the face mesh.
+
+A new detector is a file beside `mediapipe.py`, a row in `stage.DETECTORS`, and its name and model files in `config.py`.
+"""
 
 from __future__ import annotations
 

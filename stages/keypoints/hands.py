@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.detections import anchor_centers, decode, suppress
 from gsac.avatar.region import Region, around_circle, crop, upright_angle
+from gsac.avatar.ssd_decode import anchor_centers, decode, suppress
 from gsac.avatar.tflite import Network
 
 POINTS = 21

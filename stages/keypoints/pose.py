@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.detections import anchor_centers, decode, suppress
 from gsac.avatar.logistic import clipped_sigmoid
 from gsac.avatar.region import Region, around_circle, crop, full_frame
+from gsac.avatar.ssd_decode import anchor_centers, decode, suppress
 from gsac.avatar.tflite import Network
 
 POINTS = 33

@@ -28,6 +28,10 @@ MOST_THREADS = 8
 EDGE = 0.004
 """Width of the rim of the frame, as a part of its longer side, that counts as touching it."""
 
+FLICKER = 0.25
+"""Share of the frames below which what looks like a person, but shows neither face nor hand in any of them, is none."""
+ADVICE = "film one whole person, upright, at least a third of the frame high, in good light"
+
 
 def run(job: Job) -> None:
     paths = frame_paths(job.inputs["split/frames"])
@@ -66,8 +70,10 @@ def report(job: Job, frames: list[Frame], at_edge: list[bool]) -> None:
     """Warns of what was not seen; that nobody was seen in any frame is an error. at_edge: one for each frame."""
     seen = np.array([f.seen for f in frames])
     if not seen.any():
-        raise BadInput(f"No person was found in any of the clip's {len(frames)} frames; "
-                       "film one whole person, upright, at least a third of the frame high, in good light")
+        raise BadInput(f"No person was found in any of the clip's {len(frames)} frames; {ADVICE}")
+    if seen.mean() < FLICKER and not any(f.score[points].any() for f in frames for points in (FACE, *HANDS.values())):
+        raise BadInput(f"No person was found: something like one shows in {name_frames(seen)} only, and never a face or a hand; "
+                       f"{ADVICE}")
     if not seen.all():
         job.warn(f"No person was found in {name_frames(~seen)}; these frames carry no points.")
     second = np.array([f.second_person for f in frames])

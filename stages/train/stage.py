@@ -24,10 +24,10 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.frame_names import name_frames
 from gsac.stages.train.checkpoint import Checkpoints, State
+from gsac.stages.train.choose_heldout import hold_out, hold_out_for_choosing
 from gsac.stages.train.config import NETWORKS, TrainConfig
 from gsac.stages.train.fast.lod import judge_levels
 from gsac.stages.train.finite import named_result, named_values, require_finite
-from gsac.stages.train.holdout import hold_out, hold_out_for_choosing
 from gsac.stages.train.judge.coverage import unseen_parts
 from gsac.stages.train.judge.heldout import Candidate, draw_all_round, judge, judge_all
 from gsac.stages.train.judge.novel_poses import judge_novel
@@ -167,12 +167,13 @@ class Run:
     def keep(self, step: int, steps: int, state: Callable[[], State]) -> None:
         """Writes a checkpoint if it is time for one."""
         if self.checkpoints.due(ends=step == steps):
-            self.checkpoints.write({"step": step, "recipe": state(), "poses": self.poses.state(), "curve": self.curve,
-                                    "losses": self.losses, "spent": self.clock()})
+            self.checkpoints.write({"step": step, "steps": steps, "recipe": state(), "poses": self.poses.state(),
+                                    "curve": self.curve, "losses": self.losses, "spent": self.clock()})
 
     def restore(self, state: State) -> None:
         """Takes up where a stopped run's checkpoint stands."""
         self.resumed_at = state["step"]
+        self.job.resumed(state["step"], state["steps"], "steps")
         self.poses.restore(state["poses"])
         self.curve, self.losses = state["curve"], state["losses"]
         self.began -= state["spent"]

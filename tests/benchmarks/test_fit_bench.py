@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.wholebody import ARM, HANDS
-from gsac.benchmarks.fit import bench, chart, hidden, table
+from gsac.benchmarks.fit import bench, chart, hidden_wrist, table
 from gsac.benchmarks.fit.clips import prepare_case
 from gsac.benchmarks.fit.trial import FitTrial
 from gsac.stages.contract import BadInput
@@ -82,27 +82,27 @@ def test_a_bare_clip_is_rendered_without_clothes(tmp_path, monkeypatch):
 
 def test_windows_of_one_hand_are_apart_and_as_long_as_they_say():
     for frames in (60, 40, 24):
-        found = list(hidden.list_windows(frames))
-        assert found and all(last <= frames - hidden.MARGIN for *_, last in found)
+        found = list(hidden_wrist.list_windows(frames))
+        assert found and all(last <= frames - hidden_wrist.MARGIN for *_, last in found)
         for side in HANDS:
             ends = [0, *(t for s, *span in found if s == side for t in span)]
-            assert np.diff(ends)[::2].min() >= hidden.MARGIN
-    lengths = sorted(last - first for side, first, last in hidden.list_windows(60) if side == "left")
-    assert lengths == sorted(hidden.GAPS["left"])
+            assert np.diff(ends)[::2].min() >= hidden_wrist.MARGIN
+    lengths = sorted(last - first for side, first, last in hidden_wrist.list_windows(60) if side == "left")
+    assert lengths == sorted(hidden_wrist.GAPS["left"])
 
 
 def test_masking_hides_arm_and_hand_there_and_nothing_else():
     seen = {"xy": np.ones((60, 133, 2)), "score": np.ones((60, 133)), "world": np.ones((60, 133, 3))}
-    masked = hidden.mask_windows(seen)
+    masked = hidden_wrist.mask_windows(seen)
     hide = np.zeros((60, 133), bool)
-    for side, first, last in hidden.list_windows(60):
+    for side, first, last in hidden_wrist.list_windows(60):
         hide[first:last, [*range(133)[HANDS[side]], *ARM[side][1:3]]] = True
     assert np.array_equal(masked["score"] == 0, hide) and np.array_equal(np.isnan(masked["world"]).all(-1), hide)
     assert seen["score"].all()
 
 
 def test_the_hidden_wrists_table_has_a_line_for_each_gap_and_one_for_all():
-    found = [hidden.Hidden("a", "left", 3, np.full(4, 10.0)), hidden.Hidden("a", "right", 9, np.full(8, 40.0))]
-    lines = hidden.text(found).splitlines()
+    found = [hidden_wrist.Hidden("a", "left", 3, np.full(4, 10.0)), hidden_wrist.Hidden("a", "right", 9, np.full(8, 40.0))]
+    lines = hidden_wrist.text(found).splitlines()
     assert [line.split()[0] for line in lines[2:]] == ["4", "8", "all", "bar"]
     assert lines[4].split()[1:] == ["2", "40.0", "30.0", "40.0"]

@@ -10,7 +10,7 @@ from gsac.benchmarks import training
 from gsac.benchmarks.command import names
 from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart
-from gsac.benchmarks.speed_accuracy import chart, novel, table
+from gsac.benchmarks.speed_accuracy import chart, novel_poses, table
 from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto_front, seconds_to
 from gsac.stages.contract import BadInput
 
@@ -79,7 +79,7 @@ def test_joints_are_moved_onto_the_rays_of_the_truth():
     rng = np.random.default_rng(0)
     truth = rng.normal(0, 0.4, (22, 3)) + [0.2, 0.1, 4.0]
     small, shift = 0.9 * truth, np.array([0.3, -0.2, 0.5])
-    assert novel.solve_translation(small - shift, truth) == pytest.approx(shift, abs=1e-9), "nearer and smaller looks the same"
+    assert novel_poses.solve_translation(small - shift, truth) == pytest.approx(shift, abs=1e-9), "nearer and smaller looks alike"
 
 
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):

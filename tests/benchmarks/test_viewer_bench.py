@@ -2,7 +2,7 @@
 
 from gsac.benchmarks.viewer.avatar import make_avatar
 from gsac.benchmarks.viewer.bench import pages, text
-from gsac.benchmarks.viewer.race import FrameRate, cpu_seconds
+from gsac.benchmarks.viewer.frame_rate import FrameRate, cpu_seconds
 
 
 def test_both_pages_look_at_the_same_point_from_the_same_distance():

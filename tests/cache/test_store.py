@@ -237,7 +237,8 @@ def test_the_listing_tells_stage_size_and_seconds_the_last_used_first(store, mak
 
 
 def test_the_cache_knows_only_the_standard_library_and_itself():
-    modules = "code digest errors gc key lease listing lock memo objects publish record root store module_digest verify".split()
+    modules = ("code digest errors gc key lease listing lock memo objects publish record root roots store "
+               "module_digest verify").split()
     command = f"import sys, {', '.join('gsac.cache.' + m for m in modules)}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", command], capture_output=True, check=True, text=True).stdout.split()
     before = subprocess.run([sys.executable, "-c", "import sys; print(*sys.modules)"], capture_output=True, text=True)

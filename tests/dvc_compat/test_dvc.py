@@ -1,11 +1,15 @@
 """Real DVC and gsac agree about what is up to date, both ways, over the same folder."""
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from gsac.pipeline.project import shipped_dag
+from support.toy import DAG
 
 pytestmark = pytest.mark.slow
 
@@ -97,14 +101,32 @@ def test_dvc_repro_never_harms_what_is_in_the_store(toy, dvc):
 
 
 def test_the_shipped_dvc_yaml_is_one_that_dvc_reads(toy, dvc):
-    from gsac.pipeline.project import shipped_dag
-
     (toy.out / "dvc.yaml").write_text(shipped_dag().read_text())
     (toy.out / "params.yaml").write_text(Path(shipped_dag()).with_name("params.yaml").read_text())
     os.symlink(toy.clip, toy.out / "clip")
     listed = dvc("stage", "list", "--name-only").split()
     assert listed == ["split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export"]
     assert "changed deps" in dvc("status")
+
+
+def test_dvc_metrics_show_prints_what_the_folder_holds(toy, dvc):
+    toy.write("dvc.yaml", DAG + "metrics: [metrics.json]\n")
+    toy.ran()
+    toy.ran("--until", "cut")
+    assert json.loads(dvc("metrics", "show", "--json"))[""]["data"]["metrics.json"]["data"] == {"length": 10}
+    assert dvc.is_clean
+
+
+def test_dvc_draws_the_plots_that_the_shipped_dvc_yaml_names(toy, dvc):
+    (toy.out / "dvc.yaml").write_text(shipped_dag().read_text())
+    curve = [{"step": step, "loss": 1 / step, "psnr_fg": 20.0} for step in (1, 2, 3)]
+    heldout = [{"frame": frame, "psnr_full": 30.0 + frame, "psnr_fg": 25.0} for frame in (4, 9)]
+    (toy.out / "metrics.json").write_text(json.dumps({"psnr_fg": 25.0, "curve": curve, "heldout": heldout}))
+    assert "25.0" in dvc("metrics", "show")
+    for name, x, y, shown in (("loss", "step", "loss", [(1, 1.0), (2, 1 / 2), (3, 1 / 3)]),
+                              ("heldout", "frame", "psnr_full", [(4, 34.0), (9, 39.0)])):
+        points = json.loads(dvc("plots", "show", name, "--show-vega"))["data"]["values"]
+        assert [(row[x], row[y]) for row in points if x in row] == shown
 
 
 def test_gsac_never_imports_dvc():

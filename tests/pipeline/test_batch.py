@@ -69,3 +69,16 @@ def test_folders_of_photos_are_clips_and_other_things_are_not(tmp_path):
 def test_clips_of_equal_name_get_folders_of_their_own(tmp_path):
     jobs = make_jobs([tmp_path / "a" / "x.mp4", tmp_path / "b" / "x.mp4", tmp_path / "a" / "x.mp4"], tmp_path, ())
     assert [job.out.name for job in jobs] == ["x-avatar", "x-2-avatar"]
+
+
+def test_a_folder_of_an_earlier_batch_with_another_clip_of_that_name_is_replaced_only_if_told(toy, clips):
+    (clips / "bad.mp4").unlink()
+    out = toy.root / "avatars"
+    assert toy.gsac("batch", clips, "--out", out).code == 0
+    others = toy.root / "others"
+    others.mkdir()
+    (others / "one.mp4").write_text("omega psi")
+    done = toy.gsac("batch", others, "--out", out)
+    assert done.code == 1 and f"holds the avatar of {clips / 'one.mp4'}" in done.err
+    assert toy.gsac("batch", others, "--out", out, "--replace").code == 0
+    assert (out / "one-avatar" / "join" / "out.txt").read_text() == "OMEGA OMEGA"

@@ -32,6 +32,10 @@ def test_above_and_below_follow_the_edges(tmp_path):
     assert graph.below("a") == {"b", "c", "d"} and graph.below("d") == set()
 
 
+def test_what_dvc_shows_of_the_results_is_left_to_dvc(tmp_path):
+    assert load(tmp_path, CHAIN + "metrics: [m.json]\nplots: [p: {y: {m.json: loss}}]\n").steps.keys() == set("abcd")
+
+
 @pytest.mark.parametrize(("text", "words"), [
     ("stages: {a: {foreach: [1], do: {cmd: x}}}", ["step a", "'foreach'"]),
     ("stages: {a: {cmd: gsac stage a, wdir: x}}", ["step a", "'wdir'"]),

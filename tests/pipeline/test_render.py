@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.pipeline.cli import execute
 from support import dances
 from support.figure import make_figure
@@ -16,7 +17,7 @@ def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     (folder / "export").mkdir()
     figure = make_figure()
-    (folder / "export" / "avatar.gsac").write_bytes(figure.to_bytes())
+    (folder / "export" / "avatar.gsac").write_bytes(avatar_bytes(figure))
     clip = figure.clips["walk"]
     rotation = np.zeros((len(clip.rotation), len(figure.joints), 3), np.float32)
     rotation[:, [figure.joint_names.index(name) for name in clip.joints]] = clip.rotation
@@ -62,7 +63,7 @@ def test_a_walk_from_another_tool_is_the_walk_that_the_avatar_carries(run, tmp_p
 
 @pytest.mark.parametrize(("words", "named"), [
     (["--size", "97x128"], "--size 97x128"), (["--size", "big"], "--size big"), (["--fps", "0"], "--fps 0"),
-    (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"),
+    (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"), (["--yaw", "nan"], "--yaw nan"),
     (["--out", "clip.avi"], "clip.avi"), (["--motion", "jump"], "jump: no such file, and the avatar's clips are: wave, walk")])
 def test_a_wrong_word_is_named_and_what_is_expected(run, tmp_path, capsys, monkeypatch, words, named):
     monkeypatch.chdir(tmp_path)
@@ -111,7 +112,7 @@ def test_pictures_go_to_a_new_folder_and_never_over_what_is_there(run, tmp_path,
 
 def test_a_film_that_cannot_be_transparent_says_which_can(run, tmp_path, capsys):
     code, _, err = render(capsys, run, "--out", tmp_path / "a.mp4", "--background", "none")
-    assert code == 2 and ".webm, .gif or a folder" in err and list(tmp_path.iterdir()) == []
+    assert code == 2 and ".webm or .gif, or a folder" in err and list(tmp_path.iterdir()) == []
 
 
 def test_a_damaged_motion_names_its_line_and_leaves_no_video(run, tmp_path, capsys):
@@ -121,6 +122,46 @@ def test_a_damaged_motion_names_its_line_and_leaves_no_video(run, tmp_path, caps
     code, out, err = render(capsys, run, "--motion", tmp_path / "odd.bvh", "--out", tmp_path / "a.mp4", "--json")
     assert code == 2 and f"odd.bvh, line {len(lines) - 1}: 3 numbers" in err
     assert "odd.bvh" in json.loads(out.splitlines()[-1])["error"] and not (tmp_path / "a.mp4").exists()
+
+
+SMALL = ("--size", "16x16", "--seconds", 0.1, "--fps", 10)
+
+
+@pytest.fixture
+def footage(run, tmp_path, monkeypatch):
+    """The figure as the avatar of a run on clip.mp4, all in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "clip-avatar" / "export").mkdir(parents=True)
+    (tmp_path / "clip-avatar" / "export" / "avatar.gsac").symlink_to(run / "export" / "avatar.gsac")
+    (tmp_path / "clip.mp4").write_text("my footage")
+    (tmp_path / "clip-avatar" / "clip").symlink_to(tmp_path / "clip.mp4")
+    return tmp_path
+
+
+def test_without_out_the_video_is_named_after_avatar_and_motion(run, footage, capsys):
+    (footage / "me.gsac").symlink_to(run / "export" / "avatar.gsac")
+    for words, name in ((["clip-avatar"], "clip-avatar-turn"), (["clip-avatar", "--motion", "wave"], "clip-avatar-wave"),
+                        (["clip-avatar/export", "--motion", run / "walk.bvh"], "clip-avatar-walk"), (["me.gsac"], "me-turn")):
+        assert render(capsys, *words, *SMALL)[:2] == (0, f"{footage / name}.mp4\n")
+    assert (footage / "clip.mp4").read_text() == "my footage"
+
+
+def test_a_file_that_is_there_is_written_over_only_by_force(footage, capsys):
+    (footage / "clip-avatar-turn.mp4").write_text("mine")
+    code, _, err = render(capsys, "clip-avatar", *SMALL)
+    assert code == 2 and "clip-avatar-turn.mp4 is there already" in err and "--force" in err
+    assert (footage / "clip-avatar-turn.mp4").read_text() == "mine"
+    assert render(capsys, "clip-avatar", *SMALL, "--force")[0] == 0
+    assert len(film(footage / "clip-avatar-turn.mp4")) == 1
+
+
+def test_the_clip_of_the_run_is_never_written_over_by_any_name_nor_by_force(footage, capsys):
+    (footage / "other name.mp4").symlink_to("clip.mp4")
+    (footage / "hard.mp4").hardlink_to(footage / "clip.mp4")
+    for name in ("clip.mp4", "clip-avatar/../clip.mp4", "other name.mp4", "hard.mp4"):
+        code, _, err = render(capsys, "clip-avatar", "--out", name, "--force", *SMALL)
+        assert code == 2 and "the clip that" in err and "never written over" in err, name
+    assert (footage / "clip.mp4").read_text() == (footage / "hard.mp4").read_text() == "my footage"
 
 
 def test_a_folder_without_an_avatar_and_a_damaged_one_are_named(run, tmp_path, capsys):

@@ -10,8 +10,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gsac.pipeline import run_folder
-
 
 def test_until_stops_after_a_stage_and_runs_only_what_it_needs(toy):
     assert toy.ran("--until", "left") == ["cut", "left"]
@@ -75,20 +73,6 @@ def test_warnings_of_a_cached_stage_are_still_told(toy):
 def test_without_out_the_folder_is_named_after_the_clip(toy):
     assert toy.gsac("run", toy.clip).code == 0
     assert (toy.root / "clip-avatar" / "join" / "out.txt").read_text() == "ALPHA ALPHA"
-
-
-def test_a_folder_without_links_gets_copies(monkeypatch, tmp_path):
-    def no_links(self, target, target_is_directory=False):
-        raise OSError("no links here")
-
-    monkeypatch.setattr(run_folder.Path, "symlink_to", no_links)
-    source = tmp_path / "frames"
-    source.mkdir()
-    (source / "1.txt").write_text("one")
-    run_folder.link(source, tmp_path / "shown" / "frames")
-    run_folder.link(source / "1.txt", tmp_path / "shown" / "1.txt")
-    assert not (tmp_path / "shown" / "frames").is_symlink()
-    assert (tmp_path / "shown" / "frames" / "1.txt").read_text() == (tmp_path / "shown" / "1.txt").read_text() == "one"
 
 
 @pytest.mark.parametrize(("trouble", "code", "words"), [
@@ -236,3 +220,17 @@ def test_a_bar_in_a_terminal(toy):
         seen += piece
     assert process.wait(60) == 0
     assert "1/2 words" in seen.decode() and "left" in seen.decode() and "\x1b[" in seen.decode()
+
+
+def test_a_rerun_recalls_the_warnings_of_cached_stages_by_their_first_sentence(toy):
+    toy.edit("common.py", "word 2 is short", "Word 2 is short. Write a longer one in its place.")
+    toy.ran("--set", "left.trouble=warning")
+    done = toy.gsac("run", toy.clip, "--out", toy.out, "--set", "left.trouble=warning")
+    assert "left: warning: left: Word 2 is short.\n" in done.err or "left: warning: Word 2 is short.\n" in done.err
+
+
+def test_ctrl_c_says_that_the_same_command_goes_on(toy):
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "left.pause_s=30")
+    toy.wait_for(lambda: "left" in toy.runs)
+    process.terminate()
+    assert "the same command goes on from there" in process.communicate(timeout=30)[1]

@@ -12,6 +12,8 @@ def run(job):
     begin(job, "join")
     seen = job.scratch / "seen"
     times = int(seen.read_text()) if seen.exists() else 0
+    if times:
+        job.resumed(times, 5, "times")
     job.scratch.mkdir(parents=True, exist_ok=True)
     seen.write_text(str(times + 1))
     if os.environ.get("TOY_END") == "killed":
@@ -68,3 +70,12 @@ def test_the_stage_command_hands_it_as_well(counting):
     done = counting.gsac("stage", "join", cwd=counting.out)
     assert done.code == 0, done.err
     assert counting.result == "1 times before" and left(counting) == []
+
+
+def test_a_run_that_goes_on_says_so_and_from_where(counting):
+    counting.run(TOY_END="killed")
+    assert counting.run("--dry-run").json["stages"][-1]["reason"] == "stopped before"
+    done = counting.run()
+    assert "join: starts (stopped before)" in done.err and "join: goes on from time 1 of 5" in done.err
+    done = counting.run("--force", "join")
+    assert "goes on" not in done.err

@@ -57,3 +57,28 @@ def test_explain_of_an_unknown_stage_names_the_known_ones(toy):
     toy.ran()
     done = toy.gsac("explain", "shout", toy.out)
     assert done.code == 2 and "cut, left, right, join" in done.err
+
+
+def test_the_reason_of_a_result_that_was_damaged_dropped_or_removed_is_that_and_not_a_parameter(toy):
+    toy.ran("--set", "right.keep=7")
+    toy.ran()
+    blob = (toy.out / "cut" / "words" / "000000.txt").resolve()
+    blob.chmod(0o644)
+    blob.write_text("damaged")
+    assert toy.gsac("cache", "verify").code == 4
+    assert toy.gsac("status", toy.out, "--json").json["stages"][0]["reason"] == "result lost"
+    assert "cut: starts (result lost)" in toy.run().err
+    for record in (toy.cache / "actions" / "right").iterdir():
+        if "\"keep\": 100" in record.read_text():
+            record.unlink()
+    assert "right: starts (result lost)" in toy.run().err
+
+
+def test_a_result_that_is_found_damaged_on_the_way_is_named_so_in_any_folder(toy):
+    toy.ran("--set", "right.keep=7", "--set", "right.word=last")
+    blob = (toy.out / "right" / "out.txt").resolve()
+    blob.chmod(0o644)
+    blob.write_text("damaged result")
+    toy.run("--until", "cut")
+    done = toy.gsac("run", toy.clip, "--out", "elsewhere", "--set", "right.keep=7", "--set", "right.word=last")
+    assert "right: starts (result lost)" in done.err

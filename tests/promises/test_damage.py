@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -142,6 +143,7 @@ def test_verify_finds_rot_that_keeps_size_and_date_and_says_so_with_exit_code_4(
 
 def test_gc_never_removes_what_a_run_in_progress_needs(toy):
     toy.ran("--set", "right.word=last")
+    shutil.rmtree(toy.out)
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "join.pause_s=4")
     toy.wait_for(lambda: "join" in toy.runs[4:])
     for record in (toy.cache / "actions").glob("*/*.json"):

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from gsac import unity
+from gsac.avatar.gsac_file.write import avatar_bytes
 from support import mono as mono_runtime
 
 HERE = Path(__file__).parent
@@ -76,10 +77,10 @@ def files(figure, exported, tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("files")
     rng = np.random.default_rng(2)
-    (folder / "figure.gsac").write_bytes(figure.to_bytes())
+    (folder / "figure.gsac").write_bytes(avatar_bytes(figure))
     light = np.float32([[.8, .75, .7], [.3, .2, -.1], [.2, .1, .3], [.25, -.6, .2]])
     avatar = RiggedAvatar.read(exported / "avatar.gsac")
-    (folder / "person.gsac").write_bytes(replace(avatar, gaussians=replace(avatar.gaussians, light=light)).to_bytes())
+    (folder / "person.gsac").write_bytes(avatar_bytes(replace(avatar, gaussians=replace(avatar.gaussians, light=light))))
     for name, count in (("figure", 2), ("person", 52)):
         pose, transl = rng.normal(size=165) * .3, rng.normal(size=3) * .2
         np.savetxt(folder / f"{name}.txt", np.concatenate([pose, transl, rng.random(count) * .6]).astype(np.float32)[None], "%.9g")

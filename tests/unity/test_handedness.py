@@ -94,7 +94,7 @@ def test_the_left_hand_is_red_and_on_the_left_the_toes_in_front_the_head_up(expo
 @pytest.mark.slow
 def test_threes_viewer_shows_the_glb_with_the_red_hand_at_the_right(exported, node_package):
     from gsac.benchmarks.viewer import browser as chromium
-    from gsac.benchmarks.viewer.race import serve
+    from gsac.benchmarks.viewer.frame_rate import serve
     if chromium.find_chromium() is None:
         pytest.skip("needs the Debian package chromium")
     folder = node_package(THREE)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import bind, face_frames
-from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import DARKEST
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render

@@ -11,6 +11,7 @@ import pytest
 
 from gsac.avatar.gsac_file.container import unpack
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.cache.code import code_parts
 from gsac.unity import package as unity_package
 
@@ -57,7 +58,7 @@ def test_guids_are_unique_and_the_same_in_both_forms(upm, unitypackage):
 
 
 def test_guids_do_not_change_with_the_person_or_the_version(upm, figure, tmp_path):
-    unity_package.write_unity(tmp_path, figure.to_bytes(), "9.9.9")
+    unity_package.write_unity(tmp_path, avatar_bytes(figure), "9.9.9")
     root = tmp_path / "com.gsac.avatar"
     other = {str(path.relative_to(root)): guid_of(path.read_text()) for path in root.rglob("*.meta")}
     assert other == {f"{path}.meta": guid_of(meta) for path, meta in metas(upm).items()}

@@ -7,6 +7,7 @@ import pytest
 
 from gsac.avatar.gaussians import FIELDS
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.write import avatar_bytes
 
 LIGHT = np.linspace(-1, 1, 12, dtype=np.float32).reshape(4, 3)
 
@@ -18,7 +19,7 @@ def got(mono, package, programs_folder, exported, tmp_path_factory):
     exe = mono.compile_csharp([*(package / "Runtime" / "Core").glob("*.cs"), programs_folder / "Dump.cs",
                                programs_folder / "Read.cs"], folder / "read.exe")
     avatar = RiggedAvatar.read(exported / "avatar.gsac")
-    (folder / "lit.gsac").write_bytes(replace(avatar, gaussians=replace(avatar.gaussians, light=LIGHT)).to_bytes())
+    (folder / "lit.gsac").write_bytes(avatar_bytes(replace(avatar, gaussians=replace(avatar.gaussians, light=LIGHT))))
     lines = mono.run(exe, "dump", folder / "lit.gsac", folder / "arrays").splitlines()
     return mono.arrays(folder / "arrays"), lines
 

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.avatar.skinning import joint_transforms
 
 pytestmark = pytest.mark.slow
@@ -166,7 +167,7 @@ def test_coarser_levels_are_drawn_from_afar_and_do_not_flicker_where_they_change
 
 def test_every_level_is_bound_in_the_light_of_the_file_as_far_as_the_component_says(play, files, tmp_path, figure):
     light = np.linspace(-.4, .7, 12, dtype=np.float32).reshape(4, 3)
-    (tmp_path / "lit.gsac").write_bytes(replace(figure, gaussians=replace(figure.gaussians, light=light)).to_bytes())
+    (tmp_path / "lit.gsac").write_bytes(avatar_bytes(replace(figure, gaussians=replace(figure.gaussians, light=light))))
     got = np.array([line.split() for line in play("light", tmp_path / "lit.gsac").splitlines()], float)
     mirrored = (light[[1, 2, 3, 0]] * np.float32([[1], [-1], [1], [1]])).T
     even = np.tile([0, 0, 0, 1], (3, 1))

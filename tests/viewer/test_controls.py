@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer.page import page_bytes
 from support.page_modules import expose
@@ -45,7 +46,7 @@ Object.defineProperty(navigator, 'xr', { value: {
 @pytest.fixture(scope="module")
 def address(figure, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "viewer.html"
-    path.write_bytes(page_bytes(figure.to_bytes()))
+    path.write_bytes(page_bytes(avatar_bytes(figure)))
     return path.as_uri()
 
 
@@ -185,7 +186,7 @@ def test_no_button_moves_under_the_pointer_when_another_is_pressed(page):
 def test_the_page_is_named_after_the_folder_it_lies_in(page, figure, tmp_path):
     for folder, name in (("Ada & Co-avatar/export", "Ada & Co"), ("me", "me"), ("0123456789abcdef0123456789abcdef", "GSAC avatar")):
         (tmp_path / folder).mkdir(parents=True)
-        (tmp_path / folder / "viewer.html").write_bytes(page_bytes(figure.to_bytes()))
+        (tmp_path / folder / "viewer.html").write_bytes(page_bytes(avatar_bytes(figure)))
         page.open((tmp_path / folder / "viewer.html").as_uri())
         assert page.run("document.getElementById('name').textContent") == name
         assert page.run("document.title") == (name if name == "GSAC avatar" else f"{name} · GSAC avatar")
@@ -265,7 +266,7 @@ def test_a_link_shows_what_is_seen_and_the_avatar_is_saved_as_its_own_file(page,
              "HTMLAnchorElement.prototype.click = function () { window.savedName = this.download; }")
     click(page, "save")
     data = page.run("saved.arrayBuffer().then((b) => btoa([...new Uint8Array(b)].map((c) => String.fromCharCode(c)).join('')))")
-    assert base64.b64decode(data) == figure.to_bytes() and page.run("savedName").endswith(".gsac")
+    assert base64.b64decode(data) == avatar_bytes(figure) and page.run("savedName").endswith(".gsac")
 
 
 def test_on_a_phone_all_but_the_motions_folds_away(page, address):
@@ -306,7 +307,8 @@ def test_a_picture_is_the_canvas_as_png(page):
     page.until("window.saved instanceof Blob")
     data = page.run("saved.arrayBuffer().then((b) => btoa(String.fromCharCode(...new Uint8Array(b))))")
     image = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
-    assert page.run("savedName") == f"{page.run('document.title.split(String.fromCharCode(32))[0]')} A-pose.png" and image.shape == (SIZE, SIZE, 3)
+    name = page.run("document.getElementById('name').textContent")
+    assert page.run("savedName") == f"{name} A-pose.png" and image.shape == (SIZE, SIZE, 3)
     assert np.abs(image[3, 3].astype(int) - (0x3A, 0x60, 0x80)).max() <= 1 and red(image).any()
 
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import face_frames
-from gsac.avatar.blend import DARKEST
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import DARKEST
 from gsac.avatar.film import FOV, PITCH, look_at
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render_bound
 from gsac.benchmarks.viewer import browser as chromium
@@ -39,7 +40,7 @@ def lit(exported):
 @pytest.fixture(scope="module")
 def address(lit, tmp_path_factory):
     path = tmp_path_factory.mktemp("lit") / "viewer.html"
-    path.write_bytes(page_bytes(lit.to_bytes()))
+    path.write_bytes(page_bytes(avatar_bytes(lit)))
     return path.as_uri()
 
 

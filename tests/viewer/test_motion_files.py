@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.avatar.motion.bvh import parse_bvh, read_bvh
 from gsac.avatar.motion.names import match
 from gsac.avatar.motion.retarget import retarget
@@ -37,7 +38,7 @@ def browser():
 def page(browser, figure, tmp_path_factory):
     """The small figure: software GL draws it many times a second."""
     path = tmp_path_factory.mktemp("page") / "viewer.html"
-    path.write_bytes(page_bytes(figure.to_bytes()))
+    path.write_bytes(page_bytes(avatar_bytes(figure)))
     browser.open(path.as_uri())
     return browser
 

@@ -9,6 +9,7 @@ import pytest
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.avatar.raster import render_bound
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.animations import add_motion
@@ -162,7 +163,7 @@ def test_on_a_phone_the_controls_are_inside_the_screen_below_the_feet_and_over_t
 
 def test_the_scripts_reader_names_what_is_wrong_with_a_file(page, figure):
     """The same faults as the Python reader, and never anything but a GsacError."""
-    data = base64.b64encode(figure.to_bytes()).decode()
+    data = base64.b64encode(avatar_bytes(figure)).decode()
     expose(page, "readAvatar", "GsacError", "crc32")
     faults = page.run("const encoded = '" + data + "';" + """(() => {
       const whole = Uint8Array.from(atob(encoded), (c) => c.charCodeAt(0));
@@ -197,7 +198,7 @@ def test_the_scripts_reader_names_what_is_wrong_with_a_file(page, figure):
 
 
 def test_a_damaged_avatar_gives_a_sentence_on_the_page(browser, figure, tmp_path):
-    data = bytearray(figure.to_bytes())
+    data = bytearray(avatar_bytes(figure))
     data[8] = 7
     (tmp_path / "viewer.html").write_bytes(page_bytes(bytes(data)))
     with pytest.raises(AssertionError, match="version"):

@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer import wgsl
 from gsac.viewer.page import page_bytes
@@ -67,7 +68,7 @@ def page():
 @pytest.fixture(scope="module")
 def address(figure, tmp_path_factory):
     path = tmp_path_factory.mktemp("gpu") / "viewer.html"
-    path.write_bytes(page_bytes(figure.to_bytes()))
+    path.write_bytes(page_bytes(avatar_bytes(figure)))
     return path.as_uri()
 
 

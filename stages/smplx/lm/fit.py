@@ -18,7 +18,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.wholebody import LEFT_HAND, RIGHT_HAND
 from gsac.avatar.yaw import yaw
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.ground import Ground

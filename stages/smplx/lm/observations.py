@@ -11,7 +11,7 @@ import numpy as np
 
 from gsac.avatar.yaw import yaw
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.sightings import HIPS, Sightings
 from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.state import State

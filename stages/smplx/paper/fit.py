@@ -19,7 +19,7 @@ import torch
 
 from gsac.avatar.body import Body
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.jacobians import make_pairs
 from gsac.stages.smplx.lm.observations import observe

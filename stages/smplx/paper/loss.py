@@ -12,7 +12,7 @@ import torch
 
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
-from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.paper.head import Head, HeadTerms, faces_camera
 from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from gsac.stages.smplx.prior import BODY_JOINTS

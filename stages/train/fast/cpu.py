@@ -11,9 +11,9 @@ import numpy as np
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.checkpoint import loop_state
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
+from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import AVERAGED, BEGIN, refit_config, refit_steps
 from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, STEPS, coarse_steps
-from gsac.stages.train.fast.start import crop_views, init_gaussians
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import correct_midway

@@ -21,8 +21,8 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.fast import schedule
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
+from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import BEGIN, refit_config, refit_steps
-from gsac.stages.train.fast.start import crop_views, init_gaussians
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians import cloth_offsets

@@ -13,8 +13,8 @@ import numpy as np
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
 from gsac.stages.train.fast.backend import Backend
+from gsac.stages.train.fast.initial_gaussians import crop_views
 from gsac.stages.train.fast.size_search import count_pixels, viewing_weight
-from gsac.stages.train.fast.start import crop_views
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gaussians.merge import merge_to_size
 from gsac.stages.train.gaussians.unseen import level_heights

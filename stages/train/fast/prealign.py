@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.stages.train.fast.backend import Backend, Round
-from gsac.stages.train.fast.start import init_gaussians
+from gsac.stages.train.fast.initial_gaussians import init_gaussians
 from gsac.stages.train.poses.bundle_adjust import Corrections, are_apart
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop

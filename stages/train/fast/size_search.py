@@ -19,8 +19,8 @@ from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.fast.backend import Backend
+from gsac.stages.train.fast.initial_gaussians import COLOUR_FRAMES
 from gsac.stages.train.fast.size_rule import MOST_LOST, SizeScore, choose, optimism
-from gsac.stages.train.fast.start import COLOUR_FRAMES
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gaussians.merge import merge_to_size, skin_weights
 from gsac.stages.train.gaussians.unseen import level_heights

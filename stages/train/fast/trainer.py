@@ -18,8 +18,8 @@ from gsac.avatar.logistic import logit, sigmoid
 from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.checkpoint import State
+from gsac.stages.train.fast.initial_gaussians import centres_at_rest
 from gsac.stages.train.fast.schedule import GAIN_RATE, LATE_REACH, OFFSET_RATE, OFFSET_SHARE, longest_axis
-from gsac.stages.train.fast.start import centres_at_rest
 from gsac.stages.train.finite import named_gradients, named_pose, require_finite
 from gsac.stages.train.gaussians.cloth_offsets import Offsets, fold
 from gsac.stages.train.gaussians.first_colours import fill_unseen

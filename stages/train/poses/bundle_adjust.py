@@ -15,8 +15,8 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.contract import StageError
+from gsac.stages.train.choose_heldout import is_near
 from gsac.stages.train.finite import require_finite
-from gsac.stages.train.holdout import is_near
 from gsac.stages.train.poses.photometric import CORRELATED, TURNING, UNKNOWNS, NormalEquations, joint_shares, normal_equations
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.views import View

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar import rotation
-from gsac.stages.train.holdout import is_near
+from gsac.stages.train.choose_heldout import is_near
 
 SIDE = 2
 """Trained frames on each side that a frame is interpolated between."""

@@ -11,7 +11,7 @@ from gsac.avatar.body import Body, BodyParams, split_pose
 from gsac.avatar.joints import BODY, JAW_EYES
 from gsac.avatar.skinning import joint_transforms, skin, skin_backward
 from gsac.stages.train.checkpoint import State
-from gsac.stages.train.holdout import carry_corrections
+from gsac.stages.train.choose_heldout import carry_corrections
 from gsac.stages.train.poses.interpolate import follow_neighbours
 
 HAND_SHARE = 0.1

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar import binding, light, skinning
-from gsac.avatar.blend import BRIGHTEST, DARKEST, cuda_constants
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import BRIGHTEST, DARKEST, cuda_constants
 from gsac.avatar.raster import render, render_backward
 from gsac.stages.train.gaussians import kernels
 from gsac.stages.train.paper.densify import LARGEST

@@ -18,7 +18,7 @@ def test_image_loss_and_gradients_are_those_of_gsplat(size, count):
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.baseline import TorchTrainer, on_device, tensor
     from gsac.benchmarks.gpu.check import LIMIT, PER_GAUSSIAN, SWAPS, cuda_step, relative
-    from gsac.benchmarks.gpu.figure import figure, start
+    from gsac.benchmarks.gpu.synthetic_clip import figure, start
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import make_recipe
 

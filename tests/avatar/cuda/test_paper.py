@@ -13,7 +13,7 @@ LIMIT, SWAPS = 1e-3, 1e-3
 
 @pytest.fixture(scope="module")
 def figure():
-    from gsac.benchmarks.gpu.figure import figure
+    from gsac.benchmarks.gpu.synthetic_clip import figure
 
     return figure(5, 101, 67, 3000)
 

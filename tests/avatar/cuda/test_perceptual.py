@@ -17,7 +17,7 @@ WEIGHT, CORNER, FRAME = 0.05, (20, 30), (390, 420)
 
 @pytest.fixture(scope="module")
 def figure():
-    from gsac.benchmarks.gpu.figure import figure
+    from gsac.benchmarks.gpu.synthetic_clip import figure
 
     return figure(3, 300, 340, 3000)
 
@@ -33,7 +33,7 @@ def network():
 
 def trainer_of(figure, network, **more):
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import make_recipe
 

@@ -15,7 +15,7 @@ def both():
     """both(batch): a CudaTrainer and the task of a CPU trainer, over the same frames with expressions of their own."""
     from gsac.avatar.body import Body, BodyParams
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import figure, start
+    from gsac.benchmarks.gpu.synthetic_clip import figure, start
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import make_recipe
     from gsac.stages.train.gpu import body_arrays

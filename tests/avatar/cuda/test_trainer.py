@@ -19,7 +19,7 @@ def fast(count=12000, **more):
 
 @pytest.fixture(scope="module")
 def figure():
-    from gsac.benchmarks.gpu.figure import figure
+    from gsac.benchmarks.gpu.synthetic_clip import figure
 
     return figure(4, 101, 67, 3000)
 
@@ -29,7 +29,7 @@ def figure():
 @pytest.mark.parametrize("light", [None, LIGHT])
 def test_image_loss_and_gradients_are_those_of_the_cpu_path(figure, count, weights, light):
     from gsac.benchmarks.gpu.check import LIMIT, errors
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     gaussians = start(figure.body, count)
     gaussians.light = light
@@ -41,7 +41,7 @@ def test_gaussians_behind_the_camera_and_without_opacity_are_skipped_as_on_the_c
     from dataclasses import replace
 
     from gsac.benchmarks.gpu.check import LIMIT, errors
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     near = replace(figure, transl=figure.transl.copy())
     near.transl[:, 2] = 0.1
@@ -54,7 +54,7 @@ def test_gaussians_behind_the_camera_and_without_opacity_are_skipped_as_on_the_c
 @pytest.mark.parametrize("batch", [1, 3])
 def test_lists_too_short_grow_and_change_no_result_and_a_seed_gives_one_result(figure, batch):
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     results = []
     for room in (100, None, None):
@@ -79,7 +79,7 @@ def test_blocks_that_come_late_out_of_a_wait_for_each_other_change_no_byte(figur
     from gsac.avatar.cuda import kernels
     from gsac.avatar.cuda.device import Device
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     met, results = "while (seen < target);\n        }\n", []
     text = kernels.source()
@@ -99,7 +99,7 @@ def test_blocks_that_come_late_out_of_a_wait_for_each_other_change_no_byte(figur
 
 def test_training_lowers_the_loss_and_moves_the_poses_towards_the_truth(figure):
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 4000),
                           fast(4000, steps=400, pose_pull=0))
@@ -115,7 +115,7 @@ def test_offsets_are_those_of_the_cpu_recipe(figure):
 
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.check import relative
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.stages.train.gaussians.cloth_offsets import Offsets
 
     body = figure.body
@@ -143,7 +143,7 @@ def test_gradient_at_rest_is_that_of_the_cpu_path(figure):
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.avatar.skinning import skin_backward
     from gsac.benchmarks.gpu.check import relative
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     body = figure.body
     trainer = CudaTrainer(body, [figure.shots], figure.pose, figure.transl, start(body, 3000),
@@ -161,7 +161,7 @@ def test_many_gaussians_on_one_tile_are_sorted_beyond_the_fast_path(figure):
     from dataclasses import replace
 
     from gsac.benchmarks.gpu.check import LIMIT, errors
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     far = replace(figure, transl=figure.transl.copy())
     far.transl[:, 2] = 60
@@ -171,7 +171,7 @@ def test_many_gaussians_on_one_tile_are_sorted_beyond_the_fast_path(figure):
 
 def test_resting_gaussians_keep_their_values_while_the_others_learn(figure):
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 1000), fast(1000, steps=20))
     trainer.train(5)
@@ -188,7 +188,7 @@ def test_resting_gaussians_keep_their_values_while_the_others_learn(figure):
 def test_a_tighter_reach_holds_from_the_step_on_that_it_is_told(figure):
     from gsac.avatar.binding import face_frames
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 1000), fast(1000, steps=60))
     trainer.train(20)
@@ -205,7 +205,7 @@ def test_a_tighter_reach_holds_from_the_step_on_that_it_is_told(figure):
 
 def test_poses_that_are_placed_are_where_the_frames_are_pulled_and_their_moments_begin_anew(figure):
     from gsac.avatar.cuda.trainer import CudaTrainer
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
 
     trainer = CudaTrainer(figure.body, [figure.shots], figure.pose, figure.transl, start(figure.body, 1000),
                           fast(1000, steps=60, pose_pull=10.0))

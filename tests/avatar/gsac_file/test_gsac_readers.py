@@ -11,6 +11,7 @@ import pytest
 from gsac import unity
 from gsac.avatar.gsac_file.container import GsacError
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.write import avatar_bytes
 from support import hostile, mono
 from support.page_modules import copy_modules
 
@@ -75,12 +76,12 @@ READERS = {"csharp": csharp_words, "javascript": javascript_words}
 @pytest.fixture(scope="module")
 def collection(figure):
     """Name -> (bytes, right words), the damaged and hostile files."""
-    return hostile.files(figure.to_bytes())
+    return hostile.files(avatar_bytes(figure))
 
 
 @pytest.fixture(scope="module")
 def fuzzed(figure):
-    data = replace(figure, gaussians=replace(figure.gaussians, light=np.full((4, 3), .5, np.float32))).to_bytes()
+    data = avatar_bytes(replace(figure, gaussians=replace(figure.gaussians, light=np.full((4, 3), .5, np.float32))))
     return hostile.fuzzed(data, 300) | hostile.rewritten(data, 300)
 
 

@@ -9,7 +9,7 @@ import pytest
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.benchmarks.viewer.bench import CAMERA, PACKAGE, PAGE, pages
-from gsac.benchmarks.viewer.race import serve
+from gsac.benchmarks.viewer.frame_rate import serve
 
 pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")]

@@ -8,11 +8,11 @@ import pytest
 from gsac.avatar.wholebody import ARM, HANDS, PALM
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.handgap import STAGE
+from gsac.stages.handgap.arm_segments import turn_with_palm
 from gsac.stages.handgap.config import Method
 from gsac.stages.handgap.fill import METHODS, fill_gaps
 from gsac.stages.handgap.methods import gp, hermite, paper, paper_literal
 from gsac.stages.handgap.missing_hands import MissingHands
-from gsac.stages.handgap.segments import turn_with_palm
 
 SEGMENTWISE = {"paper": paper.interpolate, "hermite": hermite.interpolate, "gp": gp.interpolate}
 GOOD = ("turning", *SEGMENTWISE)

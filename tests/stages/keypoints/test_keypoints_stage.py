@@ -90,6 +90,13 @@ def test_warnings_name_the_frames_without_a_person_and_with_two():
     assert "second person was seen in frame 3" in warnings[1]
 
 
+def test_what_flickers_like_a_person_without_face_or_hand_is_refused_at_once():
+    with pytest.raises(BadInput, match=r"something like one shows in 2 of 9 frames \(3, 5\) only, and never a face"):
+        warnings_of([seen() if t in (3, 5) else Frame() for t in range(9)])
+    assert warnings_of([seen(face=FACE) if t == 3 else Frame() for t in range(9)])
+    assert warnings_of([seen() if t < 3 else Frame() for t in range(9)])
+
+
 def test_parts_that_were_never_seen_are_warned_of():
     warnings = warnings_of([seen(right=HANDS["right"])])
     assert [w.split(";")[0] for w in warnings] == ["The left hand was never seen",

@@ -58,11 +58,13 @@ def test_a_training_that_was_killed_and_goes_on_gives_the_bytes_of_an_unbroken_o
              stop, constants)
     done = subprocess.run([sys.executable, "-c", KILLED, json.dumps(order)], capture_output=True, text=True, timeout=300)
     assert done.returncode == -signal.SIGKILL, done.stderr
-    steps = []
+    steps, told = [], []
+    broken.resumed = lambda *words: told.append(words)
     broken.progress = lambda step, total, unit: unit == "steps" and steps.append(step)
     spent = Checkpoints(broken.scratch, broken.warn).read()["spent"][0]
     run(broken)
     assert steps[0] == stop + 1 if stop < values["steps"] else not steps
+    assert told == [(stop, values["steps"], "steps")]
     for name in ("avatar.npz", "body.npz"):
         assert (whole.out / name).read_bytes() == (broken.out / name).read_bytes()
     one, two = (json.loads((made.out / "metrics.json").read_text()) for made in (whole, broken))

@@ -5,7 +5,7 @@ import pytest
 
 from gsac.stages.contract import StageError
 from gsac.stages.train.fast import trainer as fast
-from gsac.stages.train.fast.start import crop_views, init_gaussians
+from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.finite import require_finite
 from gsac.stages.train.judge import heldout
 from gsac.stages.train.paper import trainer as paper

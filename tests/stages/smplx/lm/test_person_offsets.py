@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.smplx import detector
+from gsac.stages.smplx import detector_errors
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.lm.person_offsets import JOINTS
 from gsac.stages.smplx.sightings import Sightings
@@ -57,7 +57,7 @@ def test_hips_seen_too_high_in_every_frame_are_told_apart_from_the_pose(body, mo
     moved = Detector.load("", body).own @ fit.state.own
     assert moved[INDEX["left_hip"], 1] > UP / 4 and moved[INDEX["left_hip"], 1] == moved[INDEX["right_hip"], 1]
     assert not fit.joint_offset.any()
-    monkeypatch.setattr(detector, "PERSONAL", {})
+    monkeypatch.setattr(detector_errors, "PERSONAL", {})
     assert joint_error_mm(body, fit, truth) < 0.9 * joint_error_mm(body, fitted(body, truth, {}, UP), truth)
 
 

@@ -8,7 +8,7 @@ import pytest
 from gsac.avatar import rotation
 from gsac.avatar.camera import Camera
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector import Detector
+from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm import problem as module
 from gsac.stages.smplx.lm.observations import observe

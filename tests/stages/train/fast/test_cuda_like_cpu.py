@@ -11,7 +11,7 @@ LIGHT = np.float32([[0.7, 0.8, 0.7], [0.5, 0.3, 0.3], [-0.2, 0, 0.1], [0.3, 0.2,
 
 @pytest.fixture(scope="module")
 def figure():
-    from gsac.benchmarks.gpu.figure import figure
+    from gsac.benchmarks.gpu.synthetic_clip import figure
 
     return figure(4, 101, 67, 3000)
 
@@ -25,7 +25,7 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     from gsac.avatar.cuda.arrays import Shot
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.check import relative
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import make_recipe
     from gsac.stages.train.fast.schedule import GAIN_RATE, OFFSET_SHARE
@@ -78,7 +78,7 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
 def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_stay(figure):
     from gsac.avatar.body import Body, BodyParams
     from gsac.benchmarks.gpu.check import relative
-    from gsac.benchmarks.gpu.figure import start
+    from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.stages.train.fast.cpu import Cpu
     from gsac.stages.train.fast.cuda import Cuda
     from gsac.stages.train.poses.poses import Poses
@@ -103,7 +103,7 @@ def test_poses_alone_are_moved_to_their_images_as_on_the_cpu_and_the_gaussians_s
 def turning(holdout=(), size=(101, 67), **values):
     """A task of 12 frames, 30 degrees from one to the next."""
     from gsac.avatar.body import Body, BodyParams
-    from gsac.benchmarks.gpu.figure import figure
+    from gsac.benchmarks.gpu.synthetic_clip import figure
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.task import Task

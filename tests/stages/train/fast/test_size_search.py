@@ -9,7 +9,7 @@ import pytest
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.contract import BadInput, make_config
-from gsac.stages.train import STAGE, holdout
+from gsac.stages.train import STAGE, choose_heldout
 from gsac.stages.train.fast import refit, size_search, trainer
 from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.size_rule import SizeScore, choose, optimism, standard_error
@@ -105,7 +105,7 @@ def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywher
 @pytest.mark.slow
 def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job_anywhere, monkeypatch):
     monkeypatch.setattr(size_search, "SIZES", (500, 60))
-    monkeypatch.setattr(holdout, "LONG", 6)
+    monkeypatch.setattr(choose_heldout, "LONG", 6)
     made = job_anywhere(gaussians="auto", frames=10, steps=8, holdout=4, pose_rounds=0, pose_test_steps=0)
     run(made)
     figures = json.loads((made.out / "metrics.json").read_text())

@@ -9,7 +9,7 @@ from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import shade
 from gsac.avatar.threads import Workspace
-from gsac.stages.train.fast.start import centres_at_rest
+from gsac.stages.train.fast.initial_gaussians import centres_at_rest
 from gsac.stages.train.gaussians import unseen
 from gsac.stages.train.judge import heldout, novel_poses
 from gsac.stages.train.poses.poses import Poses

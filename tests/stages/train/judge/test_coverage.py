@@ -7,7 +7,7 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.train.fast.start import centres_at_rest
+from gsac.stages.train.fast.initial_gaussians import centres_at_rest
 from gsac.stages.train.judge.coverage import part_of, unseen_parts
 
 

@@ -11,7 +11,7 @@ from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.fast import prealign
 from gsac.stages.train.fast.cpu import Cpu
-from gsac.stages.train.fast.start import init_gaussians
+from gsac.stages.train.fast.initial_gaussians import init_gaussians
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.poses import bundle_adjust, photometric
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained

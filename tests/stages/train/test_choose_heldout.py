@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsac.stages.train.holdout import carry_corrections, hold_out, hold_out_for_choosing
+from gsac.stages.train.choose_heldout import carry_corrections, hold_out, hold_out_for_choosing
 
 
 def turning(yaws):

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsac.avatar import blend
+from gsac.avatar import draw_rule
 from gsac.avatar.cuda.kernels import source
 
 ROOT = Path(__file__).resolve().parents[2]
-FILE_NAMES = {"low_pass_px2": blend.BLUR, "alpha_max": blend.MAX_ALPHA, "alpha_min": blend.MIN_ALPHA}
+FILE_NAMES = {"low_pass_px2": draw_rule.BLUR, "alpha_max": draw_rule.MAX_ALPHA, "alpha_min": draw_rule.MIN_ALPHA}
 NUMBER = r"([\d.]+f?(?: ?/ ?[\d.]+f?)?)"
 
 
@@ -35,7 +35,7 @@ def test_unitys_defaults_are_the_rule(name, expected):
     assert found(rf"float {name} = {NUMBER};", "unity/Runtime/**/*.cs") == {expected}
 
 
-@pytest.mark.parametrize(("name", "expected"), [("DARKEST", blend.DARKEST), ("BRIGHTEST", blend.BRIGHTEST)])
+@pytest.mark.parametrize(("name", "expected"), [("DARKEST", draw_rule.DARKEST), ("BRIGHTEST", draw_rule.BRIGHTEST)])
 def test_the_lights_clamp_is_the_same_in_unity_and_the_viewer(name, expected):
     assert found(rf"#define GSAC_{name} {NUMBER}", "unity/Runtime/Resources/Gsac/*.hlsl") == {expected}
     assert found(rf"\b{name} = {NUMBER}", "viewer/*.js") == {expected}
@@ -45,11 +45,11 @@ def test_the_formats_page_states_the_rule():
     page = (ROOT / "docs" / "gsac-format.md").read_text()
     for name, expected in FILE_NAMES.items():
         assert value(re.search(rf'"{name}": {NUMBER}', page)[1]) == expected
-    assert f"min({blend.BRIGHTEST}, max({blend.DARKEST}," in page
+    assert f"min({draw_rule.BRIGHTEST}, max({draw_rule.DARKEST}," in page
 
 
 def test_the_cuda_text_holds_the_same_doubles():
     told = dict(re.findall(r"constexpr double (\w+) = (\S+);", source()))
-    names = {name: "NEAR_PLANE" if name == "NEAR" else name for name in vars(blend) if name.isupper()}
-    assert {name: float(told[cuda]) for name, cuda in names.items()} == {name: getattr(blend, name) for name in names}
+    names = {name: "NEAR_PLANE" if name == "NEAR" else name for name in vars(draw_rule) if name.isupper()}
+    assert {name: float(told[cuda]) for name, cuda in names.items()} == {name: getattr(draw_rule, name) for name in names}
     assert np.float32(told["MIN_ALPHA"]) == np.float32(1.0 / 255)

@@ -1,7 +1,7 @@
 """The draw rule: the numbers by which every program draws a gaussian alike.
 
 Both rasterisers, their plain reference and the head of `.gsac` files take them from here; the viewer and Unity repeat them as
-defaults (tests/avatar/test_blend.py compares). A splat is `alpha = min(MAX_ALPHA, opacity exp(-s))`, not drawn below MIN_ALPHA.
+defaults (tests/avatar/test_draw_rule.py compares). A splat is `alpha = min(MAX_ALPHA, opacity exp(-s))`, not drawn below MIN_ALPHA.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.flip import flip
+from gsac.avatar.flip_metric import flip
 
 
 def plain(*colour):

@@ -8,7 +8,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX
 from gsac.avatar.yaw import yaw as turn_yaw
-from gsac.stages.smplx.detector import HARMONICS, PERSONAL, Detector, harmonics
+from gsac.stages.smplx.detector_errors import HARMONICS, PERSONAL, Detector, harmonics
 from support.scripts import script
 
 detector_offsets = script("detector_offsets")

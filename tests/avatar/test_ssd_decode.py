@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.detections import Detections, anchor_centers, decode, iou, suppress
+from gsac.avatar.ssd_decode import Detections, anchor_centers, decode, iou, suppress
 
 
 @pytest.mark.parametrize(("size", "strides", "count"), [(224, (8, 16, 32, 32, 32), 2254), (192, (8, 16, 16, 16), 2016),

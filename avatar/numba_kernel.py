@@ -13,7 +13,7 @@ from typing import Any
 
 import numba
 
-SOURCES = ("kernel.py", "blend.py", "simd.py", "binding.py", "losses.py", "ssim.py", "sobel.py",
+SOURCES = ("numba_kernel.py", "draw_rule.py", "simd.py", "binding.py", "losses.py", "ssim.py", "sobel.py",
            "raster/project.py", "raster/tiles.py", "raster/forward.py", "raster/backward.py")
 """Files under this folder that hold kernels or their constants."""
 

@@ -1,0 +1,33 @@
+"""A folder that holds another clip's avatar: known by path and content, and replaced only if told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gsac.cache.store import Store
+from gsac.pipeline.graph import CLIP
+from gsac.pipeline.rows import port_digest, read_json, result_row, rows_of
+from gsac.pipeline.run import clip_digest
+from gsac.pipeline.run_folder import METRICS, REPORT, RUN, RunFolder
+from gsac.stages.contract import BadInput
+
+
+def find_other_clip(folder: RunFolder, clip: Path, store: Store) -> str | None:
+    """Path of the clip whose results the folder holds, where it has another path and other content than this one; else None."""
+    run = read_json(folder.root / RUN)
+    if not isinstance(run, dict) or not any(map(result_row, rows_of(run).values())):
+        return None
+    there = str(run.get("clip"))
+    digest = run.get("clip_digest") or port_digest(folder, CLIP, store)
+    return there if there != str(clip) and digest not in (None, clip_digest(clip, store)) else None
+
+
+def make_room(folder: RunFolder, clip: Path, store: Store, replace: bool) -> None:
+    """Forgets the results of another clip in the folder, if told to; else BadInput names that clip."""
+    there = find_other_clip(folder, clip, store)
+    if there is None:
+        return
+    if not replace:
+        raise BadInput(f"{folder.root} holds the avatar of {there}; give another --out, or --replace to put this clip's there")
+    for name in (RUN, METRICS, REPORT):
+        (folder.root / name).unlink(missing_ok=True)

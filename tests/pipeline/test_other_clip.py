@@ -1,0 +1,77 @@
+"""A folder that holds another clip's avatar is not silently made this one's; a mistake leaves no folder."""
+
+import json
+
+import pytest
+
+
+@pytest.fixture
+def other(toy):
+    clip = toy.root / "other.mp4"
+    clip.write_text("omega psi")
+    return clip
+
+
+def test_another_clips_avatar_is_not_replaced_and_the_clip_that_is_there_is_named(toy, other):
+    toy.ran()
+    done = toy.gsac("run", other, "--out", toy.out)
+    assert done.code == 2 and f"{toy.out} holds the avatar of {toy.clip}; give another --out, or --replace" in done.err
+    assert toy.result == "ALPHA ALPHA" and (toy.out / "clip").resolve() == toy.clip
+    assert toy.gsac("status", toy.out).code == 0
+
+
+def test_phone_clips_of_one_name_do_not_take_each_others_folder(toy):
+    for name, words in (("pa", "alpha beta"), ("pb", "gamma delta")):
+        (toy.root / name).mkdir()
+        (toy.root / name / "IMG_0001.mp4").write_text(words)
+    assert toy.gsac("run", "pa/IMG_0001.mp4").code == 0
+    assert toy.gsac("run", "pb/IMG_0001.mp4").code == 2
+    assert (toy.root / "IMG_0001-avatar" / "join" / "out.txt").read_text() == "ALPHA ALPHA"
+
+
+def test_replace_puts_the_new_clip_in_and_nothing_speaks_of_the_old_one(toy, other):
+    toy.ran()
+    assert toy.gsac("run", other, "--out", toy.out, "--replace", "--until", "cut").code == 0
+    run = json.loads((toy.out / "run.json").read_text())
+    assert run["clip"] == str(other) and [row["name"] for row in run["stages"]] == ["cut"]
+    assert json.loads((toy.out / "metrics.json").read_text()) == {}
+    assert "<h1>other.mp4</h1>" in (toy.out / "report.html").read_text()
+    assert toy.gsac("run", other, "--out", toy.out).code == 0 and toy.result == "OMEGA OMEGA"
+
+
+def test_the_same_content_moved_and_the_same_path_with_new_content_go_on(toy):
+    toy.ran()
+    moved = toy.clip.rename(toy.root / "moved.mp4")
+    assert toy.gsac("run", moved, "--out", toy.out).code == 0
+    moved.write_text("omega psi")
+    assert toy.gsac("run", moved, "--out", toy.out).code == 0
+    assert toy.result == "OMEGA OMEGA"
+
+
+def test_a_folder_in_which_nothing_was_finished_is_anybodys(toy, other):
+    toy.out.mkdir()
+    assert toy.run("--set", "cut.trouble=stage").code == 1
+    assert toy.gsac("run", other, "--out", toy.out).code == 0
+
+
+def test_a_mistaken_input_leaves_no_folder(toy):
+    done = toy.run("--set", "cut.trouble=bad input")
+    assert done.code == 2 and "the clip holds no words" in done.err and "log:" not in done.err
+    assert not toy.out.exists()
+    assert toy.gsac("run", toy.clip, "--out", "deep/deeper/out", "--set", "cut.trouble=bad input").code == 2
+    assert not (toy.root / "deep").exists()
+
+
+def test_a_mistake_takes_nothing_that_was_there(toy):
+    toy.out.mkdir()
+    (toy.out / "letter.txt").write_text("mine")
+    assert toy.run("--set", "cut.trouble=bad input").code == 2
+    assert (toy.out / "letter.txt").read_text() == "mine"
+    toy.ran()
+    assert toy.run("--force", "cut", "--set", "cut.trouble=bad input").code == 2
+    assert toy.result == "ALPHA ALPHA"
+
+
+def test_what_was_finished_before_a_mistake_stays(toy):
+    assert toy.run("--set", "left.trouble=bad input").code == 2
+    assert (toy.out / "cut" / "words").exists() and (toy.out / "run.json").exists()

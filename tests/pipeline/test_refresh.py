@@ -1,0 +1,82 @@
+"""report.html is drawn anew exactly when what it was drawn from differs, and never loses parts."""
+
+import shutil
+
+import pytest
+
+from gsac.pipeline.report.origin import read_origin
+
+
+def page(toy):
+    return toy.out / "report.html"
+
+
+def drawn_again(toy, *arguments):
+    """Whether a run draws the report anew."""
+    before = page(toy).stat().st_mtime_ns
+    assert toy.run(*arguments).code == 0
+    return page(toy).stat().st_mtime_ns != before
+
+
+def test_a_run_with_nothing_to_do_draws_nothing(toy):
+    toy.ran()
+    assert not drawn_again(toy)
+
+
+def test_going_back_to_a_parameter_that_was_computed_before_draws_the_report_of_that_parameter(toy):
+    toy.ran()
+    toy.ran("--set", "left.keep=7")
+    assert "7" in page(toy).read_text().split("left.keep")[1][:40]
+    toy.runs_file.write_text("")
+    assert drawn_again(toy) and toy.runs == []
+    assert "100" in page(toy).read_text().split("left.keep")[1][:40]
+
+
+def test_a_clip_of_another_name_is_named_in_the_report(toy):
+    toy.ran()
+    other = toy.clip.rename(toy.root / "other.mp4")
+    assert toy.gsac("run", other, "--out", toy.out).code == 0
+    assert "<h1>other.mp4</h1>" in page(toy).read_text()
+
+
+def test_a_run_that_stops_early_leaves_a_whole_report_alone(toy, everything):
+    toy.ran()
+    assert not drawn_again(toy, "--until", "cut")
+    assert list(read_origin(page(toy)).stages) == everything
+
+
+def test_the_report_says_of_what_the_last_run_left_behind_that_it_is_of_earlier_inputs(toy):
+    toy.ran()
+    assert drawn_again(toy, "--until", "right", "--set", "right.word=last")
+    assert "Not of the last run&#39;s inputs: join." in page(toy).read_text()
+    assert toy.run("--set", "right.word=last").code == 0
+    assert "Not of the last run" not in page(toy).read_text()
+
+
+def test_a_report_of_an_older_version_is_drawn_anew(toy):
+    toy.ran()
+    page(toy).write_text(page(toy).read_text().replace("gsac-drawn-from", "other"))
+    assert drawn_again(toy)
+
+
+def test_a_whole_report_is_never_replaced_by_a_part_of_it(toy):
+    toy.ran()
+    whole = page(toy).read_text()
+    shutil.rmtree(toy.out / "join")
+    done = toy.run("--until", "cut", "--set", "cut.keep=2")
+    assert done.code == 0 and "it shows results of join, which are no longer in the folder" in done.err
+    assert page(toy).read_text() == whole
+
+
+@pytest.mark.slow
+def test_report_of_dead_links_is_refused_with_the_way_back_and_the_good_page_stays(toy):
+    toy.ran()
+    whole = page(toy).read_text()
+    for name in ("objects", "actions"):
+        for path in (toy.cache / name).rglob("*"):
+            path.chmod(0o755)
+        shutil.rmtree(toy.cache / name)
+    done = toy.gsac("report", toy.out)
+    assert done.code == 2 and "which is gone" in done.err and f"`gsac run {toy.clip} --out" in done.err
+    assert page(toy).read_text() == whole
+    assert toy.run().code == 0 and toy.gsac("report", toy.out).code == 0
