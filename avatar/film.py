@@ -24,6 +24,8 @@ ROOM = 1.12
 """The picture's size over the figure's."""
 FOLLOW_S = 0.6
 """Standard deviation, s, of the smoothing of the pelvis' place that the camera follows."""
+SHADOW_RADIUS, SHADOW_STRENGTH = 0.3, 0.4
+"""Of the soft shadow: its radius as a share of the figure's height, and how dark its middle is; as the viewer's."""
 SAMPLES = 40
 """Frames whose bounds set the camera's distance."""
 
@@ -51,17 +53,20 @@ def turntable(avatar: RiggedAvatar, seconds: float, fps: float) -> Film:
     return Film(pose, np.zeros((T, 3), np.float32), np.arange(T) * 360.0 / T, fps)
 
 
-def performance(motion: Motion, fps: float, seconds: float | None = None) -> Film:
-    """The first `seconds` of a motion, all of it unless given, at `fps` frames a second."""
+def performance(motion: Motion, fps: float, seconds: float | None = None, yaw: float = 0.0) -> Film:
+    """The first `seconds` of a motion, all of it unless given, at `fps` frames a second, seen from `yaw`, degrees."""
     length = motion.seconds if seconds is None else min(seconds, motion.seconds)
     T = max(1, math.floor(length * fps + 1e-6) + 1)
     pose, transl = zip(*(motion.at(t / fps) for t in range(T)), strict=True)
-    return Film(np.stack(pose), np.stack(transl), np.zeros(T), fps)
+    return Film(np.stack(pose), np.stack(transl), np.full(T, yaw), fps)
 
 
-def draw_frames(avatar: RiggedAvatar, film: Film, width: int, height: int, background: np.ndarray,
-           workspace: Workspace | None = None) -> Iterator[np.ndarray]:
-    """Draws a film frame by frame: (height, width, 3) uint8 RGB each. background: (3,) RGB in 0..1."""
+def draw_frames(avatar: RiggedAvatar, film: Film, width: int, height: int, background: np.ndarray | None,
+                workspace: Workspace | None = None, shadow: bool = False) -> Iterator[np.ndarray]:
+    """Draws a film frame by frame: (height, width, 3) uint8 RGB each. background: (3,) RGB in 0..1.
+
+    Without a background (height, width, 4): RGB and straight alpha. shadow: whether the figure has a soft one on the floor.
+    """
     lit, gaussians, workspace = avatar.gaussians, replace(avatar.gaussians, light=None), workspace or Workspace()
     place = smooth_places(film.transl + avatar.joints[0], film.fps)
     focal = height / 2 / math.tan(math.radians(FOV / 2))
@@ -73,8 +78,32 @@ def draw_frames(avatar: RiggedAvatar, film: Film, width: int, height: int, backg
         if lit.light is not None:  # the room's light stands in the avatar's axes, not in this camera's
             gaussians.rgb = lit.rgb * shade(lit.light, face_frames(vertices, avatar.faces).R[lit.face, :, 1])
         out = render_bound(((vertices - eye) @ R.T).astype(np.float32), avatar.faces, gaussians, camera, workspace)
-        image = out.rgb + (1 - out.alpha[..., None]) * background
+        dark = cast_shadow(avatar, film.transl[t], R, eye, camera)[..., None] if shadow else 0.0
+        behind = (1 - out.alpha[..., None]) * (1 - dark)
+        if background is None:
+            image = np.concatenate([out.rgb / np.maximum(1 - behind, 1e-6), 1 - behind], -1)
+        else:
+            image = out.rgb + behind * background
         yield np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)
+
+
+def cast_shadow(avatar: RiggedAvatar, transl: np.ndarray, R: np.ndarray, eye: np.ndarray, camera: Camera) -> np.ndarray:
+    """(H, W) share of light that a soft round shadow below the figure takes, as in the viewer. transl: (3,) m; R (3, 3) and
+    eye (3,), m: the camera's place in the world."""
+    low, high = avatar.vertices.min(0), avatar.vertices.max(0)
+    radius = SHADOW_RADIUS * (high[1] - low[1])
+    x, y = np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5
+    across, down = (x - camera.center[0]) / camera.focal[0], (y - camera.center[1]) / camera.focal[1]
+    fall = down * R[1, 1] + R[2, 1]  # the camera does not roll, so a row of pixels falls alike
+    far = np.where(fall < -1e-6, (avatar.ground - eye[1]) / np.minimum(fall, -1e-6), np.inf)
+    reached = np.isfinite(far)
+    out = np.zeros((camera.height, camera.width))
+    rays = across[None, :, None] * R[0] + down[reached, None, None] * R[1] + R[2]
+    ground = eye + far[reached, None, None] * rays
+    middle = (low + high) / 2 + transl
+    share = np.minimum(np.hypot(ground[..., 0] - middle[0], ground[..., 2] - middle[2]) / radius, 1)
+    out[reached] = SHADOW_STRENGTH * ((1 - share) ** 2 * (1 + 2 * share)) ** 2
+    return out
 
 
 def smooth_places(places: np.ndarray, fps: float) -> np.ndarray:

@@ -1,8 +1,9 @@
-"""Writes a silent H.264 file frame by frame, encoded by imageio-ffmpeg's ffmpeg."""
+"""Writes frames as a silent video (H.264, VP9) or a GIF, encoded by imageio-ffmpeg's ffmpeg, or as a folder of PNG files."""
 
 from __future__ import annotations
 
 import contextlib
+import shutil
 import subprocess
 import tempfile
 from pathlib import Path
@@ -11,6 +12,22 @@ import numpy as np
 
 CRF = 18
 """libx264's quality: 0 is lossless, 51 the worst."""
+CRF_VP9 = 24
+"""libvpx's: 0 is lossless, 63 the worst."""
+BT709 = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
+TO_BT709 = ["-vf", "scale=out_color_matrix=bt709:out_range=tv"]
+PALETTE = "split[a][b];[a]palettegen=reserve_transparent=1[p];[b][p]paletteuse=dither=sierra2_4a:alpha_threshold=128"
+ENCODERS = {
+    ".mp4": lambda alpha: [*TO_BT709, "-c:v", "libx264", "-preset", "medium", "-crf", str(CRF), "-pix_fmt", "yuv420p", *BT709,
+                           "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart", "-f", "mp4"],
+    ".webm": lambda alpha: [*TO_BT709, "-c:v", "libvpx-vp9", "-crf", str(CRF_VP9), "-b:v", "0", "-cpu-used", "4", "-row-mt", "1",
+                            "-auto-alt-ref", "0", "-pix_fmt", "yuva420p" if alpha else "yuv420p", *BT709,
+                            "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "webm"],
+    ".gif": lambda alpha: ["-vf", PALETTE, "-loop", "0", "-f", "gif"],
+}
+"""Suffix -> ffmpeg's options, by whether the frames have transparency."""
+TRANSPARENT = (".webm", ".gif")
+"""Suffixes of files that can hold transparency; PNG files can as well."""
 
 
 class VideoError(Exception):
@@ -18,11 +35,11 @@ class VideoError(Exception):
 
 
 class Video:
-    """`with Video(path, 640, 480, 30) as video: video.add(frame)`. Width and height are even, px. Where the block raises, no file
-    is left."""
+    """`with Video(path, 640, 480, 30) as video: video.add(frame)`, by the suffix of the path, one of ENCODERS. Width and
+    height are even, px. Where the block raises, no file is left."""
 
-    def __init__(self, path: Path, width: int, height: int, fps: float):
-        self.path, self.size, self.fps = Path(path), (width, height), fps
+    def __init__(self, path: Path, width: int, height: int, fps: float, alpha: bool = False):
+        self.path, self.size, self.fps, self.alpha = Path(path), (width, height), fps, alpha
 
     def __enter__(self) -> Video:
         import imageio_ffmpeg
@@ -31,16 +48,14 @@ class Video:
         self.part = self.path.with_name(f".{self.path.name}.part")
         self.log = tempfile.TemporaryFile()
         self.process = subprocess.Popen(
-            [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-nostdin", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
-             "-s", f"{width}x{height}", "-r", f"{self.fps:g}", "-i", "pipe:0",
-             "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-c:v", "libx264", "-preset", "medium", "-crf", str(CRF),
-             "-pix_fmt", "yuv420p", "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709",
-             "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart", "-f", "mp4", str(self.part)],
+            [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-nostdin", "-loglevel", "error", "-f", "rawvideo",
+             "-pix_fmt", "rgba" if self.alpha else "rgb24", "-s", f"{width}x{height}", "-r", f"{self.fps:g}", "-i", "pipe:0",
+             *ENCODERS[self.path.suffix.lower()](self.alpha), str(self.part)],
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self.log)
         return self
 
     def add(self, frame: np.ndarray) -> None:
-        """Appends a frame (H, W, 3) uint8 RGB."""
+        """Appends a frame (H, W, 3) uint8 RGB, or (H, W, 4) with straight alpha where the file has it."""
         try:
             self.process.stdin.write(np.ascontiguousarray(frame, np.uint8).tobytes())
         except BrokenPipeError:
@@ -66,3 +81,29 @@ class Video:
         self.log.seek(0)
         lines = self.log.read().decode(errors="replace").strip().splitlines()
         return f"{self.path}: ffmpeg could not write it ({lines[0] if lines else 'it ended'})"
+
+
+class Pictures:
+    """`with Pictures(folder) as pictures: pictures.add(frame)` writes folder/000000.png and so on; the folder is new or empty.
+    Where the block raises, none is left."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.count = Path(folder), 0
+
+    def __enter__(self) -> Pictures:
+        self.part = Path(tempfile.mkdtemp(prefix=f".{self.folder.name}.", dir=self.folder.parent))
+        return self
+
+    def add(self, frame: np.ndarray) -> None:
+        """Writes a frame (H, W, 3) uint8 RGB, or (H, W, 4) with straight alpha."""
+        from PIL import Image
+
+        Image.fromarray(frame).save(self.part / f"{self.count:06d}.png")
+        self.count += 1
+
+    def __exit__(self, kind, error, trace) -> None:
+        if kind is not None:
+            shutil.rmtree(self.part)
+            return
+        self.part.chmod(0o755)
+        self.part.replace(self.folder)

@@ -10,7 +10,7 @@ from gsac.pipeline.executors.executor import ClipJob, ClipResult, Executor
 from gsac.stages.contract import BadInput
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".ts", ".mpg", ".mpeg")
-PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff", ".heic")
+PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff", ".heic", ".heif")
 
 
 def find_clips(source: Path) -> list[Path]:

@@ -1,11 +1,14 @@
 // The options in the page's address after its #: name=value, with & between, as in #clip=walk&yaw=30&still.
 
+// Options that pick what is seen: with one of them nothing turns by itself.
+const PICKED = ["clip", "pose", "t", "yaw", "pitch", "dist", "target", "still"];
+
 /** @param {string} words the address after # */
 export function readAddress(words) {
   const given = new URLSearchParams(words);
   const number = (name) => (given.has(name) ? Number.parseFloat(given.get(name)) : null);
   return {
-    // clip=NAME or pose=T|A: what plays. Default: the avatar's first clip, else the T-pose.
+    // clip=NAME or pose=T|A: what plays. Default: the A-pose.
     clip: given.get("clip"),
     pose: given.get("pose"),
     // t=SECONDS: where the clip begins. Default: 0.
@@ -26,8 +29,9 @@ export function readAddress(words) {
     turned: readTurns(given.get("joints") ?? ""),
     // light=off: even light instead of the clip's. Default: the clip's.
     lit: given.get("light") !== "off",
-    // turntable: the avatar turns. Default: it does not.
-    turntable: given.has("turntable"),
+    // turntable, or turntable=off: whether the avatar turns. Default: where nothing else is picked, and until something is.
+    turntable: given.has("turntable") ? given.get("turntable") !== "off" : null,
+    picked: PICKED.some((name) => given.has(name)),
     // still: one frame without controls and floor. Default: it moves.
     still: given.has("still"),
     // draw=webgpu|webgl|software, only when the page opens: the renderer. Default: what suits the device.

@@ -8,6 +8,9 @@ const PITCH = 4;
 const MARGIN_TALL = 0.57;
 const MARGIN_WIDE = 0.58;
 
+// A press that moves less than this is a click, px.
+const STILL = 5;
+
 /**
  * What a renderer draws from. view: 3x4, row by row, world to camera; focal: px; centre: px from the middle of the box to the
  * optical axis; box: x, y, width, height of the picture on the canvas, px.
@@ -29,8 +32,8 @@ export class OrbitCamera {
     this.pitch = PITCH;
     this.target = [0, 0, 0];
     this.distance = 3;
-    // Offset from the framing that a glide still has to lose: target (m), pitch (degrees), distance (m).
-    this.behind = [0, 0, 0, 0, 0];
+    // Offset from the framing that a glide still has to lose: target (m), pitch (degrees), distance (m), yaw (degrees).
+    this.behind = [0, 0, 0, 0, 0, 0];
     // Whether the user or the address moved it: a new size of the page does not frame the figure again then.
     this.moved = false;
   }
@@ -39,7 +42,7 @@ export class OrbitCamera {
   frame(low, high, aspect) {
     this.pitch = PITCH;
     this.moved = false;
-    this.behind = [0, 0, 0, 0, 0];
+    this.behind = [0, 0, 0, 0, 0, 0];
     this.target = low.map((l, i) => (l + high[i]) / 2);
     const tall = (high[1] - low[1]) * MARGIN_TALL / (1 - this.covered), wide = (high[0] - low[0]) * MARGIN_WIDE / aspect;
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
@@ -52,16 +55,23 @@ export class OrbitCamera {
     this.behind = this.place().map((to, i) => from[i] - to);
   }
 
+  // Turns gradually to a yaw, degrees, by the shorter way; a glide to another framing goes on from there.
+  glideTo(yaw) {
+    this.behind[5] += (this.yaw - yaw) % 360;
+    if (Math.abs(this.behind[5]) > 180) this.behind[5] -= 360 * Math.sign(this.behind[5]);
+    this.yaw = yaw;
+  }
+
   // Goes on with a glide by some seconds.
   settle(seconds) {
     const left = Math.exp(-seconds / GLIDE_S);
     this.behind = this.behind.map((x) => (Math.abs(x) < 1e-4 ? 0 : x * left));
   }
 
-  // Where it is now: target (m), pitch (degrees), distance (m).
+  // Where it is now: target (m), pitch (degrees), distance (m), yaw (degrees).
   place() {
     const at = this.target.map((t, i) => t + this.walked[i]);
-    return [...at, this.pitch, this.distance].map((x, i) => x + this.behind[i]);
+    return [...at, this.pitch, this.distance, this.yaw].map((x, i) => x + this.behind[i]);
   }
 
   // Focal length, px, for a picture of this height.
@@ -81,8 +91,8 @@ export class OrbitCamera {
 
   // Fills this.view.
   update() {
-    const place = this.place(), target = place.slice(0, 3), [pitch, distance] = place.slice(3);
-    const y = this.yaw * Math.PI / 180, p = pitch * Math.PI / 180;
+    const place = this.place(), target = place.slice(0, 3), [pitch, distance, yaw] = place.slice(3);
+    const y = yaw * Math.PI / 180, p = pitch * Math.PI / 180;
     const back = [Math.sin(y) * Math.cos(p), Math.sin(p), Math.cos(y) * Math.cos(p)];
     const right = [Math.cos(y), 0, -Math.sin(y)], forward = back.map((v) => -v);
     const down = [forward[1] * right[2] - forward[2] * right[1], forward[2] * right[0] - forward[0] * right[2],
@@ -109,20 +119,32 @@ export class OrbitCamera {
     for (let i = 0; i < 3; i++) this.target[i] -= step * (dx * this.view[i] + dy * this.view[4 + i]);
   }
 
-  // onMove is called with each gesture.
-  listen(element, onMove) {
+  /**
+   * @param {HTMLElement} element
+   * @param {() => void} onMove called with each gesture
+   * @param {(x: number, y: number) => void} onClick called with the place of a click or tap that moved nothing, px of the page
+   */
+  listen(element, onMove, onClick) {
     const fingers = new Map();
+    let pressed = null;
     element.addEventListener("contextmenu", (e) => e.preventDefault());
     element.addEventListener("pointerdown", (e) => {
       element.setPointerCapture(e.pointerId);
       fingers.set(e.pointerId, [e.clientX, e.clientY]);
+      pressed = fingers.size === 1 && e.button === 0 ? [e.clientX, e.clientY] : null;
     });
     const lift = (e) => fingers.delete(e.pointerId);
-    element.addEventListener("pointerup", lift);
+    element.addEventListener("pointerup", (e) => {
+      lift(e);
+      if (pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < STILL) onClick(e.clientX, e.clientY);
+      pressed = null;
+    });
     element.addEventListener("pointercancel", lift);
     element.addEventListener("pointermove", (e) => {
       const old = fingers.get(e.pointerId);
       if (!old) return;
+      if (pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < STILL) return;
+      pressed = null;
       const dx = e.clientX - old[0], dy = e.clientY - old[1];
       if (fingers.size === 2) {
         const other = [...fingers].find(([id]) => id !== e.pointerId)[1];

@@ -1,8 +1,11 @@
 // The page's buttons, sliders and dropped files: they change the viewer and show its state.
 
+import { listenForKeys } from "./keys.js";
+import { pickJoint } from "./limb.js";
 import { MotionError } from "./motion.js";
 import { addMotions, listenForDrops } from "./motion_files.js";
-import { addFaceSliders, addJointSliders } from "./sliders.js";
+import { describeView, saveFile, shareLink } from "./share.js";
+import { addFaceSliders, addJointSliders, addPresets } from "./sliders.js";
 
 // A note on the page stays this long.
 const NOTE_MS = 9000;
@@ -13,19 +16,33 @@ const RENDERERS = { webgpu: "WebGPU", webgl: "WebGL", software: "no graphics car
 const find = (id) => document.getElementById(id);
 
 export class Controls {
-  /** @param {import("./viewer.js").Viewer} viewer */
-  constructor(viewer) {
+  /**
+   * @param {import("./viewer.js").Viewer} viewer
+   * @param {string} name the avatar's, or none
+   * @param {ArrayBuffer} file the bytes of avatar.gsac
+   */
+  constructor(viewer, name, file) {
     this.viewer = viewer;
-    for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
+    this.name = name || "avatar";
+    if (name) {
+      find("name").textContent = name;
+      document.title = `${name} · GSAC avatar`;
+    }
     for (const pose of Object.keys(viewer.avatar.poses).sort()) this.addButton(`${pose}-pose`, { pose });
+    for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
     this.onClick("turntable", () => { viewer.turntable = !viewer.turntable; });
     this.onClick("light", () => { viewer.binding.lit = !viewer.binding.lit; });
     find("light").hidden = viewer.avatar.light === null;
-    this.onClick("pause", () => { viewer.paused = !viewer.paused; });
-    this.onClick("reset", () => {
-      viewer.camera.yaw = 0;
-      viewer.frame();
-    });
+    this.onClick("pause", () => this.pause());
+    this.onClick("reset", () => this.reset());
+    this.onClick("fullscreen", () => this.fullscreen());
+    this.onClick("show-help", () => this.help());
+    this.onClick("share", async () => this.note(await shareLink(describeView(viewer), document.title)));
+    this.onClick("save", () => saveFile(new Blob([file]), `${this.name}.gsac`));
+    this.onClick("fold", () => document.body.classList.toggle("folded"));
+    document.body.classList.toggle("folded", matchMedia("(max-width: 600px) and (pointer: coarse)").matches);
+    document.addEventListener("fullscreenchange", () => this.show());
+    find("fullscreen").hidden = !document.fullscreenEnabled;
     this.onClick("open", () => find("file").click());
     this.onClick("picture", () => this.savePicture());
     find("background").addEventListener("input", () => { viewer.background = find("background").value; });
@@ -38,7 +55,9 @@ export class Controls {
     viewer.camera.listen(viewer.stage, () => {
       viewer.turntable = false;
       this.show();
-    });
+    }, (x, y) => this.pick(x, y));
+    listenForKeys(this);
+    addPresets(viewer, find("presets"), () => this.show());
     viewer.onRate = (rate) => this.showRate(rate);
     viewer.onChange = (text) => this.note(text);
     // Drawer -> what makes it show the viewer's state.
@@ -50,6 +69,7 @@ export class Controls {
         else viewer.expression = {};
       });
     }
+    for (const button of document.querySelectorAll(".drawer .close")) button.addEventListener("click", () => this.openDrawer(null));
     find("show-faces").hidden = viewer.avatar.expressions.length === 0;
   }
 
@@ -96,14 +116,41 @@ export class Controls {
 
   // Offers the canvas as a PNG file.
   savePicture() {
-    const { viewer } = this, link = document.createElement("a");
+    const { viewer } = this, name = `${this.name} ${viewer.playing.clip ?? `${viewer.playing.pose}-pose`}.png`;
     viewer.draw();
-    link.download = `avatar ${viewer.playing.clip ?? `${viewer.playing.pose}-pose`}.png`;
-    viewer.canvas.toBlob((blob) => {
-      link.href = URL.createObjectURL(blob);
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-    }, "image/png");
+    viewer.canvas.toBlob((blob) => saveFile(blob, name), "image/png");
+  }
+
+  // Stops the motion, and the turn, where they are, or lets them go on.
+  pause() {
+    const { viewer } = this;
+    if (viewer.length) viewer.paused = !viewer.paused;
+    else viewer.turntable = !viewer.turntable;
+  }
+
+  reset() {
+    this.viewer.camera.yaw = 0;
+    this.viewer.frame();
+  }
+
+  // Fills the screen with the page, or goes back.
+  fullscreen() {
+    const done = document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
+    done.catch((error) => this.note(`The browser refuses the full screen: ${error.message}`));
+  }
+
+  help() {
+    if (find("help").open) find("help").close();
+    else find("help").showModal();
+  }
+
+  // Opens the drawer of joints at the one that a click means; x, y: px of the page.
+  pick(x, y) {
+    const joint = pickJoint(this.viewer, x, y);
+    if (joint === null) return;
+    find("joint").value = joint;
+    this.openDrawer("joints");
+    this.show();
   }
 
   // Shows a sentence for a while.
@@ -132,7 +179,12 @@ export class Controls {
     }
     find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
     find("light").setAttribute("aria-pressed", String(viewer.binding.lit));
-    find("timeline").hidden = !viewer.length;
+    find("timeline").hidden = find("pause").disabled = find("time").disabled = !viewer.length;
+    if (!viewer.length) find("clock").textContent = "";
+    find("fullscreen").setAttribute("aria-pressed", String(document.fullscreenElement !== null));
+    const folded = document.body.classList.contains("folded");
+    find("fold").textContent = folded ? "All controls" : "Fewer controls";
+    find("fold").setAttribute("aria-expanded", String(!folded));
     find("pause").textContent = viewer.paused ? "Play" : "Pause";
     find("background").value = viewer.background;
     Object.values(this.drawers).forEach((showSliders) => showSliders());

@@ -2,6 +2,7 @@
 
 import { readAddress } from "./address.js";
 import { Controls } from "./controls.js";
+import { readName } from "./name.js";
 import { readAvatar } from "./reader.js";
 import { Viewer } from "./viewer.js";
 import { offerHeadset } from "./xr.js";
@@ -16,10 +17,10 @@ async function unpackAvatar() {
 
 async function main() {
   const options = () => readAddress(location.hash.slice(1));
-  const viewer = await Viewer.open(readAvatar(await unpackAvatar()), options().draw);
+  const file = await unpackAvatar(), viewer = await Viewer.open(readAvatar(file), options().draw);
   // For the browser's console, tests and benchmarks.
   Object.assign(window, { gsac: viewer });
-  const controls = new Controls(viewer);
+  const controls = new Controls(viewer, readName(location.pathname), file);
   const follow = () => {
     viewer.follow(options());
     controls.show();

@@ -23,7 +23,9 @@ export async function addMotions(avatar, files) {
   const motions = files.filter((file) => Object.hasOwn(READERS, kind(file)));
   if (!motions.length) {
     const names = files.map((file) => file.name).join(", ") || "nothing";
-    throw new MotionError(`${names}: a motion is read from .bvh, .glb and .gltf`);
+    const fbx = files.some((file) => kind(file) === "fbx");
+    const instead = fbx ? "; FBX is read by `gsac render --motion`, and Blender saves it as glTF" : "";
+    throw new MotionError(`${names}: a motion is read from .bvh, .glb and .gltf${instead}`);
   }
   /** @type {Object<string, Uint8Array>} */
   const bytes = {};

@@ -14,7 +14,8 @@ MODULES = ("json.js", "container.js", "reader.js",
            "flat_quat.js", "skin.js", "binding.js", "sort.js",
            "projection.js", "pack.js", "webgl.js", "software.js", "shaders.js", "device.js", "webgpu.js", "renderer.js",
            "quat.js", "motion.js", "joint_names.js", "match_names.js", "bvh.js", "gltf.js", "retarget.js", "motion_files.js",
-           "address.js", "camera.js", "rate.js", "viewer.js", "xr.js", "sliders.js", "controls.js", "main.js")
+           "address.js", "name.js", "camera.js", "rate.js", "viewer.js", "limb.js", "share.js", "xr.js", "sliders.js", "keys.js",
+           "controls.js", "main.js")
 """Each after those that it imports; main.js runs the page. Whole names, so that the cache sees these files."""
 _IMPORT = re.compile(r'^import \{ [\w, ]+ \} from "\./\w+\.js";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(async )?function |class |const )", re.MULTILINE)

@@ -32,6 +32,36 @@ function makeSlider(label, low, high, step, read, write) {
   return { row, show };
 }
 
+// Expressions in one press: name -> weights of the face's actions.
+const PRESETS = {
+  Neutral: {},
+  Smile: { mouthSmileLeft: 0.9, mouthSmileRight: 0.9, cheekSquintLeft: 0.4, cheekSquintRight: 0.4 },
+  Laugh: { mouthSmileLeft: 1, mouthSmileRight: 1, jawOpen: 0.35, cheekSquintLeft: 0.6, cheekSquintRight: 0.6 },
+  Blink: { eyeBlinkLeft: 1, eyeBlinkRight: 1 },
+  Wink: { eyeBlinkLeft: 1, mouthSmileLeft: 0.6 },
+  Surprise: { browInnerUp: 1, browOuterUpLeft: 0.8, browOuterUpRight: 0.8, eyeWideLeft: 0.8, eyeWideRight: 0.8, jawOpen: 0.4 },
+  Angry: { browDownLeft: 1, browDownRight: 1, mouthFrownLeft: 0.5, mouthFrownRight: 0.5, noseSneerLeft: 0.4, noseSneerRight: 0.4 },
+  Sad: { browInnerUp: 0.8, mouthFrownLeft: 0.8, mouthFrownRight: 0.8 },
+};
+
+/**
+ * Fills `place` with a button for each preset whose actions the avatar has.
+ * @param {import("./viewer.js").Viewer} viewer
+ * @param {HTMLElement} place
+ * @param {() => void} onChange
+ */
+export function addPresets(viewer, place, onChange) {
+  for (const [name, weights] of Object.entries(PRESETS)) {
+    if (!Object.keys(weights).every((action) => viewer.avatar.expressions.includes(action))) continue;
+    const button = Object.assign(document.createElement("button"), { textContent: name });
+    button.addEventListener("click", () => {
+      viewer.expression = { ...weights };
+      onChange();
+    });
+    place.append(button);
+  }
+}
+
 /**
  * Fills `rows` with a choice of joint and its three turns.
  * @param {import("./viewer.js").Viewer} viewer

@@ -75,6 +75,8 @@ export class Viewer {
     this.clock = 0;
     this.paused = false;
     this.turntable = false;
+    // Whether it turns because nobody has picked anything yet.
+    this.opening = false;
     // Whether the page is one frame without controls and floor.
     this.still = false;
     this.background = BACKGROUND;
@@ -122,6 +124,10 @@ export class Viewer {
   // As `play`, and the camera glides to where it sees all of it, unless the user has moved it.
   choose(what) {
     this.play(what);
+    if (this.opening) {
+      this.opening = this.turntable = false;
+      this.camera.glideTo(0);
+    }
     if (!this.camera.moved) this.frame("glide");
   }
 
@@ -269,17 +275,18 @@ export class Viewer {
 
   /** @param {ReturnType<typeof import("./address.js").readAddress>} options */
   follow(options) {
-    const { avatar, camera } = this, { clip, pose, pitch, distance, target } = options, [first] = Object.keys(avatar.clips);
+    const { avatar, camera } = this, { clip, pose, pitch, distance, target } = options;
     this.still = options.still;
     document.body.classList.toggle("bare", this.still);
     this.background = options.background ?? this.background;
-    this.turntable = options.turntable;
+    this.opening = options.turntable === null && !options.picked && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.turntable = options.turntable ?? this.opening;
     this.binding.lit = options.lit;
     this.expression = options.expression;
     this.turned = Object.fromEntries(Object.entries(options.turned).filter(([joint]) => avatar.names.includes(joint)));
     if (Object.hasOwn(avatar.clips, clip)) this.play({ clip });
     else if (Object.hasOwn(avatar.poses, pose)) this.play({ pose });
-    else this.play(first ? { clip: first } : { pose: "T" });
+    else this.play({ pose: Object.hasOwn(avatar.poses, "A") ? "A" : "T" });
     this.seek(options.seconds);
     camera.walked.fill(0);
     this.step(0);

@@ -8,19 +8,23 @@ import numpy as np
 
 from gsac.avatar.motion.amass import read_amass
 from gsac.avatar.motion.bvh import read_bvh
+from gsac.avatar.motion.fbx import read_fbx
 from gsac.avatar.motion.retarget import retarget
 from gsac.avatar.motion.source import Motion, MotionError
 
-SUFFIXES = (".bvh", ".npz")
+SUFFIXES = (".bvh", ".fbx", ".npz")
 
 
 def read_motion(path: Path, joint_names: list[str], parents: np.ndarray, joints: np.ndarray) -> Motion:
-    """A BVH or AMASS-style npz file as a motion of the skeleton joint_names (J), parents (J,), joints (J, 3) at rest, m.
+    """A BVH, FBX or AMASS-style npz file as a motion of the skeleton joint_names (J), parents (J,), joints (J, 3) at rest, m.
 
     Raises `MotionError`, naming the file and the line or array.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        raise MotionError(f"{path}: motion is read from {' and '.join(SUFFIXES)}, not from {suffix or 'a file without suffix'}")
-    source = read_bvh(path) if suffix == ".bvh" else read_amass(path, joint_names, parents, joints)
+        raise MotionError(f"{path}: motion is read from {', '.join(SUFFIXES)}, not from {suffix or 'a file without suffix'}")
+    if suffix == ".npz":
+        source = read_amass(path, joint_names, parents, joints)
+    else:
+        source = read_bvh(path) if suffix == ".bvh" else read_fbx(path)
     return retarget(source, joint_names, parents, joints, str(path))

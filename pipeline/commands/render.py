@@ -1,4 +1,4 @@
-"""gsac render AVATAR: a video of the avatar, moved by a motion file or seen from all sides."""
+"""gsac render AVATAR: a video, a GIF or pictures of the avatar, moved by a motion file or seen from all sides."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gsac.avatar.video import TRANSPARENT
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import require_file
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from gsac.avatar.motion.source import Motion
 
 FILE = "avatar.gsac"
+FILMS = (".mp4", ".webm", ".gif")
+"""Suffixes of --out; without one it is a folder of pictures."""
 SIZES = (16, 4096)
 """Least and largest width or height, px."""
 TURN_S = 6.0
@@ -31,33 +34,40 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("avatar", type=Path, metavar="AVATAR",
                          help="avatar.gsac, or the folder of a run or its export folder")
     command.add_argument("--motion", metavar="FILE",
-                         help="a .bvh or AMASS-style .npz file, or the name of a clip in the avatar (walk, wave); "
+                         help="a .bvh, .fbx (Mixamo) or AMASS-style .npz file, or the name of a clip in the avatar (walk, wave); "
                               "without it the avatar is seen from all sides")
     command.add_argument("--out", type=Path, metavar="FILE",
-                         help="default: <avatar>-<motion>.mp4 here, without a motion <avatar>-turn.mp4")
+                         help="a .mp4, .webm or .gif, or a new folder for PNG pictures; "
+                              "default: <avatar>-<motion>.mp4 here, without a motion <avatar>-turn.mp4")
     add_force(command)
     command.add_argument("--size", default="720x960", metavar="WxH", help="pixels, even numbers; default: 720x960")
     command.add_argument("--fps", type=float, default=30.0, metavar="N", help="default: 30")
     command.add_argument("--seconds", type=float, metavar="N",
                          help=f"no more of the motion than this; of the turn, how long it takes (default: {TURN_S:g})")
-    command.add_argument("--background", default="2b303b", metavar="RRGGBB", help="default: 2b303b")
+    command.add_argument("--background", default="2b303b", metavar="RRGGBB",
+                         help="or none: transparent, for .webm, .gif and PNG pictures; default: 2b303b")
+    command.add_argument("--no-shadow", action="store_true", help="no soft shadow on the floor")
+    command.add_argument("--yaw", type=float, default=0.0, metavar="DEGREES",
+                         help="where the camera stands around a motion; default: 0, in front")
     add_json(command)
     command.set_defaults(do=do)
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     width, height = parse_size(arguments.size)
-    background = parse_colour(arguments.background)
+    background = None if arguments.background == "none" else parse_colour(arguments.background)
     if not 1 <= arguments.fps <= 240:
         raise BadInput(f"--fps {arguments.fps:g}: expected 1 to 240")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 3600:
         raise BadInput(f"--seconds {arguments.seconds:g}: expected more than 0, at most 3600")
+    if not -360 <= arguments.yaw <= 360:
+        raise BadInput(f"--yaw {arguments.yaw:g}: expected degrees, -360 to 360")
     file = find_avatar(arguments.avatar)
     out = (arguments.out or Path(default_name(file, arguments.motion))).absolute()
-    if out.suffix.lower() != ".mp4" or out.is_dir() or not out.parent.is_dir():
-        raise BadInput(f"--out {out}: expected a file .mp4 in a folder that exists")
-    refuse_footage(out, file)
-    require_free(out, arguments.force)
+    check_out(out, file, arguments.force)
+    if background is None and out.suffix.lower() not in ("", *TRANSPARENT):
+        raise BadInput(f"--background none: {out.suffix} holds no transparency; expected --out with {' or '.join(TRANSPARENT)}, "
+                       "or a folder for PNG pictures")
     with progress_reporter(arguments) as reporter:
         frames, seconds = film(file, arguments, out, (width, height), background, reporter)
     if arguments.json:
@@ -70,15 +80,15 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int], background: list[float],
-         reporter: PlainReporter) -> tuple[int, float]:
+def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int],
+         background: list[float] | None, reporter: PlainReporter) -> tuple[int, float]:
     """Writes the video. Returns the number of its frames and the seconds that it took."""
     import numpy as np
 
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.film import draw_frames, performance, turntable
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
-    from gsac.avatar.video import Video, VideoError
+    from gsac.avatar.video import Pictures, Video, VideoError
 
     began = time.monotonic()
     reporter.starts("render", f"{file.name} to {out}")
@@ -86,9 +96,10 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
         avatar = RiggedAvatar.read(file)
         motion = find_motion(arguments.motion, avatar)
         plan = (turntable(avatar, arguments.seconds or TURN_S, arguments.fps) if motion is None
-                else performance(motion, arguments.fps, arguments.seconds))
-        with Video(out, *size, arguments.fps) as video:
-            for done, frame in enumerate(draw_frames(avatar, plan, *size, np.array(background))):
+                else performance(motion, arguments.fps, arguments.seconds, arguments.yaw))
+        colour = None if background is None else np.array(background)
+        with Video(out, *size, arguments.fps, background is None) if out.suffix else Pictures(out) as video:
+            for done, frame in enumerate(draw_frames(avatar, plan, *size, colour, shadow=not arguments.no_shadow)):
                 reporter.progress("render", done, len(plan), "frames")
                 video.add(frame)
     except ArtifactError as e:
@@ -98,6 +109,19 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
     seconds = time.monotonic() - began
     reporter.ends("render", Outcome.RAN, seconds)
     return len(plan), seconds
+
+
+def check_out(out: Path, file: Path, force: bool) -> None:
+    """Raises BadInput unless the film of the avatar `file` can be written to `out` and takes nobody's place."""
+    if (out.suffix and out.suffix.lower() not in FILMS) or not out.parent.is_dir():
+        raise BadInput(f"--out {out}: expected a file {', '.join(FILMS)}, or a new folder for PNG pictures, "
+                       "in a folder that exists")
+    if not out.suffix:
+        if out.is_file() or (out.is_dir() and any(out.iterdir())):
+            raise BadInput(f"--out {out}: pictures go to a new or empty folder, and this is there already; give another name")
+        return
+    refuse_footage(out, file)
+    require_free(out, force)
 
 
 def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:

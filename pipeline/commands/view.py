@@ -1,48 +1,98 @@
-"""gsac view AVATAR: serves the viewer page on localhost."""
+"""gsac view AVATAR: serves the viewer page to this machine's browser, or with --host to a phone or a headset."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-import functools
-import http.server
+import os
+import sys
 import tempfile
+import webbrowser
 from pathlib import Path
 
 from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.page_server import PAGE, PageServer, find_network_address, make_certificate, serve
 from gsac.stages.contract import BadInput
 
-PAGE = "viewer.html"
+AVATAR = "avatar.gsac"
+EXPECTED = "give the folder of a run whose stage export is done, its export folder, or a .gsac file"
+ENDS = "Ctrl-C ends it."
+EXPOSED = ("Whoever is in this network and has this address sees the avatar and can save its files, until Ctrl-C; "
+           "nothing else of this machine is served.")
+CERTIFICATE = "The certificate is made for this call alone, so the browser warns once: go on by 'Advanced'."
+PLAIN = "Served without https, since there is no openssl here: the page works, but VR and AR need https."
 
 
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("avatar", type=Path, metavar="AVATAR",
                          help="the folder of a run, its export folder, a file in it, or an avatar.gsac that lies alone")
     command.add_argument("--port", type=int, default=0, metavar="N", help="default: any free one")
+    command.add_argument("--no-browser", action="store_true", help="only say the address")
+    command.add_argument("--host", action="store_true",
+                         help="serve to the network too, for a phone or a headset: by https, at an address nobody can guess")
     command.set_defaults(do=do)
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    with tempfile.TemporaryDirectory() as folder, serve(find_page(arguments.avatar, Path(folder)), arguments.port) as server:
-        print(address(server), flush=True)
-        with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how a user ends it
-            server.serve_forever()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        page = find_page(arguments.avatar, folder)
+        with open_server(page, find_name(arguments.avatar), arguments, folder) as server:
+            print(server.url, flush=True)
+            if arguments.host:
+                show_code(server.url)
+                print(f"{EXPOSED}\n{CERTIFICATE if server.scheme == 'https' else PLAIN}", file=sys.stderr)
+            elif not arguments.no_browser and has_screen():
+                webbrowser.open(server.url)
+            print(ENDS, file=sys.stderr, flush=True)
+            with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C is how a user ends it
+                server.serve_forever()
     return ExitCode.OK
 
 
+def open_server(page: Path, name: str, arguments: argparse.Namespace, folder: Path) -> PageServer:
+    """The server that the options ask for. folder: where its certificate may lie."""
+    if not arguments.host:
+        return serve(page, arguments.port, name)
+    host = find_network_address()
+    if host is None:
+        raise BadInput("--host: this machine has no address in a network; connect it to one, or leave --host out")
+    return serve(page, arguments.port, name, host, make_certificate(folder, host))
+
+
 def find_page(path: Path, spare: Path) -> Path:
-    """viewer.html of a run's folder, of an export folder, or beside a file; a .gsac file without one gets its page in the
-    folder `spare`. BadInput where there is none, or where its link leads to nothing."""
+    """viewer.html of a run's folder, of an export folder, or beside a file; an avatar without one gets its page in the folder
+    `spare`. BadInput where there is none, or where its link leads to nothing."""
+    if path.is_file() and path.suffix.lower() == ".gsac" and path.name != AVATAR:
+        return make_page(path, spare)
     folders = [path / "export", path] if path.is_dir() else [path.parent]
     for folder in folders:
         if (folder / PAGE).is_file():
             return folder / PAGE
         require_file(folder / PAGE)
     require_file(path)
-    if path.is_file() and path.suffix.lower() == ".gsac":
-        return make_page(path, spare)
-    raise BadInput(f"{path}: no {PAGE} here; give the folder of a run whose stage export is done")
+    for folder in folders:
+        if (folder / AVATAR).is_file() and (path.is_dir() or path.name == AVATAR):
+            return make_page(folder / AVATAR, spare)
+    raise BadInput(f"{path}: {why_not(path)}; {EXPECTED}")
+
+
+def why_not(path: Path) -> str:
+    """What is wrong with a path that leads to no page."""
+    if not path.exists():
+        return "no such file or folder"
+    return f"no {PAGE} and no {AVATAR} here" if path.is_dir() else f"no {PAGE} lies beside it, and it is no .gsac file"
+
+
+def find_name(path: Path) -> str:
+    """The avatar's name: its run's folder without `-avatar`, or the file's own name."""
+    here = path.absolute()
+    if here.is_file() and here.suffix.lower() == ".gsac" and here.name != AVATAR:
+        return here.stem
+    folder = here if here.is_dir() else here.parent
+    folder = folder.parent if folder.name == "export" else folder
+    return folder.name.removesuffix("-avatar") or "avatar"
 
 
 def make_page(path: Path, folder: Path) -> Path:
@@ -59,22 +109,13 @@ def make_page(path: Path, folder: Path) -> Path:
     return folder / PAGE
 
 
-class Handler(http.server.SimpleHTTPRequestHandler):
-    """Serves the files of one folder without logging requests."""
-
-    def log_message(self, *words: object) -> None:
-        pass
+def has_screen() -> bool:
+    """Whether a browser with a window can open here: without one a text browser would take the terminal."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def serve(page: Path, port: int) -> http.server.ThreadingHTTPServer:
-    """A server of the page's folder on localhost only."""
-    handler = functools.partial(Handler, directory=str(page.parent))
-    try:
-        return http.server.ThreadingHTTPServer(("127.0.0.1", port), handler)
-    except (OSError, OverflowError) as e:
-        raise BadInput(f"--port {port}: cannot be opened ({e}); choose another or leave it out") from e
+def show_code(url: str) -> None:
+    """Draws the address as a QR code in the terminal."""
+    import segno
 
-
-def address(server: http.server.ThreadingHTTPServer) -> str:
-    """URL of the page."""
-    return f"http://127.0.0.1:{server.server_address[1]}/{PAGE}"
+    segno.make(url, error="l").terminal(out=sys.stderr, compact=True)

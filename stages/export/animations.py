@@ -45,7 +45,7 @@ def wave(avatar: RiggedAvatar) -> Animation:
     turn = 2 * np.pi * t
     swing = np.sin(4 * turn)
     breath = np.sin(turn)
-    raised = -1.45 + 0.05 * breath  # the upper arm's twist, split between both ends: all of it in one joint would tear the skin
+    raised = -1.1 + 0.05 * breath  # the upper arm's twist, split between both ends: all of it in one joint would tear the skin
     tracks = _hang_arms(t)
     tracks |= {
         "spine1": _about(t, x=0.02 + 0.01 * breath, z=0.02 * np.sin(turn + 0.5)),
@@ -53,8 +53,8 @@ def wave(avatar: RiggedAvatar) -> Animation:
         "neck": _about(t, x=0.03, z=-0.04 + 0.02 * np.sin(turn + 1)),
         "head": _about(t, y=-0.06 + 0.05 * np.sin(turn + 0.3), z=-0.05 + 0.03 * np.sin(2 * turn)),
         "right_collar": _about(t, z=-0.12),
-        "right_shoulder": (_turn(t, z=0.35 + 0.04 * np.sin(2 * turn)) * _turn(t, x=0.5 * raised)).as_rotvec(),
-        "right_elbow": (_turn(t, x=0.5 * raised) * _turn(t, y=1.85 + 0.26 * swing)).as_rotvec(),
+        "right_shoulder": (_turn(t, z=0.1 + 0.04 * np.sin(2 * turn)) * _turn(t, y=0.15) * _turn(t, x=0.5 * raised)).as_rotvec(),
+        "right_elbow": (_turn(t, x=0.5 * raised) * _turn(t, y=1.2 + 0.2 * swing)).as_rotvec(),
         "right_wrist": _about(t, y=0.16 * np.sin(4 * turn - 0.9)),
     }
     for finger, spread in zip(FINGERS, (0.10, 0.03, -0.03, -0.10), strict=True):

@@ -20,8 +20,9 @@ class ExportConfig:
     """Pose of avatar.ply and avatar.spz: a (arms half down) or t (arms out)."""
     ply_pad_sh: bool = False
     """Whether avatar.ply has the 45 zero f_rest values that older importers need (248 bytes a gaussian instead of 68)."""
-    animations: str = "wave,walk"
-    """Animations of avatar.gsac, avatar.glb, avatar.fbx and viewer.html: names with commas between; the first one plays first."""
+    animations: str = "walk,wave"
+    """Animations of avatar.gsac, avatar.glb, avatar.fbx and viewer.html: names with commas between; a player that starts by itself
+    takes the first one, and viewer.html opens on the A-pose, turning slowly."""
     licence: str = "All rights stay with the person shown"
     """Terms of use of this person's likeness, written into the files."""
 

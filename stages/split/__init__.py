@@ -1,6 +1,6 @@
 """split: a clip becomes frames with true timestamps.
 
-takes  clip: a video file, or a folder of photos (optional plate.jpg or plate.png: the empty scene)
+takes  clip: a video file, or a folder of photos, HEIC among them (optional plate.jpg or plate.png: the empty scene)
 gives  frames/%06d.png (8-bit RGB), frames/plate.png where there is a plate, clip.json (artifacts.Clip)
 
 The rotation tag is applied, HDR is tone-mapped to SDR BT.709, transparency is composited over black and pixels are made square;
@@ -17,5 +17,5 @@ STAGE = Stage(
     inputs=("clip",),
     outputs=(Output("frames", check_image_folder), Output("clip.json", check_clip)),
     config=SplitConfig,
-    packages=("av", "imageio-ffmpeg", "numpy", "opencv-contrib-python-headless", "pillow"),
+    packages=("av", "imageio-ffmpeg", "numpy", "opencv-contrib-python-headless", "pillow", "pillow-heif"),
 )

@@ -16,10 +16,19 @@ from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.pick import fit_size, pick_evenly
 
-SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"}
-UNSUPPORTED = {".heic", ".heif", ".dng", ".raw", ".cr2", ".nef"}
+HEIC = {".heic", ".heif"}
+"""As iPhones write them."""
+SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"} | HEIC
+UNSUPPORTED = {".dng", ".raw", ".cr2", ".nef"}
 VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi"}
 PLATE = "plate"
+UNREADABLE = (UnidentifiedImageError, OSError, SyntaxError, ValueError)
+"""What Pillow raises for a file that is no image, or half of one."""
+ORIENTATION, SIDEWAYS = 0x0112, (5, 6, 7, 8)
+"""EXIF's tag, and its values for a photo that lies on its side."""
+SAME_ASPECT = 0.01
+"""Photos whose aspects differ by less are stretched to one size: rounding makes the difference."""
+COMPOSITED = "transparency composited over black"
 
 
 def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
@@ -47,23 +56,35 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
     picks = [photos[i] for i in pick_evenly(len(photos), config.count)]
     if len(picks) < len(photos):
         warn(f"{len(photos)} photos given, {len(picks)} kept evenly (split.count is {config.count}).")
-    first_size, focals, notes = None, [], set()
-    for i, path in enumerate(picks + [plate] * (plate is not None)):
-        rgb, exif, had_alpha = read_photo(path)
-        size = (rgb.shape[1], rgb.shape[0])
-        first_size = first_size or size
-        if size != first_size:
-            raise BadInput(f"{path.name} is {size[0]}x{size[1]} and {picks[0].name} is {first_size[0]}x{first_size[1]}"
-                           "; expected photos of one size, from one camera that stands still.")
-        if had_alpha:
-            notes.add("transparency composited over black")
-        width, height = fit_size(*size, config.max_height)
-        if path == plate:
-            write_frame(frames / "plate.png", _resize(rgb, width, height))
+    usual = usual_size(picks)
+    width, height = fit_size(*usual, config.max_height)
+    focals, notes, other, unread = [], set(), [], []
+    for done, path in enumerate(picks):
+        try:
+            rgb, exif, had_alpha = read_photo(path)
+        except BadInput as e:
+            unread.append(e)
             continue
-        focals.append(focal.from_exif(exif, width, height))
-        write_frame(frames / f"{i:06d}.png", _resize(rgb, width, height))
-        progress(i + 1, len(picks), "frames")
+        if had_alpha:
+            notes.add(COMPOSITED)
+        if (rgb.shape[1], rgb.shape[0]) != usual:
+            other.append(path.name)
+        shown, focal_px = fit_photo(rgb, exif, width, height)
+        write_frame(frames / f"{len(focals):06d}.png", shown)
+        focals.append(focal_px)
+        progress(done + 1, len(picks), "frames")
+    if not focals:
+        raise unread[0]
+    if unread:
+        warn(f"{len(unread)} of {len(picks)} photos left out: {'; '.join(map(str, unread))}")
+    if other:
+        warn(f"{len(other)} of {len(picks)} photos have another size than {usual[0]}x{usual[1]} and were scaled to it: "
+             f"{', '.join(other)}. Use one camera that stands still, and photos that nobody cropped.")
+    if plate is not None:
+        rgb, _, had_alpha = read_photo(plate)
+        if had_alpha:
+            notes.add(COMPOSITED)
+        write_frame(frames / "plate.png", fit_photo(rgb, Image.Exif(), width, height)[0])
     known = [f for f in focals if f is not None]
     if known and max(known) > 1.02 * min(known):
         warn(f"the photos' focal lengths differ ({min(known):.0f} to {max(known):.0f} px): was the zoom moved? "
@@ -72,10 +93,51 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
             "notes": sorted(notes)}
 
 
+def usual_size(photos: list[Path]) -> tuple[int, int]:
+    """Width and height, px, that most photos have when they stand upright; of two as frequent, the earlier photo's."""
+    sizes = []
+    for path in photos:
+        try:
+            with open_image(path) as image:
+                sizes.append(image.size[::-1] if image.getexif().get(ORIENTATION) in SIDEWAYS else image.size)
+        except UNREADABLE:
+            continue  # split_photos names it
+    return max(sizes, key=sizes.count, default=(1, 1))
+
+
+def fit_photo(rgb: np.ndarray, exif: Image.Exif, width: int, height: int) -> tuple[np.ndarray, float | None]:
+    """The photo rgb (H, W, 3) as large as it fits into width x height, px, and its focal length there, px.
+
+    What another aspect leaves free at two edges repeats the edge.
+    """
+    import cv2
+
+    wide, high = rgb.shape[1], rgb.shape[0]
+    scale = min(width / wide, height / high)
+    if abs(wide / high * height / width - 1) < SAME_ASPECT:
+        inner = (width, height)
+    else:
+        inner = max(1, round(wide * scale)), max(1, round(high * scale))
+    shown = _resize(rgb, *inner)
+    left, top = (width - inner[0]) // 2, (height - inner[1]) // 2
+    if inner != (width, height):
+        shown = cv2.copyMakeBorder(shown, top, height - inner[1] - top, left, width - inner[0] - left, cv2.BORDER_REPLICATE)
+    return shown, focal.from_exif(exif, *inner)
+
+
+def open_image(path: Path) -> Image.Image:
+    """Opens a photo; the first HEIC one loads what decodes it."""
+    if path.suffix.lower() in HEIC:
+        import pillow_heif
+
+        pillow_heif.register_heif_opener()
+    return Image.open(path)
+
+
 def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
     """(H, W, 3) uint8 sRGB turned upright, its EXIF, and whether it had transparency (composited over black)."""
     try:
-        with Image.open(path) as image:
+        with open_image(path) as image:
             exif, profile = image.getexif(), image.info.get("icc_profile")
             image = ImageOps.exif_transpose(image)
             has_alpha = image.has_transparency_data
@@ -83,7 +145,7 @@ def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
                 image = Image.fromarray((np.asarray(image, np.float64) / 257).round().clip(0, 255).astype(np.uint8))
             image = image.convert("RGBA" if has_alpha else image.mode if image.mode in ("RGB", "CMYK") else "RGB")
             image = _to_srgb(image, profile)
-    except (UnidentifiedImageError, OSError, SyntaxError) as e:
+    except UNREADABLE as e:
         raise BadInput(f"{path.name}: cannot be read as an image ({e}). Remove it or export it again.") from e
     if has_alpha:
         image = Image.alpha_composite(Image.new("RGBA", image.size, (0, 0, 0, 255)), image)

@@ -40,6 +40,23 @@ def test_the_turn_begins_at_the_front_goes_all_round_and_the_left_hand_is_at_the
     assert columns(seen[1], 0) < columns(seen[0], 0), "the camera goes to our right, so the left hand comes to the middle"
 
 
+def test_the_shadow_lies_under_the_feet_and_nowhere_else(figure):
+    film = turntable(figure, 0.1, 10)
+    white = np.ones(3)
+    plain, shaded = (next(iter(draw_frames(figure, film, WIDTH, HEIGHT, white, shadow=s))).astype(float) for s in (False, True))
+    darker = (plain - shaded).max(-1)
+    rows, columns_ = np.nonzero(darker > 20)
+    assert darker.min() >= -1 and len(rows) > 50
+    assert rows.min() > 0.8 * HEIGHT and abs(columns_.mean() - WIDTH / 2) < 4
+
+
+def test_a_motion_may_be_seen_from_behind(figure):
+    still = raised(figure, "head", (0, 0, 0))
+    front, behind = (next(iter(draw_frames(figure, performance(still, 10, yaw=yaw), WIDTH, HEIGHT, BLACK))).astype(float)
+                     for yaw in (0.0, 180.0))
+    assert columns(front, 0) > WIDTH / 2 > columns(behind, 0)
+
+
 def test_a_raised_right_arm_is_raised_at_the_left_of_the_picture(figure):
     film = performance(raised(figure, "right_shoulder", (0, 0, -1.2)), 10)
     image = drawn(figure, film)[0]

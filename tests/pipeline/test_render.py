@@ -63,13 +63,56 @@ def test_a_walk_from_another_tool_is_the_walk_that_the_avatar_carries(run, tmp_p
 
 @pytest.mark.parametrize(("words", "named"), [
     (["--size", "97x128"], "--size 97x128"), (["--size", "big"], "--size big"), (["--fps", "0"], "--fps 0"),
-    (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"),
+    (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"), (["--yaw", "nan"], "--yaw nan"),
     (["--out", "clip.avi"], "clip.avi"), (["--motion", "jump"], "jump: no such file, and the avatar's clips are: wave, walk")])
 def test_a_wrong_word_is_named_and_what_is_expected(run, tmp_path, capsys, monkeypatch, words, named):
     monkeypatch.chdir(tmp_path)
     code, _, err = render(capsys, run, *words)
     assert code == 2 and named in err
     assert list(tmp_path.iterdir()) == []
+
+
+def last_frame(path):
+    """(H, W, 4) of a file with transparency, by a reader that is not ours."""
+    from PIL import Image, ImageSequence
+
+    if path.suffix == ".gif":
+        with Image.open(path) as image:
+            return np.asarray([frame.convert("RGBA") for frame in ImageSequence.Iterator(image)][-1])
+    av = pytest.importorskip("av")
+    with av.open(str(path)) as file:
+        decoder = av.CodecContext.create("libvpx-vp9", "r")
+        frames = [f for packet in file.demux(video=0) if packet.size for f in decoder.decode(packet)]
+        return frames[-1].to_ndarray(format="rgba")
+
+
+@pytest.mark.parametrize("name", ["turn.webm", "turn.gif"])
+def test_a_film_without_a_background_is_transparent_round_the_figure(run, tmp_path, capsys, name):
+    code, _, _ = render(capsys, run, "--out", tmp_path / name, "--size", "96x128", "--seconds", 0.5, "--fps", 8, "--background",
+                        "none", "--no-shadow")
+    image = last_frame(tmp_path / name)
+    assert code == 0 and image.shape == (128, 96, 4)
+    assert image[:5, :, 3].max() < 12 and (image[..., 3] > 240).mean() > 0.05
+
+
+def test_pictures_go_to_a_new_folder_and_never_over_what_is_there(run, tmp_path, capsys):
+    words = ("--size", "96x128", "--seconds", 0.5, "--fps", 8, "--background", "none")
+    code, out, _ = render(capsys, run, "--out", tmp_path / "frames", *words)
+    assert (code, out) == (0, f"{tmp_path / 'frames'}\n")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["frames"]
+    assert sorted(p.name for p in (tmp_path / "frames").iterdir()) == [f"{k:06d}.png" for k in range(4)]
+    from PIL import Image
+
+    image = np.asarray(Image.open(tmp_path / "frames" / "000000.png"))
+    soft = image[..., 3][(image[..., :3] < 8).all(-1)]
+    assert image.shape == (128, 96, 4) and ((soft > 20) & (soft < 110)).sum() > 50, "the shadow is black and half there"
+    code, _, err = render(capsys, run, "--out", tmp_path / "frames", *words)
+    assert code == 2 and "new or empty folder" in err
+
+
+def test_a_film_that_cannot_be_transparent_says_which_can(run, tmp_path, capsys):
+    code, _, err = render(capsys, run, "--out", tmp_path / "a.mp4", "--background", "none")
+    assert code == 2 and ".webm or .gif, or a folder" in err and list(tmp_path.iterdir()) == []
 
 
 def test_a_damaged_motion_names_its_line_and_leaves_no_video(run, tmp_path, capsys):

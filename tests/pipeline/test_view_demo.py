@@ -1,3 +1,6 @@
+import contextlib
+import http.client
+import ssl
 import threading
 import urllib.error
 import urllib.request
@@ -5,8 +8,11 @@ import urllib.request
 import pytest
 
 from gsac.avatar.gsac_file.write import avatar_bytes
+from gsac.pipeline.cli import execute
+from gsac.pipeline.commands import view
 from gsac.pipeline.commands.demo import make_truth_clip
-from gsac.pipeline.commands.view import address, find_page, serve
+from gsac.pipeline.commands.view import find_name, find_page
+from gsac.pipeline.page_server import make_certificate, serve
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
 from gsac.turntable import clip as turntable
@@ -28,10 +34,10 @@ def folder(tmp_path):
 def test_the_viewer_page_is_served_through_its_link_on_this_machine_only(folder):
     with serve(find_page(folder, folder), 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        assert address(server).startswith("http://127.0.0.1:") and server.server_address[0] == "127.0.0.1"
-        assert urllib.request.urlopen(address(server)).read() == b"<h1>avatar</h1>"
+        assert server.url.startswith("http://127.0.0.1:") and server.server_address[0] == "127.0.0.1"
+        assert urllib.request.urlopen(server.url).read() == b"<h1>avatar</h1>"
         with pytest.raises(urllib.error.HTTPError):
-            urllib.request.urlopen(address(server).replace("viewer.html", "../secret.txt"))
+            urllib.request.urlopen(server.url.replace("viewer.html", "../secret.txt"))
         server.shutdown()
 
 
@@ -52,6 +58,113 @@ def test_an_avatar_file_that_lies_alone_gets_a_page_and_a_damaged_one_is_named(t
     (tmp_path / "me.gsac").write_bytes(whole[:500])
     with pytest.raises(BadInput, match=r"me\.gsac.*truncated"):
         find_page(tmp_path / "me.gsac", tmp_path)
+
+
+@contextlib.contextmanager
+def running(page, **options):
+    with serve(page, 0, "me", **options) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield server
+        server.shutdown()
+
+
+def ask(server, path, host=None, context=None):
+    """Status and content of one request; host: the Host header."""
+    address = (server.host, server.server_address[1])
+    connection = http.client.HTTPSConnection(*address, context=context) if context else http.client.HTTPConnection(*address)
+    connection.request("GET", path, headers={"Host": host or "{}:{}".format(*address)})
+    answer = connection.getresponse()
+    return answer.status, answer.read()
+
+
+def test_nothing_but_the_page_and_the_avatars_files_is_served(folder):
+    export = folder / "export"
+    (export / "avatar.glb").write_bytes(b"glb")
+    (export / ".store").write_text("hidden")
+    (export / "notes.txt").write_text("mine")
+    with running(export / "viewer.html") as server:
+        assert server.url.endswith("/me/viewer.html")
+        assert ask(server, "/me/viewer.html") == (200, b"<h1>avatar</h1>")
+        assert ask(server, "/me/avatar.glb") == (200, b"glb")
+        assert ask(server, "/")[0] == 302
+        for path in ("/me/", "/me", "/me/.store", "/me/notes.txt", "/me/../secret.txt", "/me/%2e%2e/secret.txt", "//etc/passwd",
+                     "/other/viewer.html", "/me/avatar.ply"):
+            assert ask(server, path)[0] == 404, path
+
+
+def test_a_foreign_name_that_points_at_this_machine_is_refused(folder):
+    with running(folder / "export" / "viewer.html") as server:
+        port = server.server_address[1]
+        assert ask(server, "/me/viewer.html", f"localhost:{port}")[0] == 200
+        for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", ""):
+            assert ask(server, "/me/viewer.html", host or " ")[0] == 421
+
+
+def test_for_the_network_the_page_is_served_by_https_at_an_address_nobody_can_guess(folder, tmp_path):
+    certificate = make_certificate(tmp_path, "127.0.0.1")
+    if certificate is None:
+        pytest.skip("no openssl here")
+    assert certificate.stat().st_mode & 0o077 == 0, "the key is the user's alone"
+    context = ssl.create_default_context(cafile=certificate)
+    with running(folder / "export" / "viewer.html", host="127.0.0.1", certificate=certificate) as server:
+        assert server.url.startswith("https://127.0.0.1:") and len(server.token) >= 16
+        assert ask(server, f"/{server.token}/me/viewer.html", context=context) == (200, b"<h1>avatar</h1>")
+        assert [ask(server, path, context=context)[0] for path in ("/", "/me/viewer.html", "/x/me/viewer.html")] == [404] * 3
+
+
+def view_once(monkeypatch, capsys, *words):
+    """What `gsac view` says, and the addresses that it opens, where the user ends it at once."""
+    opened = []
+    monkeypatch.setattr(view, "has_screen", lambda: True)
+    monkeypatch.setattr(view.webbrowser, "open", opened.append)
+    monkeypatch.setattr(view.PageServer, "serve_forever", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert execute(["view", *map(str, words)]) == 0
+    said = capsys.readouterr()
+    return said.out.strip(), said.err, opened
+
+
+def test_view_opens_the_browser_unless_told_and_says_how_to_end_it(folder, monkeypatch, capsys):
+    url, said, opened = view_once(monkeypatch, capsys, folder)
+    assert opened == [url] and url.startswith("http://127.0.0.1:") and url.endswith("/run/viewer.html")
+    assert "Ctrl-C ends it" in said
+    assert view_once(monkeypatch, capsys, folder, "--no-browser")[2] == []
+
+
+def test_with_host_a_code_for_the_phone_is_drawn_and_what_is_exposed_is_said(folder, monkeypatch, capsys):
+    monkeypatch.setattr(view, "find_network_address", lambda: "127.0.0.1")
+    url, said, opened = view_once(monkeypatch, capsys, folder, "--host")
+    assert opened == [] and url.startswith("https://127.0.0.1:")
+    assert "\N{FULL BLOCK}" in said or "\N{LOWER HALF BLOCK}" in said
+    assert "Whoever is in this network" in said and "nothing else of this machine" in said
+    monkeypatch.setattr(view, "make_certificate", lambda *_: None)
+    assert "VR and AR need https" in view_once(monkeypatch, capsys, folder, "--host")[1]
+    monkeypatch.setattr(view, "find_network_address", lambda: None)
+    assert execute(["view", str(folder), "--host"]) == 2 and "no address in a network" in capsys.readouterr().err
+
+
+def test_a_path_without_an_avatar_is_told_what_is_wrong_with_it(folder, tmp_path):
+    (folder / "export" / "viewer.html").unlink()
+    (tmp_path / "notes.txt").write_text("x")
+    for path, why in ((tmp_path / "nope", "nope: no such file or folder"), (tmp_path / "notes.txt", "it is no .gsac file"),
+                      (folder, "no viewer.html and no avatar.gsac here")):
+        with pytest.raises(BadInput, match=why):
+            find_page(path, tmp_path)
+
+
+def test_a_folder_with_nothing_but_an_avatar_file_gets_a_page(tmp_path):
+    (tmp_path / "lone").mkdir()
+    (tmp_path / "lone" / "avatar.gsac").write_bytes(avatar_bytes(make_figure()))
+    assert find_page(tmp_path / "lone", tmp_path) == tmp_path / "viewer.html"
+
+
+@pytest.mark.parametrize(("path", "name"), [("squats-avatar", "squats"), ("squats-avatar/export", "squats"), ("me.gsac", "me"),
+                                            ("squats-avatar/export/avatar.gsac", "squats"), ("-avatar", "avatar")])
+def test_the_page_is_served_under_the_avatars_name(tmp_path, path, name):
+    (tmp_path / "squats-avatar" / "export").mkdir(parents=True)
+    (tmp_path / "-avatar").mkdir()
+    for file in ("me.gsac", "squats-avatar/export/avatar.gsac"):
+        (tmp_path / file).write_bytes(b"")
+    assert find_name(tmp_path / path) == name
 
 
 def test_a_port_that_is_taken_or_impossible_is_named(folder):

@@ -121,6 +121,8 @@ def test_several_expressions_at_once_move_what_each_moves(page, figure):
     np.testing.assert_allclose(moved[figure.expression_vertex[span]], 0.5 * figure.expression_delta[span], atol=1e-5)
     click(page, "zero-faces")
     np.testing.assert_allclose(vertices(page), figure.vertices, atol=1e-6)
+    presets = "[...document.querySelectorAll('#presets button')].map((b) => b.textContent)"
+    assert page.run(presets) == ["Neutral"], "no preset of actions that the avatar lacks"
     click(page, "show-faces")
     assert page.run("document.getElementById('faces').hidden")
 
@@ -138,6 +140,148 @@ def test_time_stands_still_on_pause_goes_where_the_slider_is_and_on(page):
     page.until(f"gsac.clock !== {page.run('gsac.clock')}")
     page.run("location.hash = 'pose=A'")
     page.until("document.getElementById('timeline').hidden")
+
+
+def test_the_page_opens_on_a_slow_turn_in_a_pose_until_something_is_picked(page, address):
+    page.call("Page.navigate", url="about:blank")
+    page.open(address)
+    assert page.run("gsac.playing") == {"pose": "A"}
+    page.until("gsac.camera.yaw > 3")
+    page.run("document.querySelector('[data-clip=walk]').click()")
+    page.until("!gsac.turntable && Math.abs(gsac.camera.place()[5]) < 1e-3")
+    assert page.run("gsac.camera.yaw") == 0, "the walk is seen from the front"
+    for words in ("pose=T", "clip=walk", "yaw=0", "still", "turntable=off"):
+        page.run(f"location.hash = '{words}'")
+        page.until("!gsac.turntable")
+        page.run("location.hash = ''")
+        page.until("gsac.turntable")
+    page.run("location.hash = 'clip=wave&turntable'")
+    page.until("gsac.playing.clip === 'wave'")
+    page.run("document.querySelector('[data-clip=walk]').click()")
+    assert page.run("gsac.turntable"), "it was asked to turn"
+
+
+PLACES = """JSON.stringify([...document.querySelectorAll('#panel button, #top button')].filter((b) => b.offsetParent)
+  .map((b) => [b.textContent, b.getBoundingClientRect().left, b.getBoundingClientRect().top]))"""
+
+
+def press(page, key, **more):
+    page.run("document.activeElement.blur()")
+    page.call("Input.dispatchKeyEvent", type="keyDown", key=key, text=key if len(key) == 1 else "", **more)
+    page.call("Input.dispatchKeyEvent", type="keyUp", key=key, **more)
+
+
+def test_no_button_moves_under_the_pointer_when_another_is_pressed(page):
+    for size in ((1440, 900), (390, 844)):
+        page.resize(*size)
+        page.run(f"document.body.classList.remove('folded'); location.hash = 'clip=walk&{size[0]}'")
+        page.until("gsac.playing.clip === 'walk'")
+        places = page.run(PLACES)
+        for press_it in ("[data-pose=A]", "[data-clip=wave]", "#light", "#turntable", "#pause", "#pause", "#light"):
+            page.run(f"document.querySelector('{press_it}').click()")
+            assert page.run(PLACES).replace("Play", "Pause") == places, press_it
+    page.resize(SIZE, SIZE)
+
+
+def test_the_page_is_named_after_the_folder_it_lies_in(page, figure, tmp_path):
+    for folder, name in (("Ada & Co-avatar/export", "Ada & Co"), ("me", "me"), ("0123456789abcdef0123456789abcdef", "GSAC avatar")):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "viewer.html").write_bytes(page_bytes(avatar_bytes(figure)))
+        page.open((tmp_path / folder / "viewer.html").as_uri())
+        assert page.run("document.getElementById('name').textContent") == name
+        assert page.run("document.title") == (name if name == "GSAC avatar" else f"{name} · GSAC avatar")
+
+
+def test_the_keys_turn_zoom_pause_and_tell_themselves(page, address):
+    page.open(address + "#pose=A&keys")
+    press(page, "ArrowRight")
+    assert page.run("gsac.camera.yaw") == pytest.approx(10)
+    press(page, "ArrowUp")
+    assert page.run("gsac.camera.pitch") == pytest.approx(14)
+    far = page.run("gsac.camera.distance")
+    press(page, "+")
+    assert page.run("gsac.camera.distance") == pytest.approx(0.9 * far)
+    press(page, "-")
+    assert page.run("gsac.camera.distance") == pytest.approx(far)
+    press(page, "r")
+    assert page.run("gsac.camera.yaw") == 0
+    page.run("document.querySelector('[data-clip=walk]').click()")
+    press(page, " ")
+    assert page.run("gsac.paused")
+    press(page, "f")
+    page.until("document.fullscreenElement !== null")
+    press(page, "F")
+    page.until("document.fullscreenElement === null")
+    press(page, "?")
+    assert page.run("document.getElementById('help').open")
+    page.run("document.querySelector('#help button').click()")
+    assert not page.run("document.getElementById('help').open")
+    page.run("document.getElementById('time').focus()")
+    page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
+    assert page.run("gsac.camera.yaw") == 0, "a slider that has the focus keeps its keys"
+    assert page.errors == []
+
+
+def test_a_click_on_a_limb_opens_its_joint_and_a_drag_or_a_click_beside_does_not(page, address):
+    page.open(address + "#pose=T&limb")
+    expose(page, "pickJoint")
+    assert page.run("pickJoint(gsac, 3, 3)") is None
+
+    def mouse(kind, x, y):
+        page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+    mouse("mousePressed", 5, 200)
+    mouse("mouseReleased", 5, 200)
+    assert page.run("document.getElementById('joints').hidden")
+    place = page.run("""(() => {
+      const { view, focal, centre } = gsac.camera.eye(gsac.canvas.width, gsac.canvas.height);
+      const j = gsac.avatar.names.indexOf('right_knee'), p = gsac.avatar.joints.subarray(3 * j, 3 * j + 3);
+      const c = [0, 4, 8].map((r) => view[r] * p[0] + view[r + 1] * p[1] + view[r + 2] * p[2] + view[r + 3]);
+      return [focal[0] * c[0] / c[2] + centre[0] + SIZE / 2, focal[1] * c[1] / c[2] + centre[1] + SIZE / 2];
+    })()""".replace("SIZE", str(SIZE)))
+    mouse("mousePressed", *place)
+    mouse("mouseMoved", place[0] + 30, place[1])
+    mouse("mouseReleased", place[0] + 30, place[1])
+    assert page.run("document.getElementById('joints').hidden") and page.run("gsac.camera.yaw") != 0
+    page.run("gsac.camera.yaw = 0")
+    mouse("mousePressed", *place)
+    mouse("mouseReleased", *place)
+    assert page.run("document.getElementById('joints').hidden") is False
+    assert page.run("document.getElementById('joint').value") == "right_knee"
+    page.run("document.querySelector('#joints .close').click()")
+    assert page.run("document.getElementById('joints').hidden") and page.errors == []
+
+
+def test_a_link_shows_what_is_seen_and_the_avatar_is_saved_as_its_own_file(page, address, figure):
+    page.open(address + "#clip=walk&t=0.3&yaw=35&bg=203040&joints=head:0,20,0&expression=jawOpen:0.5&light=off&share")
+    page.run("gsac.paused = true")
+    expose(page, "describeView")
+    link = page.run("describeView(gsac)")
+    for words in ("clip=walk", "t=0.", "yaw=35", "bg=203040", "joints=head:0,20,0", "expression=jawOpen:0.5", "light=off"):
+        assert words in link
+    state = "JSON.stringify([gsac.playing, gsac.camera.yaw, gsac.background, gsac.turned, gsac.expression, gsac.binding.lit])"
+    before = page.run(state)
+    page.open(link)
+    assert page.run(state) == before
+    page.run("URL.createObjectURL = (blob) => { window.saved = blob; return 'data:,'; };"
+             "HTMLAnchorElement.prototype.click = function () { window.savedName = this.download; }")
+    click(page, "save")
+    data = page.run("saved.arrayBuffer().then((b) => btoa([...new Uint8Array(b)].map((c) => String.fromCharCode(c)).join('')))")
+    assert base64.b64decode(data) == avatar_bytes(figure) and page.run("savedName").endswith(".gsac")
+
+
+def test_on_a_phone_all_but_the_motions_folds_away(page, address):
+    page.resize(390, 844, 1, True)
+    page.call("Emulation.setTouchEmulationEnabled", enabled=True)
+    page.call("Page.navigate", url="about:blank")
+    page.open(address + "#pose=A&fold")
+    top = "document.getElementById('panel').getBoundingClientRect().top"
+    assert page.run(top) > 0.85 * 844 and page.run("document.getElementById('tools').offsetParent") is None
+    click(page, "fold")
+    assert page.run(top) < 0.8 * 844 and page.run("document.getElementById('fold').textContent") == "Fewer controls"
+    page.call("Emulation.setTouchEmulationEnabled", enabled=False)
+    page.resize(SIZE, SIZE)
+    page.call("Page.navigate", url="about:blank")
+    page.open(address)
 
 
 def test_the_rate_is_frames_over_time_and_the_95th_slowest_frame(page):
@@ -163,7 +307,8 @@ def test_a_picture_is_the_canvas_as_png(page):
     page.until("window.saved instanceof Blob")
     data = page.run("saved.arrayBuffer().then((b) => btoa(String.fromCharCode(...new Uint8Array(b))))")
     image = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
-    assert page.run("savedName") == "avatar A-pose.png" and image.shape == (SIZE, SIZE, 3)
+    name = page.run("document.getElementById('name').textContent")
+    assert page.run("savedName") == f"{name} A-pose.png" and image.shape == (SIZE, SIZE, 3)
     assert np.abs(image[3, 3].astype(int) - (0x3A, 0x60, 0x80)).max() <= 1 and red(image).any()
 
 

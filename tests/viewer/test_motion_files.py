@@ -208,6 +208,7 @@ def test_what_is_wrong_with_a_file_is_said_on_the_page_and_what_plays_goes_on(pa
         "cut.bvh": (text[:len(text) // 2], "cut.bvh, line "),
         "dog.bvh": (text.replace("left_elbow", "left_paw"), "dog.bvh: no joint for left_elbow"),
         "picture.txt": ("x", "picture.txt: a motion is read from .bvh, .glb and .gltf"),
+        "mixamo.fbx": ("x", "mixamo.fbx: a motion is read from .bvh, .glb and .gltf; FBX is read by `gsac render --motion`"),
         "empty.glb": ("", "empty.glb: it is not glTF"),
         "still.gltf": (json.dumps({"asset": {"version": "2.0"}}), "still.gltf: it holds no animation"),
         "short.gltf": (json.dumps(document | {"buffers": [{"uri": "data:a;base64,AAAA"}]}), "accessors[0] ends after its buffer"),

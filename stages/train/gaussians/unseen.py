@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import FLATNESS, Gaussians
+from gsac.avatar.light import shade
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace
 
@@ -72,7 +73,21 @@ def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, fac
     out.log_scale[poor] = np.stack([width, width + np.log(FLATNESS), width], 1)
     out.quat[poor] = [1, 0, 0, 0]
     out.rgb[poor] = gaussians.rgb[near].mean(1)
+    out.rgb[poor] = hold_colours(out, poor, near, frames.R[:, :, 1])
     return out
+
+
+def hold_colours(gaussians: Gaussians, poor: np.ndarray, near: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(M, 3) colours of M unseen gaussians, held where the clip's light shows them neither darker nor brighter than seen ones.
+
+    poor: (M,) the unseen; near: (M, K) seen ones around each; normals: (F, 3) of the faces at rest. The light was told apart from
+    the colours on the normals that frames showed; on others it is a guess that can leave all that was seen.
+    """
+    if gaussians.light is None:
+        return gaussians.rgb[poor]
+    factor = shade(gaussians.light, normals[gaussians.face])
+    lit = gaussians.rgb * factor
+    return np.clip(np.clip(lit[poor], lit[near].min(1), lit[near].max(1)) / factor[poor], 0, 1).astype(np.float32)
 
 
 def level_heights(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:

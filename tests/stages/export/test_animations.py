@@ -5,7 +5,7 @@ import pytest
 
 from gsac.avatar.skinning import joint_transforms
 from gsac.stages.export.animations import CLIPS
-from gsac.stages.export.config import AnimationName
+from gsac.stages.export.config import AnimationName, ExportConfig
 
 
 def poses(figure, name):
@@ -45,6 +45,17 @@ def test_the_wave_raises_the_right_hand_over_the_shoulder_and_keeps_the_left_dow
     assert (place["right_middle3"][:, 1] > place["right_shoulder"][:, 1] + 0.2).all()
     assert (place["left_wrist"][:, 1] < place["left_elbow"][:, 1]).all()
     assert np.ptp(place["right_middle3"][:, 0]) > 0.08, "the hand moves to and fro"
+
+
+def test_the_wave_bends_the_arm_no_further_than_a_sleeve_seen_stretched_holds(figure):
+    clip = figure.clips["wave"]
+    turned = {joint: np.linalg.norm(clip.rotation[:, clip.joints.index(joint)], axis=1).max()
+              for joint in ("right_shoulder", "right_elbow")}
+    assert turned["right_elbow"] < 1.6 and turned["right_shoulder"] < 0.7, "rad; at 2.2 the elbow's skin tears into fur"
+
+
+def test_the_wave_whose_elbow_is_the_hardest_to_show_comes_last():
+    assert ExportConfig().clip_names()[-1] == "wave"
 
 
 def test_the_walk_steps_with_both_legs_and_swings_the_opposite_arm(figure):

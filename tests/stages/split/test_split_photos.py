@@ -108,16 +108,57 @@ def test_count_keeps_first_and_last(folder, tmp_path):
     assert [int(f[0, 0, 0]) for f in frames] == [0, 4, 8] and "3 kept" in warnings[0]
 
 
-def test_photos_of_different_sizes_are_bad_input(folder, tmp_path):
-    photo(folder / "0.png")
-    photo(folder / "1.png", size=(60, 81))
-    with pytest.raises(BadInput, match=r"1\.png is 60x81 and 0\.png is 60x80"):
-        split(folder, tmp_path / "out")
+def test_photos_of_other_sizes_are_scaled_to_the_usual_one_with_a_warning(folder, tmp_path):
+    exif = Image.Exif()
+    exif.get_ifd(EXIF_IFD)[FOCAL_35MM] = 28
+    for name, size in (("0.jpg", (120, 160)), ("1.jpg", (60, 80)), ("2.jpg", (60, 80)), ("3.jpg", (60, 81))):
+        photo(folder / name, size=size, exif=exif)
+    clip, frames, warnings = split(folder, tmp_path / "out")
+    assert (clip.width, clip.height) == (60, 80) and {f.shape for f in frames} == {(80, 60, 3)}
+    assert all(f[40, 10, 0] > 150 and f[40, 50, 0] < 50 for f in frames)
+    assert clip.focal_px == pytest.approx(28 / np.hypot(36, 24) * 100, rel=0.01)
+    assert [w for w in warnings if "2 of 4 photos have another size than 60x80" in w and "0.jpg, 3.jpg" in w]
+
+
+def test_a_photo_of_another_shape_is_shown_whole_and_its_focal_length_is_its_own(folder, tmp_path):
+    exif = Image.Exif()
+    exif.get_ifd(EXIF_IFD)[FOCAL_35MM] = 28
+    photo(folder / "0.jpg", size=(80, 60), exif=exif)
+    for i in (1, 2):
+        photo(folder / f"{i}.jpg", exif=exif)
+    _, frames, warnings = split(folder, tmp_path / "out")
+    assert frames[0].shape == (80, 60, 3)
+    assert frames[0][40, 10, 0] > 150 and frames[0][40, 50, 0] < 50, "both of its halves are there"
+    assert frames[0][2, 10, 0] > 150, "the free edge repeats the photo's"
+    assert "focal lengths differ" in " ".join(warnings)
+
+
+def test_a_photo_that_cannot_be_read_is_left_out_with_a_warning(folder, tmp_path):
+    for i in (0, 2, 3):
+        photo(folder / f"{i}.png", (50 + i, 0, 0))
+    (folder / "1.png").write_bytes((folder / "0.png").read_bytes()[:60])
+    _, frames, warnings = split(folder, tmp_path / "out")
+    assert [int(f[0, 0, 0]) for f in frames] == [50, 52, 53]
+    assert "1 of 4 photos left out" in warnings[0] and "1.png" in warnings[0]
+
+
+def test_heic_photos_are_read_with_their_focal_length_and_colours(folder, tmp_path):
+    pillow_heif = pytest.importorskip("pillow_heif")
+    pillow_heif.register_heif_opener()
+    exif = Image.Exif()
+    exif.get_ifd(EXIF_IFD)[FOCAL_35MM] = 28
+    for name in ("IMG_1.HEIC", "IMG_2.heif"):
+        photo(folder / name, format="HEIF", exif=exif, quality=95, size=(64, 80))
+    clip, frames, warnings = split(folder, tmp_path / "out")
+    assert len(frames) == 2 and (clip.width, clip.height) == (64, 80)
+    assert frames[0][40, 5] == pytest.approx([200, 60, 30], abs=12) and frames[0][40, 59, 0] < 50
+    assert clip.focal_px == pytest.approx(28 / np.hypot(36, 24) * np.hypot(64, 80)) and not warnings
 
 
 @pytest.mark.parametrize(("name", "content", "message"), [
     ("notes.txt", b"x", "holds no photos"),
-    ("a.HEIC", b"x", "a.HEIC.*Export them as JPEG"),
+    ("a.DNG", b"x", "a.DNG.*Export them as JPEG"),
+    ("a.HEIC", b"x", "a.HEIC.*cannot be read"),
     ("a.jpg", b"not a jpeg", "a.jpg.*cannot be read"),
 ])
 def test_a_folder_that_gives_no_photo_is_bad_input(folder, tmp_path, name, content, message):

@@ -7,6 +7,7 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.light import shade
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
 from gsac.stages.train.gaussians import unseen
@@ -58,6 +59,20 @@ def test_unseen_gaussians_lie_flat_no_higher_and_coloured_as_their_neighbours_an
     np.testing.assert_array_equal(out.opacity, gaussians.opacity)
     np.testing.assert_array_equal(out.mu[seen], gaussians.mu[seen])
     np.testing.assert_array_equal(gaussians.quat[~seen, 0] == 1, False)
+
+
+def test_a_figure_seen_on_its_lit_side_alone_shows_no_colour_outside_of_the_seen_ones(body):
+    gaussians, _ = covering(body)
+    normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
+    gaussians.light = np.tile([[0.9], [0.4], [0.0], [0.1]], 3).astype(np.float32)
+    gaussians.rgb[:] = np.random.default_rng(0).uniform([0.5, 0.1, 0.2], [0.6, 0.2, 0.3], (len(gaussians), 3))
+    seen = normal[:, 0] > -0.1
+    out = unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces)
+    before, after = gaussians.rgb * shade(gaussians.light, normal), out.rgb * shade(out.light, normal)
+    low, high = before[seen].min(0), before[seen].max(0)
+    assert (before[~seen] < 0.8 * low).any(), "the light goes on falling where no frame looked"
+    assert (after[~seen] >= low - 1e-5).all() and (after[~seen] <= high + 1e-5).all()
+    np.testing.assert_array_equal(out.rgb[seen], gaussians.rgb[seen])
 
 
 def test_where_nothing_or_everything_is_seen_nothing_changes(body):

@@ -1,0 +1,150 @@
+"""Serves one avatar's page and files, and nothing else, to this machine or, at an address nobody can guess, to its network."""
+
+from __future__ import annotations
+
+import http.server
+import secrets
+import shutil
+import socket
+import ssl
+import subprocess
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote, urlsplit
+
+from gsac.stages.contract import BadInput
+
+PAGE = "viewer.html"
+FILES = {PAGE: "text/html; charset=utf-8", "avatar.gsac": "application/octet-stream", "avatar.glb": "model/gltf-binary",
+         "avatar.fbx": "application/octet-stream", "avatar.ply": "application/octet-stream",
+         "avatar.spz": "application/octet-stream"}
+"""What is served of the page's folder, by its name alone -> media type."""
+HERE = "127.0.0.1"
+NOWHERE = "192.0.2.1"
+"""An address of no machine (RFC 5737): the way towards it tells this machine's own address, and nothing is sent."""
+CERTIFICATE_DAYS = 2
+
+
+class PageServer(http.server.ThreadingHTTPServer):
+    """Serves the folder of one page under /TOKEN/NAME/, where TOKEN may be left out."""
+
+    def __init__(self, page: Path, name: str, bound: tuple[str, int], host: str, token: str, certificate: Path | None) -> None:
+        self.page, self.name, self.host, self.token = page, name, host, token
+        self.scheme = "http" if certificate is None else "https"
+        super().__init__(bound, Handler)
+        if certificate is not None:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(certificate)
+            # The handshake is left to the thread of the request: a client that never speaks holds up nobody.
+            self.socket = context.wrap_socket(self.socket, server_side=True, do_handshake_on_connect=False)
+
+    @property
+    def prefix(self) -> str:
+        """The path below which the files are."""
+        return "/".join(["", *([self.token] if self.token else []), quote(self.name, safe=""), ""])
+
+    @property
+    def url(self) -> str:
+        """Of the page."""
+        return f"{self.scheme}://{self.host}:{self.server_address[1]}{self.prefix}{PAGE}"
+
+    @property
+    def hosts(self) -> set[str]:
+        """Host headers that name this server: another is a foreign page that had its name point here."""
+        port = self.server_address[1]
+        return {f"{name}:{port}" for name in (self.host, HERE, "localhost")}
+
+    def find_file(self, path: str) -> Path | None:
+        """The file that a request's path means, or None."""
+        folder, _, name = path.rpartition("/")
+        if not secrets.compare_digest(unquote(folder + "/").encode(), unquote(self.prefix).encode()) or name not in FILES:
+            return None
+        return self.page.parent / name if (self.page.parent / name).is_file() else None
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A client that goes away, or refuses the certificate, is nothing to tell the user."""
+
+
+class Handler(http.server.BaseHTTPRequestHandler):
+    """Answers with a file of the server's page, or with why not."""
+
+    server: PageServer
+    timeout = 30
+    """s that a client may be silent."""
+
+    def do_GET(self) -> None:
+        self.answer()
+
+    def do_HEAD(self) -> None:
+        self.answer()
+
+    def answer(self) -> None:
+        """Sends the file, without its content for HEAD."""
+        if self.headers.get("Host", "") not in self.server.hosts:
+            return self.send_error(HTTPStatus.MISDIRECTED_REQUEST)
+        path = urlsplit(self.path).path
+        if path == "/" and not self.server.token:
+            return self.redirect()
+        file = self.server.find_file(path)
+        if file is None:
+            return self.send_error(HTTPStatus.NOT_FOUND)
+        content = file.read_bytes()
+        self.send_response(HTTPStatus.OK)
+        for name, value in (("Content-Type", FILES[file.name]), ("Content-Length", str(len(content))),
+                            ("Cache-Control", "no-store"), ("X-Content-Type-Options", "nosniff"),
+                            ("Referrer-Policy", "no-referrer")):
+            self.send_header(name, value)
+        self.end_headers()
+        if self.command == "GET":
+            self.wfile.write(content)
+        return None
+
+    def redirect(self) -> None:
+        """From the bare address to the page."""
+        self.send_response(HTTPStatus.FOUND)
+        self.send_header("Location", f"{self.server.prefix}{PAGE}")
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+
+    def log_message(self, *words: object) -> None:
+        pass
+
+
+def serve(page: Path, port: int, name: str = "avatar", host: str | None = None, certificate: Path | None = None) -> PageServer:
+    """A server of the page under a name: to this machine alone, or with host, its address in the network, to that too."""
+    try:
+        if host is None:
+            return PageServer(page, name, (HERE, port), HERE, "", None)
+        return PageServer(page, name, (host, port), host, secrets.token_urlsafe(12), certificate)
+    except (OSError, OverflowError) as e:
+        raise BadInput(f"--port {port}: cannot be opened ({e}); choose another or leave it out") from e
+
+
+def find_network_address() -> str | None:
+    """This machine's address in its network, or None where it is in none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((NOWHERE, 9))
+            found = probe.getsockname()[0]
+        except OSError:
+            return None
+    return None if found.startswith("127.") or found == "0.0.0.0" else found
+
+
+def make_certificate(folder: Path, host: str) -> Path | None:
+    """A key and a self-signed certificate for the address `host`, as one file in the folder; None without openssl."""
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        return None
+    key, certificate, both = folder / "key.pem", folder / "certificate.pem", folder / "server.pem"
+    made = subprocess.run(
+        [openssl, "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", str(key),
+         "-out", str(certificate), "-days", str(CERTIFICATE_DAYS), "-subj", "/CN=gsac view",
+         "-addext", f"subjectAltName=IP:{host}"],
+        capture_output=True, check=False)
+    if made.returncode:
+        return None
+    both.touch(0o600)
+    both.write_bytes(key.read_bytes() + certificate.read_bytes())
+    return both
