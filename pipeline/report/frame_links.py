@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from markupsafe import Markup, escape
-
-if TYPE_CHECKING:
-    from gsac.pipeline.report.page import Section
 
 NAMED = re.compile(r"\bframes? \(?(\d+(?:(?:-|, | to | and )\d+)*)")
 """A frame, or frames in a row, as stages name them."""
@@ -19,16 +15,16 @@ SECTION_OF = {"split": "clip", "keypoints": "keypoints", "handgap": "keypoints",
 
 
 class FrameLinks:
-    """What frames each section shows."""
+    """Makes links to the frames that the sections show."""
 
-    def __init__(self, sections: Sequence[Section]):
-        self.shown = {section.ident: [p.frame for p in section.sheet.pictures if p.frame is not None]
-                      for section in sections if section.sheet}
+    def __init__(self, shown: Mapping[str, list[int]]):
+        """shown: section -> the frames that it has pictures of."""
+        self.shown = shown
 
     def link(self, text: str, stage: str = "train") -> Markup:
         """A sentence of a stage as HTML; its frames' numbers are links where the section has pictures."""
         ident = SECTION_OF.get(stage, "clip")
-        frames = self.shown.get(ident) or []
+        frames = self.shown.get(ident, [])
         if not frames:
             return escape(text)
 

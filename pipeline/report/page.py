@@ -69,10 +69,11 @@ def render(results: Results, drawn: dict[str, Section]) -> str:
     avatar = next(section for section in made if section.ident == AVATAR)
     sections = [section for section in made if section is not avatar]
     shown = [section for section in sections if section.sheet]
+    frames = {section.ident: [p.frame for p in section.sheet.pictures if p.frame is not None] for section in shown}
     facts = {name: value for section in shown for name, value in section.sheet.facts.items()}
     return read_template().render(
         clip=results.clip_name, when=run_date(results), headline=headline(results, facts), sections=sections,
-        avatar=avatar.sheet, warnings=list_warnings(results), links=FrameLinks(sections),
+        avatar=avatar.sheet, warnings=list_warnings(results), links=FrameLinks(frames),
         failed=results.failed, reached=explain_partial_run(results), stages=stage_rows(results),
         totals=totals(results), parameters=parameters(results), files=list_exports(results), foot=provenance(results),
         viewer="export/viewer.html" if has_viewer(results) else "",

@@ -1,6 +1,6 @@
 """The verdict: likeness of body, face and hands, how much was seen, how it holds in new poses. Each a grade and a sentence.
 
-Thresholds were fitted to judged avatars: docs/lab/verdict.md.
+Bounds were fitted to judged avatars: docs/lab/verdict.md.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ SENTENCES = {
 }
 """What a grade of a part means."""
 NAMES = {"body": "Body and clothes", "face": "Face", "hands": "Hands", "seen": "Seen from all sides", "moves": "In new poses"}
-LIKENESS = {"body": ("structure", 0.91, 0.8), "face": ("worst", 0.95, 0.85), "hands": ("structure", 0.95, 0.845)}
+LIKENESS = {"body": ("structure", 0.91, 0.8), "face": ("worst", 0.95, 0.9), "hands": ("structure", 0.93, 0.845)}
 """Figure of `judge_likeness`, and the least of it for good and for fair. Of a face its worst frame counts: profiles are easy."""
 COLOUR = (25.0, 20.0)
 """Least psnr inside, dB, for good and for fair: `structure` is blind to colour."""
@@ -123,13 +123,13 @@ def grade_moves(metrics: dict[str, Any]) -> Grade:
 
 
 def grade_whole(grades: dict[str, Grade]) -> Grade:
-    """That of the body; a poor face costs one grade, and what is poor elsewhere the best one."""
-    body, poor = grades["body"], Grade.POOR
+    """That of the body; with a face that is not good it is fair at best, as with what is poor elsewhere."""
+    body, face, poor = grades["body"], grades["face"], Grade.POOR
     if body is Grade.UNKNOWN or body is poor:
         return body
-    if grades["face"] is poor:
-        return Grade.FAIR if body is Grade.GOOD else poor
-    return Grade.FAIR if poor in (grades["seen"], grades["moves"]) else body
+    if face is poor and body is Grade.FAIR:
+        return poor
+    return Grade.FAIR if face in (Grade.FAIR, poor) or poor in (grades["seen"], grades["moves"]) else body
 
 
 def say_seen(metrics: dict[str, Any]) -> str:

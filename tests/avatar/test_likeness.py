@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.stages.train.judge.likeness import SIZES, average, compare_parts
+from gsac.avatar.likeness import SIZES, average, compare_parts
 
 
 def person(height, blur=0.0, shift=0):
