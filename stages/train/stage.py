@@ -30,7 +30,9 @@ from gsac.stages.train.fast.lod import judge_levels
 from gsac.stages.train.finite import named_result, named_values, require_finite
 from gsac.stages.train.judge.coverage import unseen_parts
 from gsac.stages.train.judge.heldout import Candidate, draw_all_round, judge, judge_all
+from gsac.stages.train.judge.likeness import judge_likeness
 from gsac.stages.train.judge.novel_poses import judge_novel
+from gsac.stages.train.judge.surface import seen_area
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.task import Task
@@ -41,8 +43,8 @@ LOSS_ROWS = 20
 """Rows of the curve that have the loss."""
 LEAST_TURN = 270
 """Degrees of the person's turn below which the user is warned."""
-MOST_UNSEEN = 0.2
-"""Share of gaussians that no frame shows above which the user is warned."""
+LEAST_SEEN = 0.8
+"""Share of the body's surface in view below which the user is warned."""
 TRAIN_SAMPLE = 8
 """Trained frames, at most, that `psnr_fg_train` is the mean of."""
 JUDGING = 4, "parts of judging"
@@ -95,9 +97,8 @@ def run(job: Job) -> None:
     run.fit()
     if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
         job.warn(f"No frame shows the {', '.join(parts)}; the avatar has there the colours of what lies around.")
-    unseen = float((~run.result.seen).mean())
-    if unseen > MOST_UNSEEN:
-        job.warn(f"{unseen:.0%} of the gaussians were shown from the front by no frame; they look like their neighbours.")
+    if run.seen_area < LEAST_SEEN:
+        job.warn(f"The frames show {run.seen_area:.0%} of the body's surface; the rest has the colours of what lies around it.")
     run.write()
 
 
@@ -161,6 +162,7 @@ class Run:
         self.result = RECIPES[self.job.config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
         require_finite("after the last step", named_result(self.result.gaussians, self.poses))
+        self.seen_area = seen_area(self.poses, self.trained, self.views)
         for level in self.result.coarser:
             require_finite("after the last step", named_values(level))
 
@@ -264,6 +266,8 @@ class Run:
                                                  strict=True)],
             "resumed_at_step": self.resumed_at, "lpips_in_loss": self.in_loss is not None,
             "levels": judge_levels(gaussians, self.result.coarser, poses, held, self.views),
+            "likeness": judge_likeness(gaussians, aligned, held, self.views),
+            "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
             "curve": self.curve,
