@@ -25,7 +25,7 @@ LEAST = 24
 
 
 def compare_parts(rgb: np.ndarray, alpha: np.ndarray, true_rgb: np.ndarray, mask: np.ndarray,
-                  boxes: Mapping[str, tuple[int, int, int, int]]) -> dict[str, list[dict]]:
+                  boxes: Mapping[str, tuple[int, int, int, int]]) -> dict[str, list[dict[str, float]]]:
     """`compare_part` of body, face and each hand in one frame, with `px`, their extent in it.
 
     rgb, true_rgb: (H, W, 3) premultiplied; alpha, mask: (H, W); boxes: name -> x0, y0, x1, y1 px of face, left_hand and right_hand.
@@ -34,7 +34,7 @@ def compare_parts(rgb: np.ndarray, alpha: np.ndarray, true_rgb: np.ndarray, mask
     rows = np.flatnonzero((mask >= 0.5).any(1))
     areas = [("body", (0, 0, mask.shape[1], mask.shape[0]), rows[-1] + 1 - rows[0])] if len(rows) else []
     areas += [("face" if name == "face" else "hands", box, max(box[2] - box[0], box[3] - box[1])) for name, box in boxes.items()]
-    found: dict[str, list[dict]] = {part: [] for part in SIZES}
+    found: dict[str, list[dict[str, float]]] = {part: [] for part in SIZES}
     for part, (x0, y0, x1, y1), extent in areas:
         cut = np.s_[max(y0, 0):y1, max(x0, 0):x1]
         if extent > 0 and min(mask[cut].shape) > 0:
@@ -53,16 +53,18 @@ def compare_part(render: np.ndarray, real: np.ndarray, mask: np.ndarray, scale: 
     size = [max(1, round(side * scale)) for side in mask.shape[::-1]]
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
     render, real, mask = (cv2.resize(np.asarray(x, np.float32), size, interpolation=how) for x in (render, real, mask))
-    inside = cv2.erode(np.uint8(mask >= 0.5), np.ones((2 * RIM + 1, 2 * RIM + 1), np.uint8), borderType=cv2.BORDER_REPLICATE) > 0
+    rim = np.ones((2 * RIM + 1, 2 * RIM + 1), np.uint8)
+    inside = cv2.erode((mask >= 0.5).astype(np.uint8), rim, borderType=cv2.BORDER_REPLICATE) > 0
     if inside.sum() < LEAST:
         return None
     a, b = render.mean(2), real.mean(2)
     mean_a, mean_b, square_a, square_b, product = (cv2.GaussianBlur(x, (0, 0), WINDOW) for x in (a, b, a * a, b * b, a * b))
     alike = (2 * (product - mean_a * mean_b) + FLAT) / (square_a - mean_a**2 + square_b - mean_b**2 + FLAT)
-    return {"psnr": psnr(float(((render - real) ** 2).mean(2)[inside].mean())), "structure": float(alike[inside].mean())}
+    error = psnr(float(((render - real) ** 2).mean(2)[inside].mean()))
+    return None if error is None else {"psnr": error, "structure": float(alike[inside].mean())}
 
 
-def average(rows: list[dict]) -> dict[str, float] | None:
+def average(rows: list[dict[str, float]]) -> dict[str, float] | None:
     """Mean of each figure, and `worst`, the least structure; None of no row."""
     if not rows:
         return None

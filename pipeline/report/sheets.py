@@ -154,10 +154,10 @@ def measure_light(image: np.ndarray, alpha: np.ndarray) -> tuple[float, float]:
     scale = min(1.0, PERSON_PX / (rows[-1] + 1 - rows[0]))
     grey, mask = (cv2.resize(np.asarray(x, np.float32), None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
                   for x in (image.mean(2) / 255, alpha))
-    inside = cv2.erode(np.uint8(mask >= 0.5), np.ones((7, 7), np.uint8)) > 0
+    inside = cv2.erode((mask >= 0.5).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
     if not inside.any():
         return float("nan"), float("nan")
-    coarse = sum(x[inside].astype(float) ** 2 for x in np.gradient(grey)).sum()
+    coarse = (np.stack(np.gradient(grey))[:, inside].astype(float) ** 2).sum()
     fine = (cv2.Laplacian(grey, cv2.CV_32F)[inside].astype(float) ** 2).sum()
     return float(grey[inside].mean()), float(fine / max(coarse, 1e-9))
 

@@ -22,7 +22,7 @@ VIEWS = 12
 """Views of a turn."""
 WIDTH, HEIGHT = 270, 440
 """px of one view."""
-A_POSE = {"left_shoulder": (0, 0, -60), "right_shoulder": (0, 0, 60)}
+A_POSE = {"left_shoulder": (0.0, 0.0, -60.0), "right_shoulder": (0.0, 0.0, 60.0)}
 """Degrees about a joint's own axes, on top of the T-pose."""
 ROOM = 1.06
 """Height of the picture over the person's."""
@@ -55,7 +55,7 @@ def draw_turn(results: Results) -> list[np.ndarray]:
     def view(turn: float, workspace: Workspace) -> np.ndarray:
         posed = (vertices - middle) @ (np.diag([1.0, -1.0, -1.0]) @ about_y(turn)).T + [0, 0, 5 * height]
         drawn = render_bound(posed.astype(np.float32), body.faces, gaussians, camera, workspace)
-        return np.uint8(np.round(composite(drawn.rgb, drawn.alpha, WHITE) * 255))
+        return np.round(composite(drawn.rgb, drawn.alpha, WHITE) * 255).astype(np.uint8)
 
     return list(side_by_side(view, np.linspace(0, 2 * np.pi, VIEWS, endpoint=False).tolist()))
 

@@ -54,7 +54,7 @@ def judge_novel(gaussians: Gaussians, poses: Poses) -> dict[str, float]:
         for turn in TURNS:
             vertices, camera, metre = turn_before_camera(posed, turn)
             body = rasterise(vertices, poses.body.faces, camera)[0] >= 0
-            near, deep = (change(np.uint8(body), disc(int(np.ceil(metres * metre)))) > 0
+            near, deep = (change(body.astype(np.uint8), disc(int(np.ceil(metres * metre)))) > 0
                           for change, metres in ((cv2.dilate, OFF), (cv2.erode, RIM)))
             alpha = render_bound(vertices, poses.body.faces, gaussians, camera, workspace).alpha
             stray = max(stray, float(alpha[~near].sum() / max(body.sum(), 1)))

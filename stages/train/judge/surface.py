@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from gsac.avatar.binding import face_frames
@@ -28,15 +26,16 @@ HEIGHT = 320
 """px of the images in which hidden faces are found."""
 
 
-def seen_area(poses: Poses, frames: Sequence[int], views: list[View]) -> float:
-    """Share, 0..1, of the surface that a full turn in T-pose can show, that some of the frames show: within the mask,
-    not hidden, not at a slant.
+def seen_area(poses: Poses, frames: np.ndarray, views: list[View]) -> float:
+    """Share, 0..1, of the surface that a full turn in T-pose can show, that some frames show: in the mask, not hidden or slanting.
+
+    frames: (n,) indices.
     """
     faces = poses.body.faces
     rest = poses.rest(0)[0]
     corners = rest[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    chosen = [int(t) for t in frames][:: -(-len(frames) // MOST) or 1]
+    chosen = frames[:: -(-len(frames) // MOST)].tolist()
 
     seen = np.any(side_by_side(lambda t, workspace: faces_in_view(poses.vertices(t), faces, views[t]), chosen), axis=0)
     outer = np.any(side_by_side(lambda turn, workspace: faces_before(*turn_before_camera(rest, turn)[:2], faces), TURNS), axis=0)
