@@ -5,28 +5,22 @@ from __future__ import annotations
 import os
 import shlex
 from pathlib import Path
-from typing import Any
 
+from gsac.pipeline.report.origin import read_origin
 from gsac.pipeline.run_folder import REPORT, RunFolder
 
 RESULTS = {"avatar": Path("export") / "avatar.gsac", "viewer": Path("export") / "viewer.html", "report": Path(REPORT)}
 """What a person opens, below the folder of a run."""
 
 
-def closing_lines(folder: RunFolder, metrics: dict[str, Any]) -> list[str]:
-    """Verdict, paths of what is there, and the next command. metrics: of the run, {} without training."""
-    lines = [f"verdict: {verdict_line(metrics)}"] if "psnr_fg" in metrics else []
+def closing_lines(folder: RunFolder) -> list[str]:
+    """The report's verdict, paths of what is there, and the next command."""
+    origin = read_origin(folder.root / REPORT)
+    lines = [f"verdict: {origin.verdict}"] if origin is not None and origin.verdict else []
     lines += [f"{name + ':':<8} {folder.root / path}" for name, path in RESULTS.items() if (folder.root / path).exists()]
     if (folder.root / RESULTS["viewer"]).exists():
         lines.append(f"next:    gsac view {shlex.quote(shortest(folder.root))}")
     return lines
-
-
-def verdict_line(metrics: dict[str, Any]) -> str:
-    """The report's verdict in one sentence."""
-    from gsac.pipeline.report.quality import grade
-
-    return f"{grade(metrics)}."
 
 
 def shortest(path: Path) -> str:

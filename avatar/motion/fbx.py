@@ -46,7 +46,8 @@ def read_fbx(path: Path) -> Source:
 
 
 def place_nodes(local: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (T, P, 4) and places (T, P, 3) in the world. local: (T, P, 8) place, quaternion, mean scale from the parent (P,)."""
+    """Turns (T, P, 4) and places (T, P, 3) in the world. local: (T, P, 8) place, quaternion and mean scale from the
+    parent; parents: (P,), -1 for a root."""
     turns, places, scales = np.array(local[..., 3:7]), np.array(local[..., :3]), np.array(local[..., 7])
     for j, parent in enumerate(parents):
         if parent >= 0:

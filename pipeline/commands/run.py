@@ -83,7 +83,7 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
         elif isinstance(error, StageFailedError):
             write_report(clip_run, reporter)
         raise
-    for line in closing_lines(clip_run.folder, clip_run.metrics):
+    for line in closing_lines(clip_run.folder):
         reporter.note(line)
     if json:
         emit(clip_run.summary())

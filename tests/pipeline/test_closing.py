@@ -3,7 +3,6 @@
 import pytest
 
 from gsac.pipeline.closing import closing_lines
-from gsac.pipeline.report.quality import grade
 from gsac.pipeline.run_folder import RunFolder
 
 
@@ -14,20 +13,22 @@ def folder(tmp_path, monkeypatch):
     export.mkdir(parents=True)
     (export / "avatar.gsac").touch()
     (export / "viewer.html").touch()
-    (tmp_path / "my avatar" / "report.html").touch()
+    (tmp_path / "my avatar" / "report.html").write_text(
+        '<meta name="gsac-drawn-from" content="0"><meta name="gsac-shows" content="train"><meta name="gsac-verdict" content="Body good.">')
     return RunFolder(tmp_path / "my avatar")
 
 
 def test_a_finished_run_ends_with_its_verdict_the_paths_of_what_to_open_and_the_next_command(folder):
-    assert closing_lines(folder, {"psnr_fg": 28.0}) == [
-        f"verdict: {grade({'psnr_fg': 28.0})}.", f"avatar:  {folder.root}/export/avatar.gsac",
+    assert closing_lines(folder) == [
+        "verdict: Body good.", f"avatar:  {folder.root}/export/avatar.gsac",
         f"viewer:  {folder.root}/export/viewer.html", f"report:  {folder.root}/report.html", "next:    gsac view 'my avatar'"]
 
 
 def test_a_run_that_stops_early_names_only_what_is_there(folder):
     (folder.root / "export" / "viewer.html").unlink()
     (folder.root / "export" / "avatar.gsac").unlink()
-    assert closing_lines(folder, {}) == [f"report:  {folder.root}/report.html"]
+    (folder.root / "report.html").write_text("")
+    assert closing_lines(folder) == [f"report:  {folder.root}/report.html"]
 
 
 def test_stdout_holds_the_folder_of_the_results_and_nothing_else(toy):
