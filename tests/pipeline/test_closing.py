@@ -13,8 +13,9 @@ def folder(tmp_path, monkeypatch):
     export.mkdir(parents=True)
     (export / "avatar.gsac").touch()
     (export / "viewer.html").touch()
+    marks = {"drawn-from": "0", "shows": "train", "verdict": "Body good."}
     (tmp_path / "my avatar" / "report.html").write_text(
-        '<meta name="gsac-drawn-from" content="0"><meta name="gsac-shows" content="train"><meta name="gsac-verdict" content="Body good.">')
+        "".join(f'<meta name="gsac-{name}" content="{content}">' for name, content in marks.items()))
     return RunFolder(tmp_path / "my avatar")
 
 
