@@ -25,6 +25,7 @@ COMMANDS = {
     "view": "show an avatar in the browser",
     "render": "make a video of an avatar, moving or from all sides",
     "report": "write report.html of a run's folder",
+    "compare": "write a page that shows two runs side by side",
 }
 """Name -> help, of the modules beside this file."""
 GROUP = "gsac.commands"
