@@ -39,13 +39,13 @@ def facts_of(sections: dict[str, Section]) -> dict[str, float]:
     return {name: value for section in sections.values() if section.sheet for name, value in section.sheet.facts.items()}
 
 
-def pair_figures(*figures: list[tuple[str, str, str]]) -> list[tuple[str, str, str]]:
+def pair_figures(*figures: list[tuple[str, str, str]]) -> list[tuple[str, ...]]:
     """Name and both values, in the order of the first run; a dash where a run has none."""
     values = [{name: value for name, value, _ in rows} for rows in figures]
     return [(name, *(known.get(name, "–") for known in values)) for name in dict.fromkeys(name for rows in values for name in rows)]
 
 
-def differing_parameters(*runs: Results) -> list[tuple[str, str, str]]:
+def differing_parameters(*runs: Results) -> list[tuple[str, ...]]:
     """`stage.name` and both values, of the parameters that are not the same."""
     known = [{f"{stage}.{key}": format_value(value) for stage, row in results.rows.items()
               for key, value in (row.get("params") or {}).items()} for results in runs]
