@@ -26,6 +26,7 @@ COMMANDS = {
     "render": "make a video of an avatar, moving or from all sides",
     "report": "write report.html of a run's folder",
     "pack": "make one zip of an avatar with viewer, report and exports, which opens anywhere",
+    "compare": "write a page that shows two runs side by side",
 }
 """Name -> help, of the modules beside this file."""
 GROUP = "gsac.commands"

@@ -86,12 +86,17 @@ def render(results: Results, drawn: dict[str, Section]) -> str:
 @functools.cache
 def read_template() -> Template:
     """The page's jinja2 template."""
+    return make_template(TEMPLATE)
+
+
+def make_template(name: str) -> Template:
+    """A jinja2 template of this package."""
     import jinja2
 
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True,
                                      undefined=jinja2.StrictUndefined)
     environment.filters |= {"seconds": seconds, "bytes": size}
-    return environment.from_string(Path(__file__).with_name(TEMPLATE).read_text(encoding="utf-8"))
+    return environment.from_string(Path(__file__).with_name(name).read_text(encoding="utf-8"))
 
 
 def make_sections(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:

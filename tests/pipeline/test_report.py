@@ -17,6 +17,7 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.viewer import browser as chromium
+from gsac.pipeline.cli import execute
 from gsac.pipeline.report.advice import Advice, give_advice
 from gsac.pipeline.report.charts import curve_chart
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
@@ -535,3 +536,18 @@ def test_everybody_can_read_the_page_and_the_keyboard_alone_reaches_its_pictures
         assert not browser.errors
     finally:
         browser.close()
+
+
+def test_two_runs_stand_side_by_side_with_the_parameters_that_differ(whole, copied, tmp_path):
+    rows = [stage_row(name) for name in STAGES]
+    rows[6] |= {"params": {"steps": 99, "seed": 0}}
+    write_run(copied, rows, clip="/somewhere/private/<other>.mp4")
+    out = tmp_path / "both.html"
+    assert execute(["compare", str(whole), str(copied), "--out", str(out)]) == 0
+    page = Page(out)
+    assert "Parameters that differ" in page.text() and "train.steps 77 99" in page.text() and "train.seed" not in page.text()
+    assert "turn.mp4" in page.text() and "<other>.mp4" in page.text() and "private" not in page.html
+    assert page.text().count("~ Fair Face") == 2 and "26.54 dB 26.54 dB" in page.text()
+    assert len(page.images("head")) == 2 * (1 + 2 + 1)
+    assert execute(["compare", str(whole), str(copied), "--out", str(out)]) == 2, "nothing is written over unasked"
+    assert execute(["compare", str(whole), str(tmp_path / "nowhere")]) == 2
