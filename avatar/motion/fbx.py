@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def sample(path: str) -> dict[str, np.ndarray]:
         raise ValueError(f"a motion of {length:g} s; at most {LONGEST_S} are read")
     nodes, ids = [], {}
 
-    def add(node: object) -> int:
+    def add(node: Any) -> int:
         """Index of a node, with all above it before it; the scene's own root is left out."""
         if node is None or node.is_root:
             return -1
@@ -91,7 +92,7 @@ def sample(path: str) -> dict[str, np.ndarray]:
             "local": np.array([[row(ufbx.evaluate_transform(anim, node, float(t))) for node, _ in nodes] for t in times])}
 
 
-def row(transform: object) -> list[float]:
+def row(transform: Any) -> list[float]:
     """Place, quaternion xyzw and mean scale of ufbx's transform."""
     place, turn, scale = transform.translation, transform.rotation, transform.scale
     return [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w, (scale.x + scale.y + scale.z) / 3]
@@ -102,7 +103,8 @@ def main() -> int:
     gc.disable()  # ufbx's binding frees its scene in an order that ends the process
     out = io.BytesIO()
     try:
-        np.savez(out, **sample(sys.argv[1]))
+        arrays = sample(sys.argv[1])
+        np.savez(out, names=arrays["names"], parents=arrays["parents"], rest=arrays["rest"], local=arrays["local"])
     except ValueError as e:
         print(e, file=sys.stderr)
         return 2
