@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gsac.avatar.motion import quat
+from gsac.avatar.motion.places import place_nodes
 from gsac.avatar.motion.source import LARGEST, MotionError, Source
 
 MAX_BYTES = 256 << 20
@@ -44,18 +44,6 @@ def read_fbx(path: Path) -> Source:
         raise MotionError(f"{path}: a place or turn that is not finite, or beyond {LARGEST:g}")
     rest_turns, rest_places = place_nodes(rest[None], parents)
     return Source(RATE, [str(name) for name in names], parents, rest_turns[0], rest_places[0], *place_nodes(local, parents))
-
-
-def place_nodes(local: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (T, P, 4) and places (T, P, 3) in the world. local: (T, P, 8) place, quaternion and mean scale from the
-    parent; parents: (P,), -1 for a root."""
-    turns, places, scales = np.array(local[..., 3:7]), np.array(local[..., :3]), np.array(local[..., 7])
-    for j, parent in enumerate(parents):
-        if parent >= 0:
-            places[:, j] = places[:, parent] + quat.rotate(turns[:, parent], places[:, j] * scales[:, parent, None])
-            turns[:, j] = quat.multiply(turns[:, parent], turns[:, j])
-            scales[:, j] *= scales[:, parent]
-    return turns, places
 
 
 def sample(path: str) -> dict[str, np.ndarray]:
