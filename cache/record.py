@@ -13,7 +13,7 @@ RECORD_VERSION = 1
 
 @dataclass
 class RunInfo:
-    """Time, memory, metrics and warnings of the run that made the outputs; a cached stage reports these."""
+    """Time, memory, metrics, warnings and notes of the run that made the outputs; a cached stage reports these."""
 
     started: str = ""
     """ISO 8601, UTC."""
@@ -23,6 +23,7 @@ class RunInfo:
     device: str = "cpu"
     metrics: dict[str, Any] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     log_tail: str = ""
 
 

@@ -127,6 +127,12 @@ class Store:
             records += filter(None, [self.below.previous(stage, like)])
         return min(records, key=lambda record: len(record.parts.diff(like)), default=None)
 
+    def usual_seconds(self, stage: str) -> float | None:
+        """s, of the stage's run that was used last; None without one."""
+        newest = max(self.record_files(stage), key=_mtime, default=None)
+        record = self.read(newest) if newest is not None else None
+        return record.info.seconds if record is not None else self.below.usual_seconds(stage) if self.below is not None else None
+
     def quarantine(self, path: Path, digest: str) -> None:
         """Moves a damaged object to quarantine/, unless another process has put a sound one in its place."""
         with contextlib.suppress(OSError), exclusive(self.root / "leases" / f"{path.name}.quarantine"):

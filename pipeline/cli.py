@@ -10,6 +10,7 @@ import contextlib
 import os
 import signal
 import sys
+from functools import partial
 from typing import Any
 
 from gsac.pipeline import commands
@@ -53,7 +54,8 @@ def make_parser(argv: list[str]) -> argparse.ArgumentParser:
         prog="gsac", description="One phone clip of a turning person in, an animatable Gaussian avatar out.")
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     _add_verbosity(parser, default=Verbosity.NORMAL)
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    parser.set_defaults(do=partial(_print_help, parser))
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
     typed = next((word for word in argv if not word.startswith("-")), None)
     added = {} if typed in commands.COMMANDS else commands.load_added()
     if typed is not None and typed not in commands.COMMANDS and typed not in added:
@@ -83,6 +85,12 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *parsed: Any) -> None:
         print(f"gsac {package_version('gsac')}")
         parser.exit()
+
+
+def _print_help(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> ExitCode:
+    """The answer to `gsac` alone."""
+    parser.print_help(sys.stderr)
+    return ExitCode.USAGE
 
 
 def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None, error: BaseException) -> ExitCode:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +23,8 @@ DEVICE = "GSAC_DEVICE"
 DEVICES = ("cpu", "cuda")
 AUTO = "auto"
 """Value of a stage's parameter `device` that leaves the choice to the engine."""
+BODY = "body_model"
+"""Parameter of every stage that works with a body model."""
 
 
 class Keys:
@@ -50,6 +54,37 @@ class Keys:
             raise BadInput(f"{name}.device is cuda, but {why}; or set {name}.device to auto")
         return self.device if wanted == AUTO else wanted
 
+    def check(self, names: Iterable[str]) -> None:
+        """Raises BadInput where a stage of a run asks for a device or a model file that is not there, before anything runs."""
+        names = list(names)
+        for name in names:
+            stage, config = self.project.stage(name), self.configs[name]
+            stage.check_on(config, self.device_of(name) or self.device)
+            for model in stage.models(config):
+                self._check_model(stage, config, model)
+            one_of = stage.any_of(config)
+            if one_of and not any(model in self.models.brought for model in one_of):
+                raise BadInput(f"{_asked_by(stage, config, stage.any_of, one_of[0])}none of {' and '.join(one_of)} is here; bring "
+                               f"one with `gsac models add {one_of[0]} FILE`")
+        self._check_bodies(names)
+
+    def _check_model(self, stage: Stage, config: Any, model: str) -> None:
+        try:
+            self.models.sha256(model)
+        except BadInput as error:
+            raise BadInput(f"{_asked_by(stage, config, stage.models, model)}{error}") from error
+        if model in self.models.brought and not self.models.is_here(model):
+            raise BadInput(f"{_asked_by(stage, config, stage.models, model)}the file that you brought as {model} is gone from "
+                           f"{self.models.path(model)}; bring it again with `gsac models add {model} FILE`")
+
+    def _check_bodies(self, names: list[str]) -> None:
+        """BadInput unless all stages of a run that have a body are given the same one."""
+        given = {name: self.configs[name].body_model for name in names if hasattr(self.configs[name], BODY)}
+        digests = {self.models.sha256(body) if body in self.models.brought else body for body in given.values()}
+        if len(digests) > 1:
+            told = ", ".join(f"{name}.{BODY} is {body}" for name, body in given.items())
+            raise BadInput(f"{told}; give all the same, for short by `--body NAME`")
+
     def _models(self, stage: Stage, config: Any) -> list[str]:
         """Model files that the stage needs, and optional ones that the user has added."""
         return [*stage.models(config), *(name for name in stage.wishes(config) if name in self.models.brought)]
@@ -74,6 +109,16 @@ class Keys:
             packages={package: package_version(package) for package in stage.packages},
             device=device,
         )
+
+
+def _asked_by(stage: Stage, config: Any, names: Callable[[Any], tuple[str, ...]], model: str) -> str:
+    """`train.lpips is loss: `, the parameter by which a configuration comes to name a model file."""
+    default = stage.config()
+    for parameter, value in config_values(config).items():
+        plain = getattr(default, parameter)
+        if value != plain and model not in names(dataclasses.replace(config, **{parameter: plain})):
+            return f"{stage.name}.{parameter} is {value}: "
+    return f"stage {stage.name}: "
 
 
 def device_class() -> str:

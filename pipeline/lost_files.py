@@ -22,7 +22,7 @@ def require_file(path: Path) -> None:
     if object_of(path) is None or path.exists():
         return
     cache = Path(os.readlink(path)).parents[2]
-    state = "which does not hold them any more" if cache.is_dir() else "which is gone"
+    state = "which does not hold them any more" if (cache / "objects").is_dir() else "which is gone"
     raise BadInput(f"{path}: its files lie in the cache {cache}, {state}: `{recovery(path)}` brings them back")
 
 

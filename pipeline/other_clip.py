@@ -9,7 +9,6 @@ from gsac.pipeline.graph import CLIP
 from gsac.pipeline.rows import port_digest, read_json, result_row, rows_of
 from gsac.pipeline.run import clip_digest
 from gsac.pipeline.run_folder import METRICS, REPORT, RUN, RunFolder
-from gsac.stages.contract import BadInput
 
 
 def find_other_clip(folder: RunFolder, clip: Path, store: Store) -> str | None:
@@ -22,12 +21,7 @@ def find_other_clip(folder: RunFolder, clip: Path, store: Store) -> str | None:
     return there if there != str(clip) and digest not in (None, clip_digest(clip, store)) else None
 
 
-def make_room(folder: RunFolder, clip: Path, store: Store, replace: bool) -> None:
-    """Forgets the results of another clip in the folder, if told to; else BadInput names that clip."""
-    there = find_other_clip(folder, clip, store)
-    if there is None:
-        return
-    if not replace:
-        raise BadInput(f"{folder.root} holds the avatar of {there}; give another --out, or --replace to put this clip's there")
+def forget_results(folder: RunFolder) -> None:
+    """Removes what speaks of the results in the folder: they are of another clip."""
     for name in (RUN, METRICS, REPORT):
         (folder.root / name).unlink(missing_ok=True)

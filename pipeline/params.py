@@ -7,7 +7,7 @@ import dataclasses
 import inspect
 import itertools
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,15 @@ Values = dict[str, dict[str, Any]]
 """Section -> parameter -> value."""
 
 
-def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = (), only: str = "") -> dict[str, Any]:
-    """Config instance of every stage, or of `only` one. BadInput names the parameter and its source."""
+def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = (), only: str = "",
+            options: Mapping[str, Values] | None = None) -> dict[str, Any]:
+    """Config instance of every stage, or of `only` one. options: values by the option that gave them, which come after the file and
+    before `sets`. BadInput names the parameter and its source."""
     wanted = [only] if only else list(project.graph.steps)
     sources: list[tuple[str, Values]] = []
     if file is not None:
         sources.append((str(file), _sections(read_yaml(file), str(file))))
+    sources.extend((options or {}).items())
     sources.extend((f"--set {text}", _assignment(text)) for text in sets)
     values: Values = {name: {} for name in project.graph.steps}
     configs = {}

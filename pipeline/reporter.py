@@ -9,9 +9,16 @@ from enum import Enum
 from typing import TextIO
 
 from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.pace import Course, Pace, duration
 
 PLAIN_GAP_S = 10.0
 """At least this long between two plain progress lines."""
+BAR = 20
+"""Columns of the bar."""
+NARROW, NARROW_BAR = 80, 6
+"""Below so many columns of the terminal the bar has so many."""
+COUNTED = "done; still at work"
+"""Shown where all of a phase is counted and the stage goes on: a full bar would look hung."""
 
 
 class Verbosity(Enum):
@@ -28,7 +35,7 @@ class Verbosity(Enum):
 
 _SENTENCES = {
     Verbosity.QUIET: "only errors and the result",
-    Verbosity.NORMAL: "each stage as it starts and ends, its progress and its warnings",
+    Verbosity.NORMAL: "each stage as it starts and ends, its progress, warnings and notes",
     Verbosity.VERBOSE: "also the lines that stages print into their logs",
 }
 
@@ -39,8 +46,9 @@ class PlainReporter(AbstractContextManager):
     def __init__(self, stream: TextIO | None = None, verbose: bool = False):
         self.verbose = verbose
         self._stream = stream or sys.stderr
-        self._last = 0.0
-        self._first: tuple[float, int] | None = None
+        self._last = self._began = 0.0
+        self._pace = Pace()
+        self._course: Course | None = None
 
     def __exit__(self, *exc) -> None:
         pass
@@ -56,35 +64,60 @@ class PlainReporter(AbstractContextManager):
         """A dry run's line on one stage."""
         self.ends(stage, outcome, seconds, detail)
 
+    def follows(self, course: Course) -> None:
+        """From here on each stage is told with its place in the run and the time that the run still takes."""
+        self._course = course
+
     def starts(self, stage: str, why: str) -> None:
-        self._last, self._first = time.monotonic(), None
-        self.note(f"{stage}: starts ({why})")
+        self._begin(stage)
+        self._last = self._began
+        self.note(f"{self._titled(stage)}: starts ({why})")
 
     def progress(self, stage: str, done: int, total: int, unit: str) -> None:
-        words = self._words(done, total, unit)
         now = time.monotonic()
-        if now - self._last < PLAIN_GAP_S:
-            return
-        self._last = now
-        self.note(f"{stage}: {words}")
+        words = self._words(stage, done, total, unit, now)
+        if now - self._last >= PLAIN_GAP_S:
+            self._last = now
+            self.note(f"{self._titled(stage)}: {words}")
 
-    def _words(self, done: int, total: int, unit: str) -> str:
-        """The rate counts from the first progress event: before it the stage was loading and compiling."""
-        now = time.monotonic()
-        self._first = self._first or (now, done)
-        return progress_words(done, total, unit, now - self._first[0], self._first[1])
+    def _begin(self, stage: str) -> None:
+        self._began, self._pace = time.monotonic(), Pace()
+        if self._course is not None:
+            self._course.begin(stage)
+
+    def _end(self, stage: str, outcome: Outcome, seconds: float) -> None:
+        if self._course is not None and outcome is Outcome.RAN:
+            self._course.end(stage, seconds)
+
+    def _titled(self, stage: str) -> str:
+        """`7/8 train`"""
+        return f"{self._course.place(stage)} {stage}" if self._course is not None else stage
+
+    def _words(self, stage: str, done: int, total: int, unit: str, now: float) -> str:
+        """The stage's progress, and what is left of the run where earlier runs tell."""
+        self._pace.hear(done, unit, now)
+        words = self._pace.words(total)
+        if self._course is None:
+            return words
+        left = self._course.seconds_left(stage, now - self._began, self._pace.seconds_left(total))
+        return words if left is None else f"{words}; whole run: about {duration(left)} left"
 
     def warning(self, stage: str, message: str) -> None:
         self.note(f"{stage}: warning: {message}")
+
+    def remark(self, stage: str, message: str) -> None:
+        """A stage's note."""
+        self.note(f"{stage}: note: {message}")
 
     def log(self, stage: str, line: str) -> None:
         """A line that the stage printed; only asked for where `verbose`."""
         self.note(f"{stage}: | {line}")
 
     def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
+        self._end(stage, outcome, seconds)
         time_words = f" in {seconds:.1f} s" if outcome is Outcome.RAN else ""
         time_words = f" (took {seconds:.1f} s when it ran)" if outcome is Outcome.CACHED else time_words
-        self.note(f"{stage}: {outcome.value}{time_words}{': ' + detail if detail else ''}")
+        self.note(f"{self._titled(stage)}: {outcome.value}{time_words}{': ' + detail if detail else ''}")
 
 
 class QuietReporter(PlainReporter):
@@ -107,40 +140,51 @@ class TerminalReporter(PlainReporter):
         from rich.console import Console
 
         super().__init__(stream, verbose)
-        self._console = Console(file=self._stream, highlight=False)
+        self.console = Console(file=self._stream, highlight=False)
         self._bar = None
-        self._task = None
 
     def __exit__(self, *exc) -> None:
         self._close()
 
     def note(self, message: str) -> None:
-        self._console.print(message, markup=False, soft_wrap=True)
+        self.console.print(message, markup=False, soft_wrap=True)
 
     def starts(self, stage: str, why: str) -> None:
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+        from rich.table import Column
 
         self._close()
-        self._first = None
+        self._begin(stage)
+        cut = Column(no_wrap=True, overflow="ellipsis", ratio=1)
         self._bar = Progress(
-            SpinnerColumn(), TextColumn("{task.fields[stage]:<10}", markup=False), BarColumn(),
-            TextColumn("{task.fields[words]}", markup=False), console=self._console, transient=True,
+            SpinnerColumn(), TextColumn("{task.fields[stage]:<14}", markup=False),
+            BarColumn(BAR if self.console.width >= NARROW else NARROW_BAR),
+            TextColumn("{task.fields[words]}", markup=False, table_column=cut), console=self.console, transient=True,
+            expand=True,
         )
-        self._task = self._bar.add_task("", total=None, stage=stage, words=why)
+        self._bar.add_task("", total=None, stage=self._titled(stage), words=f"reading and loading ({why})")
         self._bar.start()
 
     def progress(self, stage: str, done: int, total: int, unit: str) -> None:
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=done, total=total or None, words=self._words(done, total, unit))
+        if self._bar is None:
+            return
+        words, task = self._words(stage, done, total, unit, time.monotonic()), self._bar.tasks[0]
+        going_on = done < total
+        task.total, task.completed = (total, done) if going_on else (None, 0)  # a bar without a total pulses
+        task.fields["words"] = words if going_on or not total else f"{done} {unit} {COUNTED}"
 
     def warning(self, stage: str, message: str) -> None:
-        self._console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
+        self.console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
+
+    def remark(self, stage: str, message: str) -> None:
+        self.console.print(f"{stage}: note: {message}", style="dim", markup=False, soft_wrap=True)
 
     def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
         self._close()
+        self._end(stage, outcome, seconds)
         took = f"{seconds:8.1f} s" if outcome is not Outcome.FAILED else " " * 10
-        self._console.print(f"{stage:<10} {took}  ", end="", markup=False)
-        self._console.print(f"{outcome.value}{': ' + detail if detail else ''}", style=outcome.style, markup=False,
+        self.console.print(f"{self._titled(stage):<14} {took}  ", end="", markup=False)
+        self.console.print(f"{outcome.value}{': ' + detail if detail else ''}", style=outcome.style, markup=False,
                             soft_wrap=True)
 
     def _close(self) -> None:
@@ -155,24 +199,3 @@ def open_reporter(verbosity: Verbosity = Verbosity.NORMAL, plain: bool = False) 
         return QuietReporter()
     kind = PlainReporter if plain or not sys.stderr.isatty() else TerminalReporter
     return kind(verbose=verbosity is Verbosity.VERBOSE)
-
-
-def progress_words(done: int, total: int, unit: str, elapsed_s: float, before: int = 0) -> str:
-    """`30/60 frames, 4.1 frames/s, 7 s left`; before: how many were done when the time began."""
-    words = f"{done}/{total} {unit}" if total else f"{done} {unit}"
-    if done > before and elapsed_s > 0:
-        rate = (done - before) / elapsed_s
-        words += f", {rate:.3g} {unit}/s"
-        if total:
-            words += f", {duration((total - done) / rate)} left"
-    return words
-
-
-def duration(seconds: float) -> str:
-    """`7 s`, `2 min 5 s`, `1 h 3 min`"""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -22,6 +22,7 @@ from gsac.pipeline.errors import NotUpToDateError, StageFailedError
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
+from gsac.pipeline.pace import Course
 from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
@@ -51,6 +52,7 @@ class StageResult:
     cpu_seconds: float = 0.0
     peak_rss_mb: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     params: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
@@ -64,14 +66,15 @@ class StageResult:
         """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, config_values(config), info.metrics, record.parts.inputs, _ports(record))
+                   info.peak_rss_mb, info.warnings, info.notes, config_values(config), info.metrics, record.parts.inputs,
+                   _ports(record))
 
     def to_json(self) -> dict[str, Any]:
         """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
-            "reason": self.reason, "warnings": self.warnings, "params": self.params, "inputs": self.inputs,
+            "reason": self.reason, "warnings": self.warnings, "notes": self.notes, "params": self.params, "inputs": self.inputs,
             "outputs": self.outputs,
         }
         return row | ({"error": self.error} if self.error else {})
@@ -144,6 +147,7 @@ class ClipRun:
         digests = {CLIP: source}
         paths = {CLIP: clip}
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
+        self.reporter.follows(Course(steps, self.graph.above, self.store.usual_seconds))
         with in_use(self.store) as lease, self._writing_results(clip, source), runner:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]
@@ -236,7 +240,7 @@ def clip_digest(clip: Path, store: Store) -> str:
 
 def first_sentence(message: str) -> str:
     """A warning that was told in full when its stage ran, cut to its first sentence."""
-    return textwrap.shorten(re.split(r"(?<=[.;])\s", message, maxsplit=1)[0], RECALLED, placeholder=" …")
+    return textwrap.shorten(re.split(r"(?<=\.)\s", message, maxsplit=1)[0], RECALLED, placeholder=" …")
 
 
 def _ports(record: Record) -> dict[str, str]:

@@ -25,7 +25,7 @@ from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.params import to_yaml
 from gsac.pipeline.placing import is_link_to, link, place
-from gsac.pipeline.project import Project
+from gsac.pipeline.project import Project, shipped_dag
 from gsac.stages.contract import BadInput
 
 DAG, LOCK, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "dvc.lock", "params.yaml", "run.json", "metrics.json", "report.html"
@@ -48,11 +48,14 @@ class RunFolder:
     def around(cls, start: Path) -> RunFolder:
         """The nearest folder with a dvc.yaml, from `start` upwards."""
         start = Path(start).absolute()
+        if not start.exists():
+            raise BadInput(f"{start}: no such folder; give the folder of a run")
         for folder in (start, *start.parents):
-            if (folder / DAG).is_file():
+            if (folder / DAG).is_file() and folder != shipped_dag().parent:
                 return cls(folder)
-        raise BadInput(f"{start} is not in the output folder of a run: no {DAG} here or above; "
-                       "give the folder, or `gsac run` first")
+        below = sorted(str(run.parent.relative_to(start)) for at in ("*", "*/avatar") for run in start.glob(f"{at}/{RUN}"))
+        hint = f"give one of: {', '.join(below)}" if below else "give the folder, or `gsac run` first"
+        raise BadInput(f"{start} is not in the output folder of a run: no {DAG} here or above; {hint}")
 
     @property
     def clip(self) -> Path:

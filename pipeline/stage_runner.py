@@ -155,8 +155,10 @@ class StageRunner:
                 self.reporter.note(f"{name}: goes on from {event['unit'].removesuffix('s')} {event['done']} of {event['total']}")
             else:
                 message = event["message"].removeprefix(f"{name}: ")  # the reporter names the stage
-                info.warnings.append(message)
-                self.reporter.warning(name, message)
+                kept, tell = {"warning": (info.warnings, self.reporter.warning), "note": (info.notes, self.reporter.remark)}[
+                    event["event"]]
+                kept.append(message)
+                tell(name, message)
 
         order = {
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),

@@ -33,6 +33,7 @@ class EventStream:
         self._stream = stream
         self._lock = threading.Lock()
         self._last = 0.0
+        self._unit = ""
 
     def send(self, event: str, **fields: Any) -> None:
         """Writes one event."""
@@ -45,15 +46,19 @@ class EventStream:
         self.send("resumed", done=int(done), total=int(total), unit=str(unit))
 
     def progress(self, done: int, total: int, unit: str) -> None:
-        """Sends progress, not too often; the last always."""
+        """Sends progress, not too often; the first of a unit and the last always."""
         now = time.monotonic()
-        if done >= total or now - self._last >= LEAST_GAP_S:
-            self._last = now
+        if done >= total or unit != self._unit or now - self._last >= LEAST_GAP_S:
+            self._last, self._unit = now, unit
             self.send("progress", done=int(done), total=int(total), unit=str(unit))
 
     def warn(self, message: str) -> None:
         """Sends a warning for the user."""
         self.send("warning", message=str(message))
+
+    def note(self, message: str) -> None:
+        """Sends a note for the user."""
+        self.send("note", message=str(message))
 
 
 def main() -> None:
@@ -96,6 +101,7 @@ def _work(order: dict[str, Any], events: EventStream) -> None:
         device=order["device"],
         progress=events.progress,
         warn=events.warn,
+        note=events.note,
     ))
     check_outputs(stage, out)
 

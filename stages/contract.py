@@ -43,6 +43,10 @@ class Stage:
     """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
     wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of model files that are used if the user has brought them; then their digests are part of the key too."""
+    any_of: Callable[[Any], tuple[str, ...]] = lambda config: ()
+    """Names among the wishes of which this configuration needs at least one."""
+    check_on: Callable[[Any, str], None] = lambda config, device: None
+    """Raises BadInput where this configuration cannot be met on a device class (cpu, cuda); called before anything runs."""
     uses_device: bool = False
     """Whether the device class (cpu, cuda) is part of the key."""
     code: tuple[str, ...] = ()
@@ -71,6 +75,8 @@ class Job:
     """Reports progress: done, total, unit (`frames`, `steps`)."""
     warn: Callable[[str], None] = lambda message: None
     """Warns the user: a sentence that names the frame, file or parameter; kept in the cache record and the report."""
+    note: Callable[[str], None] = lambda message: None
+    """Tells the user what holds for nearly every clip and is no fault of this one; kept as warnings are."""
 
 
 class StageError(Exception):

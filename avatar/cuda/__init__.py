@@ -14,7 +14,7 @@ def why_not() -> str | None:
     try:
         from cuda.bindings import driver, nvrtc  # noqa: F401
     except ImportError:
-        return 'the CUDA path needs the packages of `pip install "gsac[gpu]"` (cuda-bindings, nvidia-cuda-nvrtc)'
+        return 'the CUDA path needs the packages of `pip install -e ".[gpu]"` in the checkout (cuda-bindings, nvidia-cuda-nvrtc)'
     try:
         error, = driver.cuInit(0)
     except RuntimeError as missing:

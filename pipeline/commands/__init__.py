@@ -21,7 +21,7 @@ COMMANDS = {
     "stage": "run one stage, on a run's folder or on fixture artifacts",
     "batch": "run many clips over one cache",
     "cache": "list, check and clean the cache",
-    "models": "list, pull and add model files",
+    "models": "list, pull, add and remove model files",
     "view": "show an avatar in the browser",
     "render": "make a video of an avatar, moving or from all sides",
     "report": "write report.html of a run's folder",

@@ -7,14 +7,23 @@ import os
 from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
-from gsac.pipeline.commands.options import add_json, add_params, progress_reporter
-from gsac.pipeline.executors import EXECUTORS, make_executor
+from gsac.pipeline.batch_reporter import open_batch_reporter
+from gsac.pipeline.commands.options import (
+    add_json,
+    add_params,
+    add_person,
+    open_store,
+    progress_reporter,
+    values_of_person,
+)
+from gsac.pipeline.executors import EXECUTORS, check_executor
 from gsac.pipeline.executors.executor import ClipResult
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.pace import duration
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import duration
 from gsac.stages.contract import BadInput
 
 
@@ -27,6 +36,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
     command.add_argument("--replace", action="store_true", help="put a clip's avatar in place of another clip's in its folder")
+    add_person(command)
     add_params(command)
     add_json(command)
     command.set_defaults(do=do)
@@ -37,14 +47,19 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     workers = max(1, (os.cpu_count() or 1) // 2) if arguments.jobs is None else arguments.jobs
     if workers < 1:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
-    executor = make_executor(arguments.executor, workers)
+    check_executor(arguments.executor)
     project = Project.at_hand()
-    resolve(project, arguments.params, arguments.set)  # one error now, not one a clip
+    configs = resolve(project, arguments.params, arguments.set, options=values_of_person(arguments, project))
+    stages = set(project.graph.steps)
     if arguments.until:
         project.graph.step(arguments.until)
+        stages = project.graph.above(arguments.until) | {arguments.until}
+    Keys(project, configs, open_store(reporter)).check(stages)  # one error now, not one a clip
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
     reporter.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
-    results = run_batch(jobs, executor, lambda result: reporter.note(describe(result)))
+    with open_batch_reporter(reporter, len(jobs)) as table:
+        executor = EXECUTORS[arguments.executor](workers, lambda job, line: table.hear(job.name, line))
+        results = run_batch(jobs, executor, lambda result: table.end(result.job.name, describe(result)))
     failed = [result for result in results if result.code != ExitCode.OK]
     reporter.result(f"{len(results) - len(failed)} of {len(results)} clips are done")
     for result in failed:
@@ -59,6 +74,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
     """Arguments of every clip's `gsac run`."""
     told = ["--params", str(arguments.params.absolute())] if arguments.params else []
+    told += [] if arguments.height is None else ["--height", str(arguments.height)]
+    told += [] if arguments.body is None else ["--body", arguments.body]
     told += [word for text in arguments.set for word in ("--set", text)]
     told += ["--replace"] if arguments.replace else []
     return tuple(told + (["--until", arguments.until] if arguments.until else []))
@@ -69,5 +86,5 @@ def describe(result: ClipResult) -> str:
     rows = result.summary.get("stages", [])
     ran = sum(row["status"] == "ran" for row in rows)
     warnings = sum(len(row["warnings"]) for row in rows)
-    end = f"failed: {result.error}" if result.code else f"done, {ran} of {len(rows)} stages ran"
-    return f"{result.job.clip.name}: {end}, {warnings} warnings, {duration(result.seconds)}"
+    end = "failed" if result.code else f"done, {ran} of {len(rows)} stages ran"
+    return f"{result.job.name}: {end}, {warnings} warnings, {duration(result.seconds)}"

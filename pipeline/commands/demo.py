@@ -11,7 +11,7 @@ from gsac.pipeline.commands.options import open_store, progress_reporter
 from gsac.pipeline.commands.run import run_clip
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run_folder import OWN_STORE, REPORT
+from gsac.pipeline.run_folder import OWN_STORE
 
 CLIP_FILE = "clip.mp4"
 
@@ -25,10 +25,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     root = arguments.out.absolute()
     with progress_reporter(arguments) as reporter:
         clip = make_truth_clip(root / "clip", reporter)
-        run_folder = run_clip(clip, root / "avatar", open_store(reporter, root / "avatar" / OWN_STORE), reporter)
-    print(f"avatar:  {run_folder.root / 'export' / 'avatar.gsac'}")
-    print(f"viewer:  {run_folder.root / 'export' / 'viewer.html'}   (or `gsac view {run_folder.root}`)")
-    print(f"report:  {run_folder.root / REPORT}")
+        run_clip(clip, root / "avatar", open_store(reporter, root / "avatar" / OWN_STORE), reporter)
     return ExitCode.OK
 
 

@@ -13,6 +13,7 @@ from gsac.pipeline.outcomes import ExitCode
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("stage", metavar="STAGE", help="its name in dvc.yaml")
     add_run_folder(command)
+    command.add_argument("--all", action="store_true", help="also list every part of the key")
     add_params(command)
     add_json(command)
     command.set_defaults(do=do)
@@ -27,8 +28,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         for change in plan.changes:
             reporter.note(f"  {change.sentence}")
         if plan.parts is not None:
-            reporter.note(f"key {plan.parts.key} is made of")
-            for line in part_lines(plan.parts):
+            lines = part_lines(plan.parts)
+            reporter.note(f"key {plan.parts.key}, {len(lines)} parts{'' if arguments.all else ' (--all lists them)'}")
+            for line in lines if arguments.all else ():
                 reporter.note(f"  {line}")
     if arguments.json:
         emit({"stage": plan.stage, "reason": plan.reason.value,

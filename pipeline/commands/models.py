@@ -1,18 +1,21 @@
-"""gsac models ls | pull | add: the networks' files in the store."""
+"""gsac models ls | pull | add | remove: the networks' files in the store."""
 
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.model_check import check_model
 from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.project import OWN_STAGES
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    does = command.add_subparsers(dest="does", required=True, metavar="ls|pull|add")
+    does = command.add_subparsers(dest="does", required=True, metavar="ls|pull|add|remove")
     one = does.add_parser("ls", help="which model files are here")
     add_json(one)
     one.set_defaults(do=do_ls)
@@ -23,7 +26,11 @@ def declare(command: argparse.ArgumentParser) -> None:
     one.add_argument("name", metavar="NAME", help="as parameters refer to it, for example smplx.body_model")
     one.add_argument("files", type=Path, nargs="+", metavar="FILE",
                      help="lpips-vgg, lpips-alex: one file with all weights, or the network's and the heads' one after the other")
+    one.add_argument("--force", action="store_true", help="also where another file has that name")
     one.set_defaults(do=do_add)
+    one = does.add_parser("remove", help="forget a model file that was added, and drop it from the store")
+    one.add_argument("name", metavar="NAME", help="the name that it was added under")
+    one.set_defaults(do=do_remove)
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
@@ -56,7 +63,19 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
 
 
 def do_add(arguments: argparse.Namespace) -> ExitCode:
+    from gsac.avatar.network_files import BROUGHT, MODELS
+
     reporter = progress_reporter(arguments)
-    path = ModelStore(open_store(reporter)).add(arguments.name, *arguments.files)
+    models = ModelStore(open_store(reporter))
+    if not os.environ.get(OWN_STAGES) and arguments.name not in (*BROUGHT, *MODELS) and arguments.files[0].is_file():
+        check_model(arguments.name, arguments.files[0])  # other stages read files of kinds that are not known here
+    path = models.add(arguments.name, *arguments.files, force=arguments.force)
     reporter.result(f"{arguments.name} is {path}")
+    return ExitCode.OK
+
+
+def do_remove(arguments: argparse.Namespace) -> ExitCode:
+    reporter = progress_reporter(arguments)
+    ModelStore(open_store(reporter)).remove(arguments.name)
+    reporter.result(f"{arguments.name} is removed")
     return ExitCode.OK

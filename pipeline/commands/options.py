@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.store import Store
-from gsac.pipeline.params import resolve
+from gsac.pipeline.keys import BODY
+from gsac.pipeline.params import Values, resolve
 from gsac.pipeline.plan import StagePlan
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter, open_reporter
@@ -22,6 +23,24 @@ def add_params(command: argparse.ArgumentParser) -> None:
     command.add_argument("--params", type=Path, metavar="FILE", help="YAML file with sections of parameters")
     command.add_argument("--set", action="append", default=[], metavar="stage.key=value",
                          help="one parameter; may be repeated")
+
+
+def add_person(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--height", type=float, metavar="M",
+                         help="how tall the person is, metres; fixes the scale, which one camera cannot see (smplx.height_m)")
+    command.add_argument("--body", metavar="NAME",
+                         help="body model of all stages: open, or a name that `gsac models add` was given (body_model)")
+
+
+def values_of_person(arguments: argparse.Namespace, project: Project) -> dict[str, Values]:
+    """Parameters by the option of `add_person` that gave them."""
+    given: dict[str, Values] = {}
+    if arguments.height is not None:
+        given[f"--height {arguments.height:g}"] = {"smplx": {"height_m": arguments.height}}
+    if arguments.body is not None:
+        stages = [name for name in project.graph.steps if hasattr(project.stage(name).config(), BODY)]
+        given[f"--body {arguments.body}"] = {name: {BODY: arguments.body} for name in stages}
+    return given
 
 
 def add_json(command: argparse.ArgumentParser) -> None:

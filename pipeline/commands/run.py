@@ -6,10 +6,18 @@ import argparse
 from pathlib import Path
 
 from gsac.cache.store import Store
-from gsac.pipeline.commands.options import add_json, add_params, open_store, progress_reporter
+from gsac.pipeline.closing import closing_lines
+from gsac.pipeline.commands.options import (
+    add_json,
+    add_params,
+    add_person,
+    open_store,
+    progress_reporter,
+    values_of_person,
+)
 from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
 from gsac.pipeline.json_output import emit
-from gsac.pipeline.other_clip import make_room
+from gsac.pipeline.other_clip import find_other_clip, forget_results
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
@@ -32,6 +40,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--force", action="append", default=[], metavar="STAGE",
                          help="run this stage again; may be repeated")
     command.add_argument("--replace", action="store_true", help="put this clip's avatar in place of another clip's in DIR")
+    add_person(command)
     add_params(command)
     command.add_argument("--dry-run", action="store_true", help="say what would run and why")
     add_json(command)
@@ -40,23 +49,29 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     project = Project.at_hand()
-    configs = resolve(project, arguments.params, arguments.set)
+    configs = resolve(project, arguments.params, arguments.set, options=values_of_person(arguments, project))
     clip = find_clip(arguments.clip)
     run_folder = RunFolder(arguments.out or default_out(clip))
     options = Options(arguments.until, arguments.start, tuple(arguments.force))
     with progress_reporter(arguments) as reporter:
         store = open_store(reporter, None if arguments.dry_run else run_folder.root / OWN_STORE)
         clip_run = ClipRun(project, configs, store, run_folder, reporter)
+        clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
             return dry_run(clip_run, clip, options, reporter, arguments.json)
-        clip_run.select(options)
-        make_room(run_folder, clip, store, arguments.replace)
+        other = find_other_clip(run_folder, clip, store)
+        if other is not None and not arguments.replace:
+            raise BadInput(f"{run_folder.root} holds the avatar of {other}; give another --out, or --replace to put this clip's "
+                           "there")
         run_folder.prepare(clip, project, configs)
+        if other is not None:
+            forget_results(run_folder)
         return carry_out(clip_run, clip, options, reporter, arguments.json)
 
 
 def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
-    """The run and its report; the JSON object lists the stages done whether it ends well or not."""
+    """The run, its report and the last lines; stdout gets the folder, or the JSON object, which lists the stages done whether it
+    ends well or not."""
     early = EarlySections(clip_run.folder)
     try:
         clip_run.run(clip, options, early.start)
@@ -68,9 +83,12 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
         elif isinstance(error, StageFailedError):
             write_report(clip_run, reporter)
         raise
+    for line in closing_lines(clip_run.folder):
+        reporter.note(line)
     if json:
         emit(clip_run.summary())
-    reporter.result(f"results: {clip_run.folder.root}")
+    else:
+        print(clip_run.folder.root, flush=True)
     return ExitCode.OK
 
 
@@ -107,11 +125,10 @@ def default_out(clip: Path) -> Path:
     return Path.cwd() / f"{clip.stem}-avatar"
 
 
-def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> RunFolder:
-    """All stages with their defaults; returns the folder that shows the results."""
+def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> None:
+    """All stages with their defaults."""
     project = Project.at_hand()
     configs = resolve(project)
     run_folder = RunFolder(out)
     run_folder.prepare(find_clip(clip), project, configs)
     carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(), reporter, json=False)
-    return run_folder

@@ -9,7 +9,14 @@ from pathlib import Path
 from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
 from gsac.cache.store import Store
-from gsac.pipeline.commands.options import add_json, add_params, open_run_folder, open_store, progress_reporter
+from gsac.pipeline.commands.options import (
+    add_json,
+    add_params,
+    add_run_folder,
+    open_run_folder,
+    open_store,
+    progress_reporter,
+)
 from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.json_output import emit
@@ -29,6 +36,7 @@ from gsac.stages.contract import BadInput, StageError
 
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("name", metavar="NAME", help="its name in dvc.yaml")
+    add_run_folder(command)
     command.add_argument("--inputs", type=Path, metavar="DIR", help="artifacts: DIR/<input stage>/..., DIR/clip")
     command.add_argument("--out", type=Path, metavar="DIR",
                          help="gets the outputs, with --inputs; `--out DIR/NAME` feeds the next stage")
@@ -61,6 +69,8 @@ class Task:
 def do(arguments: argparse.Namespace) -> ExitCode:
     if (arguments.inputs is None) != (arguments.out is None):
         raise BadInput("--inputs and --out go together; without both, the folder of a run is used")
+    if arguments.inputs is not None and arguments.folder != Path("."):
+        raise BadInput(f"{arguments.folder} would be the folder of a run, but --inputs and --out were given; leave one out")
     with progress_reporter(arguments) as reporter:
         task = task_in_run_folder(arguments, reporter) if arguments.inputs is None else task_on_artifacts(arguments, reporter)
         try:
@@ -79,8 +89,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
-    """On the inputs that lie in the run's folder here, as DVC calls it."""
-    run_folder, project, configs = open_run_folder(arguments, Path.cwd(), only=arguments.name)
+    """On the inputs that lie in the folder of a run, the one here as DVC calls it."""
+    run_folder, project, configs = open_run_folder(arguments, arguments.folder, only=arguments.name)
     store = open_store(reporter, run_folder.root / OWN_STORE)
     ports = project.graph.step(arguments.name).deps
     return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
@@ -102,6 +112,7 @@ def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) ->
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     """Runs the stage through the store; shows its outputs as `out/<output>`."""
     store, name = task.store, task.name
+    task.keys.check([name])
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
         plan = plan_stage(store, parts, force, shown_key(task))

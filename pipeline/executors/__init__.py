@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gsac.pipeline.executors.executor import Executor
+from gsac.pipeline.executors.executor import Executor, Hear
 from gsac.stages.contract import BadInput, did_you_mean
 
 
-def _local(workers: int) -> Executor:
+def _local(workers: int, hear: Hear) -> Executor:
     from gsac.pipeline.executors.local import LocalExecutor
 
-    return LocalExecutor(workers)
+    return LocalExecutor(workers, hear)
 
 
-EXECUTORS: dict[str, Callable[[int], Executor]] = {"local": _local}
+EXECUTORS: dict[str, Callable[[int, Hear], Executor]] = {"local": _local}
 
 
-def make_executor(name: str, workers: int) -> Executor:
-    """The executor of a name. workers: how many clips at once."""
+def check_executor(name: str) -> None:
+    """BadInput names the known executors."""
     if name not in EXECUTORS:
         raise BadInput(f"--executor {name}: unknown{did_you_mean(name, EXECUTORS)}; choices: {', '.join(EXECUTORS)}")
-    return EXECUTORS[name](workers)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +17,11 @@ class ClipJob:
     out: Path
     arguments: tuple[str, ...] = ()
 
+    @property
+    def name(self) -> str:
+        """Its clip's, with its folder's number where clips of a batch have the same."""
+        return self.clip.name if self.out.name == f"{self.clip.stem}-avatar" else f"{self.clip.name} ({self.out.name})"
+
 
 @dataclass
 class ClipResult:
@@ -29,6 +34,10 @@ class ClipResult:
     error: str = ""
     summary: dict[str, Any] = field(default_factory=dict)
     """The object of its --json."""
+
+
+Hear = Callable[[ClipJob, str], None]
+"""Called with each line that the run of a clip says while it is at work."""
 
 
 class Executor(AbstractContextManager, Protocol):

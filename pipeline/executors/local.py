@@ -8,11 +8,12 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
-from gsac.pipeline.executors.executor import ClipJob, ClipResult
+from gsac.pipeline.executors.executor import ClipJob, ClipResult, Hear
 from gsac.pipeline.outcomes import ExitCode
 
 THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -20,9 +21,10 @@ THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 class LocalExecutor:
-    """Runs `gsac run` for each clip. workers: how many clips at once."""
+    """Runs `gsac run` for each clip. workers: how many clips at once; hear: gets what their runs say."""
 
-    def __init__(self, workers: int):
+    def __init__(self, workers: int, hear: Hear):
+        self._hear = hear
         self._pool = ThreadPoolExecutor(workers)  # the threads only wait for their process
         self._futures: list[Future[ClipResult]] = []
         self._running: set[subprocess.Popen] = set()
@@ -48,33 +50,41 @@ class LocalExecutor:
 
     def _run(self, job: ClipJob) -> ClipResult:
         began = time.monotonic()
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "gsac.pipeline.cli", "run", str(job.clip), "--out", str(job.out), "--json",
-             *job.arguments],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self._environment,
-            start_new_session=True,
-        )
-        self._running.add(process)
-        try:
-            out, words = process.communicate()
-        finally:
-            self._running.discard(process)
-        return ClipResult(job, process.returncode, time.monotonic() - began, _error(process.returncode, words),
-                          _summary(out))
+        with tempfile.TemporaryFile() as out:
+            process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "gsac.pipeline.cli", "run", str(job.clip), "--out", str(job.out), "--json",
+                 *job.arguments],
+                stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, text=True, errors="replace", env=self._environment,
+                start_new_session=True,
+            )
+            assert process.stderr is not None
+            self._running.add(process)
+            said = []
+            try:
+                with process.stderr as lines:
+                    for line in lines:
+                        said.append(line.rstrip("\n"))
+                        self._hear(job, said[-1])
+                process.wait()
+            finally:
+                self._running.discard(process)
+            out.seek(0)
+            summary = _summary(out.read())
+        return ClipResult(job, process.returncode, time.monotonic() - began, _error(process.returncode, said), summary)
 
 
-def _summary(out: str) -> dict:
+def _summary(out: bytes) -> dict:
     lines = out.splitlines()
     with contextlib.suppress(IndexError, ValueError):
         return json.loads(lines[-1])
     return {}
 
 
-def _error(code: int, words: str) -> str:
+def _error(code: int, words: list[str]) -> str:
     """The sentence with which a run ended."""
     if code == ExitCode.OK:
         return ""
     if code < 0:
         return f"its process was killed by {signal.Signals(-code).name}"
-    said = [line for line in words.splitlines() if line.startswith("gsac: ") and not line.startswith("gsac: warning: ")]
-    return said[-1].removeprefix("gsac: ") if said else (words.strip().splitlines() or ["no word of why"])[-1]
+    said = [line for line in words if line.startswith("gsac: ") and not line.startswith("gsac: warning: ")]
+    return said[-1].removeprefix("gsac: ") if said else next((line for line in reversed(words) if line.strip()), "no word of why")

@@ -14,8 +14,8 @@ from gsac.pipeline.report.results import Results
 
 HEAD_BYTES = 4096
 """The first part of the page, which holds the marks."""
-MARKS = {name: re.compile(f'<meta name="gsac-{name}" content="([^"]*)">') for name in ("drawn-from", "shows")}
-ROW_PARTS = ("name", "key", "inputs", "outputs", "warnings", "error", "stale_reason")
+MARKS = {name: re.compile(f'<meta name="gsac-{name}" content="([^"]*)">') for name in ("drawn-from", "shows", "verdict")}
+ROW_PARTS = ("name", "key", "inputs", "outputs", "warnings", "notes", "error", "stale_reason")
 """What a row of run.json gives to the page beside its times, which belong to the last command."""
 
 
@@ -26,6 +26,8 @@ class Origin:
     digest: str
     stages: tuple[str, ...]
     """Those whose results it shows."""
+    verdict: str
+    """The verdict in one line; empty without an avatar."""
 
 
 def drawn_from(results: Results) -> str:
@@ -49,8 +51,10 @@ def read_origin(page: Path) -> Origin | None:
     except OSError:
         return None
     found = {name: mark.search(head) for name, mark in MARKS.items()}
-    digest, shows = found["drawn-from"], found["shows"]
-    return Origin(digest[1], tuple(shows[1].split())) if digest and shows else None
+    if not all(found.values()):
+        return None
+    digest, shows, verdict = (found[name][1] for name in MARKS)
+    return Origin(digest, tuple(shows.split()), verdict)
 
 
 @cache

@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from gsac.pipeline.report.frame_links import FrameLinks
 from gsac.pipeline.report.origin import drawn_from, shown_stages
 from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
 from gsac.pipeline.report.tables import parameters, provenance, stage_rows, totals
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 TEMPLATE = "report.html.jinja"
+AVATAR = "avatar"
+"""The section that stands at the top of the page, without a heading."""
 
 
 @dataclass
@@ -64,12 +67,16 @@ def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path
 
 def render(results: Results, drawn: dict[str, Section]) -> str:
     """The page's HTML. drawn: as for `make_sections`."""
-    sections = make_sections(results, drawn)
+    made = make_sections(results, drawn)
+    avatar = next(section for section in made if section.ident == AVATAR)
+    sections = [section for section in made if section is not avatar]
     shown = [section for section in sections if section.sheet]
+    frames = {section.ident: [p.frame for p in section.sheet.pictures if p.frame is not None] for section in shown}
     facts = {name: value for section in shown for name, value in section.sheet.facts.items()}
     return read_template().render(
         clip=results.clip_name, when=run_date(results), headline=headline(results, facts), sections=sections,
-        warnings=list_warnings(results), failed=results.failed, reached=explain_partial_run(results), stages=stage_rows(results),
+        avatar=avatar.sheet, warnings=list_warnings(results), links=FrameLinks(frames),
+        failed=results.failed, reached=explain_partial_run(results), stages=stage_rows(results),
         totals=totals(results), parameters=parameters(results), files=list_exports(results), foot=provenance(results),
         viewer="export/viewer.html" if has_viewer(results) else "", caveat=results.caveat,
         drawn_from=drawn_from(results), shows=" ".join(shown_stages(results)),
@@ -99,7 +106,8 @@ def make_sections(results: Results, drawn: dict[str, Section] | None = None, wit
             return draw()
 
     def section(ident: str, title: str, lead: str, port: str, *how: Callable | None) -> Section:
-        return (drawn or {}).get(ident) or make_section(results, drawing, ident, title, lead, port, *how)
+        known = (drawn or {}).get(ident) if results.done(port.partition("/")[0]) else None
+        return known or make_section(results, drawing, ident, title, lead, port, *how)
 
     with ThreadPoolExecutor() as pool:
         return list(pool.map(lambda parts: section(*parts), [parts for parts in SECTIONS if parts[3].split("/")[0] != without]))
@@ -109,10 +117,11 @@ class Painter:
     """The modules that draw, imported once there is something to draw, and the frames they draw on."""
 
     def __init__(self, results: Results):
-        from gsac.pipeline.report import charts, sheets
+        from gsac.pipeline.report import charts, sheets, turn
         from gsac.pipeline.report.pictures import Footage
 
-        self.results, self.charts, self.sheets, self.footage = results, charts, sheets, Footage(results)
+        self.results, self.footage = results, Footage(results)
+        self.charts, self.sheets, self.turn = charts, sheets, turn
 
 
 def make_section(results: Results, drawing: Callable[[], Painter], ident: str, title: str, lead: str, port: str,
@@ -133,7 +142,7 @@ def make_section(results: Results, drawing: Callable[[], Painter], ident: str, t
 def training_charts(results: Results, charts: ModuleType) -> list:
     """Held-out quality and loss over the seconds of training. charts: the module, imported late."""
     curve = results.metrics.get("curve") or []
-    drawn = [charts.curve_chart(curve, "psnr_fg", "Held-out PSNR on the person", "dB"),
+    drawn = [charts.curve_chart(curve, "psnr_fg", "Held-out PSNR on the person", "dB"),  # only where train.curve asks for it
              charts.curve_chart(curve, "loss", "Loss", "log scale", log=True)]
     if not any(drawn):
         raise AbsentError("train/metrics.json holds no training curve.")
@@ -141,31 +150,39 @@ def training_charts(results: Results, charts: ModuleType) -> list:
 
 
 def headline(results: Results, facts: dict[str, float]) -> dict[str, Any]:
-    """The figures that matter, the verdict and the weak points."""
-    from gsac.pipeline.report.quality import grade, weaknesses
+    """The verdict, what to film differently, and the details behind them."""
+    from gsac.pipeline.report.advice import give_advice
+    from gsac.pipeline.report.quality import weaknesses
+    from gsac.pipeline.report.verdict import give_verdict
 
     try:
         metrics, absent = results.metrics, ""
     except AbsentError as reason:
         metrics, absent = {}, str(reason)
-    figures = []
-    psnr, aligned, fit = (number(metrics.get(k)) for k in ("psnr_fg", "psnr_fg_ttpo", "psnr_fg_fit"))
-    if psnr is not None:
-        figures.append(("Held-out PSNR, person only", f"{psnr:.2f} dB", "poses carried from neighbouring frames"))
-    if aligned is not None:
-        figures.append(("… pose aligned at test time", f"{aligned:.2f} dB", "on the held-out frame, avatar frozen"))
-    if fit is not None:
-        figures.append(("… with the fit's pose", f"{fit:.2f} dB", "as stage smplx left it"))
-    if (ssim := number(metrics.get("ssim"))) is not None:
-        figures.append(("SSIM", f"{ssim:.3f}", "whole frame, on white"))
-    if (count := number(metrics.get("n_gaussians"))) is not None:
-        figures.append(("Gaussians", f"{count:,.0f}", "bound to faces of the body"))
+    return {"verdict": give_verdict(metrics, facts) if metrics else None, "advice": give_advice(metrics, facts), "absent": absent,
+            "person": describe_person(results, facts), "weak": weaknesses(metrics, facts),
+            "figures": list_figures(results, metrics)}
+
+
+def list_figures(results: Results, metrics: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Name, value and meaning of the figures behind the verdict. metrics: train's metrics.json, {} without one."""
+    width, height = metrics.get("image_size") or (None, None)
+    at = f", at {width} x {height} px" if width else ""
+    names = (("psnr_fg", "{:.2f} dB", "Held-out PSNR, person only", f"poses carried from neighbouring frames{at}"),
+             ("psnr_fg_ttpo", "{:.2f} dB", "Held-out PSNR, pose aligned", f"on the held-out frame, avatar frozen{at}"),
+             ("psnr_fg_fit", "{:.2f} dB", "Held-out PSNR, pose of the fit", f"as stage smplx left it{at}"),
+             ("psnr_face_ttpo", "{:.2f} dB", "PSNR of the face", f"pose aligned{at}"),
+             ("psnr_hands_ttpo", "{:.2f} dB", "PSNR of the hands", f"pose aligned{at}"),
+             ("ssim", "{:.3f}", "SSIM", f"whole frame, on white{at}"),
+             ("alpha_iou_ttpo", "{:.3f}", "IoU of the outline", "pose aligned"),
+             ("n_gaussians", "{:,.0f}", "Gaussians", "bound to faces of the body"))
+    figures = [(name, form.format(value), meaning) for key, form, name, meaning in names
+               if (value := number(metrics.get(key))) is not None]
     total = totals(results)
     if total["seconds"]:
         figures.append(("Total time", seconds(total["seconds"]),
                         f"of it in this run {seconds(total['ran'])}" if total["cached"] else "all in this run"))
-    return {"figures": figures, "person": describe_person(results, facts), "weak": weaknesses(metrics, facts),
-            "grade": grade(metrics) if metrics else "No avatar in this run", "absent": absent}
+    return figures
 
 
 def describe_person(results: Results, facts: dict[str, float]) -> str:
@@ -186,10 +203,11 @@ def describe_person(results: Results, facts: dict[str, float]) -> str:
     return ", ".join(words)
 
 
-def list_warnings(results: Results) -> list[tuple[str, str]]:
-    """Stage and sentence, all of them."""
+def list_warnings(results: Results) -> dict[str, list[tuple[str, str]]]:
+    """Heading -> stage and sentence of all warnings, and of the notes, which a person has nothing to mend about."""
     rows = {name: results.result(name) or row for name, row in results.rows.items()}
-    return [(name, str(text).removeprefix(f"{name}: ")) for name, row in rows.items() for text in row.get("warnings") or []]
+    return {heading: [(name, str(text).removeprefix(f"{name}: ")) for name, row in rows.items() for text in row.get(kind) or []]
+            for heading, kind in (("Warnings", "warnings"), ("Notes", "notes"))}
 
 
 def explain_partial_run(results: Results) -> str:
@@ -267,6 +285,7 @@ def size(value: Any) -> str:
 
 
 SECTIONS = (
+    (AVATAR, "The avatar", "", "train/heldout/views.png", lambda paint: paint.turn.turn_sheet(paint.results)),
     ("clip", "The clip", "Frames that the stages read, evenly through the clip.", "split/frames",
      lambda paint: paint.sheets.contact_sheet(paint.footage)),
     ("keypoints", "Keypoints", "What the detector saw. A ring is a point filled by its neighbours in time; "
@@ -282,7 +301,7 @@ SECTIONS = (
      "frames that training never saw.", "train/heldout", lambda paint: paint.sheets.heldout_sheet(paint.results)),
     ("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
      "had.", "train/heldout/views.png", lambda paint: paint.sheets.views_sheet(paint.results)),
-    ("training", "Training", "Loss and held-out quality over the seconds of training, without the time for "
-     "judging.", "train/metrics.json", None, lambda paint: training_charts(paint.results, paint.charts)),
+    ("training", "Training", "How training went, over its seconds, without the time for judging.", "train/metrics.json", None,
+     lambda paint: training_charts(paint.results, paint.charts)),
 )
 """Name, title, lead, port, function that draws the pictures, and function that draws the charts."""

@@ -41,17 +41,19 @@ class Picture:
     height: int
     caption: str
     alt: str
+    frame: int | None = None
+    """The frame of the clip that it shows."""
 
 
-def make_picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTES) -> Picture:
-    """rgb: (H, W, 3) uint8. Quality falls, then size, until the file is at most `most_bytes`."""
+def make_picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTES, frame: int | None = None) -> Picture:
+    """rgb: (H, W, 3) uint8; frame: that it shows. Quality falls, then size, until the file is at most `most_bytes`."""
     shown = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
     while True:
         for quality in QUALITIES:
             ok, data = cv2.imencode(".webp", shown, [cv2.IMWRITE_WEBP_QUALITY, quality])
             if ok and len(data) <= most_bytes:
                 uri = "data:image/webp;base64," + base64.b64encode(data.tobytes()).decode()
-                return Picture(uri, shown.shape[1], shown.shape[0], caption, alt)
+                return Picture(uri, shown.shape[1], shown.shape[0], caption, alt, frame)
         shown = cv2.resize(shown, None, fx=0.6, fy=0.6, interpolation=cv2.INTER_AREA)
 
 

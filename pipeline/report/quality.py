@@ -1,4 +1,4 @@
-"""The words of the headline: a grade by the figures, and the weak points of input, fit and avatar."""
+"""The weak points of input, fit and avatar in words, for the details behind the verdict."""
 
 from __future__ import annotations
 
@@ -6,21 +6,9 @@ from typing import Any
 
 from gsac.pipeline.report.results import number
 
-GRADES = ((30.0, "Very close to the frames"), (27.0, "Good"), (24.0, "Fair: fine detail is lost"),
-          (20.0, "Poor: blurred or misplaced parts show"))
-"""Least held-out PSNR on the person, dB, and the word for it."""
-BAD = "Bad: it does not look like the person"
 OVERFIT_DB, POSE_DB, WORST_DB = 2.0, 1.0, 3.0
-UNSEEN, TURN, OUTLINE, ALPHA_IOU, HAND, PERSON = 0.2, 270.0, 0.85, 0.95, 0.5, 0.95
+TURN, OUTLINE, ALPHA_IOU, HAND, PERSON = 270.0, 0.85, 0.95, 0.5, 0.95
 """Bounds beyond which a figure is a weakness: shares and IoUs in 0..1, TURN in degrees."""
-
-
-def grade(metrics: dict[str, Any]) -> str:
-    """One phrase for the whole."""
-    psnr = number(metrics.get("psnr_fg"))
-    if psnr is None:
-        return "Not measured: no frame was held out"
-    return next((word for least, word in GRADES if psnr >= least), BAD)
 
 
 def weaknesses(metrics: dict[str, Any], facts: dict[str, float]) -> list[str]:
@@ -77,9 +65,6 @@ def avatar_weaknesses(metrics: dict[str, Any]) -> list[str]:
     iou = number(metrics.get("alpha_iou"))
     if iou is not None and iou < ALPHA_IOU:
         found.append(f"Its outline misses the person's (alpha IoU {iou:.2f} on held-out frames).")
-    unseen, total = number(metrics.get("unseen_gaussians")), number(metrics.get("n_gaussians"))
-    if unseen and total and unseen / total > UNSEEN:
-        found.append(f"{unseen / total:.0%} of the gaussians were shown by no frame from the front; they look like others.")
     if rows and len(rows) < 3:
         found.append(f"Quality was judged on {len(rows)} held-out frame{'s' if len(rows) > 1 else ''} only.")
     return found

@@ -48,6 +48,14 @@ class Results:
             return list(self.rows)
 
     @cached_property
+    def ports(self) -> dict[str, tuple[str, ...]]:
+        """Stage -> ports of its outputs; {} where the folder's dvc.yaml cannot be read."""
+        try:
+            return {name: step.outs for name, step in self.project.graph.steps.items()}
+        except StageError:
+            return {}
+
+    @cached_property
     def failed(self) -> tuple[str, str] | None:
         """Stage and its error, where the run failed."""
         for name, row in self.rows.items():
@@ -81,8 +89,8 @@ class Results:
 
     def holds(self, stage: str) -> bool:
         """Whether the stage's result is recorded and its files are there."""
-        step = self.project.graph.steps.get(stage)
-        return self.result(stage) is not None and step is not None and all((self.root / port).exists() for port in step.outs)
+        ports = self.ports.get(stage, ())
+        return self.result(stage) is not None and bool(ports) and all((self.root / port).exists() for port in ports)
 
     def caveat(self, stage: str) -> str:
         """What is to be known of a result that is not of the last run, or not made from what lies in the folder; else empty."""

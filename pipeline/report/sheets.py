@@ -23,6 +23,8 @@ WIDE, HIGH = 520, 640
 VIEWS_BYTES = 160_000
 LEAST_MASK = 1e-4
 """A mask that covers less of the frame is empty."""
+PERSON_PX = 420
+"""Height of the person at which the footage's sharpness is measured, px."""
 PERSON_WHITE = 250
 """Least brightness that counts as a held-out picture's white ground."""
 
@@ -46,8 +48,9 @@ def contact_sheet(footage: Footage) -> Sheet:
     for t in spread_evenly(len(footage.frames), CONTACT):
         image = footage.frame(t)
         shown = shrink_to_fit(image, 480 if image.shape[1] > image.shape[0] else 300, 400)
-        pictures.append(make_picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000))
-    return Sheet(pictures, columns="large" if shown.shape[1] > shown.shape[0] else "small")
+        pictures.append(make_picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000, t))
+    facts = {} if footage.clip.timestamps_s or len(footage.frames) == 1 else {"photos": float(len(footage.frames))}
+    return Sheet(pictures, facts=facts, columns="large" if shown.shape[1] > shown.shape[0] else "small")
 
 
 def keypoint_sheet(footage: Footage) -> Sheet:
@@ -61,11 +64,12 @@ def keypoint_sheet(footage: Footage) -> Sheet:
         draw_keypoints(image, crop.points(k["xy"][t]), k["score"][t], SEEN, k.get("filled", [None] * count)[t],
                        k.get("missing", [None] * count)[t])
         hands = ", ".join(f"{side} hand {hand_state(k, t, i, side)}" for i, side in enumerate(HANDS))
-        pictures.append(make_picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}"))
+        pictures.append(make_picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}", frame=t))
     figures = {"Detector": str(k["detector"]), "Of stage": "handgap" if "filled" in k else "keypoints",
                "Frames": str(len(k["xy"]))}
     facts = {"person_share": float((k["score"][:, BODY] >= SEEN).any(1).mean())}
     figures["Person found"] = percent(facts["person_share"])
+    facts["feet_share"] = float((k["score"][:, FEET] >= SEEN).any(1).mean())
     for side, part in HANDS.items():
         facts[f"{side}_hand_share"] = found = float(is_part_seen(k, part).mean())
         figures[f"{side.capitalize()} hand found"] = percent(found)
@@ -117,15 +121,19 @@ def alpha_sheet(footage: Footage) -> Sheet:
     """The person cut out, on magenta."""
     crop = footage.crop(WIDE, HIGH)
     masks = {p.stem for p in frame_paths(footage.results.path("segment/alpha"))}
-    pictures, covers, soft = [], [], []
+    pictures, covers, soft, looks = [], [], [], []
     for t in spread_evenly(len(footage.frames), ALPHA):
         alpha = footage.alpha(t)
+        looks.append(measure_light(footage.frame(t), alpha))
         covers.append(float(alpha.mean()))
         soft.append(float(((alpha > 0.02) & (alpha < 0.98)).sum() / max((alpha >= 0.5).sum(), 1)))
         pictures.append(make_picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
-                                f"{footage.moment(t)}: covers {percent(covers[-1])}", f"Frame {t} cut out, on magenta"))
+                                f"{footage.moment(t)}: covers {percent(covers[-1])}", f"Frame {t} cut out, on magenta", frame=t))
     missing = sum(path.stem not in masks for path in footage.frames)
     facts = {"empty_masks": float(sum(c < LEAST_MASK for c in covers))}
+    for name, values in zip(("brightness", "sharpness"), zip(*looks, strict=True), strict=True):
+        if np.isfinite(values).any():
+            facts[name] = float(np.nanmedian(values))
     figures = {"Frame covered, median": percent(float(np.median(covers))),
                "Soft edge, of the person's area": percent(float(np.median(soft)))}
     if missing:
@@ -133,6 +141,25 @@ def alpha_sheet(footage: Footage) -> Sheet:
     if facts["empty_masks"]:
         figures["Empty masks among those shown"] = f"{int(facts['empty_masks'])} of {len(covers)}"
     return Sheet(pictures, figures, facts)
+
+
+def measure_light(image: np.ndarray, alpha: np.ndarray) -> tuple[float, float]:
+    """Brightness of the person, 0..1, and sharpness: energy of the finest detail over that of all, the person PERSON_PX high.
+
+    image: (H, W, 3) uint8; alpha: (H, W) in 0..1. NaN without a person.
+    """
+    rows = np.flatnonzero((alpha >= 0.5).any(1))
+    if not len(rows):
+        return float("nan"), float("nan")
+    scale = min(1.0, PERSON_PX / (rows[-1] + 1 - rows[0]))
+    grey, mask = (cv2.resize(np.asarray(x, np.float32), None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+                  for x in (image.mean(2) / 255, alpha))
+    inside = cv2.erode((mask >= 0.5).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    if not inside.any():
+        return float("nan"), float("nan")
+    coarse = (np.stack(np.gradient(grey))[:, inside].astype(float) ** 2).sum()
+    fine = (cv2.Laplacian(grey, cv2.CV_32F)[inside].astype(float) ** 2).sum()
+    return float(grey[inside].mean()), float(fine / max(coarse, 1e-9))
 
 
 def body_sheet(footage: Footage) -> Sheet:
@@ -166,7 +193,7 @@ def body_sheet(footage: Footage) -> Sheet:
             overlaps.append(overlap)
             caption += f": outline IoU {overlap:.2f}"
         x0, y0, x1, y1 = (round(v * crop.scale) for v in (crop.x0, crop.y0, crop.x1, crop.y1))
-        pictures.append(make_picture(image[y0:y1, x0:x1], caption, f"Fitted body over frame {t}"))
+        pictures.append(make_picture(image[y0:y1, x0:x1], caption, f"Fitted body over frame {t}", frame=t))
     return body_figures(Sheet(pictures), body, params, full.focal[0], np.concatenate(misses), overlaps)
 
 
@@ -214,7 +241,7 @@ def heldout_sheet(results: Results) -> Sheet:
     for stem, triple in triples.items():
         shown = np.hstack([shrink_to_fit(image[y, x], 420, 540) for image in triple])
         pictures.append(make_picture(shown, heldout_caption(stem, rows.get(stem, {}), stem == worst),
-                                f"Held-out frame {int(stem)}: truth, render, error", 70_000))
+                                f"Held-out frame {int(stem)}: truth, render, error", 70_000, int(stem)))
     return Sheet(pictures, heldout_figures(results), columns="wide")
 
 

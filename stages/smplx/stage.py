@@ -61,7 +61,8 @@ def run(job: Job) -> None:
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
     for sentence in (*fit.notes, *describe_lost_frames(lost, fit.iou)):
         job.warn(sentence)
-    warn_of_guesses(job, params, clip)
+    if guesses := describe_guesses(job.config, params, clip):
+        job.note(guesses)
     params.write(job.out / "body.npz")
 
 
@@ -70,9 +71,11 @@ def warm(device: str) -> None:
     rehearse(run)
 
 
-def warn_of_guesses(job: Job, params: BodyParams, clip: Clip) -> None:
-    """Tells the user which of focal length and scale were guessed."""
-    if not clip.focal_px and not job.config.focal_px:
-        job.warn(f"The clip carries no focal length; estimated {params.focal[0]:.0f} px (set smplx.focal_px to fix it).")
-    if job.config.height_m is None:
-        job.warn("One camera cannot see scale; the person's height comes from the shape prior (set smplx.height_m).")
+def describe_guesses(config: SmplxConfig, params: BodyParams, clip: Clip) -> str:
+    """One sentence on what of height and focal length was guessed and how to fix it; empty where both are known."""
+    found = []
+    if config.height_m is None:
+        found.append("the person's height from the shape prior (smplx.height_m fixes it, `--height 1.78` for short)")
+    if not clip.focal_px and not config.focal_px:
+        found.append(f"the focal length, {params.focal[0]:.0f} px, from the points (smplx.focal_px)")
+    return f"Estimated: {' and '.join(found)}." if found else ""

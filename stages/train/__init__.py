@@ -22,4 +22,6 @@ STAGE = Stage(
     packages=("numpy", "numba", "scipy", "opencv-contrib-python-headless", "OpenEXR", "torch"),
     models=lambda config: config.models(),
     wishes=lambda config: config.wishes(),
+    any_of=lambda config: config.any_of(),
+    check_on=lambda config, device: config.check_on(device),
 )

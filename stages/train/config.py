@@ -82,16 +82,20 @@ class TrainConfig:
     flip: bool = False
     """Whether to judge held-out frames by FLIP, too, at 67 pixels a degree."""
     lpips: str = AUTO
-    """Where LPIPS is used, if `gsac models add` brought its weights: none; judge: metrics only; loss: also in the training loss (on
-    the CPU only recipe paper, takes hours); auto: loss for recipe paper on the CPU, otherwise judge."""
+    """Where LPIPS is used, with weights that `gsac models add` brought: none; judge: metrics only; loss: also in the training loss
+    (on the CPU only recipe paper, takes hours); auto: with weights, loss for recipe paper on the CPU, otherwise judge."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
-        return brought_files(self.body_model)
+        return (*brought_files(self.body_model), *(NETWORKS[:1] if self.lpips == "loss" else ()))
 
     def wishes(self) -> tuple[str, ...]:
         """Names of the model files that are used where the user has brought them."""
         return () if self.lpips == "none" else NETWORKS
+
+    def any_of(self) -> tuple[str, ...]:
+        """Names of the model files of which one must be there."""
+        return NETWORKS if self.lpips == "judge" else ()
 
     def in_loss(self) -> bool:
         """Whether LPIPS is to be in the loss, where it can."""
@@ -104,6 +108,12 @@ class TrainConfig:
     def budget(self) -> int:
         """Gaussians of recipe `fast`: as many as asked for, or those that the size search starts from."""
         return self.gaussians if isinstance(self.gaussians, int) else FULL_SIZE
+
+    def check_on(self, device: str) -> None:
+        """Raises BadInput where LPIPS is asked for in a loss that the device (cpu, cuda) has none of."""
+        if self.lpips == "loss" and self.recipe != "paper" and device == "cpu":
+            raise BadInput("train.lpips is loss, but on the CPU recipe paper alone has LPIPS in its loss; set train.lpips to "
+                           "judge, or train.recipe to paper")
 
     def check(self) -> None:
         """Raises BadInput that names the first value that cannot be."""

@@ -30,7 +30,9 @@ from gsac.stages.train.fast.lod import judge_levels
 from gsac.stages.train.finite import named_result, named_values, require_finite
 from gsac.stages.train.judge.coverage import unseen_parts
 from gsac.stages.train.judge.heldout import Candidate, draw_all_round, judge, judge_all
+from gsac.stages.train.judge.likeness import judge_likeness
 from gsac.stages.train.judge.novel_poses import judge_novel
+from gsac.stages.train.judge.surface import seen_area
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.task import Task
@@ -41,10 +43,12 @@ LOSS_ROWS = 20
 """Rows of the curve that have the loss."""
 LEAST_TURN = 270
 """Degrees of the person's turn below which the user is warned."""
-MOST_UNSEEN = 0.2
-"""Share of gaussians that no frame shows above which the user is warned."""
+LEAST_SEEN = 0.8
+"""Share of the body's surface in view below which the user is warned."""
 TRAIN_SAMPLE = 8
 """Trained frames, at most, that `psnr_fg_train` is the mean of."""
+JUDGING = 4, "parts of judging"
+"""What the progress of judging is counted in."""
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices, and the same sums whoever else is at work
@@ -85,15 +89,16 @@ def run(job: Job) -> None:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
     if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].camera)):
+        if config.lpips == "loss":
+            raise BadInput(f"train.lpips is loss, but {why}; set train.lpips to judge")
         job.warn(f"LPIPS takes no part in the loss: {why}.")
 
     run = Run(job, Poses(body, params), views, trained, held, choosing)
     run.fit()
     if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
         job.warn(f"No frame shows the {', '.join(parts)}; the avatar has there the colours of what lies around.")
-    unseen = float((~run.result.seen).mean())
-    if unseen > MOST_UNSEEN:
-        job.warn(f"{unseen:.0%} of the gaussians were shown from the front by no frame; they look like their neighbours.")
+    if run.seen_area < LEAST_SEEN:
+        job.warn(f"The frames show {run.seen_area:.0%} of the body's surface; the rest has the colours of what lies around it.")
     run.write()
 
 
@@ -157,6 +162,7 @@ class Run:
         self.result = RECIPES[self.job.config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
         require_finite("after the last step", named_result(self.result.gaussians, self.poses))
+        self.seen_area = seen_area(self.poses, self.trained, self.views)
         for level in self.result.coarser:
             require_finite("after the last step", named_values(level))
 
@@ -213,6 +219,7 @@ class Run:
         job, gaussians = self.job, self.result.gaussians
         folder = job.out / "heldout"
         folder.mkdir()
+        job.progress(0, *JUDGING)
         poses = self.poses_of_all()
         gaussians.write(job.out / "avatar.npz", self.result.coarser)
         poses.to_params().write(job.out / "body.npz")
@@ -223,6 +230,7 @@ class Run:
         """The content of metrics.json. folder: where the images of the held-out frames go."""
         config, held = self.job.config, self.held
         rows = judge(gaussians, poses, held, self.views, folder, config.flip, self.lpips)
+        self.job.progress(1, *JUDGING)
         fitted = poses.copy()
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
         aligned = poses.copy()
@@ -231,9 +239,11 @@ class Run:
             ttpo = judge(gaussians, aligned, held, self.views, None, config.flip, self.lpips)
         else:
             ttpo = []
+        self.job.progress(2, *JUDGING)
         sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
         of_fit, of_trained = judge_all([Candidate(gaussians, fitted, held, self.views),
                                         Candidate(gaussians, poses, sample, self.views)])
+        self.job.progress(3, *JUDGING)
         return summary(rows) | {
             **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips_net"},
             "psnr_fg_fit": summary(of_fit)["psnr_fg"],
@@ -256,6 +266,8 @@ class Run:
                                                  strict=True)],
             "resumed_at_step": self.resumed_at, "lpips_in_loss": self.in_loss is not None,
             "levels": judge_levels(gaussians, self.result.coarser, poses, held, self.views),
+            "likeness": judge_likeness(gaussians, aligned, held, self.views),
+            "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
             "curve": self.curve,

@@ -1,8 +1,12 @@
+import io
 import signal
 
 import pytest
+from rich.text import Text
 
 from gsac.pipeline.batch import find_clips, make_jobs
+from gsac.pipeline.batch_reporter import open_batch_reporter
+from gsac.pipeline.reporter import TerminalReporter
 
 pytestmark = pytest.mark.slow
 
@@ -82,3 +86,26 @@ def test_a_folder_of_an_earlier_batch_with_another_clip_of_that_name_is_replaced
     assert done.code == 1 and f"holds the avatar of {clips / 'one.mp4'}" in done.err
     assert toy.gsac("batch", others, "--out", out, "--replace").code == 0
     assert (out / "one-avatar" / "join" / "out.txt").read_text() == "OMEGA OMEGA"
+
+
+def test_a_batch_says_what_its_clips_are_at_while_they_run(toy, clips):
+    process = toy.start("batch", clips, "--out", toy.root / "avatars", "-j", "1", "--set", "cut.pause_s=60")
+    assert any("bad.mp4: 1/4 cut: starts" in process.stderr.readline() for _ in range(2))
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+
+
+def test_a_batch_names_each_error_once(toy, clips):
+    done = toy.gsac("batch", clips, "--out", toy.root / "avatars", "-j", "1")
+    assert done.err.count("stage left failed") == 1 and "(3 of 3 clips)" in done.err
+
+
+def test_the_table_of_a_batch_has_a_row_for_each_clip_at_work():
+    with open_batch_reporter(TerminalReporter(io.StringIO()), clips=2) as table:
+        table.hear("one.mp4", "1/8 split: starts (first run)")
+        table.hear("two.mp4", "1/8 split: starts (first run)")
+        table.hear("one.mp4", "2/8 keypoints: 30/60 frames")
+        assert list(table.draw().columns[0]._cells) == [Text("one.mp4"), Text("two.mp4")]
+        assert table.draw().columns[1]._cells[0] == Text("2/8 keypoints: 30/60 frames")
+        table.end("one.mp4", "one.mp4: done")
+        assert list(table.draw().columns[0]._cells) == [Text("two.mp4")]

@@ -16,10 +16,23 @@ def test_version_prints_the_installed_version(toy):
     assert done.code == 0 and done.out == f"gsac {package_version('gsac')}\n"
 
 
+@pytest.mark.parametrize("argv", [[], ["-q"]])
+def test_gsac_alone_prints_its_commands_and_exits_as_a_mistake(capsys, argv):
+    assert execute(argv) == ExitCode.USAGE
+    said = capsys.readouterr()
+    assert "run a clip through the stages" in said.err and said.out == ""
+
+
+def test_bench_list_tells_what_each_benchmark_measures(capsys):
+    assert execute(["bench", "list"]) == ExitCode.OK
+    rows = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert rows["size"].startswith("held-out quality against the number of gaussians") and "speed-accuracy" in rows
+
+
 @pytest.mark.parametrize("order", [("-q", "run"), ("run", "--quiet")])
 def test_quiet_tells_only_the_result(toy, order):
     done = toy.gsac(*order, toy.clip, "--out", toy.out, "--set", "left.trouble=warning")
-    assert done.code == 0 and done.out == "" and done.err == f"results: {toy.out}\n"
+    assert done.code == 0 and done.out == f"{toy.out}\n" and done.err == ""
 
 
 def test_quiet_still_tells_an_error(toy):

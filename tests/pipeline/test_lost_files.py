@@ -43,7 +43,7 @@ def test_dead_links_are_told_with_the_cache_they_led_to_and_the_command_that_bri
     cache, clip = folder.parent / "cache", folder.parent / "my clip.mp4"
     assert code == 2 and err.count("\n") == 1
     assert f"its files lie in the cache {cache}, which is gone: `gsac run '{clip}' --out '{folder}'` brings them back" in err
-    cache.mkdir()
+    (cache / "objects").mkdir(parents=True)
     assert f"{cache}, which does not hold them any more: `gsac run" in say(capsys, command, folder / inside)[1]
 
 

@@ -78,7 +78,7 @@ def test_a_brought_file_is_kept_by_content_and_found_by_name(store, tmp_path):
     file.write_bytes(b"one")
     first = ModelStore(store).add("mine", file)
     file.write_bytes(b"two")
-    second = ModelStore(store).add("mine", file)
+    second = ModelStore(store).add("mine", file, force=True)
     assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": second}
     assert first.read_bytes() == b"one" and second.read_bytes() == b"two"
 

@@ -39,6 +39,14 @@ def test_replace_puts_the_new_clip_in_and_nothing_speaks_of_the_old_one(toy, oth
     assert toy.gsac("run", other, "--out", toy.out).code == 0 and toy.result == "OMEGA OMEGA"
 
 
+def test_a_replace_that_is_refused_takes_nothing(toy, other):
+    toy.ran()
+    (toy.out / "clip").unlink()
+    (toy.out / "clip").write_text("precious")
+    assert toy.gsac("run", other, "--out", toy.out, "--replace").code == 2
+    assert (toy.out / "run.json").exists() and (toy.out / "report.html").exists()
+
+
 def test_the_same_content_moved_and_the_same_path_with_new_content_go_on(toy):
     toy.ran()
     moved = toy.clip.rename(toy.root / "moved.mp4")

@@ -10,6 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.cache.key import KeyParts
 from gsac.cache.publish import publish
 from gsac.cache.record import RunInfo
@@ -35,7 +36,7 @@ def folder(tmp_path, monkeypatch):
     shutil.copyfile(shipped_dag(), run.root / "dvc.yaml")
     (run.root / "params.yaml").write_text("export: {}\n")
     with store.private("export") as made:
-        avatar = make_figure().to_bytes()
+        avatar = avatar_bytes(make_figure())
         (made / "avatar.gsac").write_bytes(avatar)
         (made / "avatar.glb").write_bytes(b"glb")
         (made / "viewer.html").write_bytes(page_bytes(avatar))

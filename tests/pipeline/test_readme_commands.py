@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.pipeline.project import shipped_dag
 from gsac.viewer.page import page_bytes
 from support import dances
@@ -47,8 +48,8 @@ def user(toy, tmp_path, monkeypatch):
     toy.write("export/stage.py", MAKE)
     figure, avatar = tmp_path / "figure", make_figure()
     figure.mkdir()
-    (figure / "avatar.gsac").write_bytes(avatar.to_bytes())
-    (figure / "viewer.html").write_bytes(page_bytes(avatar.to_bytes()))
+    (figure / "avatar.gsac").write_bytes(avatar_bytes(avatar))
+    (figure / "viewer.html").write_bytes(page_bytes(avatar_bytes(avatar)))
     monkeypatch.setenv("TOY_FIGURE", str(figure))
     home = tmp_path / "home"
     home.mkdir()
@@ -71,7 +72,7 @@ def run(toy, home: Path, words: list[str]) -> tuple[int, str]:
     if words[0] != OPENS:
         done = toy.gsac(*words, cwd=home)
         return done.code, done.out + done.err
-    started = toy.start(OPENS, home / words[1], *words[2:])
+    started = toy.start(OPENS, home / words[1], *words[2:], DISPLAY="", WAYLAND_DISPLAY="")
     address = next(word for line in started.stdout for word in line.split() if word.startswith("http"))
     assert urllib.request.urlopen(address).read() == (home / words[1] / "export" / "viewer.html").read_bytes()
     started.send_signal(signal.SIGINT)

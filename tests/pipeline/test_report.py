@@ -17,15 +17,21 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.viewer import browser as chromium
+from gsac.pipeline.report.advice import Advice, give_advice
 from gsac.pipeline.report.charts import curve_chart
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
 from gsac.pipeline.report.page import draw_sections, seconds, size, write_report
 from gsac.pipeline.report.pictures import MOST_BYTES, make_picture
-from gsac.pipeline.report.quality import BAD, grade, weaknesses
+from gsac.pipeline.report.quality import weaknesses
+from gsac.pipeline.report.verdict import Grade, give_verdict
 
 T, WIDTH, HEIGHT = 6, 90, 160
 STAGES = ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")
 FILLED_FRAME, MISSING_FRAME = 2, 4
+LIKE = {"body": {"psnr": 31.0, "structure": 0.95, "worst": 0.92, "px": 420}, "hands": None,
+        "face": {"psnr": 30.0, "structure": 0.94, "worst": 0.92, "px": 50}}
+GOOD_FACE = LIKE | {"face": LIKE["face"] | {"worst": 0.97}}
+"""Body good, face fair (good), hands in no held-out frame."""
 PICTURES = ("clip", "keypoints", "alpha", "body", "heldout", "views")
 
 
@@ -82,7 +88,8 @@ def write_artifacts(out):
     (out / "train/metrics.json").write_text(json.dumps({
         "psnr_fg": 26.54, "psnr_fg_ttpo": 28.91, "psnr_fg_fit": 24.0, "psnr_fg_train": 27.0, "ssim": 0.98, "lpips": None,
         "image_size": [45, 80], "trained_frames": 4, "heldout_frames": [1, 4],
-        "n_gaussians": 12345, "unseen_gaussians": 10, "alpha_iou": 0.97,
+        "n_gaussians": 12345, "unseen_gaussians": 10, "alpha_iou": 0.97, "likeness": LIKE, "seen_area": 0.97,
+        "stray_alpha": 0.0005, "torn_alpha": 0.001,
         "heldout": [{"frame": 1, "psnr_fg": 27.5, "psnr_fg_ttpo": 29.0}, {"frame": 4, "psnr_fg": 21.25, "psnr_fg_ttpo": None}],
         "curve": [{"step": i, "seconds": 3.0 * i, "loss": 0.1 / i, "psnr_fg": 20.0 + i} for i in range(1, 8)],
     }))
@@ -159,6 +166,29 @@ def test_sections_drawn_while_the_last_stage_runs_are_those_of_the_stages_before
     shutil.rmtree(copied / "segment" / "alpha")
     page = Page(write_report(copied, early))
     assert all(page.images(section) == Page(whole / "report.html").images(section) for section in PICTURES)
+
+
+def test_a_section_that_was_drawn_early_is_shown_only_if_its_stage_is_of_this_folder(copied):
+    early = draw_sections(copied, "train")
+    write_run(copied, [stage_row("split"), stage_row("keypoints")])
+    page = Page(write_report(copied, early))
+    assert page.images("clip") and not page.images("body") and not page.images("alpha")
+
+
+def test_a_folder_whose_dvc_yaml_is_torn_gives_a_page(copied):
+    (copied / "dvc.yaml").write_text("stages: [")
+    assert page_of(copied).images("clip")
+
+
+def test_a_section_of_a_stale_result_says_what_it_was_made_from(copied):
+    rows = [stage_row(name) for name in STAGES]
+    rows[5] |= {"stale": True, "stale_reason": "made from an earlier split/frames; run again"}
+    rows[6] = stage_row("train", status="failed", error="no room", earlier=stage_row("train"))
+    write_run(copied, rows)
+    page = page_of(copied)
+    assert "This result was made from an earlier split/frames; run again." in page.text("body") and page.images("body")
+    assert "Stage train failed in the last run: this is an earlier result." in page.text("heldout") and page.images("heldout")
+    assert "Not of the last run's inputs: smplx." in page.text("head") and "failed" in page.text("stages")
 
 
 def test_the_page_asks_for_nothing_outside_itself(whole):
@@ -341,7 +371,6 @@ def test_alpha_mixes_frame_and_magenta():
 @pytest.mark.parametrize(("metrics", "facts", "words"), [
     ({"psnr_fg": 25.0, "psnr_fg_train": 28.0}, {}, "better by 3.0 dB"),
     ({"psnr_fg": 25.0, "alpha_iou": 0.9}, {}, "alpha IoU 0.90"),
-    ({"n_gaussians": 100, "unseen_gaussians": 30}, {}, "30% of the gaussians"),
     ({}, {"left_hand_share": 0.0}, "left hand was never seen"),
     ({}, {"right_hand_share": 0.25, "right_hand_filled": 0.5}, "right hand was seen in 25%"),
     ({}, {"turn_degrees": 90.0}, "Only 90 of 360"),
@@ -352,11 +381,88 @@ def test_each_weakness_has_its_sentence(metrics, facts, words):
     assert sum(words in sentence for sentence in weaknesses(metrics, facts)) == 1
 
 
-def test_good_figures_have_no_weakness_and_grades_follow_psnr():
+def test_good_figures_have_no_weakness():
     good = {"psnr_fg": 31.0, "psnr_fg_train": 31.5, "psnr_fg_ttpo": 31.2, "alpha_iou": 0.99}
     assert weaknesses(good, {"turn_degrees": 360}) == []
-    assert grade({"psnr_fg": 12.0}) == BAD != grade({"psnr_fg": 28.0})
-    assert "Not measured" in grade({"psnr_fg": None})
+
+
+def verdict(facts=None, **changes):
+    """Grade of the whole and, by name, of the parts."""
+    given = give_verdict({"likeness": LIKE, "seen_area": 0.97, "stray_alpha": 0.0, "torn_alpha": 0.001} | changes, facts or {})
+    return given.grade, {part.name: part.grade for part in given.parts}
+
+
+def test_the_verdict_has_parts_that_a_person_knows_each_with_a_grade_and_a_sentence(whole):
+    assert verdict() == (Grade.FAIR, {"Body and clothes": Grade.GOOD, "Face": Grade.FAIR, "Hands": Grade.UNKNOWN,
+                                      "Seen from all sides": Grade.GOOD, "In new poses": Grade.GOOD})
+    text = Page(whole / "report.html").text("head")
+    assert "~ Fair likeness Body good, face fair, seen from all sides good, in new poses good" in text
+    assert "~ Fair Face Recognised from a few steps away" in text and "The frames show 97% of the body's surface." in text
+
+
+def test_a_disfigured_face_or_an_unseen_side_is_never_called_good():
+    assert verdict(likeness=GOOD_FACE)[0] is Grade.GOOD
+    smeared = LIKE | {"face": LIKE["face"] | {"worst": 0.8}}
+    assert verdict(likeness=smeared)[0] is Grade.FAIR
+    assert verdict(likeness=GOOD_FACE, seen_area=0.45)[0] is Grade.FAIR
+    assert verdict(torn_alpha=0.05)[1]["In new poses"] is Grade.POOR
+
+
+def test_decibel_of_the_mask_the_pose_or_the_size_and_the_number_of_gaussians_do_not_touch_the_verdict():
+    low = {"psnr_fg": 19.8, "psnr_fg_ttpo": 21.0, "ssim": 0.8, "alpha_iou": 0.85, "image_size": [608, 1080]}
+    assert verdict(**low, n_gaussians=100, unseen_gaussians=51) == verdict()
+
+
+def test_footage_that_is_blurred_or_too_small_to_judge_by_is_not_called_good():
+    assert verdict({"sharpness": 0.35})[0] is Grade.POOR
+    assert verdict(likeness=GOOD_FACE | {"body": LIKE["body"] | {"px": 90}})[0] is Grade.FAIR
+
+
+def test_without_held_out_frames_nothing_is_called_good():
+    assert verdict(likeness=dict.fromkeys(LIKE))[0] is Grade.UNKNOWN
+    assert give_verdict({}, {}).grade is Grade.UNKNOWN
+
+
+@pytest.mark.parametrize(("metrics", "facts", "advice"), [
+    ({}, {"turn_degrees": 18.0}, Advice.TURN), ({}, {"photos": 4.0, "turn_degrees": 90.0}, Advice.PHOTOS),
+    ({}, {"feet_share": 0.0}, Advice.WHOLE), ({}, {"left_hand_share": 0.2}, Advice.HANDS), ({}, {"brightness": 0.05}, Advice.LIGHT),
+    ({}, {"sharpness": 0.3}, Advice.SHARP), ({}, {"face_used": 0.0}, Advice.FACE), ({}, {"empty_masks": 1.0}, Advice.BACKGROUND),
+    ({}, {"outline_iou": 0.6}, Advice.CLOTHES), ({}, {"person_share": 0.5}, Advice.ONE_PERSON),
+    ({"likeness": {"face": {"px": 14.0}}}, {}, Advice.CLOSER),
+])
+def test_each_cause_has_one_instruction_for_the_next_clip(metrics, facts, advice):
+    assert give_advice(metrics, facts) == [advice]
+    assert give_advice({"likeness": LIKE}, {"turn_degrees": 360.0, "sharpness": 2.0}) == []
+
+
+def test_what_stands_under_every_clip_is_a_note_and_no_warning(copied):
+    rows = [stage_row(name) for name in STAGES]
+    rows[5]["warnings"] = ["Frame 3 is odd."]
+    rows[5]["notes"] = ["The clip carries no focal length; estimated 1246 px (set smplx.focal_px to fix it)."]
+    write_run(copied, rows)
+    text = page_of(copied).text("warnings")
+    assert text.startswith("Warnings smplx Frame 3 is odd. Notes: true of every clip of one camera smplx The clip carries no focal")
+
+
+def test_the_avatar_stands_first_beside_the_verdict(whole):
+    page = Page(whole / "report.html")
+    assert [picture["alt"] for picture in page.images("head")] == ["The avatar in an A-pose, turning once"]
+    assert page.html.index("The avatar in an A-pose") < page.html.index("Body and clothes") < page.html.index("Figures behind this")
+
+
+def test_a_frame_s_number_leads_to_its_picture(copied):
+    rows = [stage_row(name) for name in STAGES]
+    rows[3]["warnings"] = ["No person is in 3 of 6 frames (0, 2-3); <b>."]
+    write_run(copied, rows)
+    html = page_of(copied).html
+    assert 'frames (<a href="#alpha-0" title="picture of frame 0">0</a>, <a href="#alpha-2"' in html and "&lt;b&gt;" in html
+    assert 'Held-out frame <a href="#heldout-4"' in html
+    links = set(re.findall(r'href="#([a-z]+-\d+)"', html))
+    assert links <= set(re.findall(r'<figure id="([a-z]+-\d+)"', html))
+
+
+def test_no_picture_waits_to_be_loaded(whole):
+    assert "lazy" not in Page(whole / "report.html").html
 
 
 def test_a_curve_leaves_out_what_is_not_a_number():
@@ -384,10 +490,48 @@ def test_nothing_overflows_on_a_phone_and_a_browser_finds_no_fault(whole):
         browser.open((whole / "report.html").as_uri())
         browser.run("document.querySelectorAll('details').forEach(d => d.open = true)")
         assert browser.run("document.documentElement.scrollWidth") == 360
-        assert browser.run("Promise.all([...document.images].map(i => (i.loading = 'eager', i.decode().then(() => 1))))"
+        assert browser.run("Promise.all([...document.images].map(i => i.decode().then(() => 1)))"
                            ".then(all => all.length)") > 20
-        assert browser.run("document.querySelector('figure img').click(), document.querySelector('dialog').open")
+        assert browser.run("document.querySelector('figure button').click(), document.querySelector('dialog').open")
         assert not browser.errors
         assert {address.partition(":")[0] for address in browser.requests} <= {"file", "data"}
+    finally:
+        browser.close()
+
+
+AXE = "axe-core@4.10.3"
+"""Checks of accessibility in the browser."""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1440])
+def test_everybody_can_read_the_page_and_the_keyboard_alone_reaches_its_pictures(whole, node_package, width, scheme):
+    axe = (node_package(AXE) / "node_modules/axe-core/axe.min.js").read_text()
+    browser = chromium.Browser(width, 900)
+    try:
+        browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme},
+                                                             {"name": "prefers-reduced-motion", "value": "reduce"}])
+        browser.resize(width, 900, mobile=width < 500)
+        browser.open((whole / "report.html").as_uri())
+        browser.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+        assert browser.run("document.documentElement.scrollWidth") == width
+        browser.run(f"{axe};0")
+        faults = "axe.run().then(r => r.violations.filter(v => ['serious', 'critical'].includes(v.impact)).map(v => v.id))"
+        assert browser.run(faults) == []
+        browser.run("document.querySelector('figure button[data-thirds]').focus(), document.activeElement.click()")
+        assert browser.run("document.querySelector('dialog').open && !document.querySelector('dialog label').hidden")
+        assert browser.run("document.querySelectorAll('dialog img').length") == 2, "truth and render, one over the other"
+        assert browser.run(faults) == []
+        before = browser.run("document.querySelector('dialog .words').textContent")
+        for kind in ("keyDown", "keyUp"):
+            browser.call("Input.dispatchKeyEvent", type=kind, key="ArrowRight", code="ArrowRight", windowsVirtualKeyCode=39)
+        assert browser.run("document.querySelector('dialog .words').textContent") != before
+        for kind in ("keyDown", "keyUp"):
+            browser.call("Input.dispatchKeyEvent", type=kind, key="Escape", code="Escape", windowsVirtualKeyCode=27)
+        browser.until("!document.querySelector('dialog').open")
+        assert browser.run("document.activeElement.matches('figure button')")
+        assert not browser.errors
     finally:
         browser.close()

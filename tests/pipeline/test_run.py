@@ -70,6 +70,13 @@ def test_warnings_of_a_cached_stage_are_still_told(toy):
     assert rows[1]["status"] == "cached" and rows[1]["warnings"] == ["word 2 is short"]
 
 
+def test_a_note_is_told_and_kept_and_is_no_warning(toy):
+    done = toy.run("--set", "left.trouble=note")
+    assert "left: note: words are taken as they come" in done.err and "warning" not in done.err
+    left = toy.run("--set", "left.trouble=note").json["stages"][1]
+    assert left["status"] == "cached" and left["warnings"] == [] and left["notes"] == ["words are taken as they come"]
+
+
 def test_without_out_the_folder_is_named_after_the_clip(toy):
     assert toy.gsac("run", toy.clip).code == 0
     assert (toy.root / "clip-avatar" / "join" / "out.txt").read_text() == "ALPHA ALPHA"
@@ -201,7 +208,7 @@ def test_the_logs_of_stages_hold_only_what_the_stages_said(toy):
 
 def test_plain_lines_without_a_terminal_and_no_control_codes(toy):
     done = toy.gsac("run", toy.clip, "--out", toy.out)
-    assert "cut: starts" in done.err and "join: ran in" in done.err and "\x1b" not in done.err and done.out == ""
+    assert "cut: starts" in done.err and "join: ran in" in done.err and "\x1b" not in done.err and done.out == f"{toy.out}\n"
 
 
 def test_a_bar_in_a_terminal(toy):

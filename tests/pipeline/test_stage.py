@@ -75,3 +75,11 @@ def test_a_replay_that_fails_still_gives_its_json_object(toy):
     done = toy.gsac("stage", "join", "--inputs", make_fixture(toy), "--out", toy.root / "replay", "--json",
                     "--set", "join.trouble=stage")
     assert done.code == 1 and done.statuses == {"join": "failed"} and "frame 3" in done.json["stages"][0]["error"]
+
+
+def test_the_folder_of_a_run_may_be_given_from_anywhere(toy):
+    toy.ran()
+    toy.runs_file.write_text("")
+    assert toy.gsac("stage", "left", toy.out, "--force").code == 0 and toy.runs == ["left"]
+    done = toy.gsac("stage", "join", toy.out, "--inputs", make_fixture(toy), "--out", toy.root / "replay")
+    assert done.code == 2 and "leave one out" in done.err

@@ -1,5 +1,11 @@
 import shutil
 
+import pytest
+
+from gsac.pipeline.project import shipped_dag
+from gsac.pipeline.run_folder import RunFolder
+from gsac.stages.contract import BadInput
+
 
 def test_status_is_clean_after_a_run_and_exit_code_3_after_a_change(toy):
     toy.ran()
@@ -82,3 +88,27 @@ def test_a_result_that_is_found_damaged_on_the_way_is_named_so_in_any_folder(toy
     toy.run("--until", "cut")
     done = toy.gsac("run", toy.clip, "--out", "elsewhere", "--set", "right.keep=7", "--set", "right.word=last")
     assert "right: starts (result lost)" in done.err
+
+
+def test_a_folder_that_is_not_there_is_named_as_that(toy):
+    done = toy.gsac("status", "nope")
+    assert done.code == 2 and f"{toy.root}/nope: no such folder" in done.err
+
+
+def test_outside_of_a_run_the_runs_that_lie_here_are_named(toy):
+    toy.ran()
+    done = toy.gsac("status")
+    assert done.code == 2 and "give one of: out" in done.err
+
+
+def test_the_checkout_of_gsac_is_no_run_although_a_dvc_yaml_lies_there():
+    with pytest.raises(BadInput, match="not in the output folder of a run"):
+        RunFolder.around(shipped_dag().parent)
+
+
+def test_explain_is_short_unless_all_is_asked_for(toy):
+    toy.ran()
+    short = toy.gsac("explain", "join", toy.out).out.splitlines()
+    assert len(short) == 3 and "(--all lists them)" in short[-1]
+    whole = toy.gsac("explain", "join", toy.out, "--all").out
+    assert "code       gsac.toy.common = " in whole and "--all" not in whole

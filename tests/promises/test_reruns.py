@@ -33,7 +33,7 @@ def test_a_model_file_that_a_stage_only_wishes_for_reruns_it_once_it_is_brought_
     assert toy.result == "ALPHA ALPHA"
     for text in (" one", " two"):
         (toy.root / "net.bin").write_text(text)
-        assert toy.gsac("models", "add", "net", toy.root / "net.bin").code == 0
+        assert toy.gsac("models", "add", "net", toy.root / "net.bin", "--force").code == 0
         assert toy.ran() == ["right", "join"] and toy.result == f"ALPHA ALPHA{text}"
         assert toy.ran() == []
 
@@ -45,7 +45,7 @@ def test_a_changed_model_file_reruns_exactly_that_stage_and_what_depends_on_it(t
     toy.ran("--set", "right.model=net")
     assert toy.ran("--set", "right.model=net") == []
     model.write_text("two")
-    assert toy.gsac("models", "add", "net", model).code == 0
+    assert toy.gsac("models", "add", "net", model, "--force").code == 0
     assert toy.ran("--set", "right.model=net") == ["right", "join"]
     assert toy.result == "ALPHA ALPHAtwo"
 

@@ -48,6 +48,7 @@ def search(task: Task, backend: Backend) -> Fit:
     scores: list[SizeScore] = []
     fits: list[Fit] = []
     for size in SIZES:
+        task.progress(len(scores), len(SIZES), "sizes at most")
         if scores:
             gaussians = trainer.gaussians()
             worth = count_pixels(gaussians, task, coarse) * viewing_weight(gaussians, task.poses.body)

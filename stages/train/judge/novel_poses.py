@@ -1,4 +1,4 @@
-"""Judges the avatar in poses that no clip of a turning person shows: alpha off the body, and needles.
+"""Judges the avatar in poses that no clip of a turning person shows: alpha off the body, gaps on it, and needles.
 
 Arms that hang beside the trunk while training are lifted, knees bend: gaussians that were hidden, or that painted a neighbouring
 part, appear as fur and floaters.
@@ -33,30 +33,41 @@ SIZE = 240
 """px, side of these images."""
 OFF = 0.06
 """m that cloth and hair may stand off the body."""
+RIM = 0.015
+"""m inside of the silhouette's edge where the avatar may be thinner than the body."""
 NEEDLE, LONG = 4.5, 0.02
 """Longest axis over the middle one, and m, above which a gaussian is a needle."""
 
 
 def judge_novel(gaussians: Gaussians, poses: Poses) -> dict[str, float]:
     """`stray_alpha`: alpha farther than OFF outside of the body's silhouette, over the silhouette's area, in the worst view;
-    `needle_share`: share of gaussians that are needles, in the worst pose."""
+    `torn_alpha`: alpha missing farther than RIM inside of it, likewise; `needle_share`: share of gaussians that are needles,
+    in the worst pose.
+    """
 
-    def of_pose(turns: dict, workspace: Workspace) -> tuple[float, float]:
+    def of_pose(turns: dict, workspace: Workspace) -> tuple[float, float, float]:
         posed = pose_body(poses, turns)
         bound = bind(face_frames(posed, poses.body.faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
         axes = np.sort(bound.scales, 1)
-        needles, stray = float(((axes[:, 2] > NEEDLE * axes[:, 1]) & (2 * axes[:, 2] > LONG)).mean()), 0.0
+        needles = float(((axes[:, 2] > NEEDLE * axes[:, 1]) & (2 * axes[:, 2] > LONG)).mean())
+        stray = torn = 0.0
         for turn in TURNS:
             vertices, camera, metre = turn_before_camera(posed, turn)
             body = rasterise(vertices, poses.body.faces, camera)[0] >= 0
-            reach = int(np.ceil(OFF * metre))
-            near = cv2.dilate(np.uint8(body), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
+            near, deep = (change(body.astype(np.uint8), disc(int(np.ceil(metres * metre)))) > 0
+                          for change, metres in ((cv2.dilate, OFF), (cv2.erode, RIM)))
             alpha = render_bound(vertices, poses.body.faces, gaussians, camera, workspace).alpha
-            stray = max(stray, float(alpha[near == 0].sum() / max(body.sum(), 1)))
-        return stray, needles
+            stray = max(stray, float(alpha[~near].sum() / max(body.sum(), 1)))
+            torn = max(torn, float((1 - alpha)[deep].sum() / max(body.sum(), 1)))
+        return stray, torn, needles
 
-    stray, needles = map(max, zip(*side_by_side(of_pose, POSES.values()), strict=True))
-    return {"stray_alpha": stray, "needle_share": needles}
+    stray, torn, needles = map(max, zip(*side_by_side(of_pose, POSES.values()), strict=True))
+    return {"stray_alpha": stray, "torn_alpha": torn, "needle_share": needles}
+
+
+def disc(radius: int) -> np.ndarray:
+    """(2 radius + 1, 2 radius + 1) uint8, a disc of ones. radius: px."""
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
 
 
 def pose_body(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.ndarray:

@@ -77,6 +77,16 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_avatar(job_
 
 
 @pytest.mark.slow
+def test_judging_is_a_phase_of_its_own_after_the_last_step(job):
+    heard = []
+    made = job(frames=6, steps=2, pose_test_steps=0)
+    made.progress = lambda done, total, unit: heard.append((done, total, unit))
+    run(made)
+    assert heard.index((2, 2, "steps")) < heard.index((0, 4, "parts of judging"))
+    assert heard[-1] == (3, 4, "parts of judging"), "never full before the stage ends"
+
+
+@pytest.mark.slow
 def test_empty_masks_are_left_out_with_a_warning_that_names_the_frames(job_anywhere):
     made = job_anywhere(blank=(2, 5), steps=10)
     run(made)

@@ -1,0 +1,81 @@
+"""How a batch reports while its clips run: a table in a terminal with a row for each clip at work, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
+
+from gsac.pipeline.reporter import PLAIN_GAP_S, PlainReporter, TerminalReporter
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+class BatchReporter(AbstractContextManager):
+    """Passes on what the clips' runs say, some lines of each; called from several threads."""
+
+    def __init__(self, reporter: PlainReporter, clips: int):
+        self._reporter, self._clips = reporter, clips
+        self._lock = threading.Lock()
+        self._last: dict[str, float] = {}
+        self._done = 0
+
+    def __exit__(self, *exc) -> None:
+        pass
+
+    def hear(self, clip: str, line: str) -> None:
+        """A line that the run of a clip has said."""
+        with self._lock:
+            now = time.monotonic()
+            if now - self._last.get(clip, -PLAIN_GAP_S) >= PLAIN_GAP_S:
+                self._last[clip] = now
+                self._reporter.note(f"{clip}: {line}")
+
+    def end(self, clip: str, words: str) -> None:
+        """The end of a clip's run, in words."""
+        with self._lock:
+            self._done += 1
+            self._reporter.note(f"{words} ({self._done} of {self._clips} clips)")
+
+
+class BatchTable(BatchReporter):
+    """The last line of each clip at work, under the lines of those that have ended."""
+
+    def __init__(self, reporter: TerminalReporter, clips: int):
+        from rich.live import Live
+
+        super().__init__(reporter, clips)
+        self._rows: dict[str, str] = {}
+        self._live = Live(console=reporter.console, get_renderable=self.draw, refresh_per_second=4, transient=True)
+        self._live.start()
+
+    def __exit__(self, *exc) -> None:
+        self._live.stop()
+
+    def hear(self, clip: str, line: str) -> None:
+        with self._lock:
+            self._rows[clip] = line
+
+    def end(self, clip: str, words: str) -> None:
+        with self._lock:
+            self._rows.pop(clip, None)
+        super().end(clip, words)
+
+    def draw(self) -> Table:
+        """The table as it stands."""
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table.grid(padding=(0, 2))
+        table.add_column(no_wrap=True, max_width=30, overflow="ellipsis", style="cyan")
+        table.add_column(no_wrap=True, overflow="ellipsis")
+        for clip, line in list(self._rows.items()):
+            table.add_row(Text(clip), Text(line))
+        return table
+
+
+def open_batch_reporter(reporter: PlainReporter, clips: int) -> BatchReporter:
+    """Of the kind that fits the command's own reporter."""
+    return BatchTable(reporter, clips) if isinstance(reporter, TerminalReporter) else BatchReporter(reporter, clips)

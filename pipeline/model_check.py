@@ -1,0 +1,64 @@
+"""Checks a model file that a user brings before it is kept: what it is is told by what it holds."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+from gsac.stages.body_choice import OPEN
+from gsac.stages.contract import BadInput
+
+DETECTOR = "onnx-wholebody"
+"""Name under which stage keypoints looks for a network of its own."""
+TAKEN = (OPEN, "none", "auto")
+"""Words that mean something else where a parameter names a model file."""
+
+
+def check_model(name: str, file: Path) -> None:
+    """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a FLAME head, the points on
+    one, or a body model."""
+    from gsac.avatar.artifacts import ArtifactError
+
+    if name in TAKEN:
+        raise BadInput(f"{name} is not a name for a model file: parameters give the word another meaning; choose another")
+    if name == DETECTOR:
+        from gsac.stages.keypoints.simcc import SimccNetwork
+
+        SimccNetwork(file)
+        return
+    try:
+        _read(file)
+    except (ArtifactError, zipfile.BadZipFile) as error:
+        said = str(error) if str(file) in str(error) else f"{file}: not a readable npz ({error})"
+        raise BadInput(f"{said}; it was not added as {name}") from error
+
+
+def _read(file: Path) -> None:
+    from gsac.avatar.body_file import read_body_file
+    from gsac.avatar.flame_file import ARRAYS, POINTS, read_flame, read_flame_points
+
+    arrays = _array_names(file)
+    if arrays & POINTS.keys() and "v_template" not in arrays:
+        read_flame_points(file)
+    elif arrays and _joints(file) == ARRAYS["kintree_table"][1]:
+        read_flame(file)
+    else:
+        read_body_file(file)
+
+
+def _array_names(file: Path) -> set[str]:
+    if not zipfile.is_zipfile(file):
+        return set()
+    with zipfile.ZipFile(file) as members:
+        return {name.removesuffix(".npy") for name in members.namelist()}
+
+
+def _joints(file: Path) -> int:
+    """Joints of the model's tree, 0 where there is none to be read."""
+    import numpy as np
+
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            return arrays["kintree_table"].shape[-1]
+    except (KeyError, ValueError, IndexError, AttributeError):
+        return 0

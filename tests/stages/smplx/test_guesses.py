@@ -1,0 +1,24 @@
+"""What the fit had to guess is one sentence; there is none where nothing was guessed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.stage import describe_guesses
+
+PARAMS = SimpleNamespace(focal=np.array([1234.4, 1234.4]))
+
+
+@pytest.mark.parametrize(("height", "focal", "words"), [
+    (None, None, ("height", "`--height 1.78`", "1234 px")), (1.7, None, ("1234 px",)), (None, 900.0, ("`--height 1.78`",))])
+def test_guessed_height_and_focal_length_are_one_sentence_that_says_how_to_fix_them(height, focal, words):
+    told = describe_guesses(SmplxConfig(height_m=height), PARAMS, SimpleNamespace(focal_px=focal))
+    assert told.startswith("Estimated: ") and all(word in told for word in words)
+    assert ("height" in told) == (height is None) and ("px" in told) == (focal is None)
+
+
+def test_nothing_is_said_where_height_and_focal_length_are_known():
+    assert describe_guesses(SmplxConfig(height_m=1.7), PARAMS, SimpleNamespace(focal_px=900.0)) == ""
+    assert describe_guesses(SmplxConfig(height_m=1.7, focal_px=900.0), PARAMS, SimpleNamespace(focal_px=None)) == ""
