@@ -8,7 +8,8 @@ const NAMELESS = /^(export|[0-9a-f]{2}|[0-9a-f]{32,}|objects)$/i;
  * @returns {string} the name, or an empty one where the path has none
  */
 export function readName(path) {
-  const folders = path.split("/").slice(0, -1).map(decodePart), folder = folders.findLast((part) => part && part !== "export") ?? "";
+  const folders = path.split("/").slice(0, -1).map(decodePart);
+  const folder = folders.findLast((part) => part && part !== "export") ?? "";
   return NAMELESS.test(folder) ? "" : folder.replace(/-avatar$/, "");
 }
 

@@ -11,10 +11,11 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from gsac.avatar.motion import quat
+from gsac.avatar.motion.places import place_nodes
 from gsac.avatar.motion.source import LARGEST, MotionError, Source
 
 MAX_BYTES = 256 << 20
@@ -45,18 +46,6 @@ def read_fbx(path: Path) -> Source:
     return Source(RATE, [str(name) for name in names], parents, rest_turns[0], rest_places[0], *place_nodes(local, parents))
 
 
-def place_nodes(local: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (T, P, 4) and places (T, P, 3) in the world. local: (T, P, 8) place, quaternion and mean scale from the
-    parent; parents: (P,), -1 for a root."""
-    turns, places, scales = np.array(local[..., 3:7]), np.array(local[..., :3]), np.array(local[..., 7])
-    for j, parent in enumerate(parents):
-        if parent >= 0:
-            places[:, j] = places[:, parent] + quat.rotate(turns[:, parent], places[:, j] * scales[:, parent, None])
-            turns[:, j] = quat.multiply(turns[:, parent], turns[:, j])
-            scales[:, j] *= scales[:, parent]
-    return turns, places
-
-
 def sample(path: str) -> dict[str, np.ndarray]:
     """names (P,), parents (P,), rest (P, 8) and local (T, P, 8) of an FBX file's bones and all above them."""
     import ufbx
@@ -70,7 +59,7 @@ def sample(path: str) -> dict[str, np.ndarray]:
         raise ValueError(f"a motion of {length:g} s; at most {LONGEST_S} are read")
     nodes, ids = [], {}
 
-    def add(node: object) -> int:
+    def add(node: Any) -> int:
         """Index of a node, with all above it before it; the scene's own root is left out."""
         if node is None or node.is_root:
             return -1
@@ -91,7 +80,7 @@ def sample(path: str) -> dict[str, np.ndarray]:
             "local": np.array([[row(ufbx.evaluate_transform(anim, node, float(t))) for node, _ in nodes] for t in times])}
 
 
-def row(transform: object) -> list[float]:
+def row(transform: Any) -> list[float]:
     """Place, quaternion xyzw and mean scale of ufbx's transform."""
     place, turn, scale = transform.translation, transform.rotation, transform.scale
     return [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w, (scale.x + scale.y + scale.z) / 3]
@@ -102,7 +91,8 @@ def main() -> int:
     gc.disable()  # ufbx's binding frees its scene in an order that ends the process
     out = io.BytesIO()
     try:
-        np.savez(out, **sample(sys.argv[1]))
+        arrays = sample(sys.argv[1])
+        np.savez(out, names=arrays["names"], parents=arrays["parents"], rest=arrays["rest"], local=arrays["local"])
     except ValueError as e:
         print(e, file=sys.stderr)
         return 2

@@ -9,14 +9,16 @@ import numpy as np
 from gsac.avatar.motion.amass import read_amass
 from gsac.avatar.motion.bvh import read_bvh
 from gsac.avatar.motion.fbx import read_fbx
+from gsac.avatar.motion.gltf import read_gltf
 from gsac.avatar.motion.retarget import retarget
 from gsac.avatar.motion.source import Motion, MotionError
 
-SUFFIXES = (".bvh", ".fbx", ".npz")
+GLTF = (".glb", ".gltf", ".vrma")
+SUFFIXES = (".bvh", ".fbx", *GLTF, ".npz")
 
 
 def read_motion(path: Path, joint_names: list[str], parents: np.ndarray, joints: np.ndarray) -> Motion:
-    """A BVH, FBX or AMASS-style npz file as a motion of the skeleton joint_names (J), parents (J,), joints (J, 3) at rest, m.
+    """A BVH, FBX, glTF or AMASS-style npz file as a motion of the skeleton joint_names (J), parents (J,), joints (J, 3) at rest, m.
 
     Raises `MotionError`, naming the file and the line or array.
     """
@@ -26,5 +28,5 @@ def read_motion(path: Path, joint_names: list[str], parents: np.ndarray, joints:
     if suffix == ".npz":
         source = read_amass(path, joint_names, parents, joints)
     else:
-        source = read_bvh(path) if suffix == ".bvh" else read_fbx(path)
+        source = (read_gltf if suffix in GLTF else read_bvh if suffix == ".bvh" else read_fbx)(path)
     return retarget(source, joint_names, parents, joints, str(path))
