@@ -50,11 +50,10 @@ def read_origin(page: Path) -> Origin | None:
             head = file.read(HEAD_BYTES).decode(errors="replace")
     except OSError:
         return None
-    found = {name: mark.search(head) for name, mark in MARKS.items()}
-    if not all(found.values()):
+    found = {name: mark[1] for name, pattern in MARKS.items() if (mark := pattern.search(head)) is not None}
+    if found.keys() != MARKS.keys():
         return None
-    digest, shows, verdict = (found[name][1] for name in MARKS)
-    return Origin(digest, tuple(shows.split()), verdict)
+    return Origin(found["drawn-from"], tuple(found["shows"].split()), found["verdict"])
 
 
 @cache

@@ -22,7 +22,7 @@ def test_importing_the_cuda_path_loads_nothing_heavy():
 def test_without_a_gpu_the_device_says_why_it_cannot_be_used():
     from gsac.avatar.cuda.device import Device, NoDeviceError
 
-    with pytest.raises(NoDeviceError, match="GPU|driver|gsac\\[gpu\\]"):
+    with pytest.raises(NoDeviceError, match="GPU|driver|\\.\\[gpu\\]"):
         Device()
 
 

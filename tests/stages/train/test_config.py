@@ -48,7 +48,7 @@ def test_exposure_is_refused_where_the_recipe_learns_none(device):
 
 @pytest.mark.skipif(why_not() is None, reason="there is a GPU here")
 def test_cuda_without_a_gpu_says_what_is_missing_and_what_to_do():
-    with pytest.raises(BadInput, match="cuda, but .*(GPU|driver|gsac\\[gpu\\]).*train.device to cpu"):
+    with pytest.raises(BadInput, match="cuda, but .*(GPU|driver|\\.\\[gpu\\]).*train.device to cpu"):
         check_device("cuda")
 
 
