@@ -128,7 +128,8 @@ def test_the_demo_scene_plays_from_its_file_and_its_buttons_pose_and_turn(play, 
     half = .87 / 2
     np.testing.assert_allclose(turned["T-pose"], [0, 0, 0, 1], atol=1e-6)
     np.testing.assert_allclose(turned["A-pose"], [0, 0, -np.sin(half), np.cos(half)], atol=1e-6)
-    assert abs(turned["start"][3]) < .95 and abs(turned["walk"][3]) < .95, "clips play"
+    for name in ("start", "walk"):  # clips play: the arm stands 10 degrees and more from where the still poses have it
+        assert max(abs(turned[name] @ turned[still]) for still in ("T-pose", "A-pose")) < np.cos(np.radians(5)), name
     before, after = (np.array(" ".join(line).split()[1:], float) - (0, .9, 0) for line in lines[5:7])
     assert before[2] > 3 and abs(before[0]) < 1e-3, "the camera sees the person's front"
     assert np.linalg.norm(after) == pytest.approx(np.linalg.norm(before) * np.exp(-.15), rel=1e-4)
