@@ -7,6 +7,7 @@ import pytest
 
 from gsac.avatar.film import FOLLOW_S, draw_frames, performance, turntable
 from gsac.avatar.motion.source import Motion
+from support.scripts import TOOLS, script
 
 WIDTH, HEIGHT = 120, 160
 BLACK = np.zeros(3)
@@ -104,3 +105,21 @@ def test_a_film_has_the_frames_of_its_rate_and_length(figure, fps, seconds, coun
     film = performance(motion, fps, seconds)
     assert len(film) == count
     np.testing.assert_allclose(film.pose[:, 4, 0], np.arange(count) / fps, atol=1e-5)
+
+
+def test_the_readme_s_film_turns_once_walks_and_ends_where_it_begins(figure):
+    motion = script("demo_pictures").turn_and_walk(figure)
+    yaw = motion.rotation[:120, 0, 1]
+    assert yaw[0] == 0 and yaw[-1] == pytest.approx(2 * np.pi, abs=0.01) and (np.diff(yaw) > 0).all()
+    assert np.abs(motion.rotation[-1, 1:] - motion.rotation[0, 1:]).max() < 0.1 > np.abs(motion.transl[-1]).max()
+    knee = motion.rotation[:, figure.joint_names.index("left_knee"), 0]
+    assert np.sum((knee[:-1] < 0.6) & (knee[1:] >= 0.6)) == 4, "four double steps"
+
+
+def test_the_readme_s_film_is_small_and_plays():
+    from PIL import Image
+
+    file = TOOLS.parent / "docs" / "demo-film.webp"
+    assert file.stat().st_size < 1.5e6
+    with Image.open(file) as film:
+        assert film.n_frames > 200 and film.info["loop"] == 0
