@@ -237,8 +237,9 @@ def list_exports(results: Results) -> dict[str, Any]:
     """Files of export: name, bytes, relative address; or why there are none."""
     words = {"viewer.html": "the avatar in a page: opens from disk, turns and moves",
              "avatar.gsac": "the avatar: body, gaussians, skinning, motions",
-             "avatar.ply": "gaussians in one pose, for 3DGS viewers", "avatar.glb": "skinned mesh, with the gaussians",
-             "avatar.spz": "gaussians in one pose, packed", "avatar.fbx": "skinned mesh with expressions", "unity": "Unity package"}
+             "avatar.ply": "gaussians in one pose, for 3DGS viewers",
+             "avatar.glb": "skinned mesh with expressions, and the gaussians", "avatar.spz": "gaussians in one pose, packed",
+             "avatar.fbx": "skinned mesh with expressions", "unity": "Unity package"}
     files = []
     for name, what in words.items():
         try:

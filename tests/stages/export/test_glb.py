@@ -11,6 +11,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.stage import pose_gaussians
 
@@ -41,6 +42,15 @@ class Gltf:
         width = WIDTH[a["type"]]
         flat = np.frombuffer(self.bin, TYPES[a["componentType"]], a["count"] * width, start)
         return flat.reshape(-1, width) if width > 1 else flat
+
+    def sparse(self, accessor):
+        """Rows and values (n, 3) of an accessor that is zero elsewhere."""
+        parts = self.doc["accessors"][accessor].get("sparse", {"count": 0})
+        if not parts["count"]:
+            return np.empty(0, int), np.empty((0, 3), np.float32)
+        start = {name: self.doc["bufferViews"][parts[name]["bufferView"]]["byteOffset"] for name in ("indices", "values")}
+        rows = np.frombuffer(self.bin, TYPES[parts["indices"]["componentType"]], parts["count"], start["indices"])
+        return rows, np.frombuffer(self.bin, "<f4", 3 * parts["count"], start["values"]).reshape(-1, 3)
 
     def attributes(self, mesh):
         return {k: self.array(v) for k, v in self.doc["meshes"][mesh]["primitives"][0]["attributes"].items()}
@@ -144,6 +154,21 @@ def test_left_hand_is_on_the_left_and_red_in_mesh_and_points(gltf):
         assert mean[0] > 0.5 and mean[1] < 0.15 and mean[2] < 0.15
     toes = gltf.attributes(0)["POSITION"][gltf.attributes(0)["POSITION"][:, 1] < 0.03]
     assert toes[:, 2].max() > 0.1, "faces +z"
+
+
+def test_the_52_expressions_of_arkit_are_morph_targets_and_move_the_mesh_as_the_avatar_s_do(exported):
+    avatar, gltf = RiggedAvatar.read(exported / "avatar.gsac"), Gltf((exported / "avatar.glb").read_bytes())
+    mesh = gltf.doc["meshes"][0]
+    names, targets = mesh["extras"]["targetNames"], mesh["primitives"][0]["targets"]
+    assert names == avatar.expression_names and len(names) == len(targets) == len(mesh["weights"]) == 52
+    assert {"jawOpen", "eyeBlinkLeft", "mouthSmileRight", "tongueOut"} <= set(names)
+    for e, target in enumerate(targets):
+        rows, values = gltf.sparse(target["POSITION"])
+        span = slice(*avatar.expression_start[e:e + 2])
+        order = np.argsort(avatar.expression_vertex[span])
+        np.testing.assert_array_equal(rows, avatar.expression_vertex[span][order])
+        np.testing.assert_allclose(values, avatar.expression_delta[span][order], atol=1e-5)
+    assert "targets" not in gltf.doc["meshes"][1]["primitives"][0], "gaussians follow faces, which glTF cannot say"
 
 
 def test_trimesh_opens_it(figure, glb):
