@@ -93,10 +93,10 @@ def make_template(name: str) -> Template:
     """A jinja2 template of this package."""
     import jinja2
 
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True,
-                                     undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True,
+                                     lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     environment.filters |= {"seconds": seconds, "bytes": size}
-    return environment.from_string(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    return environment.get_template(name)
 
 
 def make_sections(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:
