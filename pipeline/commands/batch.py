@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
-from gsac.pipeline.batch_reporter import open_batch_reporter
+from gsac.pipeline.batch_reporter import BatchReporter, open_batch_reporter
 from gsac.pipeline.commands.options import (
     add_json,
     add_params,
@@ -24,6 +24,8 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.pace import duration
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
+from gsac.pipeline.report.batch import PAGE, BatchPage
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
 
 
@@ -31,7 +33,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("source", type=Path, metavar="FOLDER|LIST",
                          help="a folder of clips, or a file with one path a line")
     command.add_argument("--out", type=Path, default=Path("."), metavar="DIR",
-                         help="gets a folder a clip (default: here)")
+                         help=f"gets a folder a clip, and {PAGE}, which shows all of them (default: here)")
     command.add_argument("--executor", default="local", metavar="NAME", help=f"one of: {', '.join(EXECUTORS)}")
     command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
@@ -56,18 +58,21 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         stages = project.graph.above(arguments.until) | {arguments.until}
     Keys(project, configs, open_store(reporter)).check(stages)  # one error now, not one a clip
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
+    page = BatchPage(arguments.out, jobs)
     reporter.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
     with open_batch_reporter(reporter, len(jobs)) as table:
         executor = EXECUTORS[arguments.executor](workers, lambda job, line: table.hear(job.name, line))
-        results = run_batch(jobs, executor, lambda result: table.end(result.job.name, describe(result)))
+        results = run_batch(jobs, executor, lambda result: end(result, table, page, reporter))
     failed = [result for result in results if result.code != ExitCode.OK]
     reporter.result(f"{len(results) - len(failed)} of {len(results)} clips are done")
     for result in failed:
         reporter.result(f"failed: {result.job.clip}: {result.error}")
     if arguments.json:
-        emit({"clips": [{
+        emit({"outputs": {"page": str(page.path)} if page.path.exists() else {}, "clips": [{
             "clip": str(r.job.clip), "out": str(r.job.out), "status": "failed" if r.code else "done", "code": r.code,
             "seconds": round(r.seconds, 3), "error": r.error or None, **r.summary} for r in results]})
+    elif page.path.exists():
+        print(page.path)
     return ExitCode.FAILED if failed else ExitCode.OK
 
 
@@ -79,6 +84,15 @@ def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
     told += [word for text in arguments.set for word in ("--set", text)]
     told += ["--replace"] if arguments.replace else []
     return tuple(told + (["--until", arguments.until] if arguments.until else []))
+
+
+def end(result: ClipResult, table: BatchReporter, page: BatchPage, reporter: PlainReporter) -> None:
+    """Tells of a clip's end, and shows it on the page; where that fails the batch goes on."""
+    table.end(result.job.name, describe(result))
+    try:
+        page.add(result)
+    except Exception as error:
+        reporter.note(f"gsac: warning: {page.path} could not be written ({type(error).__name__}: {error})")
 
 
 def describe(result: ClipResult) -> str:

@@ -14,7 +14,7 @@ from gsac.pipeline.report.results import Results
 
 HEAD_BYTES = 4096
 """The first part of the page, which holds the marks."""
-MARKS = {name: re.compile(f'<meta name="gsac-{name}" content="([^"]*)">') for name in ("drawn-from", "shows", "verdict")}
+MARKS = {name: re.compile(f'<meta name="gsac-{name}" content="([^"]*)">') for name in ("drawn-from", "shows", "verdict", "grade")}
 ROW_PARTS = ("name", "key", "inputs", "outputs", "warnings", "notes", "error", "stale_reason")
 """What a row of run.json gives to the page beside its times, which belong to the last command."""
 
@@ -28,6 +28,8 @@ class Origin:
     """Those whose results it shows."""
     verdict: str
     """The verdict in one line; empty without an avatar."""
+    grade: str
+    """Name of the verdict's `Grade`; empty without an avatar, and in pages that were written before it was kept."""
 
 
 def drawn_from(results: Results) -> str:
@@ -51,9 +53,9 @@ def read_origin(page: Path) -> Origin | None:
     except OSError:
         return None
     found = {name: mark[1] for name, pattern in MARKS.items() if (mark := pattern.search(head)) is not None}
-    if found.keys() != MARKS.keys():
+    if not MARKS.keys() - {"grade"} <= found.keys():
         return None
-    return Origin(found["drawn-from"], tuple(found["shows"].split()), found["verdict"])
+    return Origin(found["drawn-from"], tuple(found["shows"].split()), found["verdict"], found.get("grade", ""))
 
 
 @cache

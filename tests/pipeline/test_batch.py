@@ -31,6 +31,20 @@ def test_a_batch_goes_on_past_a_clip_that_fails_and_says_which_and_why(toy, clip
     assert (toy.root / "avatars" / "two-avatar" / "join" / "out.txt").read_text() == "GAMMA GAMMA"
 
 
+def test_a_batch_leaves_one_page_that_shows_every_clip_and_names_it_on_stdout(toy, clips):
+    done = toy.gsac("batch", clips, "--out", toy.root / "avatars", "-j", "2")
+    page = toy.root / "avatars" / "batch.html"
+    assert done.out.splitlines() == [str(page)]
+    html = page.read_text()
+    assert "2 of 3 clips are done, 1 failed." in html and "Stage left failed:" in html
+    for clip in ("one", "two", "bad"):
+        assert f"<h3>{clip}.mp4</h3>" in html and f'href="{clip}-avatar/report.html"' in html
+    assert 'href="bad-avatar/logs/left.log"' in html
+    page.write_text("mine")
+    refused = toy.gsac("batch", clips, "--out", toy.root / "avatars")
+    assert refused.code == 2 and "batch.html was not written by" in refused.err and page.read_text() == "mine"
+
+
 def test_a_batch_shares_one_store(toy, clips):
     (clips / "bad.mp4").unlink()
     (clips / "again.mp4").write_text("alpha beta")

@@ -1,0 +1,146 @@
+"""batch.html: a card for each clip of a batch, and for each other run that lies in its folder."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from gsac.pipeline.closing import RESULTS
+from gsac.pipeline.executors.executor import ClipJob, ClipResult
+from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.report.origin import HEAD_BYTES, read_origin
+from gsac.pipeline.report.page import make_template
+from gsac.pipeline.report.results import Results
+from gsac.pipeline.report.verdict import Grade
+from gsac.pipeline.run_folder import LOGS, REPORT, RUN, write_text
+from gsac.stages.contract import BadInput
+
+if TYPE_CHECKING:
+    from gsac.pipeline.report.pictures import Picture
+
+PAGE, TEMPLATE = "batch.html", "batch.html.jinja"
+MARK = '<meta name="gsac-page" content="batch">'
+"""Tells the page from a file of the user's by the same name."""
+STRIP = re.compile(r'<div class="turning" style="--views:(\d+)[^<]*<div class="turn"><img src="data:image/webp;base64,([^"]+)"')
+"""The turning avatar in report.html: how many views stand side by side, and the picture."""
+VIEW_HEIGHT = 264
+"""px of a view on a card."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """One clip: what became of it, and where to look further."""
+
+    clip: str
+    folder: str
+    """Name of the run's folder."""
+    outcome: Outcome
+    words: str = ""
+    """The verdict in one line, or why there is none."""
+    grade: Grade | None = None
+    strip: Picture | None = None
+    """Views of the avatar's turn side by side, `views` of them."""
+    views: int = 0
+    links: tuple[tuple[str, str], ...] = ()
+    """Name and address, relative to the page, of what there is to open."""
+
+    def address(self, name: str) -> str:
+        """Of the link of that name; empty without it."""
+        return dict(self.links).get(name, "")
+
+
+class BatchPage:
+    """The page of a batch in the folder `out`. Raises BadInput where a file of the user's stands in its place."""
+
+    def __init__(self, out: Path, jobs: list[ClipJob]):
+        self.path = out.absolute() / PAGE
+        if self.path.exists() and not is_ours(self.path):
+            raise BadInput(f"{self.path} was not written by `gsac batch`, which would write over it; move it away, or give another "
+                           "--out")
+        self._cards = {job: Card(job.clip.name, job.out.name, Outcome.PLANNED) for job in jobs}
+
+    @functools.cached_property
+    def _others(self) -> list[Card]:
+        """Runs that lie in the folder and are not of this batch."""
+        ours = {job.out for job in self._cards}
+        folders = sorted(path.parent for path in self.path.parent.glob(f"*/{RUN}") if path.parent not in ours)
+        return [make_card(folder) for folder in folders]
+
+    def add(self, result: ClipResult) -> None:
+        """Writes the page with the end of one clip. Raises OSError."""
+        self._cards[result.job] = end_card(result)
+        cards = sorted(self._cards.values(), key=lambda card: card.outcome is not Outcome.FAILED)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(self.path, render(self.path.parent.name, cards, self._others))
+
+
+def is_ours(page: Path) -> bool:
+    """Whether a file is a page of this kind."""
+    try:
+        with page.open("rb") as file:
+            return MARK.encode() in file.read(HEAD_BYTES)
+    except OSError:
+        return False
+
+
+def render(name: str, cards: list[Card], others: list[Card]) -> str:
+    """The page's HTML. name: of the batch's folder."""
+    outcomes = [card.outcome for card in cards]
+    return read_template().render(mark=MARK, name=name, cards=cards, others=others, done=outcomes.count(Outcome.RAN),
+                                  failed=outcomes.count(Outcome.FAILED), outcomes=Outcome)
+
+
+@functools.cache
+def read_template() -> Any:
+    """The page's jinja2 template."""
+    return make_template(TEMPLATE)
+
+
+def end_card(result: ClipResult) -> Card:
+    """Of a clip whose run has ended. Where its failure is not recorded in the folder, that is another run's, or there is none."""
+    failed = [row["name"] for row in result.summary.get("stages", []) if row["status"] == Outcome.FAILED.value]
+    recorded = Results(result.job.out).failed
+    if result.code == ExitCode.OK or (recorded is not None and recorded[0] in failed):
+        return make_card(result.job.out)
+    why = result.error.replace(str(result.job.clip), result.job.clip.name).replace(f"{result.job.out.parent}{os.sep}", "")
+    return Card(result.job.clip.name, result.job.out.name, Outcome.FAILED, why)
+
+
+def make_card(folder: Path) -> Card:
+    """Of what lies in the folder of a run."""
+    results, page = Results(folder), folder / REPORT
+    files = {"Report": REPORT, "Viewer": str(RESULTS["viewer"])}
+    if results.failed is not None:
+        stage, why = results.failed
+        files = {"Report": REPORT, "Log": f"{LOGS}/{stage}.log"}
+    links = tuple((name, quote(f"{folder.name}/{file}")) for name, file in files.items() if (folder / file).is_file())
+    if results.failed is not None:
+        return Card(results.clip_name, folder.name, Outcome.FAILED, f"Stage {stage} failed: {why}", links=links)
+    origin = read_origin(page)
+    if origin is None or not (origin.grade or origin.verdict):
+        words = "No avatar in this run." if origin else f"No report of this version; `gsac report {folder.name}` writes it."
+        return Card(results.clip_name, folder.name, Outcome.RAN, words, links=links)
+    strip, views = cut_strip(page)
+    grade = Grade.__members__.get(origin.grade)
+    return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, views, links)
+
+
+def cut_strip(page: Path) -> tuple[Picture | None, int]:
+    """The turning avatar of a report, made small, and the number of its views; None where it shows none."""
+    import cv2
+    import numpy as np
+
+    from gsac.pipeline.report.pictures import make_picture, shrink_to_fit
+
+    found = STRIP.search(page.read_text(encoding="utf-8", errors="replace"))
+    strip = cv2.imdecode(np.frombuffer(base64.b64decode(found[2]), np.uint8), cv2.IMREAD_COLOR) if found is not None else None
+    if found is None or strip is None:
+        return None, 0
+    small = shrink_to_fit(cv2.cvtColor(strip, cv2.COLOR_BGR2RGB), strip.shape[1], VIEW_HEIGHT)
+    return make_picture(small, "", "The avatar from the front"), int(found[1])

@@ -1,0 +1,139 @@
+"""batch.html: what became of each clip, as the reports and runs in the folder say."""
+
+import json
+import re
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gsac.avatar.artifacts import write_frame
+from gsac.benchmarks.viewer import browser as chromium
+from gsac.pipeline.executors.executor import ClipJob, ClipResult
+from gsac.pipeline.report.batch import BatchPage
+from gsac.pipeline.report.page import write_report
+from gsac.stages.contract import BadInput
+
+FACES = {"ada": 0.97, "bob": 0.92}
+"""Clip -> likeness of the avatar's face: good, fair."""
+LIKE = {"psnr": 31.0, "structure": 0.95, "worst": 0.92, "px": 420}
+AXE = "axe-core@4.10.3"
+
+
+def write_run(folder, clip, *rows):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "run.json").write_text(json.dumps({"clip": f"/home/somebody/{clip}", "stages": rows}))
+
+
+def write_avatar(folder, clip, face):
+    """The folder of a run with a report; the views of the avatar are grey, the front one red."""
+    for name in ("train/heldout", "export"):
+        (folder / name).mkdir(parents=True)
+    write_run(folder, clip, {"name": "train", "status": "ran"}, {"name": "export", "status": "ran"})
+    (folder / "train/metrics.json").write_text(json.dumps({
+        "likeness": {"body": LIKE, "face": LIKE | {"worst": face}, "hands": LIKE}, "seen_area": 0.97, "stray_alpha": 0.0,
+        "torn_alpha": 0.0}))
+    views = np.full((880, 900, 3), 200, np.uint8)
+    views[:440, :300] = 200, 0, 0
+    write_frame(folder / "train/heldout/views.png", views)
+    (folder / "export/viewer.html").write_text("viewer")
+    write_report(folder)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """The folder of a batch of five clips: two avatars, a failure, a clip that left no folder and one not done yet. One more
+    run, an earlier one, lies there as well."""
+    out = tmp_path_factory.mktemp("batch") / "avatars"
+    for name, face in FACES.items():
+        write_avatar(out / f"{name}-avatar", f"{name}.mp4", face)
+    write_avatar(out / "earlier-avatar", "earlier & <i>.mp4", 0.97)
+    failed = {"name": "keypoints", "status": "failed", "error": "no person in any frame; record again"}
+    write_run(out / "eva-avatar", "eva.mp4", {"name": "split", "status": "ran"}, failed)
+    (out / "eva-avatar" / "logs").mkdir()
+    (out / "eva-avatar" / "logs" / "keypoints.log").write_text("words")
+    write_report(out / "eva-avatar")
+    jobs = {name: ClipJob(Path(f"/home/somebody/{name}.mp4"), out / f"{name}-avatar") for name in (*FACES, "eva", "gone", "late")}
+    page = BatchPage(out, list(jobs.values()))
+    for name in FACES:
+        page.add(ClipResult(jobs[name], 0, 10.0))
+    page.add(ClipResult(jobs["eva"], 1, 1.0, "stage keypoints failed", {"stages": [failed]}))
+    refused = {"name": "split", "status": "failed"}
+    page.add(ClipResult(jobs["gone"], 2, 0.1, "stage split failed: /home/somebody/gone.mp4: no video in it", {"stages": [refused]}))
+    return out
+
+
+def read_cards(page):
+    """Clip -> text and HTML of its card, in the page's order."""
+    cards = re.findall(r'<li class="card">(.*?)</li>', page.read_text(), re.DOTALL)
+    texts = {unescape(re.search("<h3>(.*?)</h3>", card)[1]): card for card in cards}
+    return {clip: (" ".join(unescape(re.sub("<[^>]+>", " ", card)).split()), card) for clip, card in texts.items()}
+
+
+def test_each_clip_has_a_card_with_the_verdict_of_its_report_failures_first(out):
+    cards = read_cards(out / "batch.html")
+    assert list(cards) == ["eva.mp4", "gone.mp4", "ada.mp4", "bob.mp4", "late.mp4", "earlier & <i>.mp4"]
+    assert "✓ Good Body good, face good, hands good, seen from all sides good" in cards["ada.mp4"][0]
+    assert "~ Fair Body good, face fair" in cards["bob.mp4"][0]
+    assert "✕ Failed Stage keypoints failed: no person in any frame; record again" in cards["eva.mp4"][0]
+    assert "✕ Failed stage split failed: gone.mp4: no video in it" in cards["gone.mp4"][0]
+    assert "Not done yet" in cards["late.mp4"][0]
+    assert "2 of 5 clips are done, 2 failed." in (out / "batch.html").read_text()
+
+
+def test_every_link_leads_to_a_file_beside_the_page_and_nothing_tells_where_the_clips_lie(out):
+    html = (out / "batch.html").read_text()
+    links = re.findall(r'(?:href|src)="([^"]+)"', html)
+    assert all(link.startswith("data:") or (out / link).is_file() for link in links)
+    assert {"ada-avatar/export/viewer.html", "ada-avatar/report.html", "eva-avatar/logs/keypoints.log"} <= set(links)
+    assert "somebody" not in html and str(out) not in html
+
+
+def test_a_clip_that_was_refused_does_not_show_the_other_avatar_in_its_folder(out, tmp_path):
+    write_avatar(tmp_path / "ada-avatar", "ada.mp4", 0.97)
+    job = ClipJob(Path("/elsewhere/ada.mp4"), tmp_path / "ada-avatar")
+    BatchPage(tmp_path, [job]).add(ClipResult(job, 2, 0.1, f"{tmp_path}/ada-avatar holds the avatar of /home/ada.mp4"))
+    text, html = read_cards(tmp_path / "batch.html")["ada.mp4"]
+    assert "✕ Failed ada-avatar holds the avatar of /home/ada.mp4" in text and "<img" not in html and "href" not in html
+
+
+def test_an_unreadable_report_costs_its_own_verdict_only(tmp_path):
+    write_avatar(tmp_path / "ada-avatar", "ada.mp4", 0.97)
+    write_run(tmp_path / "old-avatar", "old.mp4", {"name": "train", "status": "ran"})
+    (tmp_path / "old-avatar" / "report.html").write_bytes(b"\xff of another version")
+    job = ClipJob(Path("/elsewhere/ada.mp4"), tmp_path / "ada-avatar")
+    BatchPage(tmp_path, [job]).add(ClipResult(job, 0, 1.0))
+    cards = read_cards(tmp_path / "batch.html")
+    assert "`gsac report old-avatar` writes it" in cards["old.mp4"][0] and "✓ Good" in cards["ada.mp4"][0]
+
+
+def test_a_page_of_the_user_s_by_that_name_is_never_written_over(tmp_path):
+    (tmp_path / "batch.html").write_text("mine")
+    with pytest.raises(BadInput, match="was not written by `gsac batch`"):
+        BatchPage(tmp_path, [])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")
+def test_everybody_can_read_the_page_and_its_avatars_turn_under_the_pointer(out, node_package):
+    axe = (node_package(AXE) / "node_modules/axe-core/axe.min.js").read_text()
+    browser = chromium.Browser(390, 900)
+    try:
+        for width in (390, 1440):
+            for scheme in ("light", "dark"):
+                browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+                browser.resize(width, 900, mobile=width < 500)
+                browser.open((out / "batch.html").as_uri())
+                assert browser.run("document.documentElement.scrollWidth") == width
+                browser.run(f"{axe};0")
+                assert browser.run("axe.run().then(r => r.violations.map(v => v.id))") == []
+        front = "document.querySelector('.turn img')"
+        assert browser.run(f"{front}.decode().then(() => getComputedStyle({front}).animationName)") == "none"
+        x, y = browser.run(f"(box => [box.x + 20, box.y + 20])({front}.parentNode.getBoundingClientRect())")
+        assert browser.picture()[int(y), int(x), 0] > 150 > browser.picture()[int(y), int(x), 1], "the front is red"
+        browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        assert browser.run(f"getComputedStyle({front}).animationName") == "turn"
+        assert not browser.errors and {address.partition(":")[0] for address in browser.requests} <= {"file", "data"}
+    finally:
+        browser.close()
