@@ -12,6 +12,7 @@ from gsac.pipeline.report.results import Results
 from gsac.pipeline.report.sheets import alpha_sheet
 from gsac.pipeline.report.verdict import NAMES, give_verdict
 
+FACTS = ("brightness", "sharpness")
 FIGURES = ("likeness", "seen_area", "stray_alpha", "torn_alpha")
 
 
@@ -19,7 +20,7 @@ def row_of(run: Path) -> dict[str, Any]:
     """Figures of a run's folder and the verdict as it stands, to be set right by eye."""
     results = Results(run)
     metrics = {name: results.metrics.get(name) for name in FIGURES}
-    facts = {name: value for name, value in alpha_sheet(Footage(results)).facts.items() if name == "sharpness"}
+    facts = {name: value for name, value in alpha_sheet(Footage(results)).facts.items() if name in FACTS}
     given = give_verdict(metrics, facts)
     told = {part: next(p.grade.word for p in given.parts if p.name == name) for part, name in NAMES.items()}
     return {"what": run.name, "seen_by_eye": "", "judged": {"whole": given.grade.word} | told, "facts": facts, "metrics": metrics}
