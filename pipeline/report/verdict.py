@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from gsac.pipeline.report.advice import BLURRED, DARK
 from gsac.pipeline.report.results import number
 
 
@@ -48,9 +49,9 @@ SENTENCES = {
 }
 """What a grade of a part means."""
 NAMES = {"body": "Body and clothes", "face": "Face", "hands": "Hands", "seen": "Seen from all sides", "moves": "In new poses"}
-LIKENESS = {"body": ("structure", 0.91, 0.8), "face": ("worst", 0.95, 0.9), "hands": ("structure", 0.93, 0.845)}
+LIKENESS = {"body": ("structure", 0.9, 0.8), "face": ("worst", 0.95, 0.86), "hands": ("structure", 0.93, 0.83)}
 """Figure of `judge_likeness`, and the least of it for good and for fair. Of a face its worst frame counts: profiles are easy."""
-COLOUR = (25.0, 20.0)
+COLOUR = {"body": (25.0, 20.0), "face": (25.0, 20.0), "hands": (25.0, 25.0)}
 """Least psnr inside, dB, for good and for fair: `structure` is blind to colour."""
 LEAST_PX = {"body": 160, "face": 20, "hands": 12}
 """px of person, face and hand in the frames below which nothing better than fair can be told."""
@@ -58,8 +59,6 @@ SEEN = (0.9, 0.65)
 """Least share of the surface in view, for good and for fair."""
 TORN = (0.004, 0.012)
 """Most alpha off the body, or missing on it, in poses never seen, over the body's area, for good and for fair."""
-BLURRED = 1.0
-"""Sharpness of the footage below which its likeness is worth one grade less."""
 
 
 @dataclass(frozen=True)
@@ -91,16 +90,16 @@ def give_verdict(metrics: dict[str, Any], facts: dict[str, float]) -> Verdict:
 
 
 def grade_likeness(part: str, metrics: dict[str, Any], facts: dict[str, float]) -> Grade:
-    """Of body, face or hands."""
+    """Of body, face or hands. Blur costs a grade; in dark or too small footage nothing better than fair can be told."""
     figures = (metrics.get("likeness") or {}).get(part) or {}
     name, *bounds = LIKENESS[part]
     value, psnr, size = (number(figures.get(key)) for key in (name, "psnr", "px"))
     if value is None or psnr is None:
         return Grade.UNKNOWN
-    rank = sum(value >= least and psnr >= colour for least, colour in zip(bounds, COLOUR, strict=True))
+    rank = sum(value >= least and psnr >= colour for least, colour in zip(bounds, COLOUR[part], strict=True))
     if facts.get("sharpness", BLURRED) < BLURRED:
         rank -= 1
-    if (size or 0) < LEAST_PX[part]:
+    if (size or 0) < LEAST_PX[part] or facts.get("brightness", DARK) < DARK:
         rank = min(rank, Grade.FAIR.rank)
     return next(grade for grade in (Grade.GOOD, Grade.FAIR, Grade.POOR) if grade.rank <= max(rank, 0))
 
@@ -129,7 +128,7 @@ def grade_whole(grades: dict[str, Grade]) -> Grade:
         return body
     if face is poor and body is Grade.FAIR:
         return poor
-    return Grade.FAIR if face in (Grade.FAIR, poor) or poor in (grades["seen"], grades["moves"]) else body
+    return Grade.FAIR if face is Grade.FAIR or poor in grades.values() else body
 
 
 def say_seen(metrics: dict[str, Any]) -> str:
