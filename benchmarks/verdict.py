@@ -23,7 +23,8 @@ def row_of(run: Path) -> dict[str, Any]:
     facts = {name: value for name, value in alpha_sheet(Footage(results)).facts.items() if name in FACTS}
     given = give_verdict(metrics, facts)
     told = {part: next(p.grade.word for p in given.parts if p.name == name) for part, name in NAMES.items()}
-    return {"set": "unseen", "what": run.name, "seen_by_eye": "", "judged": {"whole": given.grade.word} | told, "facts": facts, "metrics": metrics}
+    judged = {"whole": given.grade.word} | told
+    return {"set": "unseen", "what": run.name, "seen_by_eye": "", "judged": judged, "facts": facts, "metrics": metrics}
 
 
 def main(runs: list[str]) -> None:
