@@ -3,6 +3,7 @@
 
 import { isTable } from "./json.js";
 import { MotionError, MotionSource } from "./motion.js";
+import { placeNodes } from "./places.js";
 import { Quat, Vec } from "./quat.js";
 
 const GLTF_MAGIC = 0x46546c67;
@@ -12,8 +13,6 @@ const GLTF_TYPES = {
   5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array,
 };
 const GLTF_WIDTHS = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
-
-/** @typedef {{translation: number[], rotation: number[], scale: number}} NodePlace from a node's parent, or from the world */
 
 /**
  * @param {Uint8Array} bytes
@@ -138,7 +137,7 @@ class GltfReader {
 
   /**
    * A node's place from its parent, with the mean of its scales.
-   * @returns {NodePlace}
+   * @returns {import("./places.js").NodePlace}
    */
   local(node, i) {
     const given = (name, fallback) => {
@@ -209,21 +208,9 @@ class GltfReader {
   }
 }
 
-// World turn, scale and place of each node from its parent's; parents first.
-function placeNodes(pose, parents) {
-  const out = [];
-  pose.forEach(({ translation, rotation, scale }, j) => {
-    const above = out[parents[j]];
-    out.push(above ? { turn: Quat.multiply(above.turn, rotation), scale: above.scale * scale,
-      place: Vec.add(above.place, Quat.rotate(above.turn, Vec.times(translation, above.scale))) }
-      : { turn: rotation, scale, place: translation });
-  });
-  return out;
-}
-
 /**
  * Of a column-major 4x4 matrix, with the mean of its scales.
- * @returns {NodePlace}
+ * @returns {import("./places.js").NodePlace}
  */
 function splitMatrix(m) {
   const columns = [0, 4, 8].map((o) => m.slice(o, o + 3)), lengths = columns.map(Vec.length);

@@ -1,12 +1,13 @@
 // Motion files that the user drops on the page or chooses: their motions become clips of the avatar.
 
 import { readBvh } from "./bvh.js";
+import { readFbx } from "./fbx.js";
 import { readGltf } from "./gltf.js";
 import { MotionError } from "./motion.js";
 import { retarget } from "./retarget.js";
 
 const MOST_BYTES = 128 * 2 ** 20;
-const READERS = { bvh: readBvhMotions, glb: readGltf, gltf: readGltf, vrma: readGltf };
+const READERS = { bvh: readBvhMotions, fbx: readFbx, glb: readGltf, gltf: readGltf, vrma: readGltf };
 
 function readBvhMotions(bytes, where) {
   return [{ name: where.replace(/\.[^.]*$/, ""), source: readBvh(new TextDecoder().decode(bytes), where) }];
@@ -23,9 +24,7 @@ export async function addMotions(avatar, files) {
   const motions = files.filter((file) => Object.hasOwn(READERS, kind(file)));
   if (!motions.length) {
     const names = files.map((file) => file.name).join(", ") || "nothing";
-    const fbx = files.some((file) => kind(file) === "fbx");
-    const instead = fbx ? "; FBX is read by `gsac render --motion`, and Blender saves it as glTF" : "";
-    throw new MotionError(`${names}: a motion is read from .bvh, .glb and .gltf${instead}`);
+    throw new MotionError(`${names}: a motion is read from .bvh, .fbx, .glb, .gltf and .vrma`);
   }
   /** @type {Object<string, Uint8Array>} */
   const bytes = {};
@@ -37,7 +36,7 @@ export async function addMotions(avatar, files) {
   }
   const added = [];
   for (const file of motions) {
-    for (const { name, source } of READERS[kind(file)](bytes[file.name], file.name, bytes)) {
+    for (const { name, source } of await READERS[kind(file)](bytes[file.name], file.name, bytes)) {
       const clip = retarget(source, avatar, file.name), label = freeName(avatar.clips, name.slice(0, 40));
       avatar.clips[label] = clip;
       added.push(label);

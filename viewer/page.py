@@ -13,7 +13,8 @@ PAGE, STYLE = "page.html", "style.css"
 MODULES = ("json.js", "container.js", "reader.js",
            "flat_quat.js", "skin.js", "binding.js", "sort.js",
            "projection.js", "pack.js", "webgl.js", "software.js", "shaders.js", "device.js", "webgpu.js", "renderer.js",
-           "quat.js", "motion.js", "joint_names.js", "match_names.js", "bvh.js", "gltf.js", "retarget.js", "motion_files.js",
+           "quat.js", "motion.js", "places.js", "joint_names.js", "match_names.js", "bvh.js", "gltf.js",
+           "fbx_file.js", "fbx_curve.js", "fbx.js", "retarget.js", "motion_files.js",
            "address.js", "name.js", "camera.js", "rate.js", "viewer.js", "limb.js", "share.js", "xr.js", "sliders.js", "keys.js",
            "controls.js", "main.js")
 """Each after those that it imports; main.js runs the page. Whole names, so that the cache sees these files."""

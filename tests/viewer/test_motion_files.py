@@ -10,10 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.avatar.motion.bvh import parse_bvh, read_bvh
+from gsac.avatar.motion.files import read_motion
 from gsac.avatar.motion.names import match
 from gsac.avatar.motion.retarget import retarget
 from gsac.avatar.motion.source import Motion
 from gsac.benchmarks.viewer import browser as chromium
+from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.stage import pose_gaussians
 from gsac.viewer.page import page_bytes
@@ -150,6 +152,15 @@ def test_our_own_glb_dropped_gives_its_clips_back(page, figure, tmp_path):
         assert np.degrees(turn.magnitude()).max() < 0.1
 
 
+def test_a_dropped_fbx_plays_as_render_plays_it(page, figure, tmp_path):
+    pytest.importorskip("ufbx")
+    path = tmp_path / "own.fbx"
+    path.write_bytes(avatar_fbx(figure, pose_gaussians(figure, figure.pose("T"))[0]))
+    names = drop(page, path).removesuffix(": put on this avatar").split(", ")
+    assert [name.split()[0] for name in names] == ["wave", "walk"] and page.run("gsac.playing.clip") == names[0]
+    assert_same(clip_of(page, names[0]), read_motion(path, figure.joint_names, figure.parents, figure.joints), degrees=0.1)
+
+
 def gltf_of(source, step="LINEAR"):
     """A .gltf with its buffer inside: nodes at the rest pose of a Source, one animation of all its rotations and the hips."""
     data, views, accessors = bytearray(), [], []
@@ -207,8 +218,8 @@ def test_what_is_wrong_with_a_file_is_said_on_the_page_and_what_plays_goes_on(pa
         "odd.bvh": ("\n".join([*lines[:-2], "1 2 x"]), f"odd.bvh, line {len(lines) - 1}: 3 numbers; the skeleton has 168 channels"),
         "cut.bvh": (text[:len(text) // 2], "cut.bvh, line "),
         "dog.bvh": (text.replace("left_elbow", "left_paw"), "dog.bvh: no joint for left_elbow"),
-        "picture.txt": ("x", "picture.txt: a motion is read from .bvh, .glb and .gltf"),
-        "mixamo.fbx": ("x", "mixamo.fbx: a motion is read from .bvh, .glb and .gltf; FBX is read by `gsac render --motion`"),
+        "picture.txt": ("x", "picture.txt: a motion is read from .bvh, .fbx, .glb, .gltf and .vrma"),
+        "text.fbx": ("; FBX 7.4.0 project file", "text.fbx: it is FBX as text; binary FBX is read here"),
         "empty.glb": ("", "empty.glb: it is not glTF"),
         "still.gltf": (json.dumps({"asset": {"version": "2.0"}}), "still.gltf: it holds no animation"),
         "short.gltf": (json.dumps(document | {"buffers": [{"uri": "data:a;base64,AAAA"}]}), "accessors[0] ends after its buffer"),
