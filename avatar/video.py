@@ -1,4 +1,4 @@
-"""Writes frames as a silent video (H.264, VP9) or a GIF, encoded by imageio-ffmpeg's ffmpeg, or as a folder of PNG files."""
+"""Writes frames as a silent video (H.264, VP9, ProRes 4444) or a GIF, encoded by imageio-ffmpeg's ffmpeg, or as PNG files."""
 
 from __future__ import annotations
 
@@ -23,10 +23,13 @@ ENCODERS = {
     ".webm": lambda alpha: [*TO_BT709, "-c:v", "libvpx-vp9", "-crf", str(CRF_VP9), "-b:v", "0", "-cpu-used", "4", "-row-mt", "1",
                             "-auto-alt-ref", "0", "-pix_fmt", "yuva420p" if alpha else "yuv420p", *BT709,
                             "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "webm"],
+    ".mov": lambda alpha: [*TO_BT709, "-c:v", "prores_ks", "-profile:v", "4444", "-vendor", "apl0",
+                           "-alpha_bits", "16" if alpha else "0", "-pix_fmt", "yuva444p10le" if alpha else "yuv444p10le", *BT709,
+                           "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "mov"],
     ".gif": lambda alpha: ["-vf", PALETTE, "-loop", "0", "-f", "gif"],
 }
 """Suffix -> ffmpeg's options, by whether the frames have transparency."""
-TRANSPARENT = (".webm", ".gif")
+TRANSPARENT = (".webm", ".mov", ".gif")
 """Suffixes of files that can hold transparency; PNG files can as well."""
 
 

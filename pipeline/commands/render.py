@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gsac.avatar.video import TRANSPARENT
+from gsac.avatar.video import ENCODERS, TRANSPARENT
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import require_file
@@ -18,12 +19,16 @@ from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput, StageError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.avatar.motion.source import Motion
 
 FILE = "avatar.gsac"
-FILMS = (".mp4", ".webm", ".gif")
+FILMS = tuple(ENCODERS)
 """Suffixes of --out; without one it is a folder of pictures."""
+HEIGHT, WIDTHS = 960, (720, 1280)
+"""Of the picture, px, unless told: its height, and the least and largest width."""
 SIZES = (16, 4096)
 """Least and largest width or height, px."""
 TURN_S = 6.0
@@ -37,15 +42,18 @@ def declare(command: argparse.ArgumentParser) -> None:
                          help="a .bvh, .fbx (Mixamo), .glb, .vrma or AMASS-style .npz file, or the name of a clip in the "
                               "avatar (walk, wave); without it the avatar is seen from all sides")
     command.add_argument("--out", type=Path, metavar="FILE",
-                         help="a .mp4, .webm or .gif, or a new folder for PNG pictures; "
+                         help="a .mp4, .webm, .mov (ProRes 4444) or .gif, or a new folder for PNG pictures; "
                               "default: <avatar>-<motion>.mp4 here, without a motion <avatar>-turn.mp4")
     add_force(command)
-    command.add_argument("--size", default="720x960", metavar="WxH", help="pixels, even numbers; default: 720x960")
+    command.add_argument("--size", metavar="WxH",
+                         help=f"pixels, even numbers; default: {HEIGHT} high and as wide as the motion needs to fill that, "
+                              f"{WIDTHS[0]} to {WIDTHS[1]}")
     command.add_argument("--fps", type=float, default=30.0, metavar="N", help="default: 30")
     command.add_argument("--seconds", type=float, metavar="N",
                          help=f"no more of the motion than this; of the turn, how long it takes (default: {TURN_S:g})")
     command.add_argument("--background", default="2b303b", metavar="RRGGBB",
-                         help="or none: transparent, for .webm, .gif and PNG pictures; default: 2b303b")
+                         help="or none: transparent, for .webm, .mov, .gif and PNG pictures; default: 2b303b")
+    command.add_argument("--floor", metavar="RRGGBB", help="a floor of this colour with lines half a metre apart, which fades out")
     command.add_argument("--no-shadow", action="store_true", help="no soft shadow on the floor")
     command.add_argument("--yaw", type=float, default=0.0, metavar="DEGREES",
                          help="where the camera stands around a motion; default: 0, in front")
@@ -54,8 +62,9 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    width, height = parse_size(arguments.size)
-    background = None if arguments.background == "none" else parse_colour(arguments.background)
+    size = parse_size(arguments.size) if arguments.size else None
+    background = None if arguments.background == "none" else parse_colour("--background", arguments.background)
+    floor = parse_colour("--floor", arguments.floor) if arguments.floor else None
     if not 1 <= arguments.fps <= 240:
         raise BadInput(f"--fps {arguments.fps:g}: expected 1 to 240")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 3600:
@@ -69,7 +78,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--background none: {out.suffix} holds no transparency; expected --out with {' or '.join(TRANSPARENT)}, "
                        "or a folder for PNG pictures")
     with progress_reporter(arguments) as reporter:
-        frames, seconds = film(file, arguments, out, (width, height), background, reporter)
+        frames, (width, height), seconds = film(file, arguments, out, size, background, floor, reporter)
     if arguments.json:
         emit({"stages": [{"name": "render", "status": Outcome.RAN.value, "seconds": seconds, "key": None}],
               "outputs": {"video": str(out)},
@@ -80,13 +89,15 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int],
-         background: list[float] | None, reporter: PlainReporter) -> tuple[int, float]:
-    """Writes the video. Returns the number of its frames and the seconds that it took."""
-    import numpy as np
+def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int] | None, background: np.ndarray | None,
+         floor: np.ndarray | None, reporter: PlainReporter) -> tuple[int, tuple[int, int], float]:
+    """Writes the video. Returns the number of its frames, their width and height, and the seconds that it took.
+
+    background, floor: (3,) RGB in 0..1.
+    """
 
     from gsac.avatar.artifacts import ArtifactError
-    from gsac.avatar.film import draw_frames, performance, turntable
+    from gsac.avatar.film import draw_frames, fit_aspect, performance, turntable
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.avatar.video import Pictures, Video, VideoError
 
@@ -97,9 +108,9 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
         motion = find_motion(arguments.motion, avatar)
         plan = (turntable(avatar, arguments.seconds or TURN_S, arguments.fps) if motion is None
                 else performance(motion, arguments.fps, arguments.seconds, arguments.yaw))
-        colour = None if background is None else np.array(background)
+        size = size or (min(max(2 * math.ceil(fit_aspect(avatar, plan) * HEIGHT / 2), WIDTHS[0]), WIDTHS[1]), HEIGHT)
         with Video(out, *size, arguments.fps, background is None) if out.suffix else Pictures(out) as video:
-            for done, frame in enumerate(draw_frames(avatar, plan, *size, colour, shadow=not arguments.no_shadow)):
+            for done, frame in enumerate(draw_frames(avatar, plan, *size, background, shadow=not arguments.no_shadow, floor=floor)):
                 reporter.progress("render", done, len(plan), "frames")
                 video.add(frame)
     except ArtifactError as e:
@@ -108,7 +119,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
         raise StageError(str(e)) from e
     seconds = time.monotonic() - began
     reporter.ends("render", Outcome.RAN, seconds)
-    return len(plan), seconds
+    return len(plan), size, seconds
 
 
 def check_out(out: Path, file: Path, force: bool) -> None:
@@ -184,8 +195,10 @@ def parse_size(words: str) -> tuple[int, int]:
     return numbers[0], numbers[1]
 
 
-def parse_colour(words: str) -> list[float]:
-    """r, g, b in 0..1 of `rrggbb`."""
+def parse_colour(option: str, words: str) -> np.ndarray:
+    """(3,) RGB in 0..1 of `rrggbb`."""
+    import numpy as np
+
     if not re.fullmatch(r"#?[0-9a-fA-F]{6}", words):
-        raise BadInput(f"--background {words}: expected six hexadecimal digits, for example ffffff")
-    return [int(words.lstrip("#")[i:i + 2], 16) / 255 for i in (0, 2, 4)]
+        raise BadInput(f"{option} {words}: expected six hexadecimal digits, for example ffffff")
+    return np.array([int(words.lstrip("#")[i:i + 2], 16) / 255 for i in (0, 2, 4)])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsac.avatar.film import FOLLOW_S, draw_frames, performance, turntable
+from gsac.avatar.film import FOLLOW_S, draw_frames, find_distances, find_targets, fit_aspect, performance, turntable
 from gsac.avatar.motion.source import Motion
 from support.scripts import TOOLS, script
 
@@ -51,6 +51,27 @@ def test_the_shadow_lies_under_the_feet_and_nowhere_else(figure):
     assert rows.min() > 0.8 * HEIGHT and abs(columns_.mean() - WIDTH / 2) < 4
 
 
+def test_a_floor_lies_under_the_feet_has_lines_and_fades_out_before_the_horizon(figure):
+    film, red = turntable(figure, 0.1, 10), np.array([1.0, 0, 0])
+    plain, floored = (next(iter(draw_frames(figure, film, WIDTH, HEIGHT, BLACK, floor=f))).astype(float) for f in (None, red))
+    gained = (floored - plain).max(-1)
+    there = gained[:, [2, -3]].mean(1)
+    assert there[-1] > 200 and there[:HEIGHT // 2].max() < 1 and (np.diff(there[HEIGHT // 2:]) > -30).all()
+    lines = floored[-20:][gained[-20:] > 0]
+    assert 5 < (lines[:, 1] > 5).sum() < 0.4 * len(lines), "on a dark colour they are brighter"
+    (bare,) = draw_frames(figure, film, WIDTH, HEIGHT, None, floor=red)
+    assert (bare[-1, 2] == (255, 0, 0, 255)).all() or bare[-1, 2, 3] > 200
+    assert (bare[:HEIGHT // 4, :5, 3] == 0).all(), "what is not there stays transparent"
+
+
+def test_the_shadow_lies_on_the_floor(figure):
+    film = turntable(figure, 0.1, 10)
+    plain, shaded = (next(iter(draw_frames(figure, film, WIDTH, HEIGHT, BLACK, shadow=s, floor=np.ones(3)))).astype(float)
+                     for s in (False, True))
+    rows, columns_ = np.nonzero((plain - shaded).max(-1) > 20)
+    assert len(rows) > 50 and rows.min() > 0.8 * HEIGHT and abs(columns_.mean() - WIDTH / 2) < 4
+
+
 def test_a_motion_may_be_seen_from_behind(figure):
     still = raised(figure, "head", (0, 0, 0))
     front, behind = (next(iter(draw_frames(figure, performance(still, 10, yaw=yaw), WIDTH, HEIGHT, BLACK))).astype(float)
@@ -67,14 +88,39 @@ def test_a_raised_right_arm_is_raised_at_the_left_of_the_picture(figure):
     assert blue_x < WIDTH / 2 < red_x and blue_y < red_y - 20
 
 
+def restless(figure, T=41):
+    """Stands, spreads a leg in the middle, and has the arms down or up by turns."""
+    moved = raised(figure, "left_hip", (0, 0, 0), T)
+    moved.rotation[T // 2:T // 2 + 4, figure.joint_names.index("left_hip")] = (0, 0, 1.4)
+    for name, side in (("left_shoulder", 1), ("right_shoulder", -1)):
+        moved.rotation[:, figure.joint_names.index(name), 2] = side * np.where(np.arange(T) < T // 3, 1.3, -1.1)
+    return moved
+
+
 def test_every_pose_is_inside_the_picture_and_fills_it(figure):
-    figure_out = raised(figure, "left_hip", (0, 0, 1.4), 9)
-    figure_out.rotation[:5] = 0
-    for film in (turntable(figure, 1, 12), performance(figure_out, 10)):
+    for film in (turntable(figure, 1, 12), performance(restless(figure), 10)):
         lit = drawn(figure, film).max(-1) > 8
         assert not lit[:, [0, -1]].any() and not lit[:, :, [0, -1]].any()
         used = lit.any(0)
-        assert max(np.ptp(np.nonzero(used)[0]) / HEIGHT, np.ptp(np.nonzero(used)[1]) / WIDTH) > 0.75
+        assert max(np.ptp(np.nonzero(used)[0]) / HEIGHT, np.ptp(np.nonzero(used)[1]) / WIDTH) > 0.85
+
+
+def test_in_a_picture_as_wide_as_the_motion_needs_the_figure_fills_the_height_all_the_time(figure):
+    film = performance(restless(figure), 10)
+    aspect = fit_aspect(figure, film)
+    lit = np.stack(list(draw_frames(figure, film, int(np.ceil(HEIGHT * aspect)), HEIGHT, BLACK))).max(-1) > 8
+    tall = np.array([np.ptp(np.nonzero(frame.any(1))[0]) / HEIGHT for frame in lit])
+    assert np.median(tall) > 0.8 and tall.min() > 0.65
+    assert not lit[:, [0, -1]].any() and not lit[:, :, [0, -1]].any()
+    assert lit.any((0, 1))[[7, -8]].any(), "and no wider"
+
+
+def test_the_camera_comes_nearer_slowly_and_keeps_its_distance_on_the_way_round(figure):
+    film = performance(restless(figure), 10)
+    distances = find_distances(figure, film, find_targets(figure, film), 0.75)
+    assert np.ptp(distances) > 0.1 and np.abs(np.diff(np.log(distances))).max() * film.fps < 0.6
+    film = turntable(figure, 1, 10)
+    assert np.ptp(find_distances(figure, film, find_targets(figure, film), 0.75)) == 0
 
 
 def test_the_camera_goes_along_and_a_step_is_still_seen_as_one(figure):

@@ -24,11 +24,26 @@ def test_another_program_reads_back_every_frame_with_its_colours_and_rate(tmp_pa
         assert np.abs(image - frame(k)).mean() < 6, k
 
 
-def test_the_same_frames_give_the_same_bytes(tmp_path):
-    for name in ("a.mp4", "b.mp4"):
-        with Video(tmp_path / name, 64, 48, 10) as video:
+def test_a_mov_is_prores_4444_and_keeps_colours_and_transparency_almost_as_they_are(tmp_path):
+    av = pytest.importorskip("av")
+    image = np.dstack([frame(2), np.linspace(0, 255, 64 * 48).reshape(48, 64).astype(np.uint8)])
+    for alpha in (True, False):
+        with Video(tmp_path / "a.mov", 64, 48, 25, alpha) as video:
+            video.add(image[..., :4 if alpha else 3])
+        with av.open(str(tmp_path / "a.mov")) as file:
+            assert (file.streams.video[0].codec_context.codec_tag, file.streams.video[0].format.name[:7]) == (
+                "ap4h", "yuva444" if alpha else "yuv444p")
+            (read,) = (f.to_ndarray(format="rgba").astype(float) for f in file.decode(video=0))
+        assert np.abs(read[..., :3] - image[..., :3]).mean() < 3
+        assert np.abs(read[..., 3] - (image[..., 3] if alpha else 255)).max() <= 1
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mov"])
+def test_the_same_frames_give_the_same_bytes(tmp_path, suffix):
+    for name in ("a", "b"):
+        with Video(tmp_path / f"{name}.{suffix}", 64, 48, 10) as video:
             video.add(frame(0))
-    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+    assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
 
 
 def test_an_error_in_between_leaves_the_old_file_and_no_other(tmp_path):

@@ -25,6 +25,9 @@ def run(tmp_path_factory):
     walk = dances.Motion(clip.fps, rotation, clip.transl)
     names = [dances.mixamo(n) for n in figure.joint_names]
     (folder / "walk.bvh").write_text(dances.bvh_text(skeleton, walk, names, unit=100, world=dances.Z_UP))
+    rotation = np.zeros((5, len(figure.joints), 3), np.float32)
+    spread = dances.Motion(clip.fps, rotation, np.zeros((5, 3), np.float32))
+    (folder / "spread.bvh").write_text(dances.bvh_text(skeleton, spread, names, unit=100, world=dances.Z_UP))
     return folder
 
 
@@ -63,7 +66,8 @@ def test_a_walk_from_another_tool_is_the_walk_that_the_avatar_carries(run, tmp_p
 
 @pytest.mark.parametrize(("words", "named"), [
     (["--size", "97x128"], "--size 97x128"), (["--size", "big"], "--size big"), (["--fps", "0"], "--fps 0"),
-    (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"), (["--yaw", "nan"], "--yaw nan"),
+    (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"),
+    (["--floor", "wood"], "--floor wood"), (["--yaw", "nan"], "--yaw nan"),
     (["--out", "clip.avi"], "clip.avi"), (["--motion", "jump"], "jump: no such file, and the avatar's clips are: wave, walk")])
 def test_a_wrong_word_is_named_and_what_is_expected(run, tmp_path, capsys, monkeypatch, words, named):
     monkeypatch.chdir(tmp_path)
@@ -81,18 +85,34 @@ def last_frame(path):
             return np.asarray([frame.convert("RGBA") for frame in ImageSequence.Iterator(image)][-1])
     av = pytest.importorskip("av")
     with av.open(str(path)) as file:
-        decoder = av.CodecContext.create("libvpx-vp9", "r")
+        decoder = av.CodecContext.create("libvpx-vp9", "r") if path.suffix == ".webm" else file.streams.video[0]
         frames = [f for packet in file.demux(video=0) if packet.size for f in decoder.decode(packet)]
         return frames[-1].to_ndarray(format="rgba")
 
 
-@pytest.mark.parametrize("name", ["turn.webm", "turn.gif"])
+@pytest.mark.parametrize("name", ["turn.webm", "turn.mov", "turn.gif"])
 def test_a_film_without_a_background_is_transparent_round_the_figure(run, tmp_path, capsys, name):
     code, _, _ = render(capsys, run, "--out", tmp_path / name, "--size", "96x128", "--seconds", 0.5, "--fps", 8, "--background",
                         "none", "--no-shadow")
     image = last_frame(tmp_path / name)
     assert code == 0 and image.shape == (128, 96, 4)
-    assert image[:5, :, 3].max() < 12 and (image[..., 3] > 240).mean() > 0.05
+    assert image[:3, :, 3].max() < 12 and (image[..., 3] > 240).mean() > 0.05
+
+
+def test_unless_told_the_picture_is_as_wide_as_the_motion_needs(run, tmp_path, capsys):
+    for words, wide in ((["--seconds", 0.1], False), (["--motion", run / "spread.bvh"], True)):
+        code, out, _ = render(capsys, run, *words, "--fps", 4, "--out", tmp_path / str(wide), "--json")
+        made = json.loads(out.splitlines()[-1])["metrics"]
+        assert code == 0 and made["height"] == 960 and (720 < made["width"] <= 1280 if wide else made["width"] == 720)
+
+
+def test_a_floor_is_drawn_where_it_is_asked_for(run, tmp_path, capsys):
+    from PIL import Image
+
+    code, _, _ = render(capsys, run, "--out", tmp_path / "frames", "--size", "96x128", "--seconds", 0.1, "--fps", 8, "--floor",
+                        "ff0000")
+    image = np.asarray(Image.open(tmp_path / "frames" / "000000.png")).astype(int)
+    assert code == 0 and image[-1, 2, 0] > 200 > 60 > image[-1, 2, 2] and tuple(image[0, 2]) == (0x2B, 0x30, 0x3B)
 
 
 def test_pictures_go_to_a_new_folder_and_never_over_what_is_there(run, tmp_path, capsys):
@@ -112,7 +132,7 @@ def test_pictures_go_to_a_new_folder_and_never_over_what_is_there(run, tmp_path,
 
 def test_a_film_that_cannot_be_transparent_says_which_can(run, tmp_path, capsys):
     code, _, err = render(capsys, run, "--out", tmp_path / "a.mp4", "--background", "none")
-    assert code == 2 and ".webm or .gif, or a folder" in err and list(tmp_path.iterdir()) == []
+    assert code == 2 and ".webm or .mov or .gif, or a folder" in err and list(tmp_path.iterdir()) == []
 
 
 def test_a_damaged_motion_names_its_line_and_leaves_no_video(run, tmp_path, capsys):
