@@ -76,7 +76,7 @@ class Scene:
 
     def __init__(self, seconds=1.0):
         self.objects, self.connections, self.last = Node("Objects"), Node("Connections"), 10
-        self.stacks, self.seconds = [], seconds
+        self.head, self.ticks, self.seconds = Node("FBXHeaderExtension"), SECOND, seconds
 
     def add(self, kind, name, what):
         self.last += 1
@@ -95,8 +95,8 @@ class Scene:
 
     def take(self, name, begin=0.0):
         stack = self.add("AnimationStack", name, "")
-        stack.properties(("LocalStart", "KTime", "Time", "", Long(round(begin * SECOND))),
-                         ("LocalStop", "KTime", "Time", "", Long(round((begin + self.seconds) * SECOND))))
+        stack.properties(("LocalStart", "KTime", "Time", "", Long(round(begin * self.ticks))),
+                         ("LocalStop", "KTime", "Time", "", Long(round((begin + self.seconds) * self.ticks))))
         layer = self.add("AnimationLayer", name, "")
         self.connect(layer, stack)
         return layer
@@ -107,7 +107,7 @@ class Scene:
         mover.properties(*((f"d|{axis}", "Number", "", "A", 10.0 + k) for k, axis in enumerate("XYZ")))
         self.connect(mover, layer)
         self.connect(mover, model, track)
-        times = np.rint(np.asarray(seconds) * SECOND).astype(np.int64)
+        times = np.rint(np.asarray(seconds) * self.ticks).astype(np.int64)
         for axis, row in zip(axes, np.transpose(values), strict=True):
             curve = self.add("AnimationCurve", "", "")
             attributes = np.zeros((1, 4)) if data is None else data
@@ -121,7 +121,7 @@ class Scene:
             self.connect(curve, mover, f"d|{axis}")
 
     def bytes(self, wide=False):
-        nodes = [Node("GlobalSettings"), self.objects, self.connections]
+        nodes = [self.head, Node("GlobalSettings"), self.objects, self.connections]
         return wide_bytes(nodes) if wide else fbx_bytes(nodes)
 
 
@@ -134,7 +134,7 @@ def wide_bytes(nodes):
         out.extend(bytes(24) + bytes([len(name)]) + name + properties)
         for child in node.children:
             write(child)
-        if node.children:
+        if node.children or not node.values:
             out.extend(bytes(25))
         struct.pack_into("<QQQ", out, start, len(out), len(node.values), len(properties))
 
@@ -211,6 +211,18 @@ def test_a_curve_goes_on_after_its_keys_as_ufbx_lets_it(read, tmp_path, again):
     (tmp_path / "again.fbx").write_bytes(scene.bytes())
     ((motion,),) = read(tmp_path / "again.fbx")
     assert_as_ufbx(motion, tmp_path / "again.fbx")
+
+
+def test_time_may_be_counted_in_the_new_ticks(read, tmp_path):
+    scene, _, hand = arm()
+    scene.ticks = 141120000
+    scene.head.add("FBXHeaderVersion", 1004)
+    scene.head.add("OtherFlags").add("TCDefinition", 0)
+    scene.curve(scene.take("new"), hand, "Lcl Rotation", "X", [0, .5, 1], [[0], [60], [10]])
+    (tmp_path / "new.fbx").write_bytes(scene.bytes())
+    ((motion,),) = read(tmp_path / "new.fbx")
+    assert_as_ufbx(motion, tmp_path / "new.fbx")
+    assert len(motion["turns"]) == 31 * 2 * 4
 
 
 def miscounted(times, count):
