@@ -7,9 +7,9 @@ from typing import Any
 
 from gsac.pipeline.report.results import number
 
-TURN, HANDS, FEET, PERSON, OUTLINE, CUT_OUT = 270.0, 0.5, 0.8, 0.95, 0.85, 0.95
-"""Least degrees of the turn; least share of the frames that show each hand, feet, a person; least IoU of the fitted body's
-and of the avatar's outline."""
+TURN, HANDS, ENDS, PERSON, OUTLINE, CUT_OUT = 270.0, 0.5, 0.8, 0.95, 0.85, 0.95
+"""Least degrees of the turn; least share of the frames that show each hand, head and feet, a person; least IoU of the fitted
+body's and of the avatar's outline."""
 FEW_PHOTOS, DARK, BLURRED, FACE_PX = 10, 0.14, 1.0, 24
 """Least photos, brightness of the person (0..1), sharpness, and px of the face's box."""
 
@@ -20,6 +20,7 @@ class Advice(Enum):
     TURN = "Turn once fully on the spot, in 10 to 20 seconds, and film all of it."
     PHOTOS = "Take at least 12 photos, one every 30 degrees of a full turn."
     ONE_PERSON = "Let one person alone be in the picture, from the first frame to the last."
+    STILL = "Stand the phone on something firm that does not move, and leave its zoom alone."
     WHOLE = "Step back until head and feet stay in the picture all the time."
     CLOSER = "Hold the phone upright and come closer, until the person fills the height of the picture."
     FACE = "Begin with the face to the camera, in even light, nothing before it."
@@ -39,7 +40,8 @@ def give_advice(metrics: dict[str, Any], facts: dict[str, float]) -> list[Advice
         Advice.PHOTOS: few,
         Advice.TURN: not few and facts.get("turn_degrees", 360) < TURN,
         Advice.ONE_PERSON: facts.get("person_share", 1) < PERSON,
-        Advice.WHOLE: facts.get("feet_share", 1) < FEET,
+        Advice.STILL: bool(facts.get("moved_frames")),
+        Advice.WHOLE: min(facts.get("feet_share", 1), facts.get("top_share", 1)) < ENDS,
         Advice.CLOSER: (number(face.get("px")) or FACE_PX) < FACE_PX,
         Advice.FACE: facts.get("face_share", 1) == 0 or facts.get("face_used", 1) == 0,
         Advice.HANDS: any(facts.get(f"{side}_hand_share", 1) < HANDS for side in ("left", "right")),

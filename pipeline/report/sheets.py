@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 import cv2
@@ -15,6 +16,7 @@ from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
 from gsac.pipeline.report.pictures import SEEN, Footage, Picture, make_picture, shrink_to_fit, spread_evenly
 from gsac.pipeline.report.results import AbsentError, Results, number
+from gsac.stages.segment.camera_motion import find_moved, make_view, measure_sway
 
 CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT = 12, 8, 8, 8, 8
 """How many frames each sheet shows at most."""
@@ -23,6 +25,8 @@ WIDE, HIGH = 520, 640
 VIEWS_BYTES = 160_000
 LEAST_MASK = 1e-4
 """A mask that covers less of the frame is empty."""
+RIM = 2
+"""Width of the frame's rim, px: a mask that reaches it is cut off there."""
 PERSON_PX = 420
 """Height of the person at which the footage's sharpness is measured, px."""
 PERSON_WHITE = 250
@@ -121,10 +125,12 @@ def alpha_sheet(footage: Footage) -> Sheet:
     """The person cut out, on magenta."""
     crop = footage.crop(WIDE, HIGH)
     masks = {p.stem for p in frame_paths(footage.results.path("segment/alpha"))}
-    pictures, covers, soft, looks = [], [], [], []
+    pictures, covers, soft, looks, views, cut = [], [], [], [], [], []
     for t in spread_evenly(len(footage.frames), ALPHA):
         alpha = footage.alpha(t)
         looks.append(measure_light(footage.frame(t), alpha))
+        views.append(make_view(footage.frame(t), alpha))
+        cut.append(sides_touched(alpha))
         covers.append(float(alpha.mean()))
         soft.append(float(((alpha > 0.02) & (alpha < 0.98)).sum() / max((alpha >= 0.5).sum(), 1)))
         pictures.append(make_picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
@@ -134,13 +140,28 @@ def alpha_sheet(footage: Footage) -> Sheet:
     for name, values in zip(("brightness", "sharpness"), zip(*looks, strict=True), strict=True):
         if np.isfinite(values).any():
             facts[name] = float(np.nanmedian(values))
+    facts["top_share"] = 1 - float(np.mean(["top" in sides for sides in cut]))
     figures = {"Frame covered, median": percent(float(np.median(covers))),
                "Soft edge, of the person's area": percent(float(np.median(soft)))}
+    if any(cut):
+        counts = Counter(side for sides in cut for side in sides)
+        figures["Person at the picture's edge"] = ", ".join(f"{side} in {n} of {len(cut)}" for side, n in counts.items())
+    if footage.clip.timestamps_s:
+        sway = measure_sway(views)
+        facts["moved_frames"] = float(find_moved(sway, max(footage.clip.width, footage.clip.height)).sum())
+        known = np.isfinite(sway).any()
+        figures["Camera moved by at most"] = f"{np.nanmax(sway):.0f} px" if known else "not known: too plain a background"
     if missing:
         figures["Frames without a mask"] = str(missing)
     if facts["empty_masks"]:
         figures["Empty masks among those shown"] = f"{int(facts['empty_masks'])} of {len(covers)}"
     return Sheet(pictures, figures, facts)
+
+
+def sides_touched(alpha: np.ndarray) -> list[str]:
+    """Names of the picture's edges at which the person is cut off. alpha: (H, W) in 0..1."""
+    rims = {"top": alpha[:RIM], "bottom": alpha[-RIM:], "left": alpha[:, :RIM], "right": alpha[:, -RIM:]}
+    return [side for side, rim in rims.items() if (rim >= 0.5).any()]
 
 
 def measure_light(image: np.ndarray, alpha: np.ndarray) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import Job, StageError
 from gsac.stages.frame_names import name_frames
+from gsac.stages.segment.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.stages.segment.components import keep_person
 from gsac.stages.segment.config import Method
 from gsac.stages.segment.grabcut import cut_out
@@ -33,11 +34,13 @@ def run(job: Job) -> None:
     if len(paths) != len(keypoints["xy"]):
         raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
     network = METHODS[job.config.method](job.models)
+    clip = Clip.read(job.inputs["split/clip.json"])
+    is_video = clip.timestamps_s is not None
     plate, given = None, (frames / "plate.png").exists()
     if job.config.use_plate and given:
         image = read_frame(frames / "plate.png")
         plate = Plate(image, np.ones(image.shape[:2], bool))
-    elif job.config.use_plate and Clip.read(job.inputs["split/clip.json"]).timestamps_s is not None:
+    elif job.config.use_plate and is_video:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
     (job.out / "alpha").mkdir()
     absent, other_scene = np.zeros((2, len(paths)), bool)
@@ -48,7 +51,7 @@ def run(job: Job) -> None:
             region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
             yield t, image, None if region is None else network(image, region)
 
-    def cut(masked: tuple[int, np.ndarray, np.ndarray | None]) -> None:
+    def cut(masked: tuple[int, np.ndarray, np.ndarray | None]) -> View:
         t, image, probability = masked
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
         if probability is None:
@@ -62,16 +65,25 @@ def run(job: Job) -> None:
                 raise StageError(f"frame {t} ({paths[t].name}): the mask is empty although a person was found there; "
                                  "look at the frame, and remove it or try segment.method=selfie")
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
+        return make_view(image, alpha)
+
+    def counted(views: Iterable[View]) -> Iterator[View]:
+        for done, view in enumerate(views, 1):
+            job.progress(done, len(paths), "frames")
+            yield view
 
     with ThreadPoolExecutor(available_cores()) as pool:
-        for done, _ in enumerate(prefetch(pool, cut, masks(pool), available_cores()), 1):
-            job.progress(done, len(paths), "frames")
+        sway = measure_sway(counted(prefetch(pool, cut, masks(pool), available_cores())))
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
     if absent.any():
         job.warn(f"No person is in {name_frames(absent)}; the mask there is empty.")
     if other_scene.any():
         job.warn(f"The plate does not show the scene of {name_frames(other_scene)} (did the camera move?); it is not used there.")
+    moved = find_moved(sway, max(clip.width, clip.height))
+    if is_video and moved.any():
+        job.warn(f"The camera moves: in {name_frames(moved)} the background lies up to {np.nanmax(sway):.0f} px off. Stand the "
+                 "phone on something firm, and do not zoom.")
 
 
 def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,

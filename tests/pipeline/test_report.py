@@ -426,7 +426,8 @@ def test_without_held_out_frames_nothing_is_called_good():
 
 @pytest.mark.parametrize(("metrics", "facts", "advice"), [
     ({}, {"turn_degrees": 18.0}, Advice.TURN), ({}, {"photos": 4.0, "turn_degrees": 90.0}, Advice.PHOTOS),
-    ({}, {"feet_share": 0.0}, Advice.WHOLE), ({}, {"left_hand_share": 0.2}, Advice.HANDS), ({}, {"brightness": 0.05}, Advice.LIGHT),
+    ({}, {"feet_share": 0.0}, Advice.WHOLE), ({}, {"top_share": 0.4}, Advice.WHOLE), ({}, {"moved_frames": 5.0}, Advice.STILL),
+    ({}, {"left_hand_share": 0.2}, Advice.HANDS), ({}, {"brightness": 0.05}, Advice.LIGHT),
     ({}, {"sharpness": 0.3}, Advice.SHARP), ({}, {"face_used": 0.0}, Advice.FACE), ({}, {"empty_masks": 1.0}, Advice.BACKGROUND),
     ({}, {"outline_iou": 0.6}, Advice.CLOTHES), ({}, {"person_share": 0.5}, Advice.ONE_PERSON),
     ({"likeness": {"face": {"px": 14.0}}}, {}, Advice.CLOSER),
@@ -434,6 +435,27 @@ def test_without_held_out_frames_nothing_is_called_good():
 def test_each_cause_has_one_instruction_for_the_next_clip(metrics, facts, advice):
     assert give_advice(metrics, facts) == [advice]
     assert give_advice({"likeness": LIKE}, {"turn_degrees": 360.0, "sharpness": 2.0}) == []
+
+
+def test_a_camera_that_sways_and_a_person_cut_off_above_are_seen_in_the_pictures_and_told_to_mend(copied):
+    noise = cv2.GaussianBlur(np.random.default_rng(2).normal(size=(HEIGHT + 40, WIDTH + 40)).astype(np.float32), (0, 0), 2)
+    room = np.repeat(np.clip(128 + 45 * noise / noise.std(), 0, 255)[..., None], 3, 2).astype(np.uint8)
+    for t in range(T):
+        mask = np.zeros((HEIGHT, WIDTH), np.float32)
+        mask[:120, 35:50] = 1
+        frame = room[:HEIGHT, 3 * (t % 3):][:, :WIDTH]
+        write_frame(copied / f"split/frames/{t:06d}.png", np.where(mask[..., None] > 0, np.uint8(90), frame))
+        write_alpha(copied / f"segment/alpha/{t:06d}.exr", mask)
+    write_run(copied, [stage_row(name) for name in STAGES])
+    page = page_of(copied)
+    assert Advice.STILL.value in page.text("head") and Advice.WHOLE.value in page.text("head")
+    assert "Camera moved by at most 3 px" in page.text("alpha") and "top in 6 of 6" in page.text("alpha")
+
+
+def test_before_a_plain_background_nothing_is_said_of_the_camera(whole):
+    page = Page(whole / "report.html")
+    assert Advice.STILL.value not in page.text() and Advice.WHOLE.value not in page.text()
+    assert "Camera moved by at most not known: too plain a background" in page.text("alpha")
 
 
 def test_what_stands_under_every_clip_is_a_note_and_no_warning(copied):

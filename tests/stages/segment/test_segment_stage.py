@@ -93,6 +93,27 @@ def test_a_plate_that_does_not_fit_is_named_and_left_out(folder):
     assert "(0-2)" in warnings[0] and "plate" in warnings[0] and alphas[0].any()
 
 
+@pytest.mark.parametrize(("step", "times", "words"), [
+    (6, True, ["The camera moves: in 6 of 6 frames (0-5) the background lies up to 15 px off."]), (0, True, []), (6, False, [])])
+def test_a_moving_camera_is_named_with_frames_and_px_but_photos_may_differ(tmp_path, monkeypatch, step, times, words):
+    (tmp_path / "frames").mkdir()
+    noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(400, 300)).astype(np.float32), (0, 0), 3)
+    room = np.repeat(np.clip(128 + 40 * noise / noise.std(), 0, 255)[..., None], 3, 2).astype(np.uint8)
+    person = cv2.ellipse(np.zeros((400, 200), np.float32), (100, 220), (30, 120), 0, 0, 360, 1, -1)
+    for t in range(6):
+        frame = np.where(person[..., None] > 0, np.uint8((40, 60, 140)), room[:, t * step: t * step + 200])
+        write_frame(tmp_path / f"frames/{t:06d}.png", frame)
+    monkeypatch.setitem(stage.METHODS, "pose", lambda models: lambda image, region: person)
+    xy, score = np.zeros((6, 133, 2), np.float32), np.zeros((6, 133), np.float32)
+    xy[:, :4], score[:, :4] = [(100, 120), (110, 220), (90, 220), (100, 320)], 0.9
+    write_arrays(tmp_path / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=6) | {"xy": xy, "score": score})
+    Clip(10.0 if times else None, [t / 10 for t in range(6)] if times else None, 200, 400, None, "0").write(tmp_path / "clip.json")
+    warnings = []
+    stage.run(Job({"split/frames": tmp_path / "frames", "split/clip.json": tmp_path / "clip.json",
+                   "keypoints/keypoints.npz": tmp_path / "keypoints.npz"}, tmp_path, SegmentConfig(), warn=warnings.append))
+    assert [warning.split(". ")[0] + "." for warning in warnings] == words
+
+
 @pytest.mark.footage
 @pytest.mark.slow
 def test_truth_a_is_cut_out_with_an_iou_of_at_least_0_97(tmp_path):
