@@ -13,8 +13,9 @@ from gsac.benchmarks.perception import run_keypoints, run_stage, score_squats, s
 from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.keypoints import STAGE
 from gsac.stages.keypoints.config import MODELS, DetectorName, KeypointsConfig
+from gsac.stages.keypoints.cut_off import Cut, find_cuts
 from gsac.stages.keypoints.detection import Frame
-from gsac.stages.keypoints.stage import DETECTORS, report, run, touches_edge
+from gsac.stages.keypoints.stage import DETECTORS, report, run
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
 SQUATS, TRUTH = FOOTAGE / "squats" / "pose_squats.mp4", FOOTAGE / "truth-a" / "clip.mp4"
@@ -74,9 +75,9 @@ def seen(**parts) -> Frame:
     return frame
 
 
-def warnings_of(frames: list[Frame], at_edge: list[bool] | None = None) -> list[str]:
+def warnings_of(frames: list[Frame], cuts: list[set[Cut]] | None = None) -> list[str]:
     warnings: list[str] = []
-    report(Job({}, Path(), None, warn=warnings.append), frames, at_edge or [False] * len(frames))
+    report(Job({}, Path(), None, warn=warnings.append), frames, cuts or [set()] * len(frames))
     return warnings
 
 
@@ -103,14 +104,28 @@ def test_parts_that_were_never_seen_are_warned_of():
                                                    "The face was never seen from the front"]
 
 
-def test_touching_the_edge_is_seen_at_feet_and_at_the_crown():
-    frame = seen()
-    assert not touches_edge(frame, 100, 200)
-    frame.pose33[31] = (50, 199.8, 1)
-    assert touches_edge(frame, 100, 200)
-    frame = seen()
-    frame.pose33[[2, 5]], frame.pose33[[9, 10]] = (50, 14, 1), (50, 24, 1)
-    assert touches_edge(frame, 100, 200)
+def test_head_feet_and_sides_at_the_edge_are_told_apart_up_to_the_crown():
+    def cuts(at, points=(31,)):
+        frame = seen()
+        frame.pose33[list(points)] = (*at, 1)
+        return find_cuts(frame, 100, 200)
+
+    assert cuts((50, 150)) == set()
+    assert cuts((50, 199.8)) == {Cut.FEET} and cuts((-3, 150)) == {Cut.SIDE} and cuts((101, 230)) == {Cut.FEET, Cut.SIDE}
+    assert cuts((50, -5), points=(0,)) == {Cut.HEAD} and cuts((50, -5), points=(15,)) == {Cut.OTHER}
+    crown = seen()
+    crown.pose33[[2, 5]], crown.pose33[[9, 10]] = (50, 14, 1), (50, 24, 1)
+    assert find_cuts(crown, 100, 200) == {Cut.HEAD}
+    without = Frame()
+    without.xy[:23], without.score[:17] = (50, 100), 1
+    without.xy[16] = (50, 200)
+    assert find_cuts(without, 100, 200) == {Cut.FEET}, "feet of score 0 at the corner do not count, the ankle does"
+
+
+def test_which_part_the_edge_cuts_off_is_said_with_its_frames():
+    whole = dict(HANDS, face=FACE)
+    warning, = warnings_of([seen(**whole)] * 4, [{Cut.HEAD, Cut.FEET}, {Cut.FEET}, set(), {Cut.FEET}])
+    assert warning.startswith("The edge of the picture cuts off the head in frame 0, the feet in 3 of 4 frames (0-1, 3); what lies")
 
 
 @pytest.mark.footage
@@ -145,7 +160,9 @@ def test_the_same_person_is_followed_when_a_second_one_comes(tmp_path, store):
 def test_a_person_cut_by_the_frame_is_warned_of(tmp_path, store):
     image = few(SQUATS, 0)[0]
     _, warnings = stage_on([np.ascontiguousarray(image[:880])], tmp_path, store)
-    assert any("touches the edge of the picture in frame 0" in w for w in warnings)
+    assert any("The edge of the picture cuts off the feet in frame 0;" in w for w in warnings)
+    _, warnings = stage_on([np.ascontiguousarray(image[220:])], tmp_path / "headless", store)
+    assert any("The edge of the picture cuts off the head in frame 0;" in w for w in warnings)
 
 
 @pytest.mark.footage
