@@ -12,7 +12,7 @@ from gsac.avatar.cuda import why_not
 from gsac.cache.code import code_parts
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
-from gsac.pipeline.model_store import ModelStore
+from gsac.pipeline.model_store import ModelStore, Say
 from gsac.pipeline.params import config_values
 from gsac.pipeline.project import Project
 from gsac.pipeline.versions import package_version
@@ -67,6 +67,17 @@ class Keys:
                 raise BadInput(f"{_asked_by(stage, config, stage.any_of, one_of[0])}none of {' and '.join(one_of)} is here; bring "
                                f"one with `gsac models add {one_of[0]} FILE`")
         self._check_bodies(names)
+
+    def pull_models(self, names: Iterable[str], say: Say) -> None:
+        """Pulls the networks that are not here and that the stages need, where they can be kept."""
+        missing = self.missing_models(names)
+        if missing and self.models.writable:
+            self.models.pull(missing, say)
+
+    def missing_models(self, names: Iterable[str]) -> list[str]:
+        """Model files that the stages need and that are not here."""
+        needed = dict.fromkeys(model for name in names for model in self._models(self.project.stage(name), self.configs[name]))
+        return [model for model in needed if not self.models.is_here(model)]
 
     def _check_model(self, stage: Stage, config: Any, model: str) -> None:
         try:

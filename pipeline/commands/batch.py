@@ -56,8 +56,10 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if arguments.until:
         project.graph.step(arguments.until)
         stages = project.graph.above(arguments.until) | {arguments.until}
-    Keys(project, configs, open_store(reporter)).check(stages)  # one error now, not one a clip
+    keys = Keys(project, configs, open_store(reporter))
+    keys.check(stages)  # one error now, not one a clip
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
+    keys.pull_models(stages, reporter.note)
     page = BatchPage(arguments.out, jobs)
     reporter.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
     with open_batch_reporter(reporter, len(jobs)) as table:

@@ -9,9 +9,11 @@ from pathlib import Path
 
 from gsac.pipeline.commands.options import open_store, progress_reporter
 from gsac.pipeline.commands.run import run_clip
+from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.params import resolve
+from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.run_folder import OWN_STORE
 
 CLIP_FILE = "clip.mp4"
 
@@ -24,8 +26,10 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     root = arguments.out.absolute()
     with progress_reporter(arguments) as reporter:
-        clip = make_truth_clip(root / "clip", reporter)
-        run_clip(clip, root / "avatar", open_store(reporter, root / "avatar" / OWN_STORE), reporter)
+        store, project = open_store(reporter), Project.at_hand()
+        if not (root / "clip" / CLIP_FILE).is_file():
+            Keys(project, resolve(project), store).pull_models(project.graph.steps, reporter.note)
+        run_clip(make_truth_clip(root / "clip", reporter), root / "avatar", store, reporter)
     return ExitCode.OK
 
 

@@ -76,13 +76,17 @@ def answer_reporter(arguments: argparse.Namespace) -> PlainReporter:
     return PlainReporter(sys.stdout)
 
 
-def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
-    """The store of GSAC_CACHE; it reports what it finds damaged.
+def open_store(reporter: PlainReporter) -> Store:
+    """The store of GSAC_CACHE; it reports what it finds damaged."""
+    return Store.open(say=reporter.note)
 
-    Where it may only be read, results of this run go to `instead`, and what it holds is still used.
+
+def writable_store(store: Store, instead: Path, reporter: PlainReporter) -> Store:
+    """The store; where it may only be read one at `instead`, which gets the results of this run and still uses what it holds.
+
+    To be called when nothing of the user's can be at fault any more, since it makes a folder.
     """
-    store = Store.open(say=reporter.note)
-    if instead is None or store.writable:
+    if store.writable:
         return store
     reporter.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")
     return Store(instead, say=reporter.note, below=store)

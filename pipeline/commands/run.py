@@ -14,6 +14,7 @@ from gsac.pipeline.commands.options import (
     open_store,
     progress_reporter,
     values_of_person,
+    writable_store,
 )
 from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
 from gsac.pipeline.json_output import emit
@@ -54,7 +55,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     run_folder = RunFolder(arguments.out or default_out(clip))
     options = Options(arguments.until, arguments.start, tuple(arguments.force))
     with progress_reporter(arguments) as reporter:
-        store = open_store(reporter, None if arguments.dry_run else run_folder.root / OWN_STORE)
+        store = open_store(reporter)
         clip_run = ClipRun(project, configs, store, run_folder, reporter)
         clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
@@ -66,6 +67,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         run_folder.prepare(clip, project, configs)
         if other is not None:
             forget_results(run_folder)
+        own = writable_store(store, run_folder.root / OWN_STORE, reporter)
+        if own is not store:
+            clip_run = ClipRun(project, configs, own, run_folder, reporter)
         return carry_out(clip_run, clip, options, reporter, arguments.json)
 
 
@@ -74,6 +78,7 @@ def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRe
     ends well or not."""
     early = EarlySections(clip_run.folder)
     try:
+        clip_run.pull_models(clip, options)
         clip_run.run(clip, options, early.start)
         write_report(clip_run, reporter, early)
     except BaseException as error:
@@ -131,4 +136,5 @@ def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> No
     configs = resolve(project)
     run_folder = RunFolder(out)
     run_folder.prepare(find_clip(clip), project, configs)
+    store = writable_store(store, out / OWN_STORE, reporter)
     carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(), reporter, json=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
@@ -16,6 +17,7 @@ from gsac.pipeline.commands.options import (
     open_run_folder,
     open_store,
     progress_reporter,
+    writable_store,
 )
 from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.graph import CLIP
@@ -91,7 +93,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
     """On the inputs that lie in the folder of a run, the one here as DVC calls it."""
     run_folder, project, configs = open_run_folder(arguments, arguments.folder, only=arguments.name)
-    store = open_store(reporter, run_folder.root / OWN_STORE)
+    store = checked_store(project, configs, arguments.name, run_folder.root, reporter)
     ports = project.graph.step(arguments.name).deps
     return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
                 {port: run_folder.path(port).resolve() for port in ports},
@@ -101,18 +103,24 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
     """On the artifacts of --inputs, with outputs into --out."""
     project = Project.at_hand()
-    store = open_store(reporter, arguments.out / OWN_STORE)
     configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
     paths = fixture_paths(project, arguments.name, arguments.inputs)
+    store = checked_store(project, configs, arguments.name, arguments.out, reporter)
     digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
     out = arguments.out.absolute()
     return Task(arguments.name, Keys(project, configs, store), store, digests, paths, RunFolder(out), out, out / LOGS)
 
 
+def checked_store(project: Project, configs: dict[str, Any], name: str, out: Path, reporter: PlainReporter) -> Store:
+    """A store for the stage's result, opened after its devices and model files are known to be there."""
+    store = open_store(reporter)
+    Keys(project, configs, store).check([name])
+    return writable_store(store, out / OWN_STORE, reporter)
+
+
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     """Runs the stage through the store; shows its outputs as `out/<output>`."""
     store, name = task.store, task.name
-    task.keys.check([name])
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
         plan = plan_stage(store, parts, force, shown_key(task))

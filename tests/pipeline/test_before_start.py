@@ -42,6 +42,38 @@ def test_a_wish_that_cannot_be_met_is_refused_at_once_and_leaves_no_folder(clip,
     assert {path.name for path in clip.parent.iterdir()} == {"clip.mp4", "cache"}
 
 
+@pytest.fixture
+def offline(monkeypatch):
+    """A package index that nobody answers for."""
+    monkeypatch.setenv("PIP_CONFIG_FILE", "/dev/null")
+    for name in ("PIP_FIND_LINKS", "PIP_EXTRA_INDEX_URL", "PIP_RETRIES"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
+
+
+@pytest.mark.parametrize("command", ["run", "batch", "demo"])
+def test_networks_that_are_not_here_and_cannot_be_pulled_are_known_at_once_and_leave_no_folder(clip, offline, capsys, command):
+    began = time.monotonic()
+    words = {"run": [str(clip)], "batch": [str(clip.parent)], "demo": []}[command]
+    assert execute([command, *words]) == ExitCode.USAGE
+    assert time.monotonic() - began < 2, "pip alone takes half of one second"
+    assert "cannot get mediapipe" in capsys.readouterr().err
+    assert {path.name for path in clip.parent.iterdir()} == {"clip.mp4", "cache"}
+
+
+def test_networks_are_not_asked_for_where_no_stage_that_runs_needs_them(clip, offline, capsys):
+    assert execute(["run", str(clip), "--until", "split"]) == ExitCode.USAGE
+    assert "clip.mp4" in capsys.readouterr().err, "split's own word on a file that is no video"
+
+
+@pytest.mark.parametrize("words", [["--set", "smplx.body_model=nobody"], [], ["--until", "split"]])
+def test_before_a_read_only_cache_a_mistake_leaves_no_folder_either(clip, offline, monkeypatch, capsys, words):
+    Store(clip.parent / "cache")
+    monkeypatch.setattr(Store, "writable", property(lambda store: store.below is not None))
+    assert execute(["run", str(clip), *words]) == ExitCode.USAGE
+    assert {path.name for path in clip.parent.iterdir()} == {"clip.mp4", "cache"}
+
+
 def test_a_stage_that_does_not_run_may_ask_for_anything(clip, capsys):
     assert execute(["run", str(clip), "--until", "split", "--dry-run", "--set", "train.device=cuda"]) == ExitCode.OK
 
