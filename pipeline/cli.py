@@ -19,6 +19,7 @@ from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.reporter import Verbosity
 from gsac.pipeline.versions import package_version
+from gsac.pipeline.wrapping import fit
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -97,7 +98,7 @@ def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None,
     """Prints the message, with --json also an object on stdout that holds what the command had done before the error."""
     if getattr(arguments, "json", False):
         emit({"stages": [], "outputs": {}, "metrics": {}} | attached_summary(error) | {"error": message})
-    print(f"gsac: {message}", file=sys.stderr, flush=True)
+    print(fit(f"gsac: {message}", sys.stderr), file=sys.stderr, flush=True)
     return code
 
 

@@ -10,6 +10,7 @@ from typing import TextIO
 
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.pace import Course, Pace, duration
+from gsac.pipeline.wrapping import fit
 
 PLAIN_GAP_S = 10.0
 """At least this long between two plain progress lines."""
@@ -54,7 +55,7 @@ class PlainReporter(AbstractContextManager):
         pass
 
     def note(self, message: str) -> None:
-        print(message, file=self._stream, flush=True)
+        print(fit(message, self._stream), file=self._stream, flush=True)
 
     def result(self, message: str) -> None:
         """The line for which the command was run."""
@@ -147,7 +148,15 @@ class TerminalReporter(PlainReporter):
         self._close()
 
     def note(self, message: str) -> None:
-        self.console.print(message, markup=False, soft_wrap=True)
+        self._print(message)
+
+    def _print(self, message: str, style: str = "", begin: int = 0) -> None:
+        """Prints a line broken between words; style: of what follows its first `begin` characters."""
+        from rich.text import Text
+
+        text = Text(fit(message, self._stream))
+        text.stylize(style, begin)
+        self.console.print(text, soft_wrap=True)
 
     def starts(self, stage: str, why: str) -> None:
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
@@ -174,18 +183,17 @@ class TerminalReporter(PlainReporter):
         task.fields["words"] = words if going_on or not total else f"{done} {unit} {COUNTED}"
 
     def warning(self, stage: str, message: str) -> None:
-        self.console.print(f"{stage}: warning: {message}", style="yellow", markup=False, soft_wrap=True)
+        self._print(f"{stage}: warning: {message}", "yellow")
 
     def remark(self, stage: str, message: str) -> None:
-        self.console.print(f"{stage}: note: {message}", style="dim", markup=False, soft_wrap=True)
+        self._print(f"{stage}: note: {message}", "dim")
 
     def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
         self._close()
         self._end(stage, outcome, seconds)
         took = f"{seconds:8.1f} s" if outcome is not Outcome.FAILED else " " * 10
-        self.console.print(f"{self._titled(stage):<14} {took}  ", end="", markup=False)
-        self.console.print(f"{outcome.value}{': ' + detail if detail else ''}", style=outcome.style, markup=False,
-                            soft_wrap=True)
+        title = f"{self._titled(stage):<14} {took}  "
+        self._print(f"{title}{outcome.value}{': ' + detail if detail else ''}", outcome.style, len(title))
 
     def _close(self) -> None:
         if self._bar is not None:

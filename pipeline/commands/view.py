@@ -13,6 +13,7 @@ from pathlib import Path
 from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.page_server import PAGE, PageServer, find_network_address, make_certificate, serve
+from gsac.pipeline.wrapping import fit
 from gsac.stages.contract import BadInput
 
 AVATAR = "avatar.gsac"
@@ -42,7 +43,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
             print(server.url, flush=True)
             if arguments.host:
                 show_code(server.url)
-                print(f"{EXPOSED}\n{CERTIFICATE if server.scheme == 'https' else PLAIN}", file=sys.stderr)
+                print(fit(f"{EXPOSED}\n{CERTIFICATE if server.scheme == 'https' else PLAIN}", sys.stderr), file=sys.stderr)
             elif not arguments.no_browser and has_screen():
                 webbrowser.open(server.url)
             print(ENDS, file=sys.stderr, flush=True)
