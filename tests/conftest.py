@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from support.axe import axe  # noqa: F401
 from support.figure import exported, figure, node_package, person, shadowed  # noqa: F401
 from support.toy import Toy
 
