@@ -149,8 +149,8 @@ def alpha_sheet(footage: Footage) -> Sheet:
     if footage.clip.timestamps_s:
         sway = measure_sway(views)
         facts["moved_frames"] = float(find_moved(sway, max(footage.clip.width, footage.clip.height)).sum())
-        known = np.isfinite(sway).any()
-        figures["Camera moved by at most"] = f"{np.nanmax(sway):.0f} px" if known else "not known: too plain a background"
+        figures["Camera moved, among the frames shown"] = (
+            f"{np.nanmax(sway):.0f} px" if np.isfinite(sway).any() else "not known: too plain a background")
     if missing:
         figures["Frames without a mask"] = str(missing)
     if facts["empty_masks"]:

@@ -17,8 +17,9 @@ STATES = {
     "help": "document.querySelector('#faces .close').click(), document.getElementById('show-help').click()",
 }
 """What is open -> the script that opens it, in this order."""
-IN_VIEW = """[...document.querySelectorAll('button, select, input, [tabindex]')].filter((it) => it.checkVisibility() && !it.disabled)
-  .map((it, i) => it.dataset.at = String(i))"""
+IN_VIEW = """[...document.querySelectorAll('button, select, input, [tabindex]')]
+  .filter((it) => it.checkVisibility() && !it.disabled).map((it, i) => it.dataset.at = String(i))"""
+"""Numbers the controls that are seen, and gives the numbers."""
 
 
 @pytest.fixture(scope="module")
