@@ -82,8 +82,8 @@ def run(job: Job) -> None:
         job.warn(f"The plate does not show the scene of {name_frames(other_scene)} (did the camera move?); it is not used there.")
     moved = find_moved(sway, max(clip.width, clip.height))
     if is_video and moved.any():
-        job.warn(f"The camera moves: in {name_frames(moved)} the background lies up to {np.nanmax(sway):.0f} px off. Stand the "
-                 "phone on something firm, and do not zoom.")
+        job.warn(f"The camera moves by up to {np.nanmax(sway):.0f} px, in {name_frames(moved)}. Stand the phone on something firm, "
+                 "and do not zoom.")
 
 
 def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,
