@@ -1,5 +1,6 @@
 """What can be known before anything runs is checked before anything runs."""
 
+import os
 import time
 
 import pytest
@@ -53,10 +54,11 @@ def offline(monkeypatch):
 
 @pytest.mark.parametrize("command", ["run", "batch", "demo"])
 def test_networks_that_are_not_here_and_cannot_be_pulled_are_known_at_once_and_leave_no_folder(clip, offline, capsys, command):
-    began = time.monotonic()
+    began, worked = time.monotonic(), sum(os.times()[:4])
     words = {"run": [str(clip)], "batch": [str(clip.parent)], "demo": []}[command]
     assert execute([command, *words]) == ExitCode.USAGE
-    assert time.monotonic() - began < 2, "pip alone takes half of one second"
+    assert sum(os.times()[:4]) - worked < 1, "CPU s, pip's too: a busy machine must not fail it"
+    assert time.monotonic() - began < 6, "pip's own way of asking again takes 8 s"
     assert "cannot get mediapipe" in capsys.readouterr().err
     assert {path.name for path in clip.parent.iterdir()} == {"clip.mp4", "cache"}
 
