@@ -21,6 +21,7 @@ from gsac.stages.train.checkpoint import State
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
 from gsac.stages.train.fast.schedule import GAIN_RATE, LATE_REACH, OFFSET_RATE, OFFSET_SHARE, longest_axis
 from gsac.stages.train.finite import named_gradients, named_pose, require_finite
+from gsac.stages.train.gaussians.barely_seen import hold_barely_seen
 from gsac.stages.train.gaussians.cloth_offsets import Offsets, fold
 from gsac.stages.train.gaussians.first_colours import fill_unseen
 from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on_background, through_background
@@ -161,30 +162,31 @@ class Trainer:
 
     def freeze_unseen(self, views: dict[int, View]) -> Gaussians:
         """Freezes the gaussians that no frame shows; returns all gaussians. views: frame -> view at half the size."""
-        self.seen = self._find_seen(views)
-        return self.gaussians()
+        gaussians = self.gaussians()
+        self.seen = find_seen(self._front_pixels(views), gaussians, self.rest, self.faces)
+        return gaussians
 
     def finish(self, views: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
-        """The gaussians with their heights levelled, and seen (N,) bool; unseen ones take their neighbours' colour.
+        """The gaussians with their heights levelled, and seen (N,) bool; the less is seen of one, the more its neighbours' colour.
 
-        views: frame -> view at half the size, to tell what is seen where `freeze_unseen` has not.
+        views: frame -> view at half the size.
         """
-        gaussians, seen = self.gaussians(), self.seen
+        gaussians, seen, pixels = self.gaussians(), self.seen, self._front_pixels(views)
         if seen is None:
-            seen = self._find_seen(views)
+            seen = find_seen(pixels, gaussians, self.rest, self.faces)
             gaussians.rgb = fill_unseen(gaussians.rgb, seen, centres_at_rest(gaussians, self.rest, self.faces))
+        gaussians.rgb = hold_barely_seen(gaussians, pixels, seen, self.rest, self.faces)
         return level_heights(gaussians, self.rest, self.faces), seen
 
-    def _find_seen(self, views: dict[int, View]) -> np.ndarray:
-        """(N,) bool, whether the frames show the gaussian's front."""
+    def _front_pixels(self, views: dict[int, View]) -> np.ndarray:
+        """(N,) pixels that each gaussian shows of its front, mean over the frames."""
         gaussians = self.gaussians()
 
         def added(frame: tuple[int, View], workspace: Workspace) -> np.ndarray:
             t, view = frame
             return front_pixels(gaussians, self.poses.vertices(t), self.faces, view.camera, workspace)
 
-        pixels = sum(side_by_side(added, views.items()))
-        return find_seen(pixels / len(views), gaussians, self.rest, self.faces)
+        return sum(side_by_side(added, views.items()), np.zeros(len(self.face))) / len(views)
 
     def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:
         config = self.config

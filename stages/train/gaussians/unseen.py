@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.binding import Bound, bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.avatar.light import shade
@@ -48,9 +48,14 @@ def front_pixels(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, 
 def find_seen(pixels: np.ndarray, gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(N,) bool, whether gaussians are seen. pixels: (N,) `front_pixels`, mean over the frames; rest: (V, 3) m; faces: (F, 3)."""
     bound = bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    share = pixels / np.maximum(np.sort(bound.scales, 1)[:, 1:].prod(1), 1e-12)
+    share = pixels / disc_areas(bound)
     seen = pixels > LEAST_SHOWN
     return seen & (share > LEAST_SHARE * np.median(share[seen])) if seen.any() else seen
+
+
+def disc_areas(bound: Bound) -> np.ndarray:
+    """(N,) m2 and above 0, the product of each gaussian's two largest standard deviations."""
+    return np.maximum(np.sort(bound.scales, 1)[:, 1:].prod(1), 1e-12)
 
 
 def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
@@ -78,16 +83,18 @@ def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, fac
 
 
 def hold_colours(gaussians: Gaussians, poor: np.ndarray, near: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(M, 3) colours of M unseen gaussians, held where the clip's light shows them neither darker nor brighter than seen ones.
+    """(M, 3) colours of M gaussians, held within those of gaussians around them, and in the clip's light within these so lit.
 
-    poor: (M,) the unseen; near: (M, K) seen ones around each; normals: (F, 3) of the faces at rest. The light was told apart from
-    the colours on the normals that frames showed; on others it is a guess that can leave all that was seen.
+    poor: (M,) the gaussians; near: (M, K) well seen ones around each; normals: (F, 3) of the faces at rest. The light was told
+    apart from the colours on the normals that frames showed; on others it is a guess that can leave all that was seen. Where a
+    colour cannot be within both, it is so in the light.
     """
+    held = np.clip(gaussians.rgb[poor], gaussians.rgb[near].min(1), gaussians.rgb[near].max(1))
     if gaussians.light is None:
-        return gaussians.rgb[poor]
+        return held
     factor = shade(gaussians.light, normals[gaussians.face])
     lit = gaussians.rgb * factor
-    return np.clip(np.clip(lit[poor], lit[near].min(1), lit[near].max(1)) / factor[poor], 0, 1).astype(np.float32)
+    return np.clip(np.clip(held * factor[poor], lit[near].min(1), lit[near].max(1)) / factor[poor], 0, 1).astype(np.float32)
 
 
 def level_heights(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:

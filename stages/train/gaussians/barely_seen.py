@@ -1,0 +1,85 @@
+"""Colours of places that few frames show, or only at a slant: held to what the frames show well around them.
+
+There a gaussian's colour answers for few pixels, often beneath others, and training may leave it anywhere. The pixels that a
+gaussian shows of its front say how firmly it keeps its own colour; how well the frames show its place says how much the colours
+around it count. Between seen and unseen there is no step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import spsolve
+from scipy.spatial import KDTree
+
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.gaussians.unseen import AROUND, NEIGHBOURS, disc_areas, hold_colours
+
+FACING = 0.3
+"""Cosine between the normals of two gaussians above which one tells how well the frames show the other's place."""
+FAINT = 0.1
+"""Evidence at which a gaussian is half in doubt."""
+PULL = 0.02
+"""What the colour of one neighbour weighs where nothing is seen of both, over what a seen gaussian's own does in the median."""
+LEAST_ALIKE = 0.05
+"""Share of that weight between gaussians that face away from each other: round a limb's edge colours go on."""
+HELD, SURE = 0.2, 0.4
+"""Evidence up to which a colour stays within those around it, and from which on it is free, and one of those if it is shown so."""
+FREE = 1e-6
+"""What even an unseen gaussian's own colour weighs, likewise: where nothing around is seen, it stays."""
+
+
+def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, rest: np.ndarray,
+                     faces: np.ndarray) -> np.ndarray:
+    """(N, 3) colours in 0..1, those of barely seen places held to what was well seen around.
+
+    pixels: (N,) `front_pixels`, mean over the frames; seen: (N,) bool; rest: (V, 3) m; faces: (F, 3).
+    """
+    if not seen.any():
+        return gaussians.rgb
+    frames = face_frames(rest, faces)
+    bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    normals = frames.R[gaussians.face, :, 1]
+    near = KDTree(bound.means).query(bound.means, k=min(AROUND, len(gaussians)))[1].reshape(len(gaussians), -1)
+    alike = np.einsum("nki,ni->nk", normals[near], normals)
+    areas = disc_areas(bound)
+    evidence = find_evidence(pixels, areas, seen, near, alike)
+    out = gaussians[np.arange(len(gaussians))]
+    own = pixels / max(float(np.median(pixels[seen])), 1e-12)
+    out.rgb = spread_colours(gaussians.rgb, own, evidence, near[:, :NEIGHBOURS + 1], alike[:, :NEIGHBOURS + 1])
+    shown = pixels / areas
+    sure = np.flatnonzero(seen & (evidence >= SURE) & (shown >= SURE * np.median(shown[seen])))
+    poor = np.flatnonzero(evidence < SURE)
+    if len(sure) and len(poor):
+        around = KDTree(bound.means[sure]).query(bound.means[poor], k=min(AROUND, len(sure)))[1].reshape(len(poor), -1)
+        held = hold_colours(out, poor, sure[around], frames.R[:, :, 1])
+        share = np.clip((SURE - evidence[poor]) / (SURE - HELD), 0, 1)[:, None]
+        out.rgb[poor] = np.where(share < 1, out.rgb[poor] + share * (held - out.rgb[poor]), held)
+    return out.rgb
+
+
+def find_evidence(pixels: np.ndarray, areas: np.ndarray, seen: np.ndarray, near: np.ndarray, alike: np.ndarray) -> np.ndarray:
+    """(N,) how well the frames show each gaussian's place: pixels per area there, over the median of the seen.
+
+    pixels: (N,) `front_pixels`; areas: (N,) m2; seen: (N,) bool; near: (N, K) gaussians at the place; alike: (N, K) cosine
+    between their normals and its own.
+    """
+    facing = alike > FACING
+    shown = (pixels[near] * facing).sum(1) / np.maximum((areas[near] * facing).sum(1), 1e-12)
+    return shown / max(float(np.median(shown[seen])), 1e-12)
+
+
+def spread_colours(rgb: np.ndarray, own: np.ndarray, evidence: np.ndarray, near: np.ndarray, alike: np.ndarray) -> np.ndarray:
+    """(N, 3) float32 colours that differ least, in squares, from rgb (N, 3) by `own` and from their neighbours' by doubt.
+
+    own: (N,) weight; evidence: (N,) of the place; near: (N, K) neighbours; alike: (N, K) cosine between the normals.
+    """
+    doubt = 1 / (1 + (evidence / FAINT) ** 2)
+    one = np.repeat(np.arange(len(rgb)), near.shape[1])
+    weight = PULL * doubt[one] * doubt[near.ravel()] * np.clip(alike.ravel(), LEAST_ALIKE, 1)
+    pairs = coo_matrix((weight, (one, near.ravel())), shape=(len(rgb), len(rgb))).tocsr()
+    pairs = (pairs + pairs.T) / 2
+    own = own.astype(np.float64) + FREE
+    system = diags(own + np.asarray(pairs.sum(1)).ravel()) - pairs
+    return np.clip(np.asarray(spsolve(system.tocsc(), own[:, None] * rgb)), 0, 1).astype(np.float32)
