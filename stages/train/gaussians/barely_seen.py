@@ -24,6 +24,8 @@ PULL = 0.02
 """What the colour of one neighbour weighs where nothing is seen of both, over what a seen gaussian's own does in the median."""
 LEAST_ALIKE = 0.05
 """Share of that weight between gaussians that face away from each other: round a limb's edge colours go on."""
+UNLIKE = 0.2
+"""Distance between two colours, sigma, over which they count as of one cloth: what is unlike its neighbour stays unlike."""
 HELD, SURE = 0.2, 0.4
 """Evidence up to which a colour stays within those around it, and from which on it is free, and one of those if it is shown so."""
 FREE = 1e-6
@@ -76,9 +78,10 @@ def spread_colours(rgb: np.ndarray, own: np.ndarray, evidence: np.ndarray, near:
     own: (N,) weight; evidence: (N,) of the place; near: (N, K) neighbours; alike: (N, K) cosine between the normals.
     """
     doubt = 1 / (1 + (evidence / FAINT) ** 2)
-    one = np.repeat(np.arange(len(rgb)), near.shape[1])
-    weight = PULL * doubt[one] * doubt[near.ravel()] * np.clip(alike.ravel(), LEAST_ALIKE, 1)
-    pairs = coo_matrix((weight, (one, near.ravel())), shape=(len(rgb), len(rgb))).tocsr()
+    one, other = np.repeat(np.arange(len(rgb)), near.shape[1]), near.ravel()
+    cloth = np.exp(-((rgb[one] - rgb[other]).astype(np.float64) ** 2).sum(1) / (2 * UNLIKE**2))
+    weight = PULL * cloth * doubt[one] * doubt[other] * np.clip(alike.ravel(), LEAST_ALIKE, 1)
+    pairs = coo_matrix((weight, (one, other)), shape=(len(rgb), len(rgb))).tocsr()
     pairs = (pairs + pairs.T) / 2
     own = own.astype(np.float64) + FREE
     system = diags(own + np.asarray(pairs.sum(1)).ravel()) - pairs
