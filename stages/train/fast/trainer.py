@@ -7,6 +7,7 @@ no needle, no giant and no floater can arise, whatever the weights.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,8 @@ from gsac.stages.train.views import View
 
 KEPT = ("face", "values", "first", "second", "count", "start", "light", "seen")
 """Attributes of Trainer that go into a checkpoint as they are."""
+EVIDENCE_FRAMES = 20
+"""Frames at most, spread evenly, that tell how well a place is seen, once it is known which gaussians are seen at all."""
 
 
 class StepGradients(NamedTuple):
@@ -171,7 +174,9 @@ class Trainer:
 
         views: frame -> view at half the size.
         """
-        gaussians, seen, pixels = self.gaussians(), self.seen, self._front_pixels(views)
+        gaussians, seen = self.gaussians(), self.seen
+        some = dict(list(views.items())[::math.ceil(len(views) / EVIDENCE_FRAMES)])
+        pixels = self._front_pixels(views if seen is None else some)
         if seen is None:
             seen = find_seen(pixels, gaussians, self.rest, self.faces)
             gaussians.rgb = fill_unseen(gaussians.rgb, seen, centres_at_rest(gaussians, self.rest, self.faces))
