@@ -65,15 +65,18 @@ class _Held:
     def __init__(self, path: Path, mode: int, waiting: Callable[[], None] = lambda: None, blocking: bool = True) -> None:
         self.files = {path: _open(path)}
         try:
-            self.locked = _lock(self.descriptor, mode, waiting, blocking)
-        except OSError as error:
-            if error.errno not in REFUSED:
-                self.close()
-                raise
-            without_locks.add(path.parent)
-            instead = _stand_in(path)
-            self.files[instead] = _open(instead)
-            self.locked = _lock(self.files[instead], mode, waiting, blocking)
+            try:
+                self.locked = _lock(self.descriptor, mode, waiting, blocking)
+            except OSError as error:
+                if error.errno not in REFUSED:
+                    raise
+                without_locks.add(path.parent)
+                instead = _stand_in(path)
+                self.files[instead] = _open(instead)
+                self.locked = _lock(self.files[instead], mode, waiting, blocking)
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def descriptor(self) -> int:
@@ -122,7 +125,8 @@ def _open(path: Path) -> int:
         try:
             return os.open(path, os.O_RDWR | os.O_NOFOLLOW)
         except PermissionError:
-            return os.open(path, os.O_RDONLY | os.O_NOFOLLOW)  # another user's
+            with contextlib.suppress(FileNotFoundError):
+                return os.open(path, os.O_RDONLY | os.O_NOFOLLOW)  # another user's
         except FileNotFoundError:
             with contextlib.suppress(FileExistsError):
                 descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)

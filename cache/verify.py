@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from gsac.cache import objects
+from gsac.cache.digest import file_digest
 from gsac.cache.key import KeyParts
 from gsac.cache.record import Record, is_digest, is_of_other_version
 from gsac.cache.store import DIGITS, Store, read_text
@@ -79,9 +79,10 @@ def _holds(store: Store, record: Record, declared: Collection[str] | None) -> bo
 
 def _check_model(store: Store, path: Path, report: VerifyReport) -> None:
     """A model file lies in a folder that is named by the file's sha256."""
-    with path.open("rb") as stream:
-        sound = hashlib.file_digest(stream, "sha256").hexdigest() == path.parent.name
-    if not sound:
-        report.damaged_models.append(path.name)
-        target = store.set_aside(path)
-        store.say(f"the model file {path.name} was damaged: moved to {target}")
+    if path.is_file() and file_digest(path, objects.NO_MEMO) == path.parent.name:
+        return
+    report.damaged_models.append(path.name)
+    try:
+        store.say(f"the model file {path.name} was damaged: moved to {store.set_aside(path)}")
+    except OSError as error:
+        store.say(f"the model file {path} is damaged and cannot be moved away ({error.strerror})")
