@@ -90,11 +90,12 @@ class ModelStore:
             raise
         return {name: self.path(name) for name in names}
 
-    def pull_again(self, names: Iterable[str], say: Say) -> list[str]:
-        """Pulls those of the named files that can be pulled; returns their names."""
+    def pull_again(self, say: Say) -> list[str]:
+        """Pulls the files that were moved to quarantine and are missing since, where they can be pulled; returns their names."""
         from gsac.avatar.network_files import MODELS
 
-        names = sorted(set(names) & MODELS.keys())
+        damaged = {path.stem for path in (self._store.root / "quarantine").iterdir()}
+        names = sorted(name for name in damaged & MODELS.keys() if not self.is_here(name))
         try:
             self.pull(names, say)
         except BadInput as error:

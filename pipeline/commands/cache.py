@@ -30,7 +30,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     add_json(one)
     one.set_defaults(do=do_ls)
     one = does.add_parser("verify", help="read every byte; what is damaged is moved to quarantine, what was made of it is dropped")
-    one.add_argument("--repair", action="store_true", help="also pull damaged model files again")
+    one.add_argument("--repair", action="store_true", help="also pull model files again that were found damaged")
     add_json(one)
     one.set_defaults(do=do_verify)
     one = does.add_parser("gc", help="remove rubbish, and with a bound the results that were not used for longest")
@@ -75,7 +75,7 @@ def do_verify(arguments: argparse.Namespace) -> ExitCode:
         reporter.note(f"{name}: the file that you brought is gone; bring it again with `gsac models add {name} FILE`")
     reporter.note(f"{report.objects} objects, {format_size(report.bytes)} sound, {len(report.damaged)} damaged; "
                   f"{report.models} model files, {len(report.damaged_models)} damaged; in {store.root}")
-    repaired = models.pull_again(report.damaged_models, reporter.note) if arguments.repair else []
+    repaired = models.pull_again(reporter.note) if arguments.repair else []
     if arguments.json:
         emit({"sound": report.sound and not gone, **dataclasses.asdict(report), "gone_models": gone, "repaired": repaired})
     return ExitCode.OK if report.sound and not gone else ExitCode.INTEGRITY

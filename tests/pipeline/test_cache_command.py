@@ -1,5 +1,6 @@
 """gsac cache ls | verify | gc on odd stores and odd words."""
 
+import hashlib
 import json
 import os
 
@@ -69,9 +70,9 @@ def test_a_bound_of_gc_that_is_none_is_refused(cache, gsac, words, told):
     assert code == 2 and told in said
 
 
-def add_model(store, tmp_path, name="mine"):
-    (tmp_path / name).write_bytes(b"weights")
-    return ModelStore(store).add(name, tmp_path / name)
+def add_model(store, tmp_path):
+    (tmp_path / "mine").write_bytes(b"weights")
+    return ModelStore(store).add("mine", tmp_path / "mine")
 
 
 def test_verify_checks_model_files_and_names_what_the_user_has_to_bring_again(cache, gsac, tmp_path):
@@ -88,17 +89,21 @@ def test_verify_checks_model_files_and_names_what_the_user_has_to_bring_again(ca
     assert gsac("cache", "verify")[0] == 0
 
 
-def test_repair_pulls_damaged_model_files_again(cache, gsac, tmp_path, monkeypatch):
+@pytest.mark.parametrize("before", [False, True])
+def test_repair_pulls_damaged_model_files_again_also_those_found_before(cache, gsac, monkeypatch, before):
     from gsac.avatar import network_files
 
-    path = add_model(Store(cache), tmp_path, "net")
-    monkeypatch.setattr(network_files, "MODELS", {"net": network_files.ModelFile("net", path.parent.name, "Apache-2.0", "a test")})
+    content = hashlib.sha256(b"weights").hexdigest()
+    path = Store(cache).root / "models" / content / "net"
+    path.parent.mkdir()
+    path.write_bytes(b"weighty")
+    monkeypatch.setattr(network_files, "MODELS", {"net": network_files.ModelFile("net", content, "Apache-2.0", "a test")})
     pulled = []
     monkeypatch.setattr(ModelStore, "pull", lambda self, names, say: pulled.extend(names))
-    path.chmod(0o644)
-    path.write_bytes(b"weighty")
+    if before:
+        assert gsac("cache", "verify")[0] == 4 and pulled == []
     code, said = gsac("cache", "verify", "--repair", "--json")
-    assert code == 4 and pulled == json.loads(said.splitlines()[-1])["repaired"] == ["net"]
+    assert code == (0 if before else 4) and pulled == json.loads(said.splitlines()[-1])["repaired"] == ["net"]
 
 
 def test_a_record_of_the_code_at_hand_must_have_the_outputs_that_its_stage_declares(cache):
