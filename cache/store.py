@@ -20,7 +20,7 @@ from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from gsac.cache import objects
-from gsac.cache.errors import from_os_error
+from gsac.cache.errors import CacheError, from_os_error
 from gsac.cache.key import KeyParts
 from gsac.cache.lock import exclusive
 from gsac.cache.memo import Memo, memo_in
@@ -95,7 +95,7 @@ class Store:
             text = read_text(file)
             record = self.sound(file, text, outputs)
             if record is not None and all([self._holds(record, output, deep) for output in record.outputs]):
-                self._used(file)
+                self._used(file, text)
                 return record
             self.drop_unchanged(file, text)
         return self.below.lookup(key, outputs, deep) if self.below is not None else None
@@ -230,10 +230,19 @@ class Store:
             self.quarantine(path, digest)
         return False
 
-    def _used(self, file: Path) -> None:
-        with contextlib.suppress(OSError):
-            if time.time() - _mtime(file) > USED_AGAIN_S:
+    def _used(self, file: Path, text: str) -> None:
+        """Renews the time of a record; where the file is another user's, by a copy in its place."""
+        with contextlib.suppress(OSError, CacheError):
+            if time.time() - _mtime(file) <= USED_AGAIN_S:
+                return
+            try:
                 os.utime(file)
+            except PermissionError:
+                with self.private("used") as folder, self.record_change(file.stem):
+                    (folder / file.name).write_text(text)
+                    objects.seal_files(folder / file.name)
+                    if read_text(file) == text:
+                        os.replace(folder / file.name, file)
 
 
 def read_text(file: Path) -> str:

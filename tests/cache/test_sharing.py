@@ -3,6 +3,7 @@
 import os
 import shutil
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ USE = AS_USER + """
 print(store.writable)
 with in_use(store, [parts_of(fps=5).key]), single_flight(store, parts_of(fps=5).key) as found:
     print(found is not None)
+print(time.time() - store.record_path("split", parts_of(fps=5).key).stat().st_mtime < 3600)
 if store.writable:
     with in_use(store), single_flight(store, parts_of(fps=6).key):
         make(parts_of(fps=6), "second")
@@ -57,18 +59,26 @@ def root():
     shutil.rmtree(folder)
 
 
+def age(root):
+    """Makes every record look as if it was last used yesterday."""
+    for file in root.glob("actions/*/*.json"):
+        os.utime(file, (time.time() - 86400,) * 2)
+
+
 @pytest.mark.parametrize("umask", ["022", "002", "077", "000"])
 def test_a_team_shares_a_store_whose_folder_it_may_write_whatever_the_umask(root, child, umask):
     root.chmod(0o2775)
     child(AS_USER + "make(parts_of(fps=5), 'first')", root, FIRST, umask, TEAM).wait()
+    age(root)
     told = child(USE, root, SECOND, umask, TEAM).communicate()[0].split("\n")
-    assert told[:4] == ["True", "True", "True True", "seen"]
+    assert told[:5] == ["True", "True", "True", "True True", "seen"], "writable, found, its use is noted, sound, remembered"
 
 
 def test_who_may_only_read_a_store_uses_it_and_is_told_that_it_cannot_be_written(root, child):
     root.chmod(0o755)
     child(AS_USER + "make(parts_of(fps=5), 'first')", root, FIRST, "000", FIRST).wait()
-    assert child(USE, root, SECOND, "000", SECOND).communicate()[0].split() == ["False", "True"]
+    age(root)
+    assert child(USE, root, SECOND, "000", SECOND).communicate()[0].split() == ["False", "True", "False"]
 
 
 def test_damage_in_another_users_object_is_never_served_and_healed_or_told(root, child):
