@@ -18,6 +18,10 @@ class CacheError(Exception):
         self.hint = hint
 
 
+class CacheFolderError(CacheError):
+    """What was named as the store's folder is none."""
+
+
 class CacheReadOnlyError(CacheError):
     """The store's folder may be read but not written."""
 

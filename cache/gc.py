@@ -124,7 +124,7 @@ def collect(
             report.kept_bytes = sum(_bytes(path) for name, path in stored.items() if name in wanted)
             if not dry_run:
                 for file in [*broken, *(entry.file for entry in doomed), *gone(store)]:
-                    file.unlink()
+                    store.drop(file)
                 for number, path in enumerate([*rubbish, *temps, *left, *damaged]):
                     objects.unseal_folders(path)
                     os.rename(path, aside / str(number))
@@ -138,7 +138,7 @@ def _entries(store: Store, grace_s: float, shown: set[str]) -> tuple[list[_Entry
     live, now = live_keys(store), time.time()
     entries, broken = [], []
     for file in store.record_files():
-        record, used = store.read(file), file.stat().st_mtime
+        record, used = store.read(file), file.lstat().st_mtime
         if record is None:
             broken.append(file)
         else:

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 
 from gsac.cache.errors import CacheReadOnlyError, from_os_error
-from gsac.cache.lock import exclusive, if_free, shared
+from gsac.cache.lock import exclusive, if_free, shared, without_locks
 from gsac.cache.record import Record
 from gsac.cache.store import Store
 
 
 @contextlib.contextmanager
-def single_flight(store: Store, key: str, waiting: Callable[[], None] = lambda: None) -> Iterator[Record | None]:
+def single_flight(
+    store: Store, key: str, waiting: Callable[[], None] = lambda: None, outputs: Collection[str] | None = None,
+) -> Iterator[Record | None]:
     """Locks the key and gives the record published under it by then; None: the caller computes it.
 
+    outputs: those that the stage declares, as `Store.lookup` takes them.
     `waiting` is called once if another run holds the key. Should that run die, the next one gets the key at once.
     A read-only store cannot be locked: every run then computes for itself.
     """
@@ -26,7 +29,7 @@ def single_flight(store: Store, key: str, waiting: Callable[[], None] = lambda: 
                 held.enter_context(exclusive(store.root / "leases" / f"{key}.lock", waiting))
             except OSError as error:
                 raise from_os_error(error, store.root) from error
-        yield store.lookup(key)
+        yield store.lookup(key, outputs)
 
 
 class Lease:
@@ -49,6 +52,9 @@ def in_use(store: Store, keys: Iterable[str] = ()) -> Iterator[Lease]:
     with contextlib.ExitStack() as held:
         try:
             lease = Lease(store, file, held.enter_context(exclusive(file)))
+            if file.parent in without_locks:
+                store.say(f"gsac: warning: the file system of the cache {store.root} has no locks: processes of this machine keep "
+                          "clear of each other, but `gsac cache gc` does not see runs on other machines")
         except OSError:
             lease = Lease(store, None, None)  # read-only: gc cannot run on it either
         lease.add(*keys)
@@ -58,7 +64,7 @@ def in_use(store: Store, keys: Iterable[str] = ()) -> Iterator[Lease]:
 def live_keys(store: Store) -> set[str]:
     """Keys that living runs use or compute; the leases of dead runs are removed."""
     keys: set[str] = set()
-    for file in (store.root / "leases").iterdir():
+    for file in (store.root / "leases").glob("[!.]*"):
         with if_free(file) as free, contextlib.suppress(OSError):
             if free:
                 file.unlink()

@@ -14,6 +14,8 @@ from _thread import get_ident
 from functools import lru_cache
 from pathlib import Path
 
+from gsac.cache.root import make_root
+
 SETTLED_NS = 2_000_000_000
 """A file touched more recently may change again and keep its stat."""
 SCHEMA = """create table if not exists memo (
@@ -66,9 +68,12 @@ class Memo:
     def _open(self) -> sqlite3.Connection | None:
         for _ in range(2):
             try:
-                self.file.parent.mkdir(parents=True, exist_ok=True)
+                make_root(self.file.parent)
+                is_new = not self.file.exists()
                 connection = sqlite3.connect(self.file, timeout=2)
                 connection.execute(SCHEMA)
+                if is_new:  # for all users of the store, whatever the umask
+                    self.file.chmod(self.file.parent.stat().st_mode & 0o666)
                 return connection
             except (OSError, sqlite3.OperationalError):
                 return self._open_read_only()

@@ -6,13 +6,18 @@ The suffix is that of the output's name, since readers and browsers rely on it; 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import stat as modes
 from pathlib import Path, PurePosixPath
 
-from gsac.cache.digest import manifest_digest, tree_digest, tree_files
+from gsac.cache.digest import canonical, manifest_digest, tree_digest, tree_files, typed_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.memo import Memo
 from gsac.cache.record import Footprint
+
+UNKNOWN = (errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
+"""errno of what a file system does not know how to do."""
 
 
 def object_name(digest: str, output: str) -> str:
@@ -26,33 +31,46 @@ def object_path(root: Path, digest: str, output: str) -> Path:
 
 
 def measure(path: Path) -> Footprint | None:
-    """Number of files, size and times of an object, without reading it; None where it is missing."""
-    files = size = stamp = 0
-    folders = [str(path)]
+    """Number of files, size, names and times of an object, without reading it; None where it is missing, or holds a link or what
+    else is no plain file."""
+    found: list[list] = []
     try:
-        if path.is_file():
-            stat = path.stat()
-            return Footprint(1, stat.st_size, stat.st_mtime_ns)
+        stat = path.lstat()
+        if modes.S_ISREG(stat.st_mode):
+            found.append(_glance("", stat))
+        folders = [("", str(path))] if modes.S_ISDIR(stat.st_mode) else []
         while folders:
-            with os.scandir(folders.pop()) as entries:
+            prefix, folder = folders.pop()
+            with os.scandir(folder) as entries:
                 for entry in entries:
                     if entry.is_dir(follow_symlinks=False):
-                        folders.append(entry.path)
+                        folders.append((f"{prefix}{entry.name}/", entry.path))
+                    elif entry.is_file(follow_symlinks=False):
+                        found.append(_glance(prefix + entry.name, entry.stat(follow_symlinks=False)))
                     else:
-                        stat = entry.stat(follow_symlinks=False)
-                        files, size, stamp = files + 1, size + stat.st_size, stamp + stat.st_mtime_ns
+                        return None
     except OSError:
         return None
-    return Footprint(files, size, stamp)
+    if not found and not modes.S_ISDIR(stat.st_mode):
+        return None
+    return Footprint(len(found), sum(size for _, size, *_ in found), typed_digest("footprint 1", canonical(sorted(found))))
+
+
+def _glance(name: str, stat: os.stat_result) -> list:
+    """Of a plain file, all that shows a change of it without reading it."""
+    return [name, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns]
 
 
 def is_sound(path: Path, digest: str, memo: Memo | None = None) -> bool:
-    """Whether the content has this digest. Without a memo every byte is read."""
+    """Whether it is an object of this digest, of plain files. Without a memo every byte is read."""
+    before = measure(path)
+    if before is None:
+        return False
     try:
         found = tree_digest(path, memo)[0] if memo else manifest_digest(read_manifest(path))
     except (OSError, CacheError):
         return False
-    return found == digest
+    return found == digest and measure(path) == before
 
 
 def read_manifest(path: Path) -> dict[str, list]:
@@ -79,34 +97,57 @@ def sync(path: Path) -> None:
 
 
 def sync_one(path: Path) -> None:
-    """fsync of one file or folder."""
+    """fsync of one file or folder; of a folder only where its file system can."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in UNKNOWN or not path.is_dir():
+            raise
     finally:
         os.close(descriptor)
 
 
 def seal_files(path: Path) -> None:
-    """Makes every file of a tree read-only."""
+    """Makes every file of a tree read-only, where the file system can."""
     for file in tree_files(path).values():
-        file.chmod(0o444)
+        _set_mode(file, 0o444)
 
 
 def seal_folders(path: Path) -> None:
     """Makes every folder of a tree read-only; after the rename, since a read-only folder cannot be moved."""
     if path.is_dir():
         for folder, _, _ in os.walk(path, topdown=False):
-            os.chmod(folder, 0o555)
+            _set_mode(Path(folder), 0o555)
 
 
 def unseal_folders(path: Path) -> None:
-    """Makes the folders of a tree writable again."""
+    """Makes the folders of a tree writable again; links are not followed."""
     if path.is_dir() and not path.is_symlink():
-        os.chmod(path, 0o755)
+        _set_mode(path, 0o755)
         for folder, folders, _ in os.walk(path):
-            for name in folders:
-                os.chmod(Path(folder, name), 0o755)
+            for inner in (Path(folder, name) for name in folders):
+                if not inner.is_symlink():
+                    _set_mode(inner, 0o755)
+
+
+def make_folder(path: Path) -> None:
+    """Makes a folder of the store, for those who may use the folder that it lies in, whatever the umask."""
+    try:
+        path.mkdir()
+    except FileExistsError:
+        if not path.is_dir():
+            raise
+    else:
+        _set_mode(path, modes.S_IMODE(path.parent.stat().st_mode))
+
+
+def _set_mode(path: Path, mode: int) -> None:
+    try:
+        path.chmod(mode)
+    except OSError as error:
+        if error.errno not in (errno.EPERM, *UNKNOWN):  # exFAT, SMB, or another user's
+            raise
 
 
 def remove(path: Path) -> None:

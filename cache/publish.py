@@ -6,7 +6,6 @@ without a record is rubbish that gc removes.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import time
 from collections.abc import Callable
@@ -18,7 +17,7 @@ from gsac.cache.errors import CacheError, IntegrityError, from_os_error
 from gsac.cache.key import KeyParts
 from gsac.cache.lock import shared
 from gsac.cache.record import Record, RunInfo
-from gsac.cache.store import Store
+from gsac.cache.store import Store, read_text
 
 STEPS = (
     "started",
@@ -80,9 +79,12 @@ def publish(
 
 def _place(store: Store, source: Path, digest: str, output: str) -> objects.Footprint:
     target = objects.object_path(store.root, digest, output)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    if target.exists() and not objects.is_sound(target, digest):
+    objects.make_folder(target.parent)
+    if os.path.lexists(target) and not objects.is_sound(target, digest):
         store.quarantine(target, digest)
+        if os.path.lexists(target) and not objects.is_sound(target, digest):
+            raise IntegrityError(f"the cached object {target} is damaged and cannot be moved away by you; its owner can, "
+                                 "by `gsac cache verify`")
     if not target.exists():
         try:
             os.rename(source, target)
@@ -93,30 +95,32 @@ def _place(store: Store, source: Path, digest: str, output: str) -> objects.Foot
     footprint = objects.measure(target)
     if footprint is None:
         raise IntegrityError(f"output {output} could not be placed at {target}")
+    store.saw_whole(target)
     return footprint
 
 
 def _record(store: Store, record: Record, replace: bool, step: Callable[[str], None]) -> Record:
     final = store.record_path(record.parts.stage, record.key)
-    final.parent.mkdir(parents=True, exist_ok=True)
+    text = record.to_json()
+    if Record.from_json(text, record.outputs) is None:
+        raise CacheError(f"a record of {record.parts.stage} with the outputs {', '.join(record.outputs)} would not be believed")
+    objects.make_folder(final.parent)
     with store.private(record.parts.stage) as folder:
         temp = folder / "record.json"
-        temp.write_text(record.to_json())
+        temp.write_text(text)
+        objects.seal_files(temp)
         objects.sync_one(temp)
         step("record written")
         for _ in range(3):
-            if replace:
-                with store.record_change(record.key):
-                    _set_aside(final)
+            with store.record_change(record.key):
+                if replace:
+                    _set_aside(store, final, folder)
+                if replace or not os.path.lexists(final):
                     os.replace(temp, final)
-                break
-            try:
-                os.link(temp, final)
-                break
-            except FileExistsError:
-                first = store.lookup(record.key)  # removes a record that is not whole
-                if first is not None:
-                    return first
+                    break
+            first = store.lookup(record.key, record.outputs)  # removes a record that is not whole
+            if first is not None:
+                return first
         else:
             raise CacheError(f"the record {final} is neither whole nor can it be replaced")
     step("recorded")
@@ -125,7 +129,14 @@ def _record(store: Store, record: Record, replace: bool, step: Callable[[str], N
     return record
 
 
-def _set_aside(record: Path) -> None:
-    """Keeps a record under a second name: runs in progress may be using its outputs."""
-    with contextlib.suppress(FileNotFoundError):
-        os.link(record, record.with_suffix(f".{time.time_ns()}.json"))
+def _set_aside(store: Store, record: Path, folder: Path) -> None:
+    """Keeps a record under a second name, made in the private folder: runs in progress may be using its outputs."""
+    if store.read(record) is None:
+        if os.path.lexists(record):
+            store.drop(record)
+        return
+    copy, stat = folder / "before.json", record.stat()
+    copy.write_text(read_text(record))
+    objects.seal_files(copy)
+    os.utime(copy, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    os.replace(copy, record.with_suffix(f".{time.time_ns()}.json"))

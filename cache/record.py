@@ -1,14 +1,28 @@
-"""The action record: the key's parts, the outputs and the figures of one run, written once and never changed."""
+"""The action record: the key's parts, the outputs and the figures of one run, written once and never changed.
+
+The first line of a record's file holds the sha256 of all lines after it; the whole is one JSON object.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from dataclasses import asdict, dataclass, field
-from typing import Any
+import re
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, TypeVar
 
+from gsac.cache.errors import CacheError
 from gsac.cache.key import KeyParts
 
-RECORD_VERSION = 1
+RECORD_VERSION = 2
+UNSIGNED_VERSION = 1
+"""Its records had no checksum."""
+DIGEST = re.compile(r"[0-9a-f]{64}")
+FIRST_LINE = '{{"sha256": "{}",'
+PLAIN = {"str": str, "int": int, "float": (int, float)}
+
+Kind = TypeVar("Kind")
 
 
 @dataclass
@@ -29,12 +43,12 @@ class RunInfo:
 
 @dataclass(frozen=True)
 class Footprint:
-    """File count, size and times of an object; where they differ from those recorded, the object is hashed again."""
+    """File count, size, names and times of an object; where they differ from those recorded, the object is hashed again."""
 
     files: int
     bytes: int
-    stamp: int
-    """Sum of the files' mtime_ns."""
+    stamp: str
+    """Digest of each file's name, size, mtime_ns and ctime_ns."""
 
 
 @dataclass
@@ -55,23 +69,75 @@ class Record:
 
     def to_json(self) -> str:
         """The text of the record's file."""
-        return json.dumps({"version": RECORD_VERSION, **asdict(self)}, indent=1, sort_keys=True) + "\n"
+        content = json.dumps({"version": RECORD_VERSION, **asdict(self)}, indent=1, sort_keys=True).removeprefix("{\n") + "\n"
+        return f"{FIRST_LINE.format(_checksum(content))}\n{content}"
 
     @classmethod
-    def from_json(cls, text: str) -> Record | None:
-        """The record of a file's text; None unless it is whole, of this version, and its parts give its key."""
+    def from_json(cls, text: str, outputs: Collection[str] | None = None) -> Record | None:
+        """The record of a file's text; None unless it is as it was written, of this version, and its parts give its key.
+
+        outputs: those that the stage declares, where the caller knows the stage; a record of others is none.
+        """
         try:
-            raw = json.loads(text)
-            if raw.pop("version") != RECORD_VERSION:
+            raw = json.loads(text) if _is_whole(text) else {}
+            if raw.get("version") != RECORD_VERSION:
                 return None
             record = cls(
                 key=raw["key"],
-                parts=KeyParts(**raw["parts"]),
-                outputs=raw["outputs"],
-                info=RunInfo(**raw["info"]),
-                footprints={name: Footprint(**f) for name, f in raw["footprints"].items()},
+                parts=_typed(KeyParts, raw["parts"]),
+                outputs=dict(raw["outputs"]),
+                info=_typed(RunInfo, raw["info"]),
+                footprints={name: _typed(Footprint, footprint) for name, footprint in raw["footprints"].items()},
             )
             sound = record.parts.key == record.key and record.footprints.keys() == record.outputs.keys()
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, CacheError):
             return None
-        return record if sound else None
+        sound = sound and all(map(is_inside, record.outputs)) and all(map(is_digest, record.outputs.values()))
+        return record if sound and (outputs is None or record.outputs.keys() == set(outputs)) else None
+
+
+def is_of_other_version(text: str) -> bool:
+    """Whether a record's file is one of an earlier or later version of gsac, which is no damage."""
+    try:
+        version = json.loads(text)["version"]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return False
+    return version == UNSIGNED_VERSION or isinstance(version, int) and version != RECORD_VERSION and _is_whole(text)
+
+
+def is_inside(output: str) -> bool:
+    """Whether an output's name is a plain relative path, which leads out of no folder."""
+    return "\0" not in output and not {"", ".", ".."} & set(output.split("/"))
+
+
+def is_digest(text: object) -> bool:
+    """Whether it is a sha256 in lower-case hex."""
+    return isinstance(text, str) and DIGEST.fullmatch(text) is not None
+
+
+def _is_whole(text: str) -> bool:
+    first, _, content = text.partition("\n")
+    return first == FIRST_LINE.format(_checksum(content))
+
+
+def _checksum(content: str) -> str:
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _typed(kind: type[Kind], raw: dict[str, Any]) -> Kind:
+    """A dataclass of parsed JSON; TypeError where a field is of another type than its hint."""
+    made = kind(**raw)
+    for one in fields(made):  # pyright: ignore[reportArgumentType], a dataclass
+        if not _fits(str(one.type), getattr(made, one.name)):
+            raise TypeError(f"{one.name} is not {one.type}")
+    return made
+
+
+def _fits(hint: str, value: Any) -> bool:
+    if hint.startswith("dict[str, "):
+        return isinstance(value, dict) and all(_fits(hint[len("dict[str, "):-1], entry) for entry in value.values())
+    if hint.startswith("list["):
+        return isinstance(value, list) and all(_fits(hint[len("list["):-1], entry) for entry in value)
+    if isinstance(value, bool):  # which Python counts among the integers
+        return hint not in PLAIN
+    return isinstance(value, PLAIN.get(hint, object))

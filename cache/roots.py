@@ -72,6 +72,11 @@ def object_of(path: Path) -> str | None:
     return found[2] if found else None
 
 
+def is_object(path: Path) -> bool:
+    """Whether a path is that of an object of some store."""
+    return OBJECT.search(str(path)) is not None
+
+
 def _is_gone(folder: bytes) -> bool:
     try:
         os.stat(folder)
@@ -84,4 +89,4 @@ def _is_gone(folder: bytes) -> bool:
 
 def _files(store: Store) -> list[Path]:
     folder = store.root / "roots"
-    return [file for file in folder.iterdir() if not file.suffix] if folder.is_dir() else []
+    return [file for file in folder.iterdir() if not file.suffix and file.is_file()] if folder.is_dir() else []

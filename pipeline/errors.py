@@ -6,7 +6,7 @@ import errno
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.errors import CacheError, CacheReadOnlyError, IntegrityError
+from gsac.cache.errors import CacheError, CacheFolderError, CacheReadOnlyError, IntegrityError
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput, StageError
 
@@ -48,7 +48,7 @@ def exit_code(error: BaseException) -> ExitCode | None:
         return exit_code(error.cause) or ExitCode.FAILED
     if isinstance(error, NotUpToDateError):
         return ExitCode.STALE
-    if isinstance(error, (BadInput, CacheReadOnlyError)):
+    if isinstance(error, (BadInput, CacheFolderError, CacheReadOnlyError)):
         return ExitCode.USAGE
     if isinstance(error, IntegrityError):
         return ExitCode.INTEGRITY

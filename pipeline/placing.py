@@ -15,8 +15,8 @@ from pathlib import Path
 
 from gsac.cache import objects
 from gsac.cache.digest import tree_digest, tree_files
-from gsac.cache.errors import CacheError
-from gsac.cache.record import Record
+from gsac.cache.errors import CacheError, IntegrityError
+from gsac.cache.record import Record, is_inside
 from gsac.cache.roots import object_of
 from gsac.cache.store import Store
 
@@ -33,6 +33,8 @@ def place(store: Store, record: Record, folder: Path, placed: dict[str, str]) ->
     """
     placed = dict(placed)
     for output, digest in record.outputs.items():
+        if not is_inside(output):
+            raise IntegrityError(f"the record of {record.parts.stage} names the output {output!r}, which leads out of {folder}")
         port, path, source = f"{record.parts.stage}/{output}", folder / output, store.path(record, output)
         owned = record.parts.stage == OWNED
         if not owned and is_link_to(path, source):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -87,13 +88,15 @@ class StagePlan:
         return self.reason.sentence
 
 
-def plan_stage(store: Store, parts: KeyParts, forced: bool = False, shown: str | None = None) -> StagePlan:
+def plan_stage(
+    store: Store, parts: KeyParts, outputs: Collection[str], forced: bool = False, shown: str | None = None,
+) -> StagePlan:
     """Whether the result of this key is in the cache; if not, what differs from the most similar earlier run.
 
-    shown: key of the result that the folder of the run showed last.
+    outputs: those that the stage declares; shown: key of the result that the folder of the run showed last.
     """
     known = shown == parts.key or store.record_path(parts.stage, parts.key).is_file()
-    record = store.lookup(parts.key)
+    record = store.lookup(parts.key, outputs)
     if forced:
         return StagePlan(parts.stage, Reason.FORCED, parts, record)
     if record is not None:

@@ -48,6 +48,10 @@ class Project:
         check_agreement(step, stage)
         return stage
 
+    def outputs(self, name: str) -> tuple[str, ...]:
+        """Relative paths of the outputs that a stage declares."""
+        return tuple(output.path for output in self.stage(name).outputs)
+
     def entry(self, name: str) -> str:
         """Module whose `run` does the work."""
         return f"{self.package}.{name}.stage"

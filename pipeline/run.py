@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.digest import tree_digest
-from gsac.cache.errors import CacheError
+from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import in_use
 from gsac.cache.record import Record
@@ -104,6 +104,10 @@ class ClipRun:
         self.keys = Keys(project, configs, store)
         self.results: list[StageResult] = []
         self.metrics: dict[str, Any] = {}
+        self._told: dict[str, Outcome] = {}
+        """Key -> outcome, of the stages that this run has judged."""
+        self._damaged: set[str] = set()
+        """Ports whose files this run has found damaged."""
 
     def select(self, options: Options) -> list[str]:
         """Stages in running order. BadInput names a stage that is unknown or left out."""
@@ -145,6 +149,7 @@ class ClipRun:
         """Runs the stages that are not up to date; fills `results`, `metrics` and the folder. at_last: called with the
         last stage's name once it is at work.
 
+        Where an input of a stage that has to run is found damaged, the run goes back to the stage that made it.
         Raises StageFailedError, NotUpToDateError, CacheError; run.json and finished stages are kept in any case.
         """
         steps = self.select(options)
@@ -155,8 +160,9 @@ class ClipRun:
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
         self.reporter.follows(Course(steps, self.graph.above, self.store.usual_seconds))
         with in_use(self.store) as lease, self._writing_results(clip, source), runner:
-            for at, name in enumerate(steps, 1):
-                following = steps[at:at + AHEAD]
+            at = 0
+            while at < len(steps):
+                name, following = steps[at], steps[at + 1:at + 1 + AHEAD]
                 runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
                 inputs = self.graph.step(name).deps
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
@@ -167,17 +173,41 @@ class ClipRun:
                     if name in required:
                         raise NotUpToDateError(f"stage {name} is not up to date ({plan.sentence}); "
                                                f"run without --from {options.start}")
+                    maker = self._maker_of_damaged(name, paths)
+                    if maker is not None:
+                        at = steps.index(maker)
+                        del self._told[self.results[at].key], self.results[at:]
+                        continue
                     with self._recording_failure(plan, parts.key, runner):
                         outcome, record = runner.run(
                             parts, plan.reason, {port: paths[port] for port in inputs}, forced=name in options.force,
                             still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
-                if outcome is Outcome.CACHED:
+                if outcome is Outcome.CACHED and parts.key in self._told:
+                    outcome = self._told[parts.key]
+                elif outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
                     for message in record.info.warnings:
                         self.reporter.warning(name, first_sentence(message))
+                self._told[parts.key] = outcome
                 self._record(plan, outcome, record)
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
+                at += 1
+
+    def _maker_of_damaged(self, name: str, paths: dict[str, Path]) -> str | None:
+        """The stage whose result has to be made again before a stage can read it; None where all inputs are whole.
+
+        IntegrityError where that was done in this run already.
+        """
+        port = next((port for port in self.graph.step(name).deps if port != CLIP and not self.store.is_whole(paths[port])), None)
+        if port is None:
+            return None
+        if port in self._damaged:
+            raise IntegrityError(f"{port} was damaged in the cache {self.store.root} as soon as it was made again; check the disk")
+        self._damaged.add(port)
+        maker = self.graph.producer[port]
+        self.reporter.note(f"{name}: its input {port} was damaged in the cache; {maker} runs again first")
+        return maker
 
     @cached_property
     def _shown(self) -> dict[str, str]:
@@ -186,7 +216,8 @@ class ClipRun:
         return {name: str(row.get("key")) for name, row in results.items() if row is not None}
 
     def _plan(self, parts: KeyParts, options: Options) -> StagePlan:
-        return plan_stage(self.store, parts, parts.stage in options.force, self._shown.get(parts.stage))
+        forced = parts.stage in options.force and parts.key not in self._told
+        return plan_stage(self.store, parts, self.keys.project.outputs(parts.stage), forced, self._shown.get(parts.stage))
 
     def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))

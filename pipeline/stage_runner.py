@@ -106,12 +106,12 @@ class StageRunner:
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
         name = parts.stage
-        with single_flight(self.store, parts.key, lambda: self._waiting(name)) as there:
+        outputs = self.keys.project.outputs(name)
+        with single_flight(self.store, parts.key, lambda: self._waiting(name), outputs) as there:
             if there is not None and not forced:
                 return Outcome.CACHED, there
             models = self.keys.models.need(parts.models, self.reporter.note)
             self.reporter.starts(name, reason.value)
-            stage = self.keys.project.stage(name)
             scratch = self.store.partial(parts.key)
             if forced:
                 objects.remove(scratch)
@@ -123,7 +123,6 @@ class StageRunner:
                     raise
                 self._check_code(parts)
                 still_valid()
-                outputs = tuple(output.path for output in stage.outputs)
                 if METRICS_OUTPUT in outputs:
                     info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
                 record = publish(self.store, parts, folder, outputs, info, replace=forced)

@@ -5,13 +5,19 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from gsac.cache import gc, listing, verify
+from gsac.cache.code import code_parts
+from gsac.cache.errors import CacheFolderError
+from gsac.cache.key import KeyParts
 from gsac.cache.roots import find_roots
-from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter
+from gsac.cache.store import Store
+from gsac.pipeline.commands.options import add_json, answer_reporter, find_store, open_store, progress_reporter
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.project import Project
 from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
 
@@ -23,7 +29,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     one = does.add_parser("ls", help="every result with the clip and the folder that shows it, the last used first")
     add_json(one)
     one.set_defaults(do=do_ls)
-    one = does.add_parser("verify", help="read every byte; what is damaged is moved to quarantine")
+    one = does.add_parser("verify", help="read every byte; what is damaged is moved to quarantine, what was made of it is dropped")
+    one.add_argument("--repair", action="store_true", help="also pull model files again that were found damaged")
     add_json(one)
     one.set_defaults(do=do_verify)
     one = does.add_parser("gc", help="remove rubbish, and with a bound the results that were not used for longest")
@@ -37,7 +44,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
     reporter = answer_reporter(arguments)
-    store = open_store(progress_reporter(arguments))
+    store = find_store(progress_reporter(arguments))
     rows, folders = listing.ls(store), [RunFolder(root.folder) for root in find_roots(store)]
     shown = {folder: folder.objects() for folder in folders}
     places = {row.key: [folder for folder in folders if not shown[folder].isdisjoint(row.objects)] for row in rows}
@@ -55,20 +62,44 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
 
 def do_verify(arguments: argparse.Namespace) -> ExitCode:
     reporter = answer_reporter(arguments)
-    store = open_store(reporter)
-    report = verify.verify(store)
+    store = find_store(reporter)
+    if not (store.root / "objects").is_dir():
+        raise CacheFolderError(f"there is no cache in {store.root}; GSAC_CACHE names another folder, or none was made yet")
+    report, models = verify.verify(store, declared_by(Project.at_hand(), store)), ModelStore(store)
     for name in report.lost:
         reporter.note(f"{name}: dropped; it will be computed again")
-    reporter.note(f"{report.objects} objects, {format_size(report.bytes)} sound, {len(report.damaged)} damaged in {store.root}")
+    for name in report.derived:
+        reporter.note(f"{name}: dropped, since it may have been made of damaged files; it will be computed again")
+    gone = models.gone
+    for name in gone:
+        reporter.note(f"{name}: the file that you brought is gone; bring it again with `gsac models add {name} FILE`")
+    reporter.note(f"{report.objects} objects, {format_size(report.bytes)} sound, {len(report.damaged)} damaged; "
+                  f"{report.models} model files, {len(report.damaged_models)} damaged; in {store.root}")
+    repaired = models.pull_again(reporter.note) if arguments.repair else []
     if arguments.json:
-        emit({"sound": report.sound, **dataclasses.asdict(report)})
-    return ExitCode.OK if report.sound else ExitCode.INTEGRITY
+        emit({"sound": report.sound and not gone, **dataclasses.asdict(report), "gone_models": gone, "repaired": repaired})
+    return ExitCode.OK if report.sound and not gone else ExitCode.INTEGRITY
+
+
+def declared_by(project: Project, store: Store) -> Callable[[KeyParts], tuple[str, ...] | None]:
+    """Outputs that the stages at hand declare for a key; None for a key of other code."""
+    codes: dict[str, dict[str, str]] = {}
+
+    def outputs(parts: KeyParts) -> tuple[str, ...] | None:
+        name = parts.stage
+        if name not in project.graph.steps:
+            return None
+        if name not in codes:
+            codes[name] = code_parts(project.entry(name), project.stage(name).code, store.memo)
+        return project.outputs(name) if parts.code == codes[name] else None
+
+    return outputs
 
 
 def do_gc(arguments: argparse.Namespace) -> ExitCode:
     reporter = answer_reporter(arguments)
-    limit = parse_size(arguments.max_size) if arguments.max_size else None
-    if arguments.keep_days is not None and arguments.keep_days < 0:
+    limit = parse_size(arguments.max_size) if arguments.max_size is not None else None
+    if arguments.keep_days is not None and not arguments.keep_days >= 0:
         raise BadInput(f"--keep-days {arguments.keep_days}: expected 0 or more")
     report = gc.collect(open_store(reporter), arguments.keep_days, limit, arguments.dry_run, force=arguments.force)
     verb = "would remove" if arguments.dry_run else "removed"
@@ -117,5 +148,5 @@ def parse_size(text: str) -> int:
     """Bytes of `500M`, `20G`, `1.5 TB`."""
     match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*([KMGT]?)B?\s*", text, re.IGNORECASE)
     if match is None:
-        raise BadInput(f"--max-size {text}: expected a size such as 500M or 20G")
+        raise BadInput(f"--max-size {text or repr(text)}: expected a size such as 500M or 20G")
     return int(float(match.group(1)) * UNITS[match.group(2).upper()])

