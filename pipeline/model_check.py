@@ -55,10 +55,9 @@ def _array_names(file: Path) -> set[str]:
 
 def _joints(file: Path) -> int:
     """Joints of the model's tree, 0 where there is none to be read."""
-    import numpy as np
+    from gsac.avatar.npz import NpzError, read_npz
 
     try:
-        with np.load(file, allow_pickle=False) as arrays:
-            return arrays["kintree_table"].shape[-1]
-    except (KeyError, ValueError, IndexError, AttributeError):
+        return read_npz(file, ("kintree_table",))["kintree_table"].shape[-1]
+    except (KeyError, IndexError, NpzError):
         return 0
