@@ -64,8 +64,8 @@ def read_flame(path: Path | str) -> Flame:
     path = Path(path)
     a = _arrays(path, ARRAYS)
     for name, shape in ARRAYS.items():
-        if a[name].shape != shape or a[name].dtype.kind not in "fiu":
-            raise ArtifactError(f"{path}: array {name} has shape {a[name].shape} of {a[name].dtype}, expected {shape} of numbers")
+        if a[name].shape != shape:
+            raise ArtifactError(f"{path}: array {name} has shape {a[name].shape}, expected {shape}")
     if a["f"].min() < 0 or a["f"].max() >= 5023:
         raise ArtifactError(f"{path}: array f names vertex {a['f'].max()}, but there are 5023")
     if not np.allclose(np.asarray(a["weights"], np.float32).sum(1), 1, atol=2e-2):
@@ -90,8 +90,8 @@ def read_flame_points(path: Path | str) -> FlamePoints:
     count = a["lmk_face_idx"].size
     for name, dimensions in POINTS.items():
         shape = (count, 3)[:dimensions]
-        if a[name].shape != shape or a[name].dtype.kind not in "fiu":
-            raise ArtifactError(f"{path}: array {name} has shape {a[name].shape} of {a[name].dtype}, expected {shape} of numbers")
+        if a[name].shape != shape:
+            raise ArtifactError(f"{path}: array {name} has shape {a[name].shape}, expected {shape}")
     if count == 0 or a["lmk_face_idx"].min() < 0 or a["lmk_face_idx"].max() >= ARRAYS["f"][0]:
         raise ArtifactError(f"{path}: array lmk_face_idx must name some of the {ARRAYS['f'][0]} faces")
     if a["landmark_indices"].min() < 0 or not np.allclose(a["lmk_b_coords"].sum(1), 1, atol=1e-2):
@@ -113,4 +113,6 @@ def _arrays(path: Path, names: dict) -> dict[str, np.ndarray]:
     for name in names:
         if name not in found:
             raise ArtifactError(f"{path}: array {name} is missing; expected {', '.join(names)}")
+        if found[name].dtype.kind not in "fiu":
+            raise ArtifactError(f"{path}: array {name} holds {found[name].dtype}, expected numbers")
     return found
