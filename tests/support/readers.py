@@ -98,8 +98,8 @@ def probe(path):
 
 def split(path):
     from gsac.stages.contract import Job
-    from gsac.stages.split.config import SplitConfig
     from gsac.stages.split import STAGE
+    from gsac.stages.split.config import SplitConfig
     from gsac.stages.split.stage import run
 
     with tempfile.TemporaryDirectory() as out:
