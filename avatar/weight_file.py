@@ -28,7 +28,8 @@ def read_weights(path: Path) -> dict[str, np.ndarray]:
         if path.suffix == ".safetensors":
             return _safetensors(path)
         if path.suffix == ".npz":
-            return {name: np.asarray(values, np.float32) for name, values in read_npz(path).items() if values.dtype.kind == "f"}
+            with np.errstate(over="ignore"):
+                return {name: np.asarray(values, np.float32) for name, values in read_npz(path).items() if values.dtype.kind == "f"}
         if path.suffix in TORCH:
             return _torch(path)
     except FileNotFoundError as error:

@@ -24,7 +24,7 @@ VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi"}
 PLATE = "plate"
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
 """What Pillow may take a photo's content for, whatever its name says. It knows others that are programs: EPS runs Ghostscript."""
-MOST_PIXELS = 1 << 26
+MOST_PIXELS, LONGEST_SIDE = 1 << 26, 65535
 """Of a photo: more would fill the memory, however small the file is."""
 Image.MAX_IMAGE_PIXELS = None  # open_image has its own bound, and names it
 ORIENTATION, SIDEWAYS = 0x0112, (5, 6, 7, 8)
@@ -131,7 +131,7 @@ def fit_photo(rgb: np.ndarray, exif: Image.Exif, width: int, height: int) -> tup
 
 def open_image(path: Path) -> Image.Image:
     """Opens a photo, whose pixels are decoded later; the first HEIC one loads what decodes it. BadInput where it is larger than
-    MOST_PIXELS; Pillow's errors."""
+    MOST_PIXELS or LONGEST_SIDE; Pillow's errors."""
     with path.open("rb") as file:
         is_heic = file.read(8)[4:] == b"ftyp"
     if is_heic:
@@ -140,9 +140,10 @@ def open_image(path: Path) -> Image.Image:
         pillow_heif.register_heif_opener()
     image = Image.open(path, formats=("HEIF",) if is_heic else FORMATS)
     width, height = image.size
-    if width * height > MOST_PIXELS:
+    if width * height > MOST_PIXELS or max(width, height) > LONGEST_SIDE:
         image.close()
-        raise BadInput(f"{path.name}: has {width}x{height} pixels; at most {MOST_PIXELS} are read. Export it smaller.")
+        raise BadInput(f"{path.name}: has {width}x{height} pixels; at most {MOST_PIXELS}, and {LONGEST_SIDE} a side, are read. "
+                       "Export it smaller.")
     return image
 
 

@@ -40,10 +40,10 @@ def words_of(data, rng):
     """The text with one to four of its words or signs replaced by odd ones or others of the file, gone, or repeated."""
     text = data.decode("utf-8", "surrogateescape")
     for _ in range(rng.randint(1, 4)):
-        places = [found.span() for found in NUMBER_OR_WORD.finditer(text)]
-        if not places:
-            break
-        (start, end), other, kind = rng.choice(places), rng.choice(places), rng.random()
+        places = [NUMBER_OR_WORD.search(text, rng.randrange(len(text) + 1)) for _ in range(2)]
+        if None in places:
+            continue
+        (start, end), other, kind = places[0].span(), places[1].span(), rng.random()
         new = (rng.choice(WORDS) if kind < .5 else text[slice(*other)] if kind < .7 else "" if kind < .85
                else text[start:end] * rng.choice([2, 50]))
         text = text[:start] + new + text[end:]

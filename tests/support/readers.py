@@ -303,7 +303,7 @@ READERS = {
     "motion fbx": Reader(".fbx", fbx, read_motion, share=.05),
     "avatar gsac": Reader(".gsac", gsac, read_gsac),
     "body npz": Reader(".npz", body, read_body, mutate.npz_of),
-    "flame npz": Reader(".npz", flame, read_flame, mutate.npz_of, share=.1),
+    "flame npz": Reader(".npz", flame, read_flame, mutate.npz_of, share=.03),
     "points npz": Reader(".npz", points, read_points, mutate.npz_of),
     "models add": Reader(".npz", body, add_model, mutate.npz_of),
     "weights npz": Reader(".npz", lambda: weights(".npz"), read_weights, mutate.npz_of),
