@@ -85,7 +85,8 @@ def read_alpha(path: Path) -> np.ndarray:
     import numpy as np
     import OpenEXR
 
-    with OpenEXR.File(str(path)) as f:
+    # OpenEXR itself opens no path that is not UTF-8.
+    with open(path, "rb") as stream, OpenEXR.File(stream) as f:
         return np.ascontiguousarray(next(iter(f.channels().values())).pixels, dtype=np.float32)
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import os
-
-CHOSEN_BY = "IMAGEIO_FFMPEG_EXE"
-"""The variable by which imageio-ffmpeg takes another program, whose bytes would be kept as if its own had made them."""
+import shutil
+from importlib.util import find_spec
+from pathlib import Path
 
 
 def ffmpeg_program() -> str:
-    """Path of the program that the package imageio-ffmpeg brings, whatever the environment says."""
-    import imageio_ffmpeg
+    """Path of the program that the package imageio-ffmpeg brings, else of the one on the PATH.
 
-    os.environ.pop(CHOSEN_BY, None)
-    return imageio_ffmpeg.get_ffmpeg_exe()
+    Found without importing that package, since each run asks; and whatever its variable IMAGEIO_FFMPEG_EXE says, whose program's
+    bytes would be kept as if its own had made them.
+    """
+    spec = find_spec("imageio_ffmpeg")
+    for folder in (spec.submodule_search_locations or ()) if spec is not None else ():
+        for program in sorted(Path(folder, "binaries").glob("ffmpeg-*")):
+            return str(program)
+    return shutil.which("ffmpeg") or "ffmpeg"

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gsac.avatar.ffmpeg import CHOSEN_BY
 from gsac.stages.contract import BadInput, StageError
 
 GRACE_S = 2.0
@@ -49,8 +48,7 @@ class Child:
                     [sys.executable, "-P", "-m", "gsac.pipeline.worker"],
                     stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write,),
                     start_new_session=True,
-                    env=ENVIRONMENT | {name: value for name, value in os.environ.items() if name != CHOSEN_BY}
-                    | {"PYTHONUNBUFFERED": "1", "TMPDIR": self._temporary.name},
+                    env=ENVIRONMENT | os.environ | {"PYTHONUNBUFFERED": "1", "TMPDIR": self._temporary.name},
                 )
         except BaseException:
             os.close(self._events)
