@@ -111,8 +111,8 @@ def _run(path: Path, video: Video, output: list[str], folder: Path | None,
     decoder = ["-c:v", video.decoder] if video.decoder else []
     limits = [word for name, value in LIMITS.items() for word in (f"-{name}", value)]
     command = [ffmpeg_program(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
-               "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, "-i", file_url(path), "-map", f"0:{video.stream}",
-               "-fps_mode", "passthrough", *output]
+               "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, "-i", file_url(path),
+               "-map", f"0:{video.stream}", "-fps_mode", "passthrough", *output]
     ticks: list[int] = []
     base, errors = video.time_base, []
     # The output pattern is relative to `folder`: a % in the folder's own name is no pattern.

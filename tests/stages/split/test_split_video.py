@@ -144,6 +144,15 @@ def test_a_truncated_video_keeps_what_decodes_and_says_how_many(tmp_path):
     assert "60 frames" in warnings[0] and str(len(frames)) in warnings[0]
 
 
+def test_a_clip_most_of_whose_frames_are_damaged_gives_the_others_and_says_so(tmp_path):
+    source = make_clip(tmp_path / "a.mov", "-c:v", "png", size="64x48", rate=10)
+    start, *frames = source.read_bytes().split(b"IDAT")
+    assert len(frames) == 10
+    source.write_bytes(b"IDAT".join([start, *frames[:2], *(b"\xff" * 40 + frame[40:] for frame in frames[2:])]))
+    _, frames, warnings = split(source, tmp_path / "out", fps=None)
+    assert len(frames) == 2 and "a.mov is damaged: 8 of the 10 frames to keep do not decode" in warnings[0]
+
+
 def test_a_video_without_its_index_is_bad_input(tmp_path):
     whole = make_clip(tmp_path / "a.mp4")
     cut = tmp_path / "cut.mp4"
