@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import math
+import struct
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
@@ -13,6 +15,10 @@ import numpy as np
 MOST_BYTES = 640 << 20
 """Of all arrays that are read from one file, unpacked."""
 MOST_MEMBERS = 10_000
+MOST_DIRECTORY = 4 << 20
+"""Bytes of a zip's list of members, which is read whole."""
+END = struct.Struct("<4s8xI4xH")
+"""What ends a zip: its mark, bytes of the list, bytes of the comment after it."""
 SUFFIX = ".npy"
 ENCRYPTED = 0x1
 """Bit of a member's flags."""
@@ -31,7 +37,7 @@ def read_npz(path: Path, names: Collection[str] | None = None, objects: bool = T
     False: it is left out.
     """
     try:
-        with zipfile.ZipFile(path) as file:
+        with open_zip(path) as file:
             return _read_members(file, names, objects)
     except (NpzError, FileNotFoundError, IsADirectoryError, PermissionError):
         raise
@@ -39,6 +45,19 @@ def read_npz(path: Path, names: Collection[str] | None = None, objects: bool = T
         raise NpzError("its arrays do not fit into the memory") from e
     except Exception as e:  # zipfile and numpy raise nearly anything on a damaged file
         raise NpzError(str(e) or type(e).__name__) from e
+
+
+def open_zip(path: Path) -> zipfile.ZipFile:
+    """The zip of that path. Raises NpzError where its list of members is larger than MOST_DIRECTORY, else as zipfile does."""
+    with open(path, "rb") as file:
+        file.seek(max(0, file.seek(0, io.SEEK_END) - END.size - 0xFFFF))
+        end = file.read()
+    at = end.rfind(b"PK\x05\x06")
+    if 0 <= at <= len(end) - END.size:
+        size = END.unpack_from(end, at)[1]
+        if size > MOST_DIRECTORY:
+            raise NpzError(f"its list of arrays has {size} bytes; at most {MOST_DIRECTORY} are read")
+    return zipfile.ZipFile(path)
 
 
 def _read_members(file: zipfile.ZipFile, names: Collection[str] | None, objects: bool) -> dict[str, np.ndarray]:
@@ -72,7 +91,10 @@ def _check_header(stream: IO[bytes], name: str, size: int) -> bool:
     version = np.lib.format.read_magic(stream)
     if version != (1, 0):  # the others are for structures, and their headers have no bound
         raise NpzError(f"array {name} is of npy version {version[0]}.{version[1]}; save it as a plain array of numbers or text")
-    shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    try:
+        shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    except Exception as e:  # the header is Python's text: it raises what its parsers do
+        raise NpzError(f"array {name} has a header that cannot be read; was the file damaged?") from e
     if dtype.hasobject:
         return True
     if not all(type(n) is int and n >= 0 for n in shape) or math.prod(shape) > MOST_BYTES:

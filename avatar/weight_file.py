@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.npz import MOST_BYTES, read_npz
+from gsac.avatar.npz import MOST_BYTES, open_zip, read_npz
 
 TORCH = (".pth", ".pt", ".ckpt", ".bin")
 SUFFIXES = (".safetensors", ".npz", *TORCH)
@@ -73,7 +73,7 @@ def _torch(path: Path) -> dict[str, np.ndarray]:
     import torch
 
     if zipfile.is_zipfile(path):
-        with zipfile.ZipFile(path) as file:
+        with open_zip(path) as file:
             unpacked = sum(member.file_size for member in file.infolist())
         if unpacked > MOST_BYTES:
             raise ValueError(f"it has {unpacked} bytes when unpacked; at most {MOST_BYTES} are read")

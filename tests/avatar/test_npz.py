@@ -62,6 +62,8 @@ HOSTILE = {
     "object": (packed({"poses.npy": with_header(SHAPE.replace("<f8", "|O") % "(3,)")}), "poses is a pickled object"),
     "version 2": (packed({"poses.npy": PLAIN.replace(b"\x01\x00", b"\x02\x00", 1)}), "poses is of npy version 2.0"),
     "flipped": (patched(packed({"poses.npy": PLAIN}, zipfile.ZIP_STORED), np.float64(2).tobytes(), np.float64(3).tobytes()), "CRC"),
+    "long list": (WHOLE[:-10] + (5 << 20).to_bytes(4, "little") + WHOLE[-6:],
+                  "its list of arrays has 5242880 bytes; at most 4194304 are read"),
     "many": (packed(dict.fromkeys((f"{n}.npy" for n in range(10_001)), PLAIN)), "holds 10001 arrays; at most 10000"),
 }
 
