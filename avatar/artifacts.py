@@ -60,8 +60,13 @@ def frame_paths(frames: Path) -> list[Path]:
 def read_frame(path: Path) -> np.ndarray:
     """(H, W, 3) uint8 RGB."""
     import cv2
+    import numpy as np
 
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    try:
+        data = np.fromfile(path, np.uint8)  # OpenCV's own reading ends the process where the path is not UTF-8
+    except OSError as e:
+        raise ArtifactError(f"{path}: cannot be read ({e.strerror})") from e
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
     if image is None:
         raise ArtifactError(f"{path}: cannot be read as an image")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
@@ -80,7 +85,8 @@ def read_alpha(path: Path) -> np.ndarray:
     import numpy as np
     import OpenEXR
 
-    with OpenEXR.File(str(path)) as f:
+    # OpenEXR itself opens no path that is not UTF-8.
+    with open(path, "rb") as stream, OpenEXR.File(stream) as f:
         return np.ascontiguousarray(next(iter(f.channels().values())).pixels, dtype=np.float32)
 
 
@@ -103,15 +109,11 @@ def write_arrays(path: Path, **arrays: np.ndarray) -> None:
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """All arrays (...) of an npz by name, unchecked; objects are refused."""
-    import zipfile
-    import zlib
-
-    import numpy as np
+    from gsac.avatar.npz import NpzError, read_npz
 
     try:
-        with np.load(path, allow_pickle=False) as z:
-            return {k: z[k] for k in z.files}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as e:
+        return read_npz(path)
+    except (OSError, NpzError) as e:
         raise ArtifactError(f"{path}: not a readable npz ({e})") from e
 
 

@@ -15,10 +15,15 @@ from scipy import sparse
 from gsac.avatar import joints, wholebody
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.joints import J
+from gsac.avatar.npz import NpzError, read_npz
 from gsac.avatar.wholebody import BODY_NAMES, HAND_POINTS
 
 ALWAYS = {"v_template": 2, "f": 2, "shapedirs": 3, "J_regressor": 2, "weights": 2, "kintree_table": 2}
 """Array -> number of dimensions."""
+SOMETIMES = ("num_betas", "expression_names", "clothes", "jaw_actions", "keypoint_row", "keypoint_vertex", "keypoint_weight",
+             "vt", "ft", "lmk_faces_idx", "lmk_bary_coords")
+"""Arrays that only some body models have."""
+MOST_VERTICES, MOST_DIRECTIONS = 50_000, 500
 SMPLX_KEYPOINT_JOINTS = {keypoint: joints.INDEX[name] for keypoint, name in enumerate(BODY_NAMES) if name in joints.INDEX} | {
     wholebody.INDEX[f"{side}_hand_{point}"]: joints.INDEX[f"{side}_{point}"]
     for side in ("left", "right") for point in HAND_POINTS.split() if f"{side}_{point}" in joints.INDEX}
@@ -41,6 +46,18 @@ def read_body_file(path: Path) -> dict:
         raise ArtifactError(f"{path}: a body model must be an .npz file (pickles run code when read, so .pkl is refused); "
                             "SMPL-X is distributed as SMPLX_NEUTRAL.npz, SMPLX_MALE.npz and SMPLX_FEMALE.npz")
     a = _read_arrays(path)
+    try:
+        with np.errstate(over="ignore"):  # a number beyond float32 becomes infinite, and is found
+            fields = _fields(path, a)
+    except (ValueError, TypeError, IndexError, KeyError) as e:  # of an array that is of another kind or shape than it should be
+        raise ArtifactError(f"{path}: it is not built as a body model ({e}); get the file again from where it came from") from e
+    for name, values in fields.items():
+        if isinstance(values, np.ndarray) and not np.isfinite(values).all():
+            raise ArtifactError(f"{path}: {name} is not finite, or beyond float32")
+    return fields
+
+
+def _fields(path: Path, a: dict[str, np.ndarray]) -> dict:
     v = len(a["v_template"])
     _check_sizes(path, a, v)
     shapes = np.asarray(a["shapedirs"], np.float32)
@@ -58,7 +75,7 @@ def read_body_file(path: Path) -> dict:
         "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": _four_heaviest(np.asarray(a["weights"], np.float32)),
         "parents": _parents_of(a["kintree_table"]), "joint_names": joints.NAMES,
         "expression_names": tuple(names or (f"expression{i}" for i in range(expressions))),
-        "jaw_actions": np.asarray(a.get("jaw_actions", np.zeros((expressions, 3))), np.float32),
+        "jaw_actions": np.asarray(a.get("jaw_actions", np.zeros((expressions, 3))), np.float32).reshape(expressions, 3),
         "keypoint_matrix": _keypoint_matrix(a, v), "vt": np.asarray(a["vt"], np.float32) if "vt" in a else None,
         "ft": np.asarray(a["ft"], np.int32) if "ft" in a else None,
     }
@@ -67,14 +84,8 @@ def read_body_file(path: Path) -> dict:
 def _read_arrays(path: Path) -> dict[str, np.ndarray]:
     """Arrays of the npz by name; the object arrays of official files are left out."""
     try:
-        with np.load(path, allow_pickle=False) as z:
-            arrays = {}
-            for key in z.files:
-                try:
-                    arrays[key] = z[key]
-                except ValueError:
-                    continue
-    except (OSError, ValueError) as e:
+        arrays = read_npz(path, {*ALWAYS, *SOMETIMES}, objects=False)
+    except (OSError, NpzError) as e:
         raise ArtifactError(f"{path}: not a readable body model npz ({e})") from e
     for name, dims in ALWAYS.items():
         if name not in arrays:
@@ -91,6 +102,9 @@ def _check_sizes(path: Path, a: dict, v: int) -> None:
         if a[name].shape != shape:
             raise ArtifactError(f"{path}: array {name} has shape {a[name].shape}, expected {shape}"
                                 + ("; SMPL and SMPL-H files have fewer joints, SMPL-X is needed" if J in shape else ""))
+    if v > MOST_VERTICES or a["shapedirs"].shape[2] > MOST_DIRECTIONS:
+        raise ArtifactError(f"{path}: {v} vertices and {a['shapedirs'].shape[2]} shape directions; at most {MOST_VERTICES} and "
+                            f"{MOST_DIRECTIONS} are read")
     if a["f"].min() < 0 or a["f"].max() >= v:
         raise ArtifactError(f"{path}: array f names vertex {a['f'].max()}, but there are {v}")
     if not np.allclose(np.asarray(a["weights"], np.float32).sum(1), 1, atol=2e-2):
@@ -109,6 +123,8 @@ def _parents_of(kintree: np.ndarray) -> np.ndarray:
     """(55,) int; official files write the root's parent as 2**32 - 1."""
     parents = np.asarray(kintree[0], np.int64).copy()
     parents[0] = -1
+    if not (parents[1:] < np.arange(1, J)).all() or parents[1:].min() < 0:
+        raise ValueError("kintree_table names a parent that is no earlier joint")
     return parents
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.npz import NpzError, read_npz
 
 SHAPES, EXPRESSIONS = 300, 100
 ARRAYS = {"v_template": (5023, 3), "f": (9976, 3), "shapedirs": (5023, 3, SHAPES + EXPRESSIONS), "posedirs": (5023, 3, 36),
@@ -75,6 +76,8 @@ def read_flame(path: Path | str) -> Flame:
     directions = np.asarray(a["shapedirs"], np.float32)
     parents = np.asarray(a["kintree_table"][0], np.int64).copy()
     parents[0] = -1
+    if not (parents[1:] < np.arange(1, len(parents))).all() or parents[1:].min() < 0:
+        raise ArtifactError(f"{path}: array kintree_table names a parent that is no earlier joint")
     return Flame(np.asarray(a["v_template"], np.float32), np.asarray(a["f"], np.int32), directions[:, :, :SHAPES],
                  directions[:, :, SHAPES:], np.asarray(a["posedirs"], np.float32), np.asarray(a["J_regressor"], np.float32),
                  np.asarray(a["weights"], np.float32), parents)
@@ -84,7 +87,7 @@ def read_flame_points(path: Path | str) -> FlamePoints:
     """The points of `mediapipe_landmark_embedding.npz`. Raises `ArtifactError` as `read_flame`."""
     path = Path(path)
     a = _arrays(path, POINTS)
-    count = len(a["lmk_face_idx"])
+    count = a["lmk_face_idx"].size
     for name, dimensions in POINTS.items():
         shape = (count, 3)[:dimensions]
         if a[name].shape != shape:
@@ -103,16 +106,13 @@ def _arrays(path: Path, names: dict) -> dict[str, np.ndarray]:
     if path.suffix != ".npz" and not zipfile.is_zipfile(path):  # the model store keeps files under names without suffix
         raise ArtifactError(f"{path}: a FLAME file must be .npz (pickles run code when read, so .pkl is refused); "
                             f"save its arrays {', '.join(names)} with numpy.savez once")
-    found = {}
     try:
-        with np.load(path, allow_pickle=False) as z:
-            for name in names:
-                if name not in z.files:
-                    raise ArtifactError(f"{path}: array {name} is missing; expected {', '.join(names)}")
-                try:
-                    found[name] = z[name]
-                except ValueError as e:
-                    raise ArtifactError(f"{path}: array {name} is a pickled object; save it as a plain array") from e
-    except (OSError, ValueError, zipfile.BadZipFile) as e:
+        found = read_npz(path, names)
+    except (OSError, NpzError) as e:
         raise ArtifactError(f"{path}: not a readable npz ({e})") from e
+    for name in names:
+        if name not in found:
+            raise ArtifactError(f"{path}: array {name} is missing; expected {', '.join(names)}")
+        if found[name].dtype.kind not in "fiu":
+            raise ArtifactError(f"{path}: array {name} holds {found[name].dtype}, expected numbers")
     return found

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from gsac.avatar.npz import NpzError, read_npz
 from gsac.avatar.weight_file import WeightsError, read_weights
 
 if TYPE_CHECKING:
@@ -120,8 +121,10 @@ class Lpips:
     @classmethod
     def read(cls, name: str, path: Path) -> Lpips:
         """From the store's file. Raises `WeightsError` where its arrays are not those of `shapes(name)`."""
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
+        try:
+            arrays = read_npz(path)
+        except (OSError, NpzError) as error:
+            raise WeightsError(f"{path} cannot be read ({error}); run `gsac models add {name} FILE` again") from error
         if {own: values.shape for own, values in arrays.items()} != shapes(name):
             raise WeightsError(f"{path} does not hold the arrays of {name}; run `gsac models add {name} FILE` again")
         return cls(name, arrays)

@@ -7,6 +7,7 @@ Reads the part of DVC's format that one clip needs, and refuses the rest by name
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,12 @@ CLIP = "clip"
 TOP_KEYS = ("stages", "metrics", "plots")
 STEP_KEYS = ("cmd", "deps", "params", "outs", "desc")
 OUT_OPTIONS = ("cache",)
+MOST_CHARACTERS = 1 << 20
+"""Of a YAML text, and of what it says once its aliases are written out."""
+MOST_DEPTH = 50
+MOST_DIGITS = 40
+OLD_NUMBER = re.compile(r"[-+]?0[0-9_]+|[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?")
+"""Numbers that YAML 1.1 counts in eights or in sixties, and YAML 1.2 and people do not."""
 
 
 @dataclass(frozen=True)
@@ -96,14 +103,16 @@ class Graph:
 def read_yaml(path: Path) -> dict[str, Any]:
     """Mapping of a YAML file; {} for an empty one."""
     try:
-        text = Path(path).read_text()
+        with Path(path).open() as file:
+            text = file.read(MOST_CHARACTERS + 1)
     except (OSError, UnicodeDecodeError) as e:
         raise BadInput(f"{path}: cannot be read ({getattr(e, 'strerror', None) or e})") from e
     return parse_yaml(text, str(path)) or {}
 
 
 def parse_yaml(text: str, source: str) -> Any:
-    """The value of a YAML text. BadInput where it is not YAML, or a key is given twice (YAML would keep the last)."""
+    """The value of a YAML text. BadInput where it is not YAML, is larger or deeper than is read, has a number that YAML's versions
+    read differently, or a key is given twice (YAML would keep the last)."""
     import yaml
 
     base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -117,10 +126,53 @@ def parse_yaml(text: str, source: str) -> Any:
                 seen.add(str(key.value))
             return super().construct_mapping(node, deep)
 
+        def construct_scalar(self, node: Any) -> Any:
+            value = super().construct_scalar(node)
+            where = f"{source}: line {node.start_mark.line + 1}"
+            if node.tag.endswith((":int", ":float")) and len(value) > MOST_DIGITS:
+                raise BadInput(f"{where}: a number of {len(value)} digits; at most {MOST_DIGITS} are read")
+            if not node.style and node.tag.endswith((":int", ":float")) and OLD_NUMBER.fullmatch(value):
+                raise BadInput(f"{where}: {value} is another number to some readers of YAML (a leading 0 counts in eights, a colon "
+                               "in sixties); write it plainly, or in quotes where it is text")
+            return value
+
     try:
+        _check_bounds(text, Loader, source)
         return yaml.load(text, Loader)  # noqa: S506, both base loaders are safe ones
-    except yaml.YAMLError as e:
-        raise BadInput(f"{source}: not valid YAML ({' '.join(str(e).split())})") from e
+    except BadInput:
+        raise
+    except Exception as e:  # beside its own errors yaml raises what Python does of an odd number or date
+        raise BadInput(f"{source}: not valid YAML ({' '.join(str(e).split()) or type(e).__name__})") from e
+
+
+def _check_bounds(text: str, loader: Any, source: str) -> None:
+    """BadInput where the text is too long or too deep; before a value is made, since the parser's own recursion has no bound."""
+    import yaml
+
+    if len(text) > MOST_CHARACTERS:
+        raise BadInput(f"{source}: it has more than {MOST_CHARACTERS} characters, which is the most that is read")
+    says, sizes, opened = 0, {}, []  # characters so far; of each anchor; of each collection around, its anchor and where it began
+    for event in yaml.parse(text, loader):
+        if isinstance(event, yaml.CollectionEndEvent):
+            anchor, began = opened.pop()
+            sizes[anchor] = says - began
+            continue
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor not in sizes:
+                raise BadInput(f"{source}: line {event.start_mark.line + 1}: *{event.anchor} names nothing that ends before it")
+            says += sizes[event.anchor]
+        elif isinstance(event, yaml.ScalarEvent):
+            says += len(event.value) + 1
+            sizes[event.anchor] = len(event.value) + 1
+        elif isinstance(event, yaml.CollectionStartEvent):
+            opened.append((event.anchor, says))
+            says += 1
+        where = f"{source}: line {event.start_mark.line + 1}"
+        if len(opened) > MOST_DEPTH:
+            raise BadInput(f"{where}: it is more than {MOST_DEPTH} levels deep, which is the most that is read")
+        if says > MOST_CHARACTERS:
+            raise BadInput(f"{where}: with its aliases written out it has more than {MOST_CHARACTERS} characters, which is the "
+                           "most that is read")
 
 
 def _parse(document: Any, source: str) -> list[Step]:

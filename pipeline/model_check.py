@@ -18,6 +18,7 @@ def check_model(name: str, file: Path) -> None:
     """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a FLAME head, the points on
     one, or a body model."""
     from gsac.avatar.artifacts import ArtifactError
+    from gsac.avatar.npz import NpzError
 
     if name in TAKEN:
         raise BadInput(f"{name} is not a name for a model file: parameters give the word another meaning; choose another")
@@ -28,7 +29,7 @@ def check_model(name: str, file: Path) -> None:
         return
     try:
         _read(file)
-    except (ArtifactError, zipfile.BadZipFile) as error:
+    except (ArtifactError, NpzError, zipfile.BadZipFile) as error:
         said = str(error) if str(file) in str(error) else f"{file}: not a readable npz ({error})"
         raise BadInput(f"{said}; it was not added as {name}") from error
 
@@ -47,18 +48,19 @@ def _read(file: Path) -> None:
 
 
 def _array_names(file: Path) -> set[str]:
+    from gsac.avatar.npz import open_zip
+
     if not zipfile.is_zipfile(file):
         return set()
-    with zipfile.ZipFile(file) as members:
+    with open_zip(file) as members:
         return {name.removesuffix(".npy") for name in members.namelist()}
 
 
 def _joints(file: Path) -> int:
     """Joints of the model's tree, 0 where there is none to be read."""
-    import numpy as np
+    from gsac.avatar.npz import NpzError, read_npz
 
     try:
-        with np.load(file, allow_pickle=False) as arrays:
-            return arrays["kintree_table"].shape[-1]
-    except (KeyError, ValueError, IndexError, AttributeError):
+        return read_npz(file, ("kintree_table",))["kintree_table"].shape[-1]
+    except (KeyError, IndexError, NpzError):
         return 0

@@ -9,7 +9,7 @@ import numpy as np
 from gsac.avatar.artifacts import ArtifactError, read_arrays
 from gsac.avatar.joints import BODY, FINGERS, POSE_PARTS, J
 from gsac.avatar.motion import quat
-from gsac.avatar.motion.source import LARGEST, MotionError, Source
+from gsac.avatar.motion.source import LARGEST, MotionError, Source, most_frames, too_long
 
 FPS = 30.0
 """Frames a second, where the file gives no rate."""
@@ -59,6 +59,7 @@ def _pose(arrays: dict[str, np.ndarray], where: str) -> np.ndarray:
         shape = arrays["poses"].shape
         if len(shape) != 2 or shape[1] not in LAYOUTS or not shape[0]:
             raise MotionError(f"{where}: array poses has shape {shape}; expected (T, 72), (T, 156) or (T, 165)")
+        _check_length(shape[0], where)
         given = _numbers(arrays, "poses", shape, where).reshape(shape[0], -1, 3)
         out = np.zeros((shape[0], J, 3))
         for first, end, ours in LAYOUTS[shape[1]]:
@@ -67,11 +68,20 @@ def _pose(arrays: dict[str, np.ndarray], where: str) -> np.ndarray:
     parts = {name: at for name, at in PARTS.items() if name in arrays}
     if not any(at == POSE_PARTS["body_pose"] for at in parts.values()):
         raise MotionError(f"{where}: no array poses, pose_body or body_pose (it has {', '.join(sorted(arrays)[:20])})")
-    T = len(arrays[next(name for name, at in parts.items() if at == POSE_PARTS["body_pose"])].reshape(-1, 63))
+    body = next(name for name, at in parts.items() if at == POSE_PARTS["body_pose"])
+    if arrays[body].ndim < 2 or not len(arrays[body]):
+        raise MotionError(f"{where}: array {body} has shape {arrays[body].shape}; expected (T, 63)")
+    T = len(arrays[body])
+    _check_length(T, where)
     out = np.zeros((T, J, 3))
     for name, at in parts.items():
         out[:, at] = _numbers(arrays, name, (T, 3 * (at.stop - at.start)), where).reshape(T, -1, 3)
     return out
+
+
+def _check_length(frames: int, where: str) -> None:
+    if frames > most_frames(J):
+        raise MotionError(f"{where}: {too_long(frames, J)}")
 
 
 def _numbers(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...], where: str) -> np.ndarray:

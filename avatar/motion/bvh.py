@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from gsac.avatar.motion import quat
-from gsac.avatar.motion.source import LARGEST, MotionError, Source
+from gsac.avatar.motion.source import LARGEST, MotionError, Source, most_frames, too_long
 
 MAX_BYTES = 256 << 20
+MAX_LINE = 1 << 20
+"""Characters."""
 MAX_JOINTS = 1000
 MAX_DEPTH = 200
 AXES = "XYZ"
@@ -22,19 +25,20 @@ def read_bvh(path: Path) -> Source:
     size = Path(path).stat().st_size
     if size > MAX_BYTES:
         raise MotionError(f"{path}: it has {size} bytes, at most {MAX_BYTES} are read")
-    return parse_bvh(Path(path).read_text(encoding="utf-8", errors="replace"), str(path))
+    with open(path, encoding="utf-8", errors="replace") as file:
+        return _Reader(file, str(path)).source()
 
 
 def parse_bvh(text: str, where: str = "motion.bvh") -> Source:
     """As `read_bvh`, from the text of a file; where: its name in messages."""
-    return _Reader(text, where).source()
+    return _Reader(io.StringIO(text, newline=None), where).source()
 
 
 class _Reader:
-    """Joints in the order of the file, then the table of numbers."""
+    """Joints in the order of the file, then the table of numbers; one line of it is in memory at a time."""
 
-    def __init__(self, text: str, where: str) -> None:
-        self.lines, self.where, self.line = text.splitlines(), where, 0
+    def __init__(self, file: io.TextIOBase, where: str) -> None:
+        self.file, self.where, self.line = file, where, 0
         self.words = self.read_words()
         self.names: list[str] = []
         self.parents: list[int] = []
@@ -44,9 +48,15 @@ class _Reader:
     def bad(self, why: str) -> MotionError:
         return MotionError(f"{self.where}, line {self.line}: {why}")
 
+    def read_lines(self) -> Iterator[str]:
+        while line := self.file.readline(MAX_LINE):
+            self.line += 1
+            if len(line) == MAX_LINE:
+                raise self.bad(f"a line of more than {MAX_LINE} characters")
+            yield line
+
     def read_words(self) -> Iterator[str]:
-        for number, line in enumerate(self.lines, 1):
-            self.line = number
+        for line in self.read_lines():
             yield from line.split()
 
     def word(self, *wanted: str) -> str:
@@ -128,12 +138,16 @@ class _Reader:
     def table(self, frames: int) -> np.ndarray:
         """(T, all channels); one line a frame."""
         width = sum(map(len, self.channels))
-        rows = [(n, row) for n, row in enumerate(self.lines[self.line:], self.line + 1) if row.strip()]
-        out = np.empty((min(frames, len(rows)), width))
-        for k, (self.line, row) in enumerate(rows):
+        most = most_frames(len(self.names))
+        out, k = np.empty((min(frames, most), width)), 0
+        for row in self.read_lines():
+            values = row.split()
+            if not values:
+                continue
             if k >= frames:
                 raise self.bad(f"a frame more than the {frames} that the file says")
-            values = row.split()
+            if k >= most:
+                raise self.bad(too_long(frames, len(self.names)))
             if len(values) != width:
                 raise self.bad(f"{len(values)} numbers; the skeleton has {width} channels")
             try:
@@ -142,8 +156,9 @@ class _Reader:
                 raise self.bad("something other than numbers") from None
             if not (np.abs(out[k]) <= LARGEST).all():
                 raise self.bad(f"a number that is not finite, or beyond {LARGEST:g}")
-        if len(rows) < frames:
-            raise self.bad(f"the file ends after {len(rows)} of {frames} frames; was it cut off?")
+            k += 1
+        if k < frames:
+            raise self.bad(f"the file ends after {k} of {frames} frames; was it cut off?")
         return out
 
     def posed(self, table: np.ndarray, fps: float) -> Source:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import gc
 import io
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -16,13 +17,15 @@ from typing import Any
 import numpy as np
 
 from gsac.avatar.motion.places import place_nodes
-from gsac.avatar.motion.source import LARGEST, MotionError, Source
+from gsac.avatar.motion.source import LARGEST, MotionError, Source, most_frames, too_long
 
 MAX_BYTES = 256 << 20
 RATE = 30.0
 """Frames a second at which the curves are sampled."""
 LONGEST_S = 3600
-TIMEOUT_S = 300
+TIMEOUT_S = 60
+MAX_MEMORY = 1 << 30
+"""Of the process that reads the file, bytes."""
 
 
 def read_fbx(path: Path) -> Source:
@@ -50,7 +53,7 @@ def sample(path: str) -> dict[str, np.ndarray]:
     """names (P,), parents (P,), rest (P, 8) and local (T, P, 8) of an FBX file's bones and all above them."""
     import ufbx
 
-    scene = ufbx.load_file(path)
+    scene = ufbx.load_memory(Path(path).read_bytes())
     stacks = [(stack.time_end - stack.time_begin, stack.time_begin, stack.anim) for stack in scene.anim_stacks]
     if not stacks:
         raise ValueError("it holds no motion; expected an FBX file with an animation")
@@ -75,9 +78,13 @@ def sample(path: str) -> dict[str, np.ndarray]:
     if not nodes:
         raise ValueError("it holds no skeleton")
     times = begin + np.arange(int(length * RATE + 1e-6) + 1) / RATE
+    if len(times) > most_frames(len(nodes)):
+        raise ValueError(too_long(len(times), len(nodes)))
+    local = np.empty((len(times), len(nodes), 8))
+    for t, time in enumerate(times):
+        local[t] = [row(ufbx.evaluate_transform(anim, node, float(time))) for node, _ in nodes]
     return {"names": np.array([node.name for node, _ in nodes]), "parents": np.array([above for _, above in nodes]),
-            "rest": np.array([row(node.local_transform) for node, _ in nodes]),
-            "local": np.array([[row(ufbx.evaluate_transform(anim, node, float(t))) for node, _ in nodes] for t in times])}
+            "rest": np.array([row(node.local_transform) for node, _ in nodes]), "local": local}
 
 
 def row(transform: Any) -> list[float]:
@@ -89,12 +96,16 @@ def row(transform: Any) -> list[float]:
 def main() -> int:
     """Writes the arrays of the file to stdout and ends the process; what is wrong with it to stderr, with exit code 2."""
     gc.disable()  # ufbx's binding frees its scene in an order that ends the process
+    resource.setrlimit(resource.RLIMIT_DATA, (MAX_MEMORY, MAX_MEMORY))
     out = io.BytesIO()
     try:
         arrays = sample(sys.argv[1])
         np.savez(out, names=arrays["names"], parents=arrays["parents"], rest=arrays["rest"], local=arrays["local"])
     except ValueError as e:
         print(e, file=sys.stderr)
+        return 2
+    except MemoryError:
+        print(f"reading it takes more than {MAX_MEMORY} bytes of memory", file=sys.stderr)
         return 2
     sys.stdout.buffer.write(out.getvalue())
     sys.stdout.flush()

@@ -15,15 +15,17 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.motion import quat
 from gsac.avatar.motion.places import place_nodes
-from gsac.avatar.motion.source import LARGEST, MotionError, Source
+from gsac.avatar.motion.source import LARGEST, MotionError, Source, most_frames, too_long
 
 MAX_BYTES = 256 << 20
 MAGIC = 0x46546C67
 RATE = 30.0
 """Frames a second at which animations are sampled."""
 LONGEST_S = 3600
-MOST = 4_000_000
-"""Frames times joints."""
+MAX_JSON = 32 << 20
+MOST_NODES = 10_000
+MOST_NUMBERS = 32_000_000
+"""Of all accessors that the motion names: they may lie over each other, so that the file's size is no bound."""
 TYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 ODD = (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError, struct.error)
@@ -45,28 +47,72 @@ def read_gltf(path: Path) -> Source:
     return source
 
 
-def _read(data: bytes) -> Source:
-    chunk = None
-    text = data
+class _Document:
+    """The JSON of a file and what its accessors name."""
+
+    def __init__(self, data: bytes) -> None:
+        text, self.chunk = _split(data)
+        if len(text) > MAX_JSON:
+            raise ValueError(f"its JSON has {len(text)} bytes, at most {MAX_JSON} are read; save it as .glb")
+        self.json: dict[str, Any] = json.loads(text)
+        self.buffers: dict[int, bytes | None] = {}
+        self.left = MOST_NUMBERS
+
+    def buffer(self, i: int) -> bytes | None:
+        if i not in self.buffers:
+            uri = self.json["buffers"][i].get("uri")
+            try:
+                self.buffers[i] = self.chunk if uri is None else base64.b64decode(uri.split(";base64,", 1)[1], validate=True)
+            except (IndexError, binascii.Error):
+                raise ValueError("a buffer lies in another file; save it as .glb") from None
+        return self.buffers[i]
+
+    def numbers(self, i: int) -> np.ndarray:
+        """(count, width) of an accessor; normalised integers become -1..1."""
+        accessor = self.json["accessors"][i]
+        view = self.json["bufferViews"][accessor["bufferView"]]
+        kind, width, count = np.dtype(TYPES[accessor["componentType"]]), WIDTHS[accessor["type"]], accessor["count"]
+        size, data = kind.itemsize * width, self.buffer(view["buffer"])
+        first, start, stride = view.get("byteOffset", 0), accessor.get("byteOffset", 0), view.get("byteStride") or size
+        if not all(type(n) is int and n >= 0 for n in (first, start, stride, count)) or stride < size:
+            raise ValueError(f"accessors[{i}] has an offset, a stride or a count that glTF does not allow")
+        start += first
+        if data is None or count < 1 or start + (count - 1) * stride + size > len(data):
+            raise ValueError(f"accessors[{i}] ends after its buffer; was the file cut off?")
+        self.left -= count * width
+        if self.left < 0:
+            raise ValueError(f"its accessors hold more than {MOST_NUMBERS} numbers in all; cut the motion")
+        rows = np.ndarray((count, width), kind.newbyteorder("<"), data, start, (stride, kind.itemsize)).astype(float)
+        return rows / np.iinfo(kind).max if accessor.get("normalized") and kind.kind in "iu" else rows
+
+
+def _split(data: bytes) -> tuple[bytes, bytes | None]:
+    """JSON and the binary part of a .glb; of a .gltf all of it and None."""
     if len(data) >= 20 and struct.unpack_from("<I", data)[0] == MAGIC:
         rest = 20 + struct.unpack_from("<I", data, 12)[0]
         if struct.unpack_from("<I", data, 8)[0] > len(data) or rest > len(data):
             raise ValueError("it ends before it says; was it cut off?")
-        text = data[20:rest]
-        chunk = data[rest + 8:]
-    document = json.loads(text)
-    document["asset"]  # noqa: B018
-    if not document.get("animations"):
+        return data[20:rest], data[rest + 8:]
+    return data, None
+
+
+def _read(data: bytes) -> Source:
+    document = _Document(data)
+    document.json["asset"]  # noqa: B018
+    if not document.json.get("animations"):
         raise ValueError("it holds no animation")
-    nodes = document["nodes"]
+    nodes = document.json["nodes"]
+    skin = document.json["skins"][0] if document.json.get("skins") else None
+    for what, count in (("nodes", len(nodes)), ("joints in its skin", len(skin["joints"]) if skin else 0)):
+        if count > MOST_NODES:
+            raise ValueError(f"{count} {what}; at most {MOST_NODES} are read")
     above = [-1] * len(nodes)
     for i, node in enumerate(nodes):
         for child in node.get("children", []):
             if above[child] >= 0:
                 raise ValueError(f"nodes[{child}] has two parents")
             above[child] = i
-    skin = document["skins"][0] if document.get("skins") else None
-    order: list[int] = []
+    order: dict[int, int] = {}  # node -> its index among the joints
 
     def visit(i: int, depth: int = 0) -> None:
         if depth > len(nodes):
@@ -74,17 +120,17 @@ def _read(data: bytes) -> Source:
         if i not in order:
             if above[i] >= 0:
                 visit(above[i], depth + 1)
-            order.append(i)
+            order[i] = len(order)
 
     for i in skin["joints"] if skin else range(len(nodes)):
         visit(i)
     local = np.array([_local(nodes[i]) for i in order])
-    parents = np.array([order.index(above[i]) if above[i] >= 0 else -1 for i in order])
-    posed = _sample(document, chunk, order, local)
+    parents = np.array([order[above[i]] if above[i] >= 0 else -1 for i in order])
+    posed = _sample(document, order, local)
     rest_turns, rest_places = (a[0] for a in place_nodes(local[None], parents))
     if skin and "inverseBindMatrices" in skin:
-        rest_turns, rest_places = _bind_pose(_numbers(document, chunk, skin["inverseBindMatrices"]), skin, order, parents,
-                                             rest_turns, rest_places)
+        rest_turns, rest_places = _bind_pose(document.numbers(skin["inverseBindMatrices"]), [order[i] for i in skin["joints"]],
+                                             parents, rest_turns, rest_places)
     names = [str(nodes[i].get("name", f"node {i}")) for i in order]
     return Source(RATE, names, parents, rest_turns, rest_places, *place_nodes(posed, parents))
 
@@ -99,49 +145,31 @@ def _local(node: dict[str, Any]) -> list[float]:
     return [*node.get("translation", [0, 0, 0]), *(turn / np.linalg.norm(turn)), float(np.mean(node.get("scale", [1, 1, 1])))]
 
 
-def _numbers(document: dict[str, Any], chunk: bytes | None, i: int) -> np.ndarray:
-    """(count, width) of an accessor; normalised integers become -1..1."""
-    accessor = document["accessors"][i]
-    view = document["bufferViews"][accessor["bufferView"]]
-    kind, width, count = np.dtype(TYPES[accessor["componentType"]]), WIDTHS[accessor["type"]], accessor["count"]
-    uri = document["buffers"][view["buffer"]].get("uri")
-    try:
-        data = chunk if uri is None else base64.b64decode(uri.split(";base64,", 1)[1], validate=True)
-    except (IndexError, binascii.Error):
-        raise ValueError("a buffer lies in another file; save it as .glb") from None
-    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    stride = view.get("byteStride") or kind.itemsize * width
-    if data is None or start < 0 or count < 1 or start + (count - 1) * stride + kind.itemsize * width > len(data):
-        raise ValueError(f"accessors[{i}] ends after its buffer; was the file cut off?")
-    rows = np.ndarray((count, width), kind.newbyteorder("<"), data, start, (stride, kind.itemsize)).astype(float)
-    return rows / np.iinfo(kind).max if accessor.get("normalized") and kind.kind in "iu" else rows
-
-
-def _sample(document: dict[str, Any], chunk: bytes | None, order: list[int], local: np.ndarray) -> np.ndarray:
+def _sample(document: _Document, order: dict[int, int], local: np.ndarray) -> np.ndarray:
     """(T, P, 8) local places, turns and scales of the first animation."""
-    animation = document["animations"][0]
-    tracks = []
+    animation = document.json["animations"][0]
+    tracks = {}
     for channel in animation["channels"]:
         path, node = channel["target"]["path"], channel["target"].get("node")
         if node in order and path in ("translation", "rotation"):
             sampler = animation["samplers"][channel["sampler"]]
-            times = _numbers(document, chunk, sampler["input"])[:, 0]
-            values = _numbers(document, chunk, sampler["output"])
+            times = document.numbers(sampler["input"])[:, 0]
+            values = document.numbers(sampler["output"])
             if sampler.get("interpolation") == "CUBICSPLINE":
                 values = values[1::3]  # the keys themselves; between them linear
-            if len(values) != len(times) or (np.diff(times) < 0).any():
+            if len(values) != len(times) or not (np.diff(times) >= 0).all():
                 raise ValueError("animations[0] has a sampler whose times and values do not fit")
-            tracks.append((order.index(node), path, times, values, sampler.get("interpolation") == "STEP"))
+            tracks[order[node], path] = times, values, sampler.get("interpolation") == "STEP"
     if not tracks:
         raise ValueError("animations[0] turns no joint of its skeleton")
-    end = max(times[-1] for _, _, times, _, _ in tracks)
+    end = max(times[-1] for times, _, _ in tracks.values())
     if not 0 <= end <= LONGEST_S:
         raise ValueError(f"a motion of {end:g} s; at most {LONGEST_S} are read")
     at = np.arange(int(end * RATE + 1e-6) + 1) / RATE
-    if len(at) * len(order) > MOST:
-        raise ValueError(f"{len(at)} frames of {len(order)} joints; at most {MOST} in all are read")
+    if len(at) > most_frames(len(order)):
+        raise ValueError(too_long(len(at), len(order)))
     out = np.tile(local, (len(at), 1, 1))
-    for joint, path, times, values, step in tracks:
+    for (joint, path), (times, values, step) in tracks.items():
         low = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 1)
         high = np.minimum(low + 1, len(times) - 1)
         share = np.clip((at - times[low]) / np.maximum(times[high] - times[low], 1e-12), 0, 0 if step else 1)[:, None]
@@ -152,15 +180,18 @@ def _sample(document: dict[str, Any], chunk: bytes | None, order: list[int], loc
     return out
 
 
-def _bind_pose(matrices: np.ndarray, skin: dict[str, Any], order: list[int], parents: np.ndarray, turns: np.ndarray,
+def _bind_pose(matrices: np.ndarray, at: list[int], parents: np.ndarray, turns: np.ndarray,
                places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """turns (P, 4) and places (P, 3) with the skin's joints as they were bound, scaled to the size of the nodes."""
-    at = [order.index(i) for i in skin["joints"]]
+    """turns (P, 4) and places (P, 3) with the skin's joints `at` as they were bound, scaled to the size of the nodes.
+
+    matrices: (n, 16) inverse bind matrices, in the order of `at`.
+    """
     bound = np.linalg.inv(matrices[:len(at)].reshape(-1, 4, 4).transpose(0, 2, 1))
     out_turns, out_places = turns.copy(), places.copy()
     columns = bound[:, :3, :3] / np.linalg.norm(bound[:, :3, :3], axis=1, keepdims=True)
     out_turns[at], out_places[at] = Rotation.from_matrix(columns).as_quat(), bound[:, :3, 3]
-    pairs = [(j, parents[j]) for j in at if parents[j] in at]
+    bound_joints = set(at)
+    pairs = [(j, parents[j]) for j in at if parents[j] in bound_joints]
     ours = sum(np.linalg.norm(places[j] - places[p]) for j, p in pairs)
     theirs = sum(np.linalg.norm(out_places[j] - out_places[p]) for j, p in pairs)
     if theirs > 1e-9:

@@ -7,14 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.joints import J
 from gsac.avatar.motion import quat
 
 LARGEST = 1e9
 """Upper limit of the numbers in a motion file: beyond it sums and products leave float32."""
+MOST = 4_000_000
+"""Frames times joints, the file's or ours, that are read: more would fill the memory, however small the file is."""
 
 
 class MotionError(ArtifactError):
     """A motion cannot be read or does not fit a person. Names the file and the line, array or joint."""
+
+
+def most_frames(joints: int) -> int:
+    """Frames that are read of a motion of so many joints."""
+    return MOST // max(joints, J)
+
+
+def too_long(frames: int, joints: int) -> str:
+    """The sentence for a motion of more than `most_frames`."""
+    return f"{frames} frames of {joints} joints; at most {most_frames(joints)} are read: cut it, or save fewer frames a second"
 
 
 @dataclass

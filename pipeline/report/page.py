@@ -94,9 +94,16 @@ def make_template(name: str) -> Template:
     import jinja2
 
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True,
-                                     lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+                                     lstrip_blocks=True, undefined=jinja2.StrictUndefined, finalize=_as_utf8)
     environment.filters |= {"seconds": seconds, "bytes": size}
     return environment.get_template(name)
+
+
+def _as_utf8(value: Any) -> Any:
+    """What a template shows; of a name that is not UTF-8 with ? for each letter that no page can hold."""
+    if not isinstance(value, str) or value.isascii():
+        return value
+    return type(value)(value.encode(errors="replace").decode())
 
 
 def make_sections(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:

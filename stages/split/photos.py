@@ -22,8 +22,11 @@ SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"} | HEIC
 UNSUPPORTED = {".dng", ".raw", ".cr2", ".nef"}
 VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi"}
 PLATE = "plate"
-UNREADABLE = (UnidentifiedImageError, OSError, SyntaxError, ValueError)
-"""What Pillow raises for a file that is no image, or half of one."""
+FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
+"""What Pillow may take a photo's content for, whatever its name says. It knows others that are programs: EPS runs Ghostscript."""
+MOST_PIXELS, LONGEST_SIDE = 1 << 26, 65535
+"""Of a photo: more would fill the memory, however small the file is."""
+Image.MAX_IMAGE_PIXELS = None  # open_image has its own bound, and names it
 ORIENTATION, SIDEWAYS = 0x0112, (5, 6, 7, 8)
 """EXIF's tag, and its values for a photo that lies on its side."""
 SAME_ASPECT = 0.01
@@ -70,6 +73,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         if (rgb.shape[1], rgb.shape[0]) != usual:
             other.append(path.name)
         shown, focal_px = fit_photo(rgb, exif, width, height)
+        del rgb  # before the next one is read
         write_frame(frames / f"{len(focals):06d}.png", shown)
         focals.append(focal_px)
         progress(done + 1, len(picks), "frames")
@@ -100,8 +104,8 @@ def usual_size(photos: list[Path]) -> tuple[int, int]:
         try:
             with open_image(path) as image:
                 sizes.append(image.size[::-1] if image.getexif().get(ORIENTATION) in SIDEWAYS else image.size)
-        except UNREADABLE:
-            continue  # split_photos names it
+        except Exception:  # read_photo says why
+            continue
     return max(sizes, key=sizes.count, default=(1, 1))
 
 
@@ -126,12 +130,21 @@ def fit_photo(rgb: np.ndarray, exif: Image.Exif, width: int, height: int) -> tup
 
 
 def open_image(path: Path) -> Image.Image:
-    """Opens a photo; the first HEIC one loads what decodes it."""
-    if path.suffix.lower() in HEIC:
+    """Opens a photo, whose pixels are decoded later; the first HEIC one loads what decodes it. BadInput where it is larger than
+    MOST_PIXELS or LONGEST_SIDE; Pillow's errors."""
+    with path.open("rb") as file:
+        is_heic = file.read(8)[4:] == b"ftyp"
+    if is_heic:
         import pillow_heif
 
         pillow_heif.register_heif_opener()
-    return Image.open(path)
+    image = Image.open(path, formats=("HEIF",) if is_heic else FORMATS)
+    width, height = image.size
+    if width * height > MOST_PIXELS or max(width, height) > LONGEST_SIDE:
+        image.close()
+        raise BadInput(f"{path.name}: has {width}x{height} pixels; at most {MOST_PIXELS}, and {LONGEST_SIDE} a side, are read. "
+                       "Export it smaller.")
+    return image
 
 
 def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
@@ -139,17 +152,37 @@ def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
     try:
         with open_image(path) as image:
             exif, profile = image.getexif(), image.info.get("icc_profile")
-            image = ImageOps.exif_transpose(image)
-            has_alpha = image.has_transparency_data
-            if image.mode.startswith(("I", "F")):  # 16-bit grey: Pillow would clip it
-                image = Image.fromarray((np.asarray(image, np.float64) / 257).round().clip(0, 255).astype(np.uint8))
-            image = image.convert("RGBA" if has_alpha else image.mode if image.mode in ("RGB", "CMYK") else "RGB")
-            image = _to_srgb(image, profile)
-    except UNREADABLE as e:
-        raise BadInput(f"{path.name}: cannot be read as an image ({e}). Remove it or export it again.") from e
-    if has_alpha:
-        image = Image.alpha_composite(Image.new("RGBA", image.size, (0, 0, 0, 255)), image)
-    return np.asarray(image.convert("RGB")), exif, has_alpha
+            image.load()
+        ImageOps.exif_transpose(image, in_place=True)
+        has_alpha = image.has_transparency_data
+        if image.mode.startswith(("I", "F")):  # 16-bit grey: Pillow would clip it
+            image = _eight_bits(image)
+        image = _in_mode(image, "RGBA" if has_alpha else image.mode if image.mode in ("RGB", "CMYK") else "RGB")
+        image = _to_srgb(image, profile)
+        if has_alpha:
+            image = Image.alpha_composite(Image.new("RGBA", image.size, (0, 0, 0, 255)), image)
+        return np.asarray(_in_mode(image, "RGB")), exif, has_alpha
+    except BadInput:
+        raise
+    except UnidentifiedImageError as e:
+        raise BadInput(f"{path.name}: cannot be read as an image (its content is no {', '.join(FORMATS)} or HEIC). "
+                       "Remove it or export it again.") from e
+    except Exception as e:  # a damaged file makes Pillow's readers raise nearly anything
+        raise BadInput(f"{path.name}: cannot be read as an image ({e or type(e).__name__}). Remove it or export it again.") from e
+
+
+def _in_mode(image: Image.Image, mode: str) -> Image.Image:
+    """The image itself where it has the mode: a copy of a large photo costs much."""
+    return image if image.mode == mode else image.convert(mode)
+
+
+def _eight_bits(image: Image.Image) -> Image.Image:
+    """Of 16-bit grey, or numbers of another kind; row by row: in float64 the whole would be eight times as large."""
+    grey = np.asarray(image)
+    out = np.empty(grey.shape, np.uint8)
+    for row, of in zip(out, grey, strict=True):
+        row[:] = (of.astype(np.float64) / 257).round().clip(0, 255)
+    return Image.fromarray(out)
 
 
 def _to_srgb(image: Image.Image, profile: bytes | None) -> Image.Image:

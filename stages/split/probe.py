@@ -13,6 +13,13 @@ from gsac.stages.contract import BadInput
 
 HLG, PQ, BT2020_PRIMARIES, BT2020_MATRIX, UNSPECIFIED = 18, 16, 9, 9, 2
 """Code points of ITU-T H.273."""
+MOST_PIXELS = 8192 * 4320
+"""Of a frame: 8K. A larger one would fill the memory, however small the file is."""
+CONTAINERS = ("mov", "matroska", "webm", "avi", "mpegts", "mpeg", "mpegvideo", "flv", "asf", "ogg", "mxf", "dv", "ivf", "m4v",
+              "h264", "hevc", "obu", "yuv4mpegpipe", "gif")
+"""What ffmpeg may take a video's content for. It knows others that name further files, as playlists do, or that are programs."""
+LIMITS = {"format_whitelist": ",".join(CONTAINERS), "protocol_whitelist": "file", "max_pixels": str(MOST_PIXELS)}
+"""ffmpeg's options for a file that anybody may have made."""
 
 
 @dataclass
@@ -44,18 +51,42 @@ class Video:
 def probe(path: Path) -> Video:
     """Raises BadInput where no picture of the file can be decoded."""
     try:
-        with av.open(str(path), metadata_errors="ignore") as container:
+        with _open(path) as container:
             return _probe(container, path)
-    except (av.FFmpegError, OSError) as e:
+    except BadInput:
+        raise
+    except Exception as e:  # beside its own errors PyAV raises nearly anything on a damaged file
+        if _is_text(path):
+            raise BadInput(f"{path.name}: is text, no video; a playlist or a list of files is not followed. Give the video itself, "
+                           "or a folder of photos.") from e
         raise BadInput(f"{path.name}: not a video that ffmpeg can read ({_reason(e)}). If it plays elsewhere, "
                        "convert it to MP4 (H.264); if it does not, it is cut off or damaged: copy it from the phone again.") from e
+
+
+def file_url(path: Path) -> str:
+    """The file's address, in which no part of its name is a protocol or an option."""
+    return f"file:{path.absolute()}"
+
+
+def _open(path: Path) -> av.container.InputContainer:
+    return av.open(file_url(path), options=LIMITS, metadata_errors="ignore")
+
+
+def _is_text(path: Path) -> bool:
+    with path.open("rb") as file:
+        return not any(byte < 32 and chr(byte) not in "\t\r\n" for byte in file.read(64))
 
 
 def _probe(container: av.container.InputContainer, path: Path) -> Video:
     streams = [s for s in container.streams.video if not s.disposition & av.stream.Disposition.attached_pic]
     if not streams:
         raise BadInput(f"{path.name}: holds no video stream; expected a video of one person or a folder of photos.")
-    stream = max(streams, key=lambda s: (s.width or 0) * (s.height or 0))
+    decoded = [s for s in streams if s.codec_context is not None]
+    if not decoded:
+        raise BadInput(f"{path.name}: its video is packed in a way that ffmpeg cannot read; convert it to MP4 (H.264).")
+    stream = max(decoded, key=lambda s: (s.width or 0) * (s.height or 0))
+    _check_size(path, stream.width, stream.height)
+    stream.codec_context.options = {"max_pixels": LIMITS["max_pixels"]}
     picture = _first_picture(container, stream, path)
     ticks = _packet_times(path, stream.index)
 
@@ -67,6 +98,7 @@ def _probe(container: av.container.InputContainer, path: Path) -> Video:
         height = round(height / aspect)
     if abs(picture.rotation) % 180 == 90:
         width, height = height, width
+    _check_size(path, width, height)
 
     codec = stream.codec_context.name
     tags = {key.lower(): value for key, value in (dict(container.metadata) | dict(stream.metadata)).items()}
@@ -78,6 +110,12 @@ def _probe(container: av.container.InputContainer, path: Path) -> Video:
         matrix=int(picture.colorspace), has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
         decoder={"vp8": "libvpx", "vp9": "libvpx-vp9"}[codec] if hidden_alpha else None,
         rate=float(rate) if rate else None, tags=tags)
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    if width * height > MOST_PIXELS:
+        raise BadInput(f"{path.name}: has frames of {width}x{height} pixels; at most {MOST_PIXELS} (8192x4320) are read. "
+                       "Export it smaller.")
 
 
 def _first_picture(container: av.container.InputContainer, stream: av.VideoStream, path: Path) -> av.VideoFrame:
@@ -95,7 +133,7 @@ def _first_picture(container: av.container.InputContainer, stream: av.VideoStrea
 def _packet_times(path: Path, index: int) -> np.ndarray:
     """(N,) rising ticks of the intact packets of one stream; empty if any has no time."""
     ticks = []
-    with av.open(str(path), metadata_errors="ignore") as container:
+    with _open(path) as container:
         try:
             for packet in container.demux(container.streams[index]):
                 if packet.size == 0 or packet.is_discard or packet.is_corrupt:

@@ -8,18 +8,19 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 
+from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.pick import fit_size, pick_by_time
-from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, PQ, UNSPECIFIED, Video, probe
+from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, LIMITS, PQ, UNSPECIFIED, Video, file_url, probe
 
 TRANSFER_NAMES = {HLG: "arib-std-b67", PQ: "smpte2084"}
 SHOWN = re.compile(r"\bn:\s*\d+ pts:\s*(-?\d+)")
 TIME_BASE = re.compile(r"config in time_base: (\d+)/(\d+)")
+LONGEST_S = 24 * 3600
 SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
 
 
@@ -39,6 +40,9 @@ def split_video(path: Path, frames: Path, config: SplitConfig, warn: Callable[[s
 
     width, height = fit_size(video.width, video.height, config.max_height)
     times = (video.ticks - video.ticks[0]) * float(base)
+    if not 0 <= times[-1] <= LONGEST_S:
+        raise BadInput(f"{path.name}: its frames lie {times[-1]:g} s apart from first to last; at most {LONGEST_S} s are read. "
+                       "Copy the file from the phone again, or cut the clip.")
     picks = pick_by_time(times, config.fps, config.count)
     graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, width, height))
     output = ["-vf", graph, "-pix_fmt", "rgb24", "-compression_level", "4", "-pred", "up", "-flags", "+bitexact",
@@ -105,9 +109,10 @@ def _run(path: Path, video: Video, output: list[str], folder: Path | None,
          on_frame: Callable[[int], None] | None) -> tuple[list[int], Fraction, list[str]]:
     """Runs ffmpeg. Returns the ticks of the frames that passed `showinfo`, their time base, and its error lines."""
     decoder = ["-c:v", video.decoder] if video.decoder else []
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
-               "-fflags", "+discardcorrupt", *decoder, "-i", f"file:{path.absolute()}", "-map", f"0:{video.stream}",
-               "-fps_mode", "passthrough", *output]
+    limits = [word for name, value in LIMITS.items() for word in (f"-{name}", value)]
+    command = [ffmpeg_program(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
+               "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, "-i", file_url(path),
+               "-map", f"0:{video.stream}", "-fps_mode", "passthrough", *output]
     ticks: list[int] = []
     base, errors = video.time_base, []
     # The output pattern is relative to `folder`: a % in the folder's own name is no pattern.

@@ -10,12 +10,13 @@ import contextlib
 import json
 import os
 import time
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+
+from gsac.avatar.npz import read_npz
 
 EVERY_S = 10.0
 """Least seconds of training from one checkpoint to the next."""
@@ -67,10 +68,10 @@ class Checkpoints:
         if self.path is None or not self.path.exists():
             return None
         try:
-            with np.load(self.path) as file:
-                arrays = [file[f"arr_{k}"] for k in range(len(file.files))]
+            found = read_npz(self.path)
+            arrays = [found[f"arr_{k}"] for k in range(len(found))]
             return _put_together(json.loads(str(arrays[0])), arrays[1:])
-        except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile) as error:
+        except (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
             self.warn(f"The checkpoint {self.path} cannot be read ({error}); training starts anew.")
             return None
 

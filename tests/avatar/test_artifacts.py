@@ -6,7 +6,16 @@ import sys
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import ArtifactError, check_arrays, read_arrays, write_arrays
+from gsac.avatar.artifacts import (
+    ArtifactError,
+    check_arrays,
+    read_alpha,
+    read_arrays,
+    read_frame,
+    write_alpha,
+    write_arrays,
+    write_frame,
+)
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "flipped", "text"])
@@ -33,3 +42,16 @@ def test_declaring_the_stages_imports_nothing_heavy():
               "print(*sorted({'numpy', 'cv2', 'torch', 'numba', 'scipy', 'av'} & sys.modules.keys()))")
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_a_path_that_is_not_utf8_is_read_as_any_other(tmp_path):
+    odd = tmp_path / "a\udcff.png"
+    write_frame(tmp_path / "a.png", np.full((4, 5, 3), (1, 2, 3), np.uint8))
+    write_alpha(tmp_path / "a.exr", np.full((4, 5), 0.5))
+    (tmp_path / "a.png").rename(odd)
+    (tmp_path / "a.exr").rename(odd.with_suffix(".exr"))
+    assert read_frame(odd)[0, 0].tolist() == [1, 2, 3] and read_alpha(odd.with_suffix(".exr"))[0, 0] == 0.5
+    for content in (b"", b"no picture"):
+        odd.write_bytes(content)
+        with pytest.raises(ArtifactError, match="cannot be read as an image"):
+            read_frame(odd)

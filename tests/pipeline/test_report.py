@@ -20,6 +20,7 @@ from gsac.benchmarks.viewer import browser as chromium
 from gsac.pipeline.cli import execute
 from gsac.pipeline.report.advice import Advice, give_advice
 from gsac.pipeline.report.charts import curve_chart
+from gsac.pipeline.report.compare import write_comparison
 from gsac.pipeline.report.drawing import FILLED_COLOUR, MISSING_COLOUR, SIDE_COLOURS, draw_keypoints, over_magenta
 from gsac.pipeline.report.page import draw_sections, seconds, size, write_report
 from gsac.pipeline.report.pictures import MOST_BYTES, make_picture
@@ -174,6 +175,14 @@ def test_a_section_that_was_drawn_early_is_shown_only_if_its_stage_is_of_this_fo
     write_run(copied, [stage_row("split"), stage_row("keypoints")])
     page = Page(write_report(copied, early))
     assert page.images("clip") and not page.images("body") and not page.images("alpha")
+
+
+def test_names_that_are_not_utf8_give_a_page_with_all_its_pictures(copied):
+    write_run(copied, [stage_row(name) for name in STAGES], clip="/somewhere/t\udcffrn.mp4")
+    odd = copied.rename(copied.with_name("b\udcffd ü"))
+    page = page_of(odd)
+    assert [section for section in PICTURES if not page.images(section)] == [] and "t?rn.mp4" in page.text("head")
+    write_comparison(odd, odd, odd.parent / "compare.html")
 
 
 def test_a_folder_whose_dvc_yaml_is_torn_gives_a_page(copied):

@@ -5,6 +5,7 @@ from scipy.spatial.transform import Rotation
 from gsac.avatar.motion.amass import read_amass
 from gsac.avatar.motion.files import read_motion
 from gsac.avatar.motion.source import Motion, MotionError
+from support import mutate
 
 
 def z_up(motion, skeleton):
@@ -74,3 +75,17 @@ def test_a_torn_file_pickles_and_other_suffixes_are_named_errors(tmp_path, skele
     for name in ("torn.npz", "pickle.npz", "dance.fbx"):
         with pytest.raises(MotionError, match=name):
             read(tmp_path / name, skeleton)
+
+
+def test_a_motion_of_too_many_frames_is_refused_with_the_bound(tmp_path, skeleton):
+    for name, width in (("poses", 165), ("pose_body", 63)):
+        (tmp_path / "long.npz").write_bytes(mutate.bomb((72_728, width), "<f2", name))
+        with pytest.raises(MotionError, match=r"long\.npz: 72728 frames of 55 joints; at most 72727 are read: cut it"):
+            read(tmp_path / "long.npz", skeleton)
+
+
+@pytest.mark.parametrize("shape", [(63,), (), (2, 62), (0, 63), (2, 21, 4)])
+def test_a_pose_of_an_odd_size_is_named(tmp_path, skeleton, shape):
+    np.savez(tmp_path / "odd.npz", body_pose=np.zeros(shape))
+    with pytest.raises(MotionError, match=r"odd\.npz: array body_pose has shape"):
+        read(tmp_path / "odd.npz", skeleton)

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from gsac.avatar.motion import source as motion_source
 from gsac.avatar.motion.bvh import MAX_BYTES, parse_bvh, read_bvh
 from gsac.avatar.motion.source import MotionError
 from support import dances
@@ -96,6 +97,15 @@ def test_a_skeleton_without_end_and_a_huge_file_are_refused_at_once(tmp_path):
     with pytest.raises(MotionError, match="huge.bvh"):
         read_bvh(tmp_path / "huge.bvh")
     assert time.process_time() - began < 2
+
+
+def test_frames_times_joints_and_lines_have_a_bound_that_the_error_names(monkeypatch):
+    many = SMALL.replace("Frames: 2", "Frames: 100000") + "1 2 3 0 0 0 0 0 0\n" * 99_998
+    monkeypatch.setattr(motion_source, "MOST", 55 * 100)
+    with pytest.raises(MotionError, match=r"line 119: 100000 frames of 2 joints; at most 100 are read: cut it"):
+        parse_bvh(many)
+    with pytest.raises(MotionError, match=r"line 19: a line of more than 1048576 characters"):
+        parse_bvh(SMALL.replace("1 2 3", "1 " * 600_000, 1))
 
 
 def test_what_another_tool_writes_is_the_motion_again(skeleton, dance):

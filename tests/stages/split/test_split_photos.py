@@ -1,6 +1,7 @@
 """split on folders of photos."""
 
 import io
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -164,6 +165,38 @@ def test_heic_photos_are_read_with_their_focal_length_and_colours(folder, tmp_pa
 def test_a_folder_that_gives_no_photo_is_bad_input(folder, tmp_path, name, content, message):
     (folder / name).write_bytes(content)
     with pytest.raises(BadInput, match=message):
+        split(folder, tmp_path / "out")
+
+
+def drawn(format, size=(8, 8)):
+    buffer = io.BytesIO()
+    Image.new("RGB", size).save(buffer, format)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize("format", ["EPS", "GIF", "TGA", "PCX", "DDS", "ICNS", "PPM", "PDF"])
+def test_a_photo_is_never_a_program_nor_of_a_kind_that_nobody_asked_for(folder, tmp_path, monkeypatch, format):
+    monkeypatch.setattr("PIL.EpsImagePlugin.Ghostscript", lambda *_, **__: pytest.fail("a photo was run as a program"))
+    (folder / "a.jpg").write_bytes(drawn(format))
+    with pytest.raises(BadInput, match=r"a\.jpg: cannot be read as an image \(its content is no JPEG, PNG"):
+        split(folder, tmp_path / "out")
+
+
+@pytest.mark.parametrize(("name", "format"), [("a.jpg", "PNG"), ("b.png", "JPEG"), ("c.jpg", "WEBP"), ("d.jpg", "HEIF")])
+def test_a_photo_of_another_kind_than_its_name_says_is_read_by_its_content(folder, tmp_path, name, format):
+    pytest.importorskip("pillow_heif").register_heif_opener()
+    (folder / name).write_bytes(drawn(format, (64, 64)))
+    _, frames, _ = split(folder, tmp_path / "out")
+    assert len(frames) == 1
+
+
+@pytest.mark.parametrize(("width", "height"), [(8193, 8192), (60000, 60000), (3, 65536)])
+def test_a_photo_of_too_many_pixels_is_refused_before_it_is_decoded(folder, tmp_path, width, height):
+    small = bytearray(drawn("PNG"))
+    small[16:24] = width.to_bytes(4, "big") + height.to_bytes(4, "big")
+    small[29:33] = zlib.crc32(small[12:29]).to_bytes(4, "big")
+    (folder / "a.png").write_bytes(small)
+    with pytest.raises(BadInput, match=rf"a\.png: has {width}x{height} pixels; at most 67108864, and 65535 a side, are read"):
         split(folder, tmp_path / "out")
 
 

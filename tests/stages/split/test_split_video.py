@@ -2,6 +2,7 @@
 
 import filecmp
 import subprocess
+import zlib
 from pathlib import Path
 
 import av
@@ -143,6 +144,15 @@ def test_a_truncated_video_keeps_what_decodes_and_says_how_many(tmp_path):
     assert "60 frames" in warnings[0] and str(len(frames)) in warnings[0]
 
 
+def test_a_clip_most_of_whose_frames_are_damaged_gives_the_others_and_says_so(tmp_path):
+    source = make_clip(tmp_path / "a.mov", "-c:v", "png", size="64x48", rate=10)
+    start, *frames = source.read_bytes().split(b"IDAT")
+    assert len(frames) == 10
+    source.write_bytes(b"IDAT".join([start, *frames[:2], *(b"\xff" * 40 + frame[40:] for frame in frames[2:])]))
+    _, frames, warnings = split(source, tmp_path / "out", fps=None)
+    assert len(frames) == 2 and "a.mov is damaged: 8 of the 10 frames to keep do not decode" in warnings[0]
+
+
 def test_a_video_without_its_index_is_bad_input(tmp_path):
     whole = make_clip(tmp_path / "a.mp4")
     cut = tmp_path / "cut.mp4"
@@ -157,6 +167,77 @@ def test_what_is_not_a_video_is_bad_input(tmp_path, content):
     source.write_bytes(content)
     with pytest.raises(BadInput, match="notes.mp4"):
         split(source, tmp_path / "out")
+
+
+PLAYLISTS = {
+    "list.m3u8": "#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n{0}\n#EXT-X-ENDLIST\n", "list.m3u": "#EXTM3U\n{0}\n",
+    "list.mp4": "ffconcat version 1.0\nfile '{0}'\n", "list.ffconcat": "ffconcat version 1.0\nfile '{0}'\n",
+    "call.sdp": "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=video 9 RTP/AVP 96\na=rtpmap:96 H264/90000\n",
+    "list.mpd": "<?xml version='1.0'?><MPD xmlns='urn:mpeg:dash:schema:mpd:2011'><BaseURL>{0}</BaseURL></MPD>",
+    "drawn.svg": "<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'/>",
+}
+
+
+@pytest.mark.parametrize("name", PLAYLISTS)
+def test_a_playlist_that_names_other_files_is_not_followed(tmp_path, name):
+    secret = make_clip(tmp_path / "secret.mp4", seconds=0.2)
+    (tmp_path / name).write_text(PLAYLISTS[name].format(secret))
+    with pytest.raises(BadInput, match=rf"{name}: is text, no video; a playlist"):
+        split(tmp_path / name, tmp_path / "out")
+
+
+def test_a_name_is_no_pattern_for_the_files_beside_it(tmp_path):
+    for i in range(5):
+        make_clip(tmp_path / f"y{i:03d}.jp2", "-frames:v", "1", size="32x32")
+    (tmp_path / "y%03d.jp2").write_text("no picture")
+    with pytest.raises(BadInput, match="y%03d.jp2"):
+        split(tmp_path / "y%03d.jp2", tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", ["-i", "concat:a.mp4", "a\udcff.mp4", "subfile,,start,0,end,9,,:b.mp4", "pipe:0"])
+def test_an_odd_name_is_only_a_name(tmp_path, monkeypatch, name):
+    whole = make_clip(tmp_path / "whole.mp4", seconds=0.2)
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_bytes(whole.read_bytes())
+    _, frames, _ = split(Path(name), tmp_path / "out")
+    assert len(frames) == 6
+
+
+def test_frames_beyond_8k_are_refused_before_one_is_decoded(tmp_path):
+    source = make_clip(tmp_path / "a.mov", "-c:v", "png", "-frames:v", "1", size="64x48")
+    data = bytearray(source.read_bytes())
+    entry = data.index(b"png ", data.index(b"stsd")) + 28
+    assert data[entry:entry + 4] == bytes([0, 64, 0, 48])
+    data[entry:entry + 4] = (20000).to_bytes(2, "big") * 2
+    header = data.index(b"IHDR") + 4
+    data[header:header + 8] = (20000).to_bytes(4, "big") * 2
+    data[header + 13:header + 17] = zlib.crc32(data[header - 4:header + 13]).to_bytes(4, "big")
+    source.write_bytes(data)
+    with pytest.raises(BadInput, match=r"a\.mov: (has frames of 20000x20000 pixels; at most 35389440|no frame can be decoded)"):
+        split(source, tmp_path / "out")
+
+
+def test_a_stretched_pixel_makes_no_huge_frame(tmp_path):
+    source = make_clip(tmp_path / "a.mov", "-c:v", "png", "-frames:v", "1", size="64x1200", filters="setsar=900:max=1000")
+    with pytest.raises(BadInput, match=r"a\.mov: has frames of \d+x1200 pixels; at most 35389440"):
+        split(source, tmp_path / "out")
+
+
+def test_a_codec_that_ffmpeg_does_not_know_is_bad_input(tmp_path):
+    source = make_clip(tmp_path / "a.mp4", seconds=0.2)
+    source.write_bytes(source.read_bytes().replace(b"avc1", b"zzzz").replace(b"avcC", b"zzzC"))
+    with pytest.raises(BadInput, match="a.mp4"):
+        split(source, tmp_path / "out")
+
+
+def test_no_variable_of_the_environment_chooses_the_program(tmp_path, monkeypatch):
+    own = tmp_path / "ffmpeg"
+    own.write_text("#!/bin/sh\nexit 7\n")
+    own.chmod(0o755)
+    source = make_clip(tmp_path / "a.mp4", seconds=0.2)
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(own))
+    _, frames, _ = split(source, tmp_path / "out")
+    assert len(frames) == 6
 
 
 def test_sound_alone_is_bad_input(tmp_path):
