@@ -27,6 +27,8 @@ class BvhReader {
     this.line = 0;
     this.row = "";
     this.column = 0;
+    this.ends = /\r\n|\r|\n/g;
+    this.words = /\S+/g;
     // Of each joint: name, index of the parent, offset from it, and indices into BVH_CHANNELS.
     this.names = [];
     this.parents = [];
@@ -44,27 +46,25 @@ class BvhReader {
 
   // The next line, without spaces around it.
   nextLine() {
-    const ends = /\r\n|\r|\n/g;
-    ends.lastIndex = this.at;
-    const end = ends.exec(this.text), row = this.text.slice(this.at, end?.index).trim();
-    this.at = end ? ends.lastIndex : this.text.length + 1;
+    this.ends.lastIndex = this.at;
+    const end = this.ends.exec(this.text), row = this.text.slice(this.at, end?.index).trim();
+    this.at = end ? this.ends.lastIndex : this.text.length + 1;
     this.line++;
     return row;
   }
 
   // The next word; with `wanted`, one of them in any case.
   word(...wanted) {
-    const words = /\S+/g;
     for (;;) {
-      words.lastIndex = this.column;
-      const found = words.exec(this.row)?.[0];
+      this.words.lastIndex = this.column;
+      const found = this.words.exec(this.row)?.[0];
       if (found === undefined) {
         if (this.ended) throw this.bad(`the file ends where ${wanted.join(" or ") || "more"} is expected`);
         this.row = this.nextLine();
         this.column = 0;
         continue;
       }
-      this.column = words.lastIndex;
+      this.column = this.words.lastIndex;
       if (wanted.length && !wanted.some((w) => w.toLowerCase() === found.toLowerCase())) {
         throw this.bad(`"${found.slice(0, 40)}" stands where ${wanted.join(" or ")} is expected`);
       }
