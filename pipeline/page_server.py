@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.server
+import os
 import secrets
 import shutil
 import socket
 import ssl
 import subprocess
+import time
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any
-from urllib.parse import quote, unquote, urlsplit
+from typing import Any, BinaryIO
+from urllib.parse import quote, unquote_to_bytes, urlsplit
 
 from gsac.stages.contract import BadInput
 
 PAGE = "viewer.html"
-FILES = {PAGE: "text/html; charset=utf-8", "avatar.gsac": "application/octet-stream", "avatar.glb": "model/gltf-binary",
-         "avatar.fbx": "application/octet-stream", "avatar.ply": "application/octet-stream",
-         "avatar.spz": "application/octet-stream"}
-"""What is served of the page's folder, by its name alone -> media type."""
+FILES = {PAGE: ("text/html; charset=utf-8", b"<!doctype html>"), "avatar.gsac": ("application/octet-stream", b"GSAC\r\n"),
+         "avatar.glb": ("model/gltf-binary", b"glTF"), "avatar.fbx": ("application/octet-stream", b"Kaydara FBX"),
+         "avatar.ply": ("application/octet-stream", b"ply\n"), "avatar.spz": ("application/octet-stream", b"\x1f\x8b")}
+"""What is served of the page's folder, by its name alone -> media type, and how it begins: a link to some other file of this
+machine, which a folder from elsewhere may hold, is none."""
+PORTS = {"http": 80, "https": 443}
+"""Browsers leave these out of the Host header."""
+MOST_SILENT = 64
+"""Clients that have not asked yet; with one more, the oldest is hung up on."""
+PATIENCE_S = 30
+"""For a client to ask, and for each part of the answer that it takes."""
 HERE = "127.0.0.1"
 NOWHERE = "192.0.2.1"
 """An address of no machine (RFC 5737): the way towards it tells this machine's own address, and nothing is sent."""
@@ -32,6 +42,7 @@ class PageServer(http.server.ThreadingHTTPServer):
     def __init__(self, page: Path, name: str, bound: tuple[str, int], host: str, token: str, certificate: Path | None) -> None:
         self.page, self.name, self.host, self.token = page, name, host, token
         self.scheme = "http" if certificate is None else "https"
+        self.silent: dict[socket.socket, float] = {}
         super().__init__(bound, Handler)
         if certificate is not None:
             context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
@@ -42,7 +53,7 @@ class PageServer(http.server.ThreadingHTTPServer):
     @property
     def prefix(self) -> str:
         """The path below which the files are."""
-        return "/".join(["", *([self.token] if self.token else []), quote(self.name, safe=""), ""])
+        return "/".join(["", *([self.token] if self.token else []), quote(os.fsencode(self.name), safe=""), ""])
 
     @property
     def url(self) -> str:
@@ -53,14 +64,48 @@ class PageServer(http.server.ThreadingHTTPServer):
     def hosts(self) -> set[str]:
         """Host headers that name this server: another is a foreign page that had its name point here."""
         port = self.server_address[1]
-        return {f"{name}:{port}" for name in (self.host, HERE, "localhost")}
+        names = (self.host, HERE, "localhost")
+        return {f"{name}:{port}" for name in names} | (set(names) if port == PORTS[self.scheme] else set())
 
-    def find_file(self, path: str) -> Path | None:
-        """The file that a request's path means, or None."""
+    def open_file(self, path: str) -> BinaryIO | None:
+        """The file that a request's path means, at its beginning, or None."""
         folder, _, name = path.rpartition("/")
-        if not secrets.compare_digest(unquote(folder + "/").encode(), unquote(self.prefix).encode()) or name not in FILES:
+        if not secrets.compare_digest(unquote_to_bytes(folder + "/"), unquote_to_bytes(self.prefix)) or name not in FILES:
             return None
-        return self.page.parent / name if (self.page.parent / name).is_file() else None
+        file = self.page.parent / name
+        beginning = FILES[name][1]
+        try:
+            opened = file.open("rb") if file.is_file() else None
+        except OSError:
+            return None
+        if opened is not None and opened.read(len(beginning)) == beginning:
+            opened.seek(0)
+            return opened
+        return None
+
+    def get_request(self) -> tuple[socket.socket, Any]:
+        """Takes a connection. Those that never ask cannot keep others out."""
+        connection, address = super().get_request()
+        self.silent[connection] = time.monotonic()
+        for oldest in list(self.silent)[:-MOST_SILENT]:
+            self.hang_up(oldest)
+        return connection, address
+
+    def service_actions(self) -> None:
+        """Hangs up on who has not asked in time, however busy with half a request."""
+        for connection, since in list(self.silent.items()):
+            if time.monotonic() - since > PATIENCE_S:
+                self.hang_up(connection)
+
+    def hang_up(self, connection: socket.socket) -> None:
+        """Ends what the connection's thread waits for."""
+        self.silent.pop(connection, None)
+        with contextlib.suppress(OSError):
+            socket.socket.shutdown(connection, socket.SHUT_RDWR)
+
+    def shutdown_request(self, request: Any) -> None:
+        self.silent.pop(request, None)
+        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A client that goes away, or refuses the certificate, is nothing to tell the user."""
@@ -70,8 +115,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     """Answers with a file of the server's page, or with why not."""
 
     server: PageServer
-    timeout = 30
-    """s that a client may be silent."""
+    timeout = PATIENCE_S
 
     def do_GET(self) -> None:
         self.answer()
@@ -81,23 +125,27 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def answer(self) -> None:
         """Sends the file, without its content for HEAD."""
-        if self.headers.get("Host", "") not in self.server.hosts:
+        self.server.silent.pop(self.connection, None)
+        if {*self.headers.get_all("Host", [""])} - self.server.hosts:
             return self.send_error(HTTPStatus.MISDIRECTED_REQUEST)
-        path = urlsplit(self.path).path
+        try:
+            path = urlsplit(self.path).path
+        except ValueError:
+            return self.send_error(HTTPStatus.BAD_REQUEST)
         if path == "/" and not self.server.token:
             return self.redirect()
-        file = self.server.find_file(path)
+        file = self.server.open_file(path)
         if file is None:
             return self.send_error(HTTPStatus.NOT_FOUND)
-        content = file.read_bytes()
-        self.send_response(HTTPStatus.OK)
-        for name, value in (("Content-Type", FILES[file.name]), ("Content-Length", str(len(content))),
-                            ("Cache-Control", "no-store"), ("X-Content-Type-Options", "nosniff"),
-                            ("Referrer-Policy", "no-referrer")):
-            self.send_header(name, value)
-        self.end_headers()
-        if self.command == "GET":
-            self.wfile.write(content)
+        with file:
+            self.send_response(HTTPStatus.OK)
+            for name, value in (("Content-Type", FILES[path.rpartition("/")[2]][0]),
+                                ("Content-Length", str(os.fstat(file.fileno()).st_size)), ("Cache-Control", "no-store"),
+                                ("X-Content-Type-Options", "nosniff"), ("Referrer-Policy", "no-referrer")):
+                self.send_header(name, value)
+            self.end_headers()
+            if self.command == "GET":
+                shutil.copyfileobj(file, self.wfile)
         return None
 
     def redirect(self) -> None:

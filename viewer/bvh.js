@@ -4,7 +4,10 @@ import { MotionError, MotionSource } from "./motion.js";
 import { Quat, Vec } from "./quat.js";
 
 const BVH_CHANNELS = ["xposition", "yposition", "zposition", "xrotation", "yrotation", "zrotation"];
+const BVH_AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 const BVH_MOST_JOINTS = 1000;
+// Of a joint's name.
+const BVH_MOST_WORDS = 100;
 
 /**
  * @param {string} text
@@ -17,10 +20,15 @@ export function readBvh(text, where) {
 class BvhReader {
   constructor(text, where) {
     this.where = where;
-    this.lines = text.split(/\r\n|\r|\n/);
-    // Number of lines read, and the words of the last one that are still to come.
+    this.text = text;
+    // Where the next line begins, the number of lines read, and the last one with the place up to which its words are read. One
+    // line and one word are held at a time, of which a file may have as many as it has bytes.
+    this.at = 0;
     this.line = 0;
-    this.words = [];
+    this.row = "";
+    this.column = 0;
+    this.ends = /\r\n|\r|\n/g;
+    this.words = /\S+/g;
     // Of each joint: name, index of the parent, offset from it, and indices into BVH_CHANNELS.
     this.names = [];
     this.parents = [];
@@ -32,17 +40,36 @@ class BvhReader {
     return new MotionError(`${this.where}, line ${this.line}: ${why}`);
   }
 
+  get ended() {
+    return this.at > this.text.length;
+  }
+
+  // The next line, without spaces around it.
+  nextLine() {
+    this.ends.lastIndex = this.at;
+    const end = this.ends.exec(this.text), row = this.text.slice(this.at, end?.index).trim();
+    this.at = end ? this.ends.lastIndex : this.text.length + 1;
+    this.line++;
+    return row;
+  }
+
   // The next word; with `wanted`, one of them in any case.
   word(...wanted) {
-    while (!this.words.length) {
-      if (this.line >= this.lines.length) throw this.bad(`the file ends where ${wanted.join(" or ") || "more"} is expected`);
-      this.words = this.lines[this.line++].trim().split(/\s+/).filter(Boolean);
+    for (;;) {
+      this.words.lastIndex = this.column;
+      const found = this.words.exec(this.row)?.[0];
+      if (found === undefined) {
+        if (this.ended) throw this.bad(`the file ends where ${wanted.join(" or ") || "more"} is expected`);
+        this.row = this.nextLine();
+        this.column = 0;
+        continue;
+      }
+      this.column = this.words.lastIndex;
+      if (wanted.length && !wanted.some((w) => w.toLowerCase() === found.toLowerCase())) {
+        throw this.bad(`"${found.slice(0, 40)}" stands where ${wanted.join(" or ")} is expected`);
+      }
+      return found;
     }
-    const found = this.words.shift();
-    if (wanted.length && !wanted.some((w) => w.toLowerCase() === found.toLowerCase())) {
-      throw this.bad(`"${found.slice(0, 40)}" stands where ${wanted.join(" or ")} is expected`);
-    }
-    return found;
   }
 
   number() {
@@ -64,6 +91,8 @@ class BvhReader {
     this.word("Time:");
     const seconds = this.number();
     if (!(seconds >= 1e-4 && seconds <= 10)) throw this.bad(`a frame time of ${seconds} s; 0.0001 to 10 is expected`);
+    const refused = MotionSource.refuse(frames, this.names.length);
+    if (refused) throw this.bad(refused);
     return this.toSource(this.table(frames), 1 / seconds);
   }
 
@@ -71,7 +100,9 @@ class BvhReader {
   joint(parent, depth) {
     const at = this.names.length, name = [];
     if (at >= BVH_MOST_JOINTS || depth > 200) throw this.bad(`more than ${BVH_MOST_JOINTS} joints or 200 generations`);
-    for (let word = this.word(); word !== "{"; word = this.word()) name.push(word);
+    for (let word = this.word(); word !== "{"; word = this.word()) {
+      if (name.push(word) > BVH_MOST_WORDS) throw this.bad(`a joint's name has more than ${BVH_MOST_WORDS} words`);
+    }
     if (!name.length) throw this.bad("a joint without a name");
     this.names.push(name.join(" "));
     this.parents.push(parent);
@@ -107,12 +138,12 @@ class BvhReader {
   // Reads the motion: a line of numbers for each frame.
   table(frames) {
     const width = this.channels.reduce((sum, c) => sum + c.length, 0), out = [];
-    while (this.line < this.lines.length) {
-      const row = this.lines[this.line++].trim();
+    while (!this.ended) {
+      const row = this.nextLine();
       if (!row) continue;
       if (out.length >= frames) throw this.bad(`a frame more than the ${frames} that the file says`);
-      const values = row.split(/\s+/).map(Number);
-      if (values.length !== width) throw this.bad(`${values.length} numbers; the skeleton has ${width} channels`);
+      const values = row.split(/\s+/, width + 1).map(Number), count = values.length > width ? "more" : values.length;
+      if (values.length !== width) throw this.bad(`${count} numbers; the skeleton has ${width} channels`);
       if (!values.every(Number.isFinite)) throw this.bad("something other than finite numbers");
       out.push(values);
     }
@@ -133,7 +164,7 @@ class BvhReader {
         for (const kind of channels[j]) {
           const value = row[column++];
           if (kind < 3) local[kind] = value;
-          else turn = Quat.multiply(turn, Quat.about([3, 4, 5].map((k) => Number(k === kind)), value * Math.PI / 180));
+          else turn = Quat.multiply(turn, Quat.about(BVH_AXES[kind - 3], value * Math.PI / 180));
         }
         if (p < 0) return source.set(t, j, turn, local);
         const above = source.turn(t, p);

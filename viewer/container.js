@@ -29,17 +29,19 @@ export class GsacError extends Error {
  */
 export function unpackGsac(buffer) {
   const start = checkHeader(buffer), head = parseHead(new Uint8Array(buffer, GSAC_HEADER, start - GSAC_HEADER));
+  const spans = Object.entries(head.blocks).map(([name, entry]) => {
+    const size = blockBytes(name, entry, buffer.byteLength - start);
+    return { name, entry, size, from: entry.offset, to: entry.offset + size };
+  });
+  // Before a block is read: as many as lie in one place would take the memory of each.
+  const sorted = [...spans].sort((a, b) => a.from - b.from || a.to - b.to);
+  for (let i = 1; i < sorted.length; i++) {
+    if (sorted[i].from < sorted[i - 1].to) throw new GsacError("block", `${sorted[i - 1].name} and ${sorted[i].name} overlap`);
+  }
   /** @type {Blocks} */
   const blocks = {};
-  const spans = [];
-  for (const [name, entry] of Object.entries(head.blocks)) {
-    const size = blockBytes(name, entry, buffer.byteLength - start);
-    spans.push({ name, from: entry.offset, to: entry.offset + size });
-    blocks[name] = { shape: entry.shape, data: readBlock(entry, buffer, start + entry.offset, size) };
-  }
-  spans.sort((a, b) => a.from - b.from || a.to - b.to);
-  for (let i = 1; i < spans.length; i++) {
-    if (spans[i].from < spans[i - 1].to) throw new GsacError("block", `${spans[i - 1].name} and ${spans[i].name} overlap`);
+  for (const { name, entry, size, from } of spans) {
+    blocks[name] = { shape: entry.shape, data: readBlock(entry, buffer, start + from, size) };
   }
   return { head, blocks };
 }
@@ -81,7 +83,7 @@ function parseHead(bytes) {
 // Checks a block's entry in the head. Returns its size in bytes; room: bytes from the head's end to the file's.
 function blockBytes(name, entry, room) {
   const bad = (why) => new GsacError("block", `block ${name} ${why}`);
-  if (!isTable(entry) || !Object.hasOwn(GSAC_TYPES, entry.dtype)) throw bad("has an unknown type");
+  if (!isTable(entry) || !Object.keys(GSAC_TYPES).includes(entry.dtype)) throw bad("has an unknown type");
   const { offset, shape, scale } = entry;
   if (!Array.isArray(shape) || shape.length > 4 || !shape.every((n) => Number.isInteger(n) && n >= 0 && n <= 2 ** 26)) {
     throw bad("has a shape that is not a short list of lengths");

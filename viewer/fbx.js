@@ -104,16 +104,18 @@ class FbxReader {
   async motions() {
     const stacks = [...this.objects].filter(([, node]) => node.name === "AnimationStack");
     if (!stacks.length) throw this.bad("it holds no animation");
+    if (stacks.length > MotionSource.MOST_MOTIONS) {
+      throw this.bad(`it holds ${stacks.length} animations; at most ${MotionSource.MOST_MOTIONS} are taken`);
+    }
     const joints = this.joints(), movers = this.movers(joints), found = [];
-    let samples = 0;
+    let total = 0;
     for (const [id, node] of stacks) {
       const label = plainLabel(node.values[1]), tracks = await this.tracks(id, label, movers);
       if (!tracks.length) continue;
       const { begin, frames } = this.span(node);
-      samples += frames * joints.length;
-      if (!(samples <= MotionSource.MOST)) {
-        throw this.bad(`${frames} frames of ${joints.length} joints are more than this page takes`);
-      }
+      total += frames;
+      const refused = MotionSource.refuse(total, joints.length);
+      if (refused) throw this.bad(refused);
       found.push({ name: label, begin, frames, tracks });
     }
     if (!found.length) throw this.bad("it holds no animation that moves a joint");
@@ -143,7 +145,9 @@ class FbxReader {
           place: new FbxPlace(propertiesOf(node), this.defaults) });
       }
     }
+    const refused = MotionSource.refuse(1, out.length);
     if (!out.length) throw this.bad("it holds no skeleton");
+    if (refused) throw this.bad(refused);
     return out;
   }
 

@@ -11,10 +11,11 @@ const FBX_PARTS = {
   "": ["FBXHeaderExtension", "Definitions", "Objects", "Connections"],
   Objects: ["Model", "NodeAttribute", "AnimationStack", "AnimationLayer", "AnimationCurveNode", "AnimationCurve"],
 };
-const FBX_MOST_NODES = 2e6;
+// Nodes and their values.
+const FBX_MOST_PARTS = 2e6;
 const FBX_DEEPEST = 32;
 // Bytes of all unpacked arrays.
-const FBX_MOST_UNPACKED = 256 * 2 ** 20;
+const FBX_MOST_UNPACKED = 128 * 2 ** 20;
 // The most that deflate makes of a byte.
 const FBX_DEFLATE = 1032;
 // Bytes that are unpacked at a time.
@@ -37,6 +38,7 @@ export class FbxFile {
     this.bytes = bytes;
     this.where = where;
     this.view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    this.decoder = new TextDecoder();
     if (bytes.length < 27 || this.text(0, FBX_MAGIC.length) !== FBX_MAGIC) {
       const written = /^\s*;|FBXHeaderExtension/.test(this.text(0, Math.min(bytes.length, 4096)));
       throw this.bad(written ? "it is FBX as text; binary FBX is read here, both by `gsac render --motion`" : "it is not FBX");
@@ -46,7 +48,7 @@ export class FbxFile {
       throw this.bad(`it is FBX of version ${this.version / 1000}; version 7 is read here, older ones by \`gsac render --motion\``);
     }
     this.wide = this.version >= 7500;
-    this.nodes = 0;
+    this.parts = 0;
     this.unpacked = 0;
     this.root = { name: "", values: [], children: this.list(27, bytes.length, "", 0) };
   }
@@ -56,7 +58,7 @@ export class FbxFile {
   }
 
   text(at, length) {
-    return new TextDecoder().decode(this.bytes.subarray(at, at + length));
+    return this.decoder.decode(this.bytes.subarray(at, at + length));
   }
 
   /**
@@ -74,12 +76,16 @@ export class FbxFile {
         throw this.bad(`the node at byte ${at} ends outside of its parent; was the file cut off?`);
       }
       if (!Object.hasOwn(FBX_PARTS, parent) || FBX_PARTS[parent].includes(name)) {
-        if (++this.nodes > FBX_MOST_NODES) throw this.bad(`more than ${FBX_MOST_NODES} nodes`);
+        this.count();
         out.push({ name, values: this.values(first, inner, count), children: this.list(inner, next, name, depth + 1) });
       }
       at = next;
     }
     return out;
+  }
+
+  count() {
+    if (++this.parts > FBX_MOST_PARTS) throw this.bad(`more than ${FBX_MOST_PARTS} nodes and values`);
   }
 
   offset(at) {
@@ -96,6 +102,7 @@ export class FbxFile {
     };
     // Ends where `take` does: each value has at least one byte.
     for (let k = 0; k < count; k++) {
+      this.count();
       const code = String.fromCharCode(this.bytes[take(1)]);
       if (code in FBX_SIZES) {
         out.push(view[FBX_GETTERS[code]](take(FBX_SIZES[code]), true));

@@ -1,6 +1,7 @@
 // Reads the animations of a glTF 2.0 file: .glb, or .gltf with its buffers inside or beside it. The rest pose is the skin's bind
 // pose where there is one, else that of the nodes. An error names the file and the part.
 
+import { decodeBase64 } from "./base64.js";
 import { isTable } from "./json.js";
 import { MotionError, MotionSource } from "./motion.js";
 import { placeNodes } from "./places.js";
@@ -13,6 +14,12 @@ const GLTF_TYPES = {
   5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array,
 };
 const GLTF_WIDTHS = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
+const GLTF_DEEPEST = 1000;
+// Values in the JSON, and numbers that its animations read: a small file can ask for many.
+const GLTF_MOST_PARTS = 2e6;
+const GLTF_MOST_NUMBERS = 32e6;
+
+/** @typedef {{data: Float64Array, count: number, width: number}} Rows */
 
 /**
  * @param {Uint8Array} bytes
@@ -39,6 +46,7 @@ class GltfReader {
       text = bytes.subarray(20, rest);
       if (rest + 8 <= bytes.length) this.chunk = bytes.subarray(rest + 8, rest + 8 + view.getUint32(rest, true));
     }
+    if (countParts(text) > GLTF_MOST_PARTS) throw this.bad(`its JSON has more than ${GLTF_MOST_PARTS} parts`);
     try {
       this.document = JSON.parse(new TextDecoder().decode(text));
     } catch (e) {
@@ -46,17 +54,34 @@ class GltfReader {
     }
     if (!isTable(this.document) || !isTable(this.document.asset)) throw this.bad("it is not glTF: `asset` is missing");
     this.buffers = new Map();
+    /** @type {Map<number, Rows>} */
+    this.rows = new Map();
+    this.read = 0;
+    // Accessors whose times are known to rise.
+    this.rising = new Set();
   }
 
   bad(why) {
     return new MotionError(`${this.where}: ${why}`);
   }
 
-  // Entry i of a list of the document.
-  entry(list, i) {
-    const found = Array.isArray(this.document[list]) ? this.document[list][i] : undefined;
-    if (!isTable(found)) throw this.bad(`${list}[${i}] is missing`);
+  // A list that may be left out.
+  list(owner, name, what = name) {
+    const found = owner[name] ?? [];
+    if (!Array.isArray(found)) throw this.bad(`${what} is not a list`);
     return found;
+  }
+
+  // Table i of a list; what: its name.
+  entry(list, i, what) {
+    const found = Number.isInteger(i) ? list[i] : undefined;
+    if (!isTable(found)) throw this.bad(`${what}[${Number.isInteger(i) ? i : "?"}] is missing`);
+    return found;
+  }
+
+  // Entry i of a list of the document.
+  part(name, i) {
+    return this.entry(this.list(this.document, name), i, name);
   }
 
   buffer(i) {
@@ -65,74 +90,123 @@ class GltfReader {
   }
 
   loadBuffer(i) {
-    const { uri } = this.entry("buffers", i);
+    const { uri } = this.part("buffers", i);
     if (uri === undefined && this.chunk) return this.chunk;
     if (typeof uri !== "string") throw this.bad(`buffers[${i}] has no content`);
     const inside = uri.match(/^data:[^,]*;base64,/);
-    if (inside) {
-      try {
-        return Uint8Array.from(atob(uri.slice(inside[0].length)), (c) => c.charCodeAt(0));
-      } catch (e) {
-        throw this.bad(`buffers[${i}] is not base64`);
-      }
+    try {
+      if (inside) return decodeBase64(uri.slice(inside[0].length));
+    } catch (e) {
+      throw this.bad(`buffers[${i}] is not base64`);
     }
-    const name = decodeURIComponent(uri).split("/").at(-1);
+    let name = uri.split("/").at(-1);
+    try {
+      name = decodeURIComponent(name);
+    } catch (e) {
+      throw this.bad(`buffers[${i}] lies in ${uri}, which is no file's name`);
+    }
     if (!Object.hasOwn(this.beside, name)) throw this.bad(`it needs ${name}; drop both files together`);
     return this.beside[name];
   }
 
-  // Rows of numbers of an accessor; `normalized` integers become -1..1.
+  /**
+   * Rows of numbers of an accessor; `normalized` integers become -1..1.
+   * @returns {Rows}
+   */
   numbers(i, width) {
-    const accessor = this.entry("accessors", i);
-    const { count, componentType, type, bufferView, byteOffset = 0, normalized } = accessor;
-    const Type = GLTF_TYPES[componentType];
-    if (!Type || GLTF_WIDTHS[type] !== width || !(Number.isInteger(count) && count > 0) || accessor.sparse) {
+    const known = this.rows.get(i);
+    if (known && known.width === width) return known;
+    const { count, componentType, type, bufferView, byteOffset = 0, normalized, sparse } = this.part("accessors", i);
+    const Type = typeof componentType === "number" ? GLTF_TYPES[componentType] : undefined;
+    if (!Type || typeof type !== "string" || GLTF_WIDTHS[type] !== width || !isCount(count) || count === 0 || sparse) {
       throw this.bad(`accessors[${i}] is of a kind that an animation does not have`);
     }
-    const { buffer, byteOffset: start = 0, byteStride } = this.entry("bufferViews", bufferView), bytes = this.buffer(buffer);
-    const size = Type.BYTES_PER_ELEMENT, stride = byteStride || size * width, first = start + byteOffset;
-    if (!(first >= 0 && stride > 0 && first + (count - 1) * stride + size * width <= bytes.length)) {
+    const { buffer, byteOffset: start = 0, byteStride } = this.part("bufferViews", bufferView), bytes = this.buffer(buffer);
+    const size = Type.BYTES_PER_ELEMENT, stride = byteStride || size * width;
+    if (![start, byteOffset, stride].every(isCount) || stride < size * width) {
+      throw this.bad(`accessors[${i}] has an odd offset or byteStride`);
+    }
+    const first = start + byteOffset;
+    if (first + (count - 1) * stride + size * width > bytes.length) {
       throw this.bad(`accessors[${i}] ends after its buffer; was the file cut off?`);
     }
+    this.read += count * width;
+    if (this.read > GLTF_MOST_NUMBERS) throw this.bad("its animations have more keys than this page takes");
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength), get = `get${Type.name.replace("Array", "")}`;
     const factor = normalized && Type !== Float32Array ? 2 ** (8 * size - (Type.name[0] === "U" ? 0 : 1)) - 1 : 1;
-    return Array.from({ length: count }, (_, row) => Array.from({ length: width }, (_, column) => {
-      const value = view[get](first + row * stride + column * size, true) / factor;
+    const rows = { data: new Float64Array(count * width), count, width };
+    for (let k = 0; k < rows.data.length; k++) {
+      const column = k % width, value = view[get](first + (k - column) / width * stride + column * size, true) / factor;
       if (!Number.isFinite(value)) throw this.bad(`accessors[${i}] is not finite`);
-      return value;
-    }));
+      rows.data[k] = value;
+    }
+    this.rows.set(i, rows);
+    return rows;
+  }
+
+  // The numbers of an accessor, which rise.
+  times(i, where) {
+    const rows = this.numbers(i, 1);
+    if (!this.rising.has(i) && rows.data.some((time, k) => k > 0 && time < rows.data[k - 1])) {
+      throw this.bad(`${where} has times that do not rise`);
+    }
+    this.rising.add(i);
+    return rows;
   }
 
   motions() {
-    const animations = this.document.animations || [];
-    if (!Array.isArray(animations) || !animations.length) throw this.bad("it holds no animation");
-    const skeleton = this.skeleton();
-    return animations.map((animation, i) => {
+    const animations = this.list(this.document, "animations");
+    if (!animations.length) throw this.bad("it holds no animation");
+    if (animations.length > MotionSource.MOST_MOTIONS) {
+      throw this.bad(`it holds ${animations.length} animations; at most ${MotionSource.MOST_MOTIONS} are taken`);
+    }
+    const skeleton = this.skeleton(), joints = skeleton.order.length;
+    let frames = 0;
+    return animations.map((_, i) => {
+      const animation = this.part("animations", i), { tracks, end } = this.tracks(animation, `animations[${i}]`, skeleton);
+      const length = Math.max(1, Math.floor(end * GLTF_RATE + 1e-6) + 1);
+      frames += length;
+      const refused = MotionSource.refuse(frames, joints);
+      if (refused) throw this.bad(refused);
       const name = typeof animation.name === "string" && animation.name ? animation.name : `animation ${i + 1}`;
-      return { name, source: this.sampleAnimation(animation, `animations[${i}]`, skeleton) };
+      return { name, source: this.sample(tracks, length, skeleton) };
     });
   }
 
   // Nodes of the first skin and all above them, parents first; without a skin all nodes.
   skeleton() {
-    const nodes = (this.document.nodes || []).map((_, i) => this.entry("nodes", i)), above = nodes.map(() => -1);
-    nodes.forEach((node, i) => (node.children || []).forEach((child) => {
-      if (!(child in nodes) || above[child] >= 0) throw this.bad(`nodes[${i}] has a child that is not there or has another parent`);
+    const nodes = this.list(this.document, "nodes").map((_, i) => this.part("nodes", i)), above = nodes.map(() => -1);
+    nodes.forEach((node, i) => this.list(node, "children", `nodes[${i}].children`).forEach((child) => {
+      if (!isCount(child) || child >= nodes.length || above[child] >= 0) {
+        throw this.bad(`nodes[${i}] has a child that is not there or has another parent`);
+      }
       above[child] = i;
     }));
-    const order = [], seen = new Set(), skin = Array.isArray(this.document.skins) ? this.entry("skins", 0) : null;
-    const visit = (i, depth) => {
-      if (!(i in nodes) || depth > 1000) throw this.bad("its nodes are not a tree");
-      if (seen.has(i)) return;
-      if (above[i] >= 0) visit(above[i], depth + 1);
-      seen.add(i);
-      order.push(i);
-    };
-    for (const i of skin ? skin.joints : nodes.keys()) visit(i, 0);
+    const skin = this.list(this.document, "skins").length ? this.part("skins", 0) : null;
+    const joints = skin ? this.joints(skin, nodes) : [];
+    // Node -> its place in the skeleton.
+    const index = new Map();
+    for (const i of skin ? joints : nodes.keys()) {
+      const line = [];
+      for (let at = i; at >= 0 && !index.has(at); at = above[at]) {
+        if (line.push(at) > GLTF_DEEPEST) throw this.bad("its nodes are not a tree");
+      }
+      for (const at of line.reverse()) index.set(at, index.size);
+    }
+    const order = [...index.keys()], refused = MotionSource.refuse(1, order.length);
     if (!order.length) throw this.bad("it holds no skeleton");
-    const local = order.map((i) => this.local(nodes[i], i));
-    return { order, skin, local, parents: order.map((i) => order.indexOf(above[i])),
-      names: order.map((i) => String(nodes[i].name ?? `node ${i}`)) };
+    if (refused) throw this.bad(refused);
+    const local = order.map((i) => this.local(nodes[i], i)), parents = order.map((i) => index.get(above[i]) ?? -1);
+    const names = order.map((i) => (typeof nodes[i].name === "string" ? nodes[i].name : `node ${i}`));
+    const rest = this.rest(skin, joints.map((i) => index.get(i)), local, parents);
+    return { order, index, local, parents, names, rest };
+  }
+
+  // The nodes that a skin moves.
+  joints(skin, nodes) {
+    const found = this.list(skin, "joints", "skins[0].joints");
+    if (!found.every((i) => isCount(i) && i < nodes.length)) throw this.bad("skins[0].joints names a node that is not there");
+    return found;
   }
 
   /**
@@ -153,28 +227,28 @@ class GltfReader {
       scale: (scale[0] + scale[1] + scale[2]) / 3 };
   }
 
-  // Turns and places of all joints, GLTF_RATE times a second.
-  sampleAnimation(animation, where, { order, skin, local, parents, names }) {
-    const tracks = [];
+  // What an animation moves, and its end, s.
+  tracks(animation, where, { index }) {
+    const tracks = new Map(), samplers = this.list(animation, "samplers", `${where}.samplers`);
     let end = 0;
-    for (const channel of Array.isArray(animation.channels) ? animation.channels : []) {
-      const at = order.indexOf(channel.target?.node), path = channel.target?.path;
-      if (at < 0 || !["translation", "rotation"].includes(path)) continue;
-      const sampler = (animation.samplers || [])[channel.sampler];
-      if (!isTable(sampler)) throw this.bad(`${where} has a channel without its sampler`);
-      const times = this.numbers(sampler.input, 1).map(([t]) => t);
-      const values = this.numbers(sampler.output, path === "rotation" ? 4 : 3);
-      const cubic = sampler.interpolation === "CUBICSPLINE";
-      if (values.length !== times.length * (cubic ? 3 : 1) || times.some((t, k) => k && t < times[k - 1])) {
+    for (const channel of this.list(animation, "channels", `${where}.channels`)) {
+      const { node, path } = isTable(channel) && isTable(channel.target) ? channel.target : {}, at = index.get(node);
+      if (at === undefined || !["translation", "rotation"].includes(path)) continue;
+      const { input, output, interpolation: how } = this.entry(samplers, channel.sampler, `${where}.samplers`);
+      const times = this.times(input, where), values = this.numbers(output, path === "rotation" ? 4 : 3);
+      if (values.count !== times.count * (how === "CUBICSPLINE" ? 3 : 1)) {
         throw this.bad(`${where} has a sampler whose times and values do not fit`);
       }
-      end = Math.max(end, times.at(-1));
-      tracks.push({ at, path, times, values, how: sampler.interpolation });
+      end = Math.max(end, times.data.at(-1));
+      tracks.set(`${at} ${path}`, { at, path, times: times.data, values, how });
     }
-    if (!tracks.length) throw this.bad(`${where} turns no joint of its skeleton`);
-    const frames = Math.max(1, Math.floor(end * GLTF_RATE + 1e-6) + 1), pose = local.map((node) => ({ ...node }));
-    const [restTurns, restPlaces] = this.rest(order, skin, local, parents);
-    const source = new MotionSource(GLTF_RATE, frames, names, parents, restTurns, restPlaces);
+    if (!tracks.size) throw this.bad(`${where} turns no joint of its skeleton`);
+    return { tracks: [...tracks.values()], end };
+  }
+
+  // Turns and places of all joints, GLTF_RATE times a second.
+  sample(tracks, frames, { local, parents, names, rest: [turns, places] }) {
+    const pose = local.map((node) => ({ ...node })), source = new MotionSource(GLTF_RATE, frames, names, parents, turns, places);
     for (let t = 0; t < frames; t++) {
       for (const track of tracks) pose[track.at][track.path] = sampleTrack(track, t / GLTF_RATE);
       placeNodes(pose, parents).forEach(({ turn, place }, j) => source.set(t, j, turn, place));
@@ -182,13 +256,20 @@ class GltfReader {
     return source;
   }
 
-  // World turns and places of the rest pose; a bind pose is scaled to the size of the nodes.
-  rest(order, skin, local, parents) {
+  /**
+   * World turns and places of the rest pose; a bind pose is scaled to the size of the nodes.
+   * @param {Object<string, any> | null} skin
+   * @param {number[]} joints the skin's, as places in the skeleton
+   * @param {import("./places.js").NodePlace[]} local
+   * @param {number[]} parents
+   * @returns {[number[][], number[][]]}
+   */
+  rest(skin, joints, local, parents) {
     const standing = placeNodes(local, parents), turns = standing.map((s) => s.turn), places = standing.map((s) => s.place);
     if (!skin || skin.inverseBindMatrices === undefined) return [turns, places];
-    const bind = this.numbers(skin.inverseBindMatrices, 16).map((m) => splitMatrix(m));
-    const joints = skin.joints.map((i) => order.indexOf(i));
-    if (bind.length < joints.length) throw this.bad("its skin has fewer bind matrices than joints");
+    const matrices = this.numbers(skin.inverseBindMatrices, 16);
+    if (matrices.count < joints.length) throw this.bad("its skin has fewer bind matrices than joints");
+    const bind = joints.map((_, k) => splitMatrix(rowOf(matrices, k)));
     let ours = 0, theirs = 0;
     const bound = new Map(joints.map((j, k) => {
       const turn = Quat.inverse(bind[k].rotation);
@@ -208,6 +289,19 @@ class GltfReader {
   }
 }
 
+// Whole and not below 0.
+const isCount = (value) => Number.isInteger(value) && value >= 0;
+
+// An upper bound of the values in a JSON text: each but the first has one of these before it.
+function countParts(text) {
+  let count = 0;
+  for (let i = 0; i < text.length; i++) count += text[i] === 0x2c || text[i] === 0x5b || text[i] === 0x7b ? 1 : 0;
+  return count;
+}
+
+/** @param {Rows} rows */
+const rowOf = ({ data, width }, k) => Array.from(data.subarray(k * width, (k + 1) * width));
+
 /**
  * Of a column-major 4x4 matrix, with the mean of its scales.
  * @returns {import("./places.js").NodePlace}
@@ -221,7 +315,7 @@ function splitMatrix(m) {
 
 // The value of a track at a time, s: a step, linear, or a cubic spline as glTF 2.0 has it.
 function sampleTrack({ path, times, values, how }, seconds) {
-  const cubic = how === "CUBICSPLINE", value = (k) => values[cubic ? 3 * k + 1 : k], last = times.length - 1;
+  const cubic = how === "CUBICSPLINE", value = (k) => rowOf(values, cubic ? 3 * k + 1 : k), last = times.length - 1;
   const finish = (v) => (path === "rotation" ? Quat.unit(v) : v);
   if (seconds <= times[0]) return finish(value(0));
   if (seconds >= times[last]) return finish(value(last));
@@ -235,7 +329,7 @@ function sampleTrack({ path, times, values, how }, seconds) {
   const length = times[high] - times[low], t = (seconds - times[low]) / length;
   if (!cubic && path === "rotation") return Quat.mix(value(low), value(high), t);
   if (!cubic) return value(low).map((v, i) => v + t * (value(high)[i] - v));
-  const t2 = t * t, t3 = t2 * t, leaving = values[3 * low + 2], arriving = values[3 * high];
+  const t2 = t * t, t3 = t2 * t, leaving = rowOf(values, 3 * low + 2), arriving = rowOf(values, 3 * high);
   return finish(value(low).map((v, i) => (2 * t3 - 3 * t2 + 1) * v + (t3 - 2 * t2 + t) * length * leaving[i]
     + (3 * t2 - 2 * t3) * value(high)[i] + (t3 - t2) * length * arriving[i]));
 }

@@ -1,6 +1,7 @@
 // Runs the page: unpacks the avatar inside it, shows it, and follows the address.
 
 import { readAddress } from "./address.js";
+import { decodeBase64 } from "./base64.js";
 import { Controls } from "./controls.js";
 import { readName } from "./name.js";
 import { readAvatar } from "./reader.js";
@@ -10,8 +11,7 @@ import { offerHeadset } from "./xr.js";
 // The bytes of avatar.gsac, which page.html holds compressed and in base64.
 async function unpackAvatar() {
   if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old: it cannot unpack the avatar");
-  const text = atob(document.getElementById("avatar").textContent.trim());
-  const packed = Uint8Array.from(text, (c) => c.charCodeAt(0));
+  const packed = decodeBase64(document.getElementById("avatar").textContent.trim());
   return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
 }
 

@@ -3,9 +3,10 @@
 import { readBvh } from "./bvh.js";
 import { readFbx } from "./fbx.js";
 import { readGltf } from "./gltf.js";
-import { MotionError } from "./motion.js";
+import { MotionError, MotionSource } from "./motion.js";
 import { retarget } from "./retarget.js";
 
+// Of all files that are dropped together.
 const MOST_BYTES = 128 * 2 ** 20;
 const READERS = { bvh: readBvhMotions, fbx: readFbx, glb: readGltf, gltf: readGltf, vrma: readGltf };
 
@@ -26,29 +27,42 @@ export async function addMotions(avatar, files) {
     const names = files.map((file) => file.name).join(", ") || "nothing";
     throw new MotionError(`${names}: a motion is read from .bvh, .fbx, .glb, .gltf and .vrma`);
   }
+  const size = files.reduce((sum, file) => sum + file.size, 0);
+  if (size > MOST_BYTES) throw new MotionError(`${files[0].name}: it has ${size} bytes; at most ${MOST_BYTES} are read`);
   /** @type {Object<string, Uint8Array>} */
   const bytes = {};
   for (const file of files) {
-    if (file.size > MOST_BYTES) throw new MotionError(`${file.name}: it has ${file.size} bytes; at most ${MOST_BYTES} are read`);
     bytes[file.name] = new Uint8Array(await file.arrayBuffer().catch((error) => {
       throw new MotionError(`${file.name}: the browser could not read it (${error.name})`);
     }));
   }
-  const added = [];
+  const found = [];
+  let frames = 0;
   for (const file of motions) {
-    for (const { name, source } of await READERS[kind(file)](bytes[file.name], file.name, bytes)) {
-      const clip = retarget(source, avatar, file.name), label = freeName(avatar.clips, name.slice(0, 40));
-      avatar.clips[label] = clip;
-      added.push(label);
+    try {
+      for (const { name, source } of await READERS[kind(file)](bytes[file.name], file.name, bytes)) {
+        frames += source.frames;
+        const refused = MotionSource.refuse(frames, avatar.names.length);
+        if (refused) throw new MotionError(`${file.name}: ${refused}`);
+        found.push({ name, clip: retarget(source, avatar, file.name) });
+      }
+    } catch (error) {
+      if (error instanceof MotionError) throw error;
+      console.error(error);
+      throw new MotionError(`${file.name}: it cannot be read (${error.message})`);
     }
   }
-  return added;
+  return found.map(({ name, clip }) => {
+    const label = freeName(avatar.clips, name.slice(0, 40) || "motion");
+    avatar.clips[label] = clip;
+    return label;
+  });
 }
 
 // The name, with a number after it where a clip has it already.
 function freeName(clips, name) {
   let label = name;
-  for (let k = 2; Object.hasOwn(clips, label); k++) label = `${name} ${k}`;
+  for (let k = 2; label in clips; k++) label = `${name} ${k}`;
   return label;
 }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 PAGE, STYLE = "page.html", "style.css"
-MODULES = ("json.js", "container.js", "reader.js",
+MODULES = ("json.js", "base64.js", "container.js", "reader.js",
            "flat_quat.js", "skin.js", "binding.js", "sort.js",
            "projection.js", "pack.js", "webgl.js", "software.js", "shaders.js", "device.js", "webgpu.js", "renderer.js",
            "quat.js", "motion.js", "places.js", "joint_names.js", "match_names.js", "bvh.js", "gltf.js",

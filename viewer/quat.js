@@ -11,14 +11,15 @@ export const Quat = {
    * @param {Quaternion} b
    * @returns {Quaternion}
    */
-  multiply([ax, ay, az, aw], [bx, by, bz, bw]) {
+  multiply(a, b) {
+    const ax = a[0], ay = a[1], az = a[2], aw = a[3], bx = b[0], by = b[1], bz = b[2], bw = b[3];
     return [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
       aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz];
   },
 
   /** @param {Quaternion} q */
-  inverse([x, y, z, w]) {
-    return [-x, -y, -z, w];
+  inverse(q) {
+    return [-q[0], -q[1], -q[2], q[3]];
   },
 
   /**
@@ -26,9 +27,9 @@ export const Quat = {
    * @param {Vector} v
    * @returns {Vector}
    */
-  rotate([x, y, z, w], v) {
-    const t = Vec.cross([x, y, z], v).map((c) => 2 * c), u = Vec.cross([x, y, z], t);
-    return v.map((c, i) => c + w * t[i] + u[i]);
+  rotate(q, v) {
+    const t = Vec.times(Vec.cross(q, v), 2), u = Vec.cross(q, t), w = q[3];
+    return [v[0] + w * t[0] + u[0], v[1] + w * t[1] + u[1], v[2] + w * t[2] + u[2]];
   },
 
   // The smallest turn from direction a to direction b, of any length; where they are opposite, about some normal of a.
@@ -43,7 +44,8 @@ export const Quat = {
 
   // The turn about a unit axis by an angle, rad.
   about(axis, angle) {
-    return [...axis.map((c) => c * Math.sin(angle / 2)), Math.cos(angle / 2)];
+    const s = Math.sin(angle / 2);
+    return [axis[0] * s, axis[1] * s, axis[2] * s, Math.cos(angle / 2)];
   },
 
   unit(q) {

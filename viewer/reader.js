@@ -119,7 +119,10 @@ function readExpressions(head, arrays, vertexCount) {
 
 // Returns the levels of detail, the finest first: face and opacity (N,), mu, logScale and rgb (N, 3), quat (N, 4) wxyz.
 function readLevels(head, arrays, faceCount) {
-  const levels = checkList(head.levels, "levels").map((level) => {
+  const given = checkList(head.levels, "levels"), prefixes = new Set(given.map((level) => level?.prefix));
+  if (given.length === 0 || given.length > GSAC_MAX_LEVELS) throw new GsacError("head", "levels is empty or too long");
+  if (prefixes.size !== given.length) throw new GsacError("head", "two levels have the same gaussians");
+  return given.map((level) => {
     if (!isTable(level) || typeof level.prefix !== "string") throw new GsacError("head", "a level has no prefix");
     const face = arrays.index(`${level.prefix}.face`, faceCount, null), N = face.length;
     if (level.count !== N) throw new GsacError("value", `a level says it has other than ${N} gaussians`);
@@ -130,10 +133,6 @@ function readLevels(head, arrays, faceCount) {
     }
     return { face, mu: real("mu", 3), quat, logScale: real("log_scale", 3), rgb: real("rgb", 3), opacity: real("opacity") };
   });
-  if (levels.length === 0 || levels.length > GSAC_MAX_LEVELS) throw new GsacError("head", "levels is empty or too long");
-  const prefixes = new Set(head.levels.map((level) => level.prefix));
-  if (prefixes.size !== levels.length) throw new GsacError("head", "two levels have the same gaussians");
-  return levels;
 }
 
 function checkPoses(poses, names) {

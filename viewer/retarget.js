@@ -33,7 +33,9 @@ export function retarget(source, avatar, where) {
   const { names, parents } = avatar, T = source.frames, J = names.length;
   /** @type {Places} */
   const ours = Object.fromEntries(names.map((name, j) => [name, Array.from(avatar.joints.subarray(j * 3, j * 3 + 3))]));
-  const { found, torso } = matchSkeleton(source, where);
+  const lacking = ["pelvis", ...NEEDED].filter((name) => !names.includes(name));
+  if (lacking.length) throw new MotionError(`${where}: this avatar has no joint ${lacking.join(", ")} that a motion could turn`);
+  const { found, torso } = matchSkeleton(source, names, where);
   const reference = new Reference(source, found, torso, ours), laid = reference.lay();
   // The world turn of our joint in frame t: `turn` where the source's joint `at` is as in the reference.
   const follow = (t, at, turn) => Quat.multiply(source.turn(t, at), Quat.multiply(Quat.inverse(reference.turns[at]), turn));
@@ -45,7 +47,7 @@ export function retarget(source, avatar, where) {
       const { below, above, share } = spine[SPINE.indexOf(name)];
       return Quat.mix(follow(t, below, laid.pelvis), follow(t, above, laid.pelvis), share);
     }
-    return name in found ? follow(t, found[name], laid[name] || laid.pelvis) : null;
+    return Object.hasOwn(found, name) ? follow(t, found[name], laid[name] || laid.pelvis) : null;
   };
   const rotation = new Float32Array(T * J * 3), transl = new Float64Array(T * 3), lowest = new Float64Array(T);
   const feet = names.filter((name) => /_(ankle|foot)$/.test(name)), turns = [], places = {};
@@ -60,6 +62,9 @@ export function retarget(source, avatar, where) {
     const moved = Vec.minus(Vec.times(Quat.rotate(upright, source.place(t, torso[0])), scale), ours.pelvis);
     transl.set(moved, t * 3);
     lowest[t] = Math.min(...feet.map((name) => places[name][1] - ours[name][1])) + moved[1];
+  }
+  if (!rotation.every(Number.isFinite) || !transl.every(Number.isFinite)) {
+    throw new MotionError(`${where}: a joint is somewhere that is not finite, or far too far away`);
   }
   const floor = feet.length ? lowest.sort()[Math.floor(FLOOR_SHARE * T)] : 0;
   return { fps: source.fps, loop: false, joints: names.map((_, j) => j), keys: T, rotation, transl: startAtOrigin(transl, floor) };
@@ -81,11 +86,12 @@ function startAtOrigin(transl, floor) {
 }
 
 /**
- * Finds our joints in theirs; torso: their joints from the hips to the chest.
+ * Finds our joints, by their names, in theirs; torso: their joints from the hips to the chest.
  * @returns {{found: Found, torso: number[]}}
  */
-function matchSkeleton(source, where) {
-  const found = matchNames(source.names), missing = NEEDED.filter((name) => !(name in found));
+function matchSkeleton(source, names, where) {
+  const found = Object.fromEntries(Object.entries(matchNames(source.names)).filter(([name]) => names.includes(name)));
+  const missing = NEEDED.filter((name) => !(name in found));
   if (missing.length) {
     throw new MotionError(`${where}: no joint for ${missing.join(", ")} among the ${source.names.length} of the skeleton `
       + `(${source.names.slice(0, 12).join(", ")} ...); known are the names of Mixamo, CMU, SMPL, VRM, Rigify and Unreal`);

@@ -88,12 +88,13 @@ def why_not(path: Path) -> str:
 
 def find_name(path: Path) -> str:
     """The avatar's name: its run's folder without `-avatar`, or the file's own name."""
-    here = path.absolute()
+    here = Path(os.path.abspath(path))  # without `..`, which a browser takes out of an address
     if here.is_file() and here.suffix.lower() == ".gsac" and here.name != AVATAR:
-        return here.stem
-    folder = here if here.is_dir() else here.parent
-    folder = folder.parent if folder.name == "export" else folder
-    return folder.name.removesuffix("-avatar") or "avatar"
+        name = here.stem
+    else:
+        folder = here if here.is_dir() else here.parent
+        name = (folder.parent if folder.name == "export" else folder).name.removesuffix("-avatar")
+    return name if name.strip(".") else "avatar"
 
 
 def make_page(path: Path, folder: Path) -> Path:

@@ -1,5 +1,8 @@
 import contextlib
 import http.client
+import os
+import select
+import socket
 import ssl
 import threading
 import urllib.error
@@ -8,6 +11,7 @@ import urllib.request
 import pytest
 
 from gsac.avatar.gsac_file.write import avatar_bytes
+from gsac.pipeline import page_server
 from gsac.pipeline.cli import execute
 from gsac.pipeline.commands import view
 from gsac.pipeline.commands.demo import make_truth_clip
@@ -19,11 +23,13 @@ from gsac.turntable import clip as turntable
 from gsac.viewer.page import page_bytes
 from support.figure import make_figure
 
+CONTENT = b"<!doctype html><h1>avatar</h1>"
+
 
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "store").mkdir()
-    (tmp_path / "store" / "abc.html").write_text("<h1>avatar</h1>")
+    (tmp_path / "store" / "abc.html").write_bytes(CONTENT)
     export = tmp_path / "run" / "export"
     export.mkdir(parents=True)
     (export / "viewer.html").symlink_to(tmp_path / "store" / "abc.html")
@@ -35,7 +41,7 @@ def test_the_viewer_page_is_served_through_its_link_on_this_machine_only(folder)
     with serve(find_page(folder, folder), 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         assert server.url.startswith("http://127.0.0.1:") and server.server_address[0] == "127.0.0.1"
-        assert urllib.request.urlopen(server.url).read() == b"<h1>avatar</h1>"
+        assert urllib.request.urlopen(server.url).read() == CONTENT
         with pytest.raises(urllib.error.HTTPError):
             urllib.request.urlopen(server.url.replace("viewer.html", "../secret.txt"))
         server.shutdown()
@@ -61,8 +67,8 @@ def test_an_avatar_file_that_lies_alone_gets_a_page_and_a_damaged_one_is_named(t
 
 
 @contextlib.contextmanager
-def running(page, **options):
-    with serve(page, 0, "me", **options) as server:
+def running(page, name="me", **options):
+    with serve(page, 0, name, **options) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield server
         server.shutdown()
@@ -79,25 +85,72 @@ def ask(server, path, host=None, context=None):
 
 def test_nothing_but_the_page_and_the_avatars_files_is_served(folder):
     export = folder / "export"
-    (export / "avatar.glb").write_bytes(b"glb")
+    (export / "avatar.glb").write_bytes(b"glTF")
     (export / ".store").write_text("hidden")
     (export / "notes.txt").write_text("mine")
     with running(export / "viewer.html") as server:
         assert server.url.endswith("/me/viewer.html")
-        assert ask(server, "/me/viewer.html") == (200, b"<h1>avatar</h1>")
-        assert ask(server, "/me/avatar.glb") == (200, b"glb")
+        assert ask(server, "/me/viewer.html") == (200, CONTENT)
+        assert ask(server, "/me/avatar.glb") == (200, b"glTF")
         assert ask(server, "/")[0] == 302
         for path in ("/me/", "/me", "/me/.store", "/me/notes.txt", "/me/../secret.txt", "/me/%2e%2e/secret.txt", "//etc/passwd",
                      "/other/viewer.html", "/me/avatar.ply"):
             assert ask(server, path)[0] == 404, path
 
 
-def test_a_foreign_name_that_points_at_this_machine_is_refused(folder):
+def say(server, request):
+    """The first line of the answer to the bytes of a request; nothing where there is none."""
+    with socket.create_connection(server.server_address, timeout=10) as connection:
+        connection.sendall(request)
+        with connection.makefile("rb") as answer:
+            return answer.readline()
+
+
+def test_an_odd_request_is_answered_and_never_by_a_file(folder):
+    with running(folder / "export" / "viewer.html") as server:
+        host = b"Host: 127.0.0.1:%d\r\n" % server.server_address[1]
+        paths = (b"/%00", b"/me/%00", b"/me/viewer.html%00", b"//[", b"http://[/me/viewer.html", b"/%ff/viewer.html", b"*", b"?",
+                 b"/\xff/viewer.html", b"/me/..%2fviewer.html", b"/me//viewer.html", b"/" + b"%2e" * 9000, b"/me/" + b"a" * 70_000)
+        for path in paths:
+            assert say(server, b"GET " + path + b" HTTP/1.1\r\n" + host + b"\r\n")[:10] == b"HTTP/1.0 4", path[:40]
+        for head in (b"X: y\r\n" * 200, b"X: " + b"y" * 70_000 + b"\r\n", b""):
+            assert say(server, b"GET /me/viewer.html HTTP/1.1\r\n" + head + b"\r\n")[:10] == b"HTTP/1.0 4", head[:10]
+        assert say(server, b"GET /me/viewer.html HTTP/1.1\r\n" + host + b"\r\n")[:12] == b"HTTP/1.0 200"
+
+
+def test_a_link_to_another_file_of_this_machine_is_not_served(folder):
+    export = folder / "export"
+    for name in ("avatar.gsac", "avatar.glb", "avatar.fbx", "avatar.ply", "avatar.spz"):
+        (export / name).symlink_to(folder / "secret.txt")
+    with running(export / "viewer.html") as server:
+        assert [ask(server, f"/me/{name}")[0] for name in page_server.FILES] == [200, 404, 404, 404, 404, 404]
+
+
+def test_clients_that_never_ask_keep_nobody_out_and_are_hung_up_on(folder, monkeypatch):
+    monkeypatch.setattr(page_server, "MOST_SILENT", 3)
+    monkeypatch.setattr(page_server, "PATIENCE_S", 1)
+    with running(folder / "export" / "viewer.html") as server, contextlib.ExitStack() as open_ones:
+        silent = [open_ones.enter_context(socket.create_connection(server.server_address, timeout=10)) for _ in range(4)]
+        assert silent[0].recv(1) == b"", "the oldest goes when there are too many"
+        assert ask(server, "/me/viewer.html") == (200, CONTENT)
+        for _ in range(100):
+            if select.select([silent[3]], [], [], 0.05)[0]:
+                break
+            silent[3].sendall(b"G")
+        else:
+            pytest.fail("a client that drips a byte at a time is never hung up on")
+
+
+def test_a_foreign_name_that_points_at_this_machine_is_refused(folder, monkeypatch):
     with running(folder / "export" / "viewer.html") as server:
         port = server.server_address[1]
         assert ask(server, "/me/viewer.html", f"localhost:{port}")[0] == 200
         for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", ""):
             assert ask(server, "/me/viewer.html", host or " ")[0] == 421
+        twice = f"GET /me/viewer.html HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nHost: evil.example\r\n\r\n"
+        assert say(server, twice.encode())[:12] == b"HTTP/1.0 421"
+        monkeypatch.setitem(page_server.PORTS, "http", port)
+        assert ask(server, "/me/viewer.html", "localhost")[0] == 200, "browsers leave out the port that is usual"
 
 
 def test_for_the_network_the_page_is_served_by_https_at_an_address_nobody_can_guess(folder, tmp_path):
@@ -108,7 +161,7 @@ def test_for_the_network_the_page_is_served_by_https_at_an_address_nobody_can_gu
     context = ssl.create_default_context(cafile=certificate)
     with running(folder / "export" / "viewer.html", host="127.0.0.1", certificate=certificate) as server:
         assert server.url.startswith("https://127.0.0.1:") and len(server.token) >= 16
-        assert ask(server, f"/{server.token}/me/viewer.html", context=context) == (200, b"<h1>avatar</h1>")
+        assert ask(server, f"/{server.token}/me/viewer.html", context=context) == (200, CONTENT)
         assert [ask(server, path, context=context)[0] for path in ("/", "/me/viewer.html", "/x/me/viewer.html")] == [404] * 3
 
 
@@ -158,13 +211,19 @@ def test_a_folder_with_nothing_but_an_avatar_file_gets_a_page(tmp_path):
 
 
 @pytest.mark.parametrize(("path", "name"), [("squats-avatar", "squats"), ("squats-avatar/export", "squats"), ("me.gsac", "me"),
-                                            ("squats-avatar/export/avatar.gsac", "squats"), ("-avatar", "avatar")])
+                                            ("squats-avatar/export/avatar.gsac", "squats"), ("-avatar", "avatar"),
+                                            ("squats-avatar/export/..", "squats"), ("..gsac", "avatar")])
 def test_the_page_is_served_under_the_avatars_name(tmp_path, path, name):
     (tmp_path / "squats-avatar" / "export").mkdir(parents=True)
     (tmp_path / "-avatar").mkdir()
-    for file in ("me.gsac", "squats-avatar/export/avatar.gsac"):
+    for file in ("me.gsac", "..gsac", "squats-avatar/export/avatar.gsac"):
         (tmp_path / file).write_bytes(b"")
     assert find_name(tmp_path / path) == name
+
+
+def test_a_name_in_another_encoding_is_served(folder):
+    with running(folder / "export" / "viewer.html", name=os.fsdecode(b"bad\xff")) as server:
+        assert server.prefix == "/bad%FF/" and ask(server, "/bad%ff/viewer.html") == (200, CONTENT)
 
 
 def test_a_port_that_is_taken_or_impossible_is_named(folder):

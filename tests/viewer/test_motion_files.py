@@ -224,6 +224,8 @@ def test_what_is_wrong_with_a_file_is_said_on_the_page_and_what_plays_goes_on(pa
         "still.gltf": (json.dumps({"asset": {"version": "2.0"}}), "still.gltf: it holds no animation"),
         "short.gltf": (json.dumps(document | {"buffers": [{"uri": "data:a;base64,AAAA"}]}), "accessors[0] ends after its buffer"),
         "loop.gltf": (json.dumps(document | {"nodes": [{"children": [0]}]}), "loop.gltf: its nodes are not a tree"),
+        "table.gltf": (json.dumps(document | {"nodes": {}}), "table.gltf: nodes is not a list"),
+        "percent.gltf": (json.dumps(document | {"buffers": [{"uri": "%"}]}), "percent.gltf: buffers[0] lies in %"),
     }
     for name, (content, words) in bad.items():
         (tmp_path / name).write_text(content)
