@@ -30,6 +30,7 @@ from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import read_rows, result_row, write_rows
 from gsac.pipeline.run_folder import LOGS, RunFolder
 from gsac.pipeline.stage_runner import StageRunner
+from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
@@ -55,6 +56,8 @@ class StageResult:
     notes: list[str] = field(default_factory=list)
     params: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
+    """Timings among them."""
+    timings: dict[str, Any] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
     """Port -> tree digest."""
     outputs: dict[str, str] = field(default_factory=dict)
@@ -66,16 +69,16 @@ class StageResult:
         """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, info.notes, config_values(config), info.metrics, record.parts.inputs,
-                   _ports(record))
+                   info.peak_rss_mb, info.warnings, info.notes, config_values(config), add_timings(info.metrics, info.timings),
+                   info.timings, record.parts.inputs, _ports(record))
 
     def to_json(self) -> dict[str, Any]:
         """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
-            "reason": self.reason, "warnings": self.warnings, "notes": self.notes, "params": self.params, "inputs": self.inputs,
-            "outputs": self.outputs,
+            "reason": self.reason, "warnings": self.warnings, "notes": self.notes, "params": self.params, "timings": self.timings,
+            "inputs": self.inputs, "outputs": self.outputs,
         }
         return row | ({"error": self.error} if self.error else {})
 
@@ -184,7 +187,7 @@ class ClipRun:
 
     def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))
-        self.metrics |= record.info.metrics
+        self.metrics |= self.results[-1].metrics
         self.folder.place(self.store, record)
 
     @contextlib.contextmanager

@@ -153,6 +153,8 @@ class StageRunner:
                 self.reporter.progress(name, event["done"], event["total"], event["unit"])
             elif event["event"] == "resumed":
                 self.reporter.note(f"{name}: goes on from {event['unit'].removesuffix('s')} {event['done']} of {event['total']}")
+            elif event["event"] == "timing":
+                info.timings[event["name"]] = event["value"]
             else:
                 message = event["message"].removeprefix(f"{name}: ")  # the reporter names the stage
                 kept, tell = {"warning": (info.warnings, self.reporter.warning), "note": (info.notes, self.reporter.remark)}[

@@ -60,6 +60,10 @@ class EventStream:
         """Sends a note for the user."""
         self.send("note", message=str(message))
 
+    def timing(self, name: str, value: Any) -> None:
+        """Sends a figure of this run for the cache record. value: as JSON holds it."""
+        self.send("timing", name=str(name), value=value)
+
 
 def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
@@ -102,6 +106,7 @@ def _work(order: dict[str, Any], events: EventStream) -> None:
         progress=events.progress,
         warn=events.warn,
         note=events.note,
+        timing=events.timing,
     ))
     check_outputs(stage, out)
 

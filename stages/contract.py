@@ -77,6 +77,9 @@ class Job:
     """Warns the user: a sentence that names the frame, file or parameter; kept in the cache record and the report."""
     note: Callable[[str], None] = lambda message: None
     """Tells the user what holds for nearly every clip and is no fault of this one; kept as warnings are."""
+    timing: Callable[[str, Any], None] = lambda name, value: None
+    """Tells a figure that another run of equal inputs would not repeat: name, and seconds, or a list of rows with seconds; kept in
+    the cache record, in no output."""
 
 
 class StageError(Exception):
