@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import errno
 import json
 import shutil
 from collections.abc import Callable
@@ -12,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache import objects
-from gsac.cache.errors import FULL, CacheError, CacheFullError
+from gsac.cache.errors import CacheError, no_room
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
 from gsac.cache.publish import publish
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store
-from gsac.pipeline.child import Child, LogReader, StageBugError, tail
+from gsac.pipeline.child import Child, LogReader, NoRoomError, StageBugError, tail
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.params import config_values
@@ -180,9 +181,11 @@ class StageRunner:
                 raise
             finally:
                 self._show_log(name, log, ended=True)
+        except NoRoomError as error:
+            raise no_room(error.errno, self.store.root, f" ({error})") from error
         except StageError as error:
             if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
-                raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
+                raise no_room(errno.ENOSPC, self.store.root, f" ({error})") from error
             if not isinstance(error, StageBugError):  # another run would only fail in the same way
                 objects.remove(scratch)
             raise

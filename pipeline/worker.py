@@ -20,6 +20,7 @@ import traceback
 from pathlib import Path
 from typing import Any, TextIO
 
+from gsac.pipeline.errors import NO_ROOM, sentence
 from gsac.stages.contract import BadInput, Job, Stage, StageError, make_config
 
 LEAST_GAP_S = 0.1
@@ -84,7 +85,7 @@ def main() -> None:
         _work(order, events)
     except Exception as error:  # the parent must hear of any failure
         traceback.print_exc()
-        events.send("failed", kind=_kind(error), message=_message(error))
+        events.send("failed", kind=_kind(error), message=_message(error), errno=getattr(error, "errno", None))
     else:
         events.send("done", seconds=time.time() - order["started"], **cost())
     sys.stdout.flush()
@@ -150,6 +151,8 @@ def _peak_kb(fallback: int) -> int:
 def _kind(error: Exception) -> str:
     if isinstance(error, BadInput):
         return "bad input"
+    if isinstance(error, OSError) and error.errno in NO_ROOM:
+        return "no room"
     # An ArtifactError is known by name: toy stages in tests and a user's own need not import gsac.avatar.
     return "stage" if isinstance(error, StageError) or type(error).__name__ == "ArtifactError" else "bug"
 
@@ -157,6 +160,8 @@ def _kind(error: Exception) -> str:
 def _message(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "out of memory"
+    if _kind(error) == "no room":
+        return sentence(error)
     return str(error) if _kind(error) != "bug" else f"{type(error).__name__}: {error}"
 
 

@@ -16,6 +16,7 @@ from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
+from gsac.avatar.files import write_file
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import LEAST_SIDE, Lpips
 from gsac.avatar.metrics import figures, summary
@@ -226,7 +227,8 @@ class Run:
         gaussians.write(job.out / "avatar.npz", self.result.coarser)
         poses.to_params().write(job.out / "body.npz")
         write_frame(folder / "views.png", draw_all_round(gaussians, poses))
-        (job.out / "metrics.json").write_text(json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n")
+        figures = json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n"
+        write_file(job.out / "metrics.json", figures.encode())
         self.tell_timings()
 
     def tell_timings(self) -> None:
