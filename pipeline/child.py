@@ -53,7 +53,7 @@ class Child:
         try:
             with log.open("wb") as log_stream:
                 self._process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "gsac.pipeline.worker"],
+                    [sys.executable, "-P", "-m", "gsac.pipeline.by_content"],
                     stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write,),
                     start_new_session=True,
                     env=ENVIRONMENT | os.environ | {"PYTHONUNBUFFERED": "1", "TMPDIR": self._temporary.name},

@@ -1,4 +1,4 @@
-"""Figures of a run beside its outputs: seconds, and where it went on from. Another run of the key gives the same outputs, not these."""
+"""Figures of a run beside its outputs: seconds, and the step it went on from. Another run of the key would not repeat them."""
 
 from __future__ import annotations
 

@@ -169,7 +169,3 @@ def _leave_with_parent() -> None:
     while os.read(sys.stdin.fileno(), 1):
         pass
     os.killpg(os.getpgid(0), signal.SIGKILL)
-
-
-if __name__ == "__main__":
-    main()

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
 import imageio_ffmpeg
 import numpy as np
 from scipy.spatial.transform import Rotation
