@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.ffmpeg import ffmpeg_program
+
 CRF = 18
 """libx264's quality: 0 is lossless, 51 the worst."""
 CRF_VP9 = 24
@@ -42,13 +44,11 @@ class Video:
         self.path, self.size, self.fps, self.alpha = Path(path), (width, height), fps, alpha
 
     def __enter__(self) -> Video:
-        import imageio_ffmpeg
-
         width, height = self.size
         self.part = self.path.with_name(f".{self.path.name}.part")
         self.log = tempfile.TemporaryFile()
         self.process = subprocess.Popen(
-            [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-nostdin", "-loglevel", "error", "-f", "rawvideo",
+            [ffmpeg_program(), "-y", "-nostdin", "-loglevel", "error", "-f", "rawvideo",
              "-pix_fmt", "rgba" if self.alpha else "rgb24", "-s", f"{width}x{height}", "-r", f"{self.fps:g}", "-i", "pipe:0",
              *ENCODERS[self.path.suffix.lower()](self.alpha), str(self.part)],
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self.log)

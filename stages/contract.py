@@ -38,7 +38,12 @@ class Stage:
     config: type
     """Dataclass; its fields are the parameters `<stage>.<field>`, its defaults are params.yaml's."""
     packages: tuple[str, ...] = ()
-    """Distributions whose version is part of the key."""
+    """Distributions whose version is part of the key, Python's own beside them: all that its process loads and that may decide a
+    number."""
+    packages_on: Callable[[str], tuple[str, ...]] = lambda device: ()
+    """Those that it loads besides on a device class (cpu, cuda)."""
+    programs: Callable[[], dict[str, str]] = dict
+    """Programs that it runs, name -> path; their digests are part of the key."""
     models: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
     wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import imageio_ffmpeg
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -16,6 +15,7 @@ from gsac.avatar import wholebody
 from gsac.avatar.artifacts import write_arrays, write_frame, write_image
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
+from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, WRISTS, J
 from gsac.avatar.skinning import joint_transforms
 from gsac.avatar.zbuffer import visible_points
@@ -186,7 +186,7 @@ class VideoWriter:
     def __init__(self, path: Path, options: TurntableOptions):
         width, height = options.size
         self.process = subprocess.Popen(
-            [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+            [ffmpeg_program(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
              "-s", f"{width}x{height}", "-r", str(options.fps), "-i", "-",
              "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-c:v", "libx264", "-preset", "fast", "-threads", "1",
              "-crf", str(options.crf), "-pix_fmt", "yuv420p", "-colorspace", "bt709", "-color_primaries", "bt709",

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 
+from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.avatar.files import told_no_room
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.split import focal
@@ -106,7 +106,7 @@ def _run(path: Path, video: Video, output: list[str], folder: Path | None,
          on_frame: Callable[[int], None] | None) -> tuple[list[int], Fraction, list[str]]:
     """Runs ffmpeg. Returns the ticks of the frames that passed `showinfo`, their time base, and its error lines."""
     decoder = ["-c:v", video.decoder] if video.decoder else []
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
+    command = [ffmpeg_program(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
                "-fflags", "+discardcorrupt", *decoder, "-i", f"file:{path.absolute()}", "-map", f"0:{video.stream}",
                "-fps_mode", "passthrough", *output]
     ticks: list[int] = []
