@@ -11,7 +11,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.digest import tree_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import in_use
@@ -29,6 +28,7 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import read_rows, result_row, write_rows
 from gsac.pipeline.run_folder import LOGS, RunFolder
+from gsac.pipeline.sources import Source, source_digest
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, StageError
@@ -123,7 +123,7 @@ class ClipRun:
 
     def forecast(self, clip: Path, options: Options) -> list[StagePlan]:
         """What would run and why, as far as it is known before anything runs."""
-        digests = {CLIP: clip_digest(clip, self.store)}
+        digests = {CLIP: source_digest(clip, self.store)}
         plans = []
         for name in self.select(options):
             unknown = [p for p in self.graph.step(name).deps if p not in digests]
@@ -146,12 +146,12 @@ class ClipRun:
         """
         steps = self.select(options)
         required = self.graph.above(options.start) if options.start else set()
-        source = clip_digest(clip, self.store)
-        digests = {CLIP: source}
+        source = Source(clip, self.store)
+        digests = {CLIP: source.digest}
         paths = {CLIP: clip}
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
         self.reporter.follows(Course(steps, self.graph.above, self.store.usual_seconds))
-        with in_use(self.store) as lease, self._writing_results(clip, source), runner:
+        with in_use(self.store) as lease, self._writing_results(clip, source.digest), runner:
             for at, name in enumerate(steps, 1):
                 following = steps[at:at + AHEAD]
                 runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
@@ -167,7 +167,7 @@ class ClipRun:
                     with self._recording_failure(plan, parts.key, runner):
                         outcome, record = runner.run(
                             parts, plan.reason, {port: paths[port] for port in inputs}, forced=name in options.force,
-                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
+                            sources=(source,) if CLIP in inputs else ())
                 if outcome is Outcome.CACHED:
                     self.reporter.ends(name, outcome, record.info.seconds)
                     for message in record.info.warnings:
@@ -223,22 +223,6 @@ class ClipRun:
             "outputs": self.folder.outputs(ports),
             "metrics": self.metrics,
         }
-
-    def _unchanged(self, clip: Path, digest: str) -> None:
-        if clip_digest(clip, self.store) != digest:
-            raise BadInput(f"{clip} changed while it was being read; run again when it is complete")
-
-
-def clip_digest(clip: Path, store: Store) -> str:
-    """Tree digest of a file or folder. BadInput where it does not exist or cannot be read."""
-    if not clip.exists():
-        raise BadInput(f"{clip}: no such file or folder; give a video or a folder of photos")
-    try:
-        return tree_digest(clip, store.memo)[0]
-    except OSError as e:
-        raise BadInput(f"{clip}: cannot be read ({e.strerror})") from e
-    except CacheError as e:
-        raise BadInput(f"the clip cannot be read: {e}; take it out of the folder") from e
 
 
 def first_sentence(message: str) -> str:

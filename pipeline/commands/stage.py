@@ -6,7 +6,6 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import (
@@ -30,6 +29,7 @@ from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import clip_entries, read_rows, result_row, write_rows
 from gsac.pipeline.run import StageResult
 from gsac.pipeline.run_folder import LOGS, OWN_STORE, REPORT, RunFolder
+from gsac.pipeline.sources import Source
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
@@ -53,10 +53,8 @@ class Task:
     name: str
     keys: Keys
     store: Store
-    digests: dict[str, str]
-    """Port -> tree digest of an input."""
-    paths: dict[str, Path]
-    """Port -> path of an input."""
+    sources: dict[str, Source]
+    """Port -> input, where it lies."""
     folder: RunFolder
     """Knows what was placed in it."""
     out: Path
@@ -92,10 +90,9 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -
     """On the inputs that lie in the folder of a run, the one here as DVC calls it."""
     run_folder, project, configs = open_run_folder(arguments, arguments.folder, only=arguments.name)
     store = open_store(reporter, run_folder.root / OWN_STORE)
-    ports = project.graph.step(arguments.name).deps
-    return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
-                {port: run_folder.path(port).resolve() for port in ports},
-                run_folder, run_folder.root / arguments.name, run_folder.root / LOGS, in_run=True)
+    sources = {port: Source(run_folder.require(port), store) for port in project.graph.step(arguments.name).deps}
+    return Task(arguments.name, Keys(project, configs, store), store, sources, run_folder, run_folder.root / arguments.name,
+                run_folder.root / LOGS, in_run=True)
 
 
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
@@ -104,23 +101,24 @@ def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) ->
     store = open_store(reporter, arguments.out / OWN_STORE)
     configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
     paths = fixture_paths(project, arguments.name, arguments.inputs)
-    digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
+    sources = {port: Source(path, store) for port, path in paths.items()}
     out = arguments.out.absolute()
-    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, RunFolder(out), out, out / LOGS)
+    return Task(arguments.name, Keys(project, configs, store), store, sources, RunFolder(out), out, out / LOGS)
 
 
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     """Runs the stage through the store; shows its outputs as `out/<output>`."""
     store, name = task.store, task.name
     task.keys.check([name])
-    parts = task.keys.parts(name, task.digests)
+    parts = task.keys.parts(name, {port: source.digest for port, source in task.sources.items()})
     with in_use(store, [parts.key]):
         plan = plan_stage(store, parts, force, shown_key(task))
         outcome, record = Outcome.CACHED, plan.cached
         if record is None:
             try:
                 with StageRunner(task.keys, store, reporter, task.logs) as runner:
-                    outcome, record = runner.run(parts, plan.reason, task.paths, forced=force)
+                    outcome, record = runner.run(parts, plan.reason, {port: source.path for port, source in task.sources.items()},
+                                                 forced=force, sources=task.sources.values())
             except StageError as error:
                 raise StageFailedError(name, error, task.logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:
