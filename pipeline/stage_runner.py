@@ -150,8 +150,10 @@ class StageRunner:
             return publish(self.store, parts, folder, outputs, info, replace=forced)
 
     def _all_untouched(self, name: str, watched: list[Source], scratch: Path) -> bool:
-        """Whether all that the stage read stayed as it was; else tells what did not, and drops the work on it in `scratch`. BadInput
-        where it is another by now."""
+        """Whether all that the stage read stayed as it was; else tells what did not, and drops the work on it in `scratch`.
+
+        BadInput where it is another by now.
+        """
         touched = [source for source in watched if not source.is_untouched()]
         if touched:
             objects.remove(scratch)
