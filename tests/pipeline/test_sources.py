@@ -92,6 +92,23 @@ def test_a_clip_that_is_touched_each_time_is_refused_with_a_sentence(toy):
     assert toy.runs == ["cut"] * 3 and not list((toy.cache / "actions").glob("cut/*"))
 
 
+def test_a_brought_model_that_was_swapped_and_put_back_is_read_again(toy):
+    toy.edit("right/stage.py", "    model = job",
+             "    Path(os.environ['TOY_RUNS'] + '.read').touch()\n    time.sleep(0.5)\n    model = job")
+    toy.edit("right/stage.py", "from gsac.toy", "import os\nimport time\nfrom pathlib import Path\n\nfrom gsac.toy")
+    (toy.root / "net.bin").write_text(" one")
+    assert toy.gsac("models", "add", "net", toy.root / "net.bin").code == 0
+    (model,) = (toy.cache / "models").glob("*/net")
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "right.model=net")
+    toy.wait_for(Path(f"{toy.runs_file}.read").exists)
+    other = toy.root / "other"
+    other.write_text(" two")
+    for content in (other, toy.root / "net.bin"):
+        content.replace(model)
+    assert f"right: {model} was written or replaced while it was read" in process.communicate(timeout=60)[1]
+    assert process.returncode == 0 and toy.result == "ALPHA ALPHA one" and toy.runs.count("right") == 2
+
+
 def test_the_stage_command_reads_again_as_well(slow):
     for name in (".opened", ".closed"):
         Path(f"{slow.runs_file}{name}").touch()
