@@ -6,11 +6,14 @@ A letter in a shape is one length throughout a file: T kept frames, B betas, E e
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from gsac.avatar.files import told_no_room, write_file
 
 if TYPE_CHECKING:  # numpy is imported where it works: every `gsac status` reads this file
     import numpy as np
@@ -38,7 +41,7 @@ class Clip:
     """What was changed on the way, for people: `transparency composited over black`."""
 
     def write(self, path: Path) -> None:
-        path.write_text(json.dumps(asdict(self), indent=1, sort_keys=True) + "\n")
+        write_file(path, (json.dumps(asdict(self), indent=1, sort_keys=True) + "\n").encode())
 
     @classmethod
     def read(cls, path: Path) -> Clip:
@@ -76,8 +79,17 @@ def write_frame(path: Path, rgb: np.ndarray) -> None:
     """rgb: (H, W, 3) uint8."""
     import cv2
 
-    if not cv2.imwrite(str(path), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)):
-        raise OSError(f"{path}: cannot be written")
+    write_image(path, cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+
+
+def write_image(path: Path, image: np.ndarray, *settings: int) -> None:
+    """image: (H, W) or (H, W, 3) uint8, BGR; settings: OpenCV's, of the format that the suffix names."""
+    import cv2
+
+    ok, content = cv2.imencode(path.suffix, image, settings)
+    if not ok:
+        raise OSError(f"{path}: an image of shape {image.shape} cannot be encoded")
+    write_file(path, content.tobytes())
 
 
 def read_alpha(path: Path) -> np.ndarray:
@@ -96,15 +108,19 @@ def write_alpha(path: Path, alpha: np.ndarray) -> None:
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with OpenEXR.File(header, {"A": alpha.astype("float16")}) as f:
-        f.write(str(path))
+        try:
+            f.write(str(path))  # it has no encoder into memory, but looks at each write
+        except RuntimeError as error:
+            raise told_no_room(str(error), path) or OSError(f"{path}: cannot be written ({error})") from error
 
 
 def write_arrays(path: Path, **arrays: np.ndarray) -> None:
     """Compressed npz, no pickle, byte-deterministic. arrays: (...) of any shape, by name."""
     import numpy as np
 
-    with open(path, "wb") as f:
-        np.savez_compressed(f, **arrays)
+    content = io.BytesIO()
+    np.savez_compressed(content, **arrays)
+    write_file(path, content.getvalue())
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:

@@ -1,13 +1,14 @@
-"""Decorator that compiles our numba kernels.
+"""Decorators that compile our numba kernels.
 
-numba's disk cache checks only the file of a kernel, not the kernels and constants that it takes from other files; a digest of
-all of them in the kernel's name keeps it from running old code after an edit elsewhere.
+numba's disk cache checks only size and time of a kernel's file, and nothing of the kernels and constants that it takes from other
+files. A digest of them in the kernel's name keeps it from running old code after an edit.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,23 @@ def digest(folder: Path) -> str:
 
 
 DIGEST = digest(Path(__file__).parent)
+
+
+def own_kernel(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compiles a kernel that takes nothing from other files of ours, at the first call for each set of types, cached on disk.
+
+    options: of numba.njit.
+    """
+    def compiled(function: Callable[..., Any]) -> Any:
+        function.__qualname__ += f"_{_file_digest(function.__code__.co_filename)}"
+        return numba.njit(cache=True, **options)(function)
+
+    return compiled
+
+
+@cache
+def _file_digest(path: str) -> str:
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

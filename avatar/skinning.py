@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from gsac.avatar.numba_kernel import own_kernel
 
 
 def joint_transforms(pose: np.ndarray, joints: np.ndarray, parents: np.ndarray) -> np.ndarray:
@@ -65,7 +66,7 @@ def skin_backward(grad: np.ndarray, pose: np.ndarray, rest: np.ndarray, joints: 
     return tuple(g.astype(rest.dtype) for g in (grad_pose, grad_transl, grad_rest, grad_joints))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _coefficients(t2):
     """sin t / t, (1 - cos t) / t^2 and the derivative of each by t, divided by t."""
     if t2 < 1e-4:
@@ -75,7 +76,7 @@ def _coefficients(t2):
     return s / t, (1 - c) / t2, (t * c - s) / (t2 * t), (t * s - 2 * (1 - c)) / (t2 * t2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _rodrigues(pose, out):
     for j in range(pose.shape[0]):
         x, y, z = np.float64(pose[j, 0]), np.float64(pose[j, 1]), np.float64(pose[j, 2])
@@ -92,7 +93,7 @@ def _rodrigues(pose, out):
         out[j, 2, 1] = b * y * z + a * x
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _rodrigues_backward(pose, grad, out):
     for j in range(pose.shape[0]):
         w, m = pose[j], grad[j]
@@ -112,7 +113,7 @@ def _rodrigues_backward(pose, grad, out):
             out[j, i] = (da * on_k + db * on_k2) * w[i] + a * skew[i] + b * turn
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _chain(local, joints, parents, out):
     """out[..., :3] = world rotation, out[..., 3] = posed place of the joint minus its turned rest place."""
     for t in range(local.shape[0]):
@@ -134,7 +135,7 @@ def _chain(local, joints, parents, out):
                                            + out[t, j, i, 2] * joints[j, 2])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _chain_backward(local, joints, parents, transforms, grad, grad_local, grad_joints):
     """A_j = [R_j | t_j - R_j J_j] with R_j = R_p L_j and t_j = A_p [J_j; 1]; grad is used up on its way up."""
     for j in range(len(parents) - 1, -1, -1):
@@ -159,7 +160,7 @@ def _chain_backward(local, joints, parents, transforms, grad, grad_local, grad_j
                                   + grad[j, i, 1] * local[j, k, 1] + grad[j, i, 2] * local[j, k, 2])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _skin(rest, transforms, skin_index, skin_weight, out):
     for v in range(rest.shape[0]):
         x, y, z = rest[v, 0], rest[v, 1], rest[v, 2]
@@ -174,7 +175,7 @@ def _skin(rest, transforms, skin_index, skin_weight, out):
         out[v, 0], out[v, 1], out[v, 2] = px, py, pz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _skin_backward(grad, rest, transforms, skin_index, skin_weight, grad_rest, grad_transforms):
     for v in range(rest.shape[0]):
         gx, gy, gz = grad[v, 0], grad[v, 1], grad[v, 2]

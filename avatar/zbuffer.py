@@ -8,9 +8,9 @@ are drawn. A face with a corner at or behind `near`, or not finite, is left out 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from gsac.avatar.camera import Camera
+from gsac.avatar.numba_kernel import own_kernel
 
 NEAR = 0.01
 """Metres."""
@@ -76,18 +76,18 @@ def _screen(vertices: np.ndarray, camera: Camera) -> np.ndarray:
         return np.round(camera.project(vertices) * _SNAP) / _SNAP
 
 
-@njit(cache=True, inline="always")
+@own_kernel(inline="always")
 def _edge(ax, ay, bx, by, px, py):
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 
 
-@njit(cache=True, inline="always")
+@own_kernel(inline="always")
 def _owns(ax, ay, bx, by):
     """Whether a face that lies at `_edge > 0` owns the centres on its edge a -> b: a left or a top edge (y down)."""
     return by < ay or (by == ay and bx > ax)
 
 
-@njit(cache=True, inline="always")
+@own_kernel(inline="always")
 def _setup(screen, z, faces, f, width, height, near):
     """Corners (b and c swapped so that the area is positive), area, swapped or not, pixel box; area 0 = skip."""
     a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -112,7 +112,7 @@ def _setup(screen, z, faces, f, width, height, near):
     return ax, ay, bx, by, cx, cy, area, swapped, x0, x1, y0, y1
 
 
-@njit(cache=True, nogil=True)
+@own_kernel(nogil=True)
 def _rasterise(screen, z, faces, width, height, near):
     face_id = np.full((height, width), -1, np.int32)
     bary = np.zeros((height, width, 3), np.float32)
@@ -148,7 +148,7 @@ def _rasterise(screen, z, faces, width, height, near):
     return face_id, bary, depth
 
 
-@njit(cache=True, nogil=True)
+@own_kernel(nogil=True)
 def _silhouette(screen, z, faces, width, height, near):
     mask = np.zeros((height, width), np.bool_)
     for f in range(len(faces)):
@@ -170,7 +170,7 @@ def _silhouette(screen, z, faces, width, height, near):
     return mask
 
 
-@njit(cache=True, nogil=True)
+@own_kernel(nogil=True)
 def _interpolate(attributes, faces, face_id, bary):
     height, width = face_id.shape
     channels = attributes.shape[1]

@@ -18,6 +18,7 @@ from typing import Any
 from gsac.benchmarks.clip_runs import render_clip, run_clip
 from gsac.cache.store import Store
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.train import STAGE
 from gsac.stages.train.config import TrainConfig
@@ -90,7 +91,7 @@ def side_by_side(work: Callable, calls: list[tuple], jobs: int) -> list:
 
 
 def train(case: Case, folder: Path, cores: list[int] | None = None, **values: Any) -> dict:
-    """Trains one case. Returns metrics.json and `peak_gb`, the peak memory of its process.
+    """Trains one case. Returns metrics.json with the training's timings, and `peak_gb`, the peak memory of its process.
 
     folder: emptied first; cores: numbers of the CPU cores to use, None for all; values: parameters of the stage.
     LPIPS is measured if its weights are in the store, but is in no loss: on the CPU recipe `paper` would take hours.
@@ -98,18 +99,20 @@ def train(case: Case, folder: Path, cores: list[int] | None = None, **values: An
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        peak = pool.apply(_train, (case.inputs, folder, values, cores))
-    return json.loads((folder / "metrics.json").read_text()) | {"peak_gb": peak}
+        timings, peak = pool.apply(_train, (case.inputs, folder, values, cores))
+    return add_timings(json.loads((folder / "metrics.json").read_text()), timings) | {"peak_gb": peak}
 
 
-def _train(inputs: dict[str, Path], folder: Path, values: dict, cores: list[int] | None) -> float:
+def _train(inputs: dict[str, Path], folder: Path, values: dict, cores: list[int] | None) -> tuple[dict[str, Any], float]:
     if cores:
         os.sched_setaffinity(0, cores)
     from gsac.stages.train.stage import run
 
     config = make_config(STAGE, {"lpips": "judge"} | values)
-    run(Job(inputs, folder, config, _find_networks(config), device="cuda" if config.device == "cuda" else "cpu"))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    timings: dict[str, Any] = {}
+    run(Job(inputs, folder, config, _find_networks(config), device="cuda" if config.device == "cuda" else "cpu",
+            timing=timings.__setitem__))
+    return timings, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 
 def _find_networks(config: TrainConfig) -> dict[str, Path]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 READ_ONLY = "runs may go on without keeping their results, or set GSAC_CACHE to a folder that you may write"
 FULL = "nothing that was kept before is lost; free space, run `gsac cache gc`, or set GSAC_CACHE to a larger disk"
+LARGEST = "nothing that was kept before is lost; raise `ulimit -f`, or set GSAC_CACHE to a disk that takes larger files"
 INTEGRITY = "run `gsac cache verify`; what it finds damaged is moved to quarantine/ and computed again"
 
 
@@ -38,7 +39,13 @@ def from_os_error(error: OSError, folder: Path, needed: int | None = None) -> Ca
     """The CacheError that an OSError under `folder` means; needed: bytes that were to be written, if known."""
     if error.errno in (errno.EROFS, errno.EACCES, errno.EPERM) or not folder.is_dir():
         return CacheReadOnlyError(f"the cache folder {folder} cannot be written ({error.strerror})", READ_ONLY)
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        size = "" if needed is None else f" for a result of {needed:,} bytes"
-        return CacheFullError(f"no room left in the cache folder {folder}{size}", FULL)
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return no_room(error.errno, folder, "" if needed is None else f" for a result of {needed:,} bytes")
     return CacheError(f"the cache folder {folder} failed: {error}")
+
+
+def no_room(number: int, folder: Path, more: str) -> CacheFullError:
+    """The error of a disk or quota that is full, or of a largest size of files. number: errno; more: put behind the folder."""
+    if number == errno.EFBIG:
+        return CacheFullError(f"no room in the cache folder {folder} for a file of that size{more}", LARGEST)
+    return CacheFullError(f"no room left in the cache folder {folder}{more}", FULL)

@@ -83,7 +83,7 @@ class KeyParts:
     models: dict[str, str] = field(default_factory=dict)
     """Model file's name -> sha256."""
     packages: dict[str, str] = field(default_factory=dict)
-    """Declared distribution -> version."""
+    """Declared distribution -> version; the interpreter -> version, and programs that are run -> digest, beside them."""
     device: str = ""
     """Device class (cpu, cuda) where the stage says that it matters, else empty."""
 

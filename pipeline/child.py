@@ -34,6 +34,14 @@ class StageBugError(StageError):
     """A stage raised something it should not have; the log has the traceback."""
 
 
+class NoRoomError(StageError):
+    """A stage could not write a file; `errno` says what was used up: the disk, a quota, the largest size of a file."""
+
+    def __init__(self, message: str, errno: int):
+        super().__init__(message)
+        self.errno = errno
+
+
 class Child:
     """A stage's process. It loads the stage's code at once, then waits for its order; leaving the context kills it."""
 
@@ -45,7 +53,7 @@ class Child:
         try:
             with log.open("wb") as log_stream:
                 self._process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "gsac.pipeline.worker"],
+                    [sys.executable, "-P", "-m", "gsac.pipeline.by_content"],
                     stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write,),
                     start_new_session=True,
                     env=ENVIRONMENT | os.environ | {"PYTHONUNBUFFERED": "1", "TMPDIR": self._temporary.name},
@@ -115,6 +123,8 @@ def _judge(end: dict | None, code: int, log: Path) -> dict[str, Any]:
         why = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         hint = " (out of memory?)" if code == -signal.SIGKILL else ""
         raise StageBugError(f"its process ended without a word: {why}{hint}\n{tail(log)}".rstrip())
+    if end["event"] == "failed" and end["kind"] == "no room":
+        raise NoRoomError(end["message"], end["errno"])
     if end["event"] == "failed":
         kind = {"bad input": BadInput, "stage": StageError, "bug": StageBugError}[end["kind"]]
         raise kind(end["message"])

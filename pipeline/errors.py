@@ -14,7 +14,8 @@ PATH_ERRORS = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOENT, errno.ENOTD
                errno.ELOOP, errno.EINVAL, errno.ENODEV, errno.ENXIO, errno.EOPNOTSUPP)
 """errno of a path from the user that cannot be read or written as it should."""
 NO_FOLDER = "the folder in which you are is gone; change to one that is there"
-NO_ROOM = {errno.ENOSPC: "no room left on the disk", errno.EDQUOT: "the disk quota is used up"}
+NO_ROOM = {errno.ENOSPC: "no room left on the disk", errno.EDQUOT: "the disk quota is used up",
+           errno.EFBIG: "the largest size of a file is reached (`ulimit -f`, or the disk's own)"}
 
 
 class NotUpToDateError(Exception):

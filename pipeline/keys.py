@@ -6,16 +6,18 @@ import dataclasses
 import os
 from collections.abc import Callable, Iterable
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from gsac.avatar.cuda import why_not
 from gsac.cache.code import code_parts
+from gsac.cache.digest import file_digest
 from gsac.cache.key import KeyParts
 from gsac.cache.store import Store
 from gsac.pipeline.model_store import ModelStore, Say
 from gsac.pipeline.params import config_values
 from gsac.pipeline.project import Project
-from gsac.pipeline.versions import package_version
+from gsac.pipeline.versions import ABSENT, PYTHON, package_version, python_version
 from gsac.stages.contract import BadInput, Stage
 
 DEVICE = "GSAC_DEVICE"
@@ -100,6 +102,15 @@ class Keys:
         """Model files that the stage needs, and optional ones that the user has added."""
         return [*stage.models(config), *(name for name in stage.wishes(config) if name in self.models.brought)]
 
+    def _versions(self, stage: Stage, device: str) -> dict[str, str]:
+        """Of Python, and of the packages and programs that the stage computes with."""
+        versions = {PYTHON: python_version()}
+        versions |= {package: package_version(package) for package in (*stage.packages, *stage.packages_on(device))}
+        return versions | {name: self._program_version(Path(path)) for name, path in stage.programs().items()}
+
+    def _program_version(self, path: Path) -> str:
+        return f"sha256 {file_digest(path, self.memo)[:16]}" if path.is_file() else ABSENT
+
     def code(self, name: str) -> dict[str, str]:
         """Digests of our modules and files that the stage's result depends on."""
         return code_parts(self.project.entry(name), self.project.stage(name).code, self.memo)
@@ -117,7 +128,7 @@ class Keys:
             params=params,
             code=self.code(name),
             models={model: self.models.sha256(model) for model in self._models(stage, config)},
-            packages={package: package_version(package) for package in stage.packages},
+            packages=self._versions(stage, device),
             device=device,
         )
 

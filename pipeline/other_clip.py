@@ -7,8 +7,8 @@ from pathlib import Path
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.rows import port_digest, read_json, result_row, rows_of
-from gsac.pipeline.run import clip_digest
 from gsac.pipeline.run_folder import METRICS, REPORT, RUN, RunFolder
+from gsac.pipeline.sources import source_digest
 
 
 def find_other_clip(folder: RunFolder, clip: Path, store: Store) -> str | None:
@@ -18,7 +18,7 @@ def find_other_clip(folder: RunFolder, clip: Path, store: Store) -> str | None:
         return None
     there = str(run.get("clip"))
     digest = run.get("clip_digest") or port_digest(folder, CLIP, store)
-    return there if there != str(clip) and digest not in (None, clip_digest(clip, store)) else None
+    return there if there != str(clip) and digest not in (None, source_digest(clip, store)) else None
 
 
 def forget_results(folder: RunFolder) -> None:

@@ -98,8 +98,10 @@ def _dependencies(stage: Stage) -> str:
     config = stage.config()
     rows = {"model files, with the defaults": stage.models(config),
             "model files, where the user has added them": stage.wishes(config),
-            "versions of packages": stage.packages, "device class": ("cpu or cuda",) if stage.uses_device else ()}
-    return "\n".join(["- its code", *(f"- {what}: {', '.join(names)}" for what, names in rows.items() if names)])
+            "versions of packages": stage.packages, "programs": tuple(stage.programs()),
+            "device class": ("cpu or cuda",) if stage.uses_device else ()}
+    return "\n".join(["- its code, and the version of Python",
+                      *(f"- {what}: {', '.join(names)}" for what, names in rows.items() if names)])
 
 
 def _command(parser: argparse.ArgumentParser) -> Iterator[str]:

@@ -18,6 +18,7 @@ from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.run_folder import METRICS, RUN, RunFolder
+from gsac.pipeline.timings import add_timings
 
 Row = dict[str, Any]
 
@@ -49,7 +50,7 @@ def write_rows(folder: RunFolder, graph: Graph, store: Store, fresh: list[Row], 
     `clip_digest` of run.json."""
     rows = merge_rows(folder, graph, store, fresh)
     ports = [port for row in rows if result_row(row) is not None for port in graph.step(row["name"]).outs]
-    metrics = folder_metrics(folder, ports)
+    metrics = folder_metrics(folder, ports, {row["name"]: timings_of(row) for row in rows})
     folder.write_json(RUN, {**clip, "stages": rows, "outputs": folder.outputs(ports), "metrics": metrics})
     folder.write_json(METRICS, metrics)
 
@@ -61,10 +62,24 @@ def clip_entries(folder: RunFolder, store: Store) -> Row:
     return {"clip": str(folder.clip.resolve()), "clip_digest": port_digest(folder, CLIP, store) or known}
 
 
-def folder_metrics(folder: RunFolder, ports: list[str]) -> Row:
-    """Metrics of the results at these ports, all stages' in one object."""
-    contents = [read_json(folder.path(port)) for port in ports if port.partition("/")[2] == METRICS]
-    return {name: value for content in contents if isinstance(content, dict) for name, value in content.items()}
+def folder_metrics(folder: RunFolder, ports: list[str], timings: dict[str, Row]) -> Row:
+    """Metrics of the results at these ports, all stages' in one object, with the timings of the runs that made them.
+
+    timings: by stage.
+    """
+    metrics: Row = {}
+    for port in ports:
+        stage, _, output = port.partition("/")
+        content = read_json(folder.path(port)) if output == METRICS else None
+        if isinstance(content, dict):
+            metrics |= add_timings(content, timings.get(stage, {}))
+    return metrics
+
+
+def timings_of(row: Row | None) -> Row:
+    """The timings of the result that a row speaks of; {} where it has none."""
+    timings = (result_row(row) or {}).get("timings")
+    return timings if isinstance(timings, dict) else {}
 
 
 def merge_rows(folder: RunFolder, graph: Graph, store: Store, fresh: list[Row]) -> list[Row]:

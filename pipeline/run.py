@@ -11,7 +11,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.digest import tree_digest
 from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import in_use
@@ -29,7 +28,9 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import read_rows, result_row, write_rows
 from gsac.pipeline.run_folder import LOGS, RunFolder
+from gsac.pipeline.sources import Source, source_digest
 from gsac.pipeline.stage_runner import StageRunner
+from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, StageError
 
 AHEAD = 2
@@ -55,6 +56,8 @@ class StageResult:
     notes: list[str] = field(default_factory=list)
     params: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
+    """Timings among them."""
+    timings: dict[str, Any] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
     """Port -> tree digest."""
     outputs: dict[str, str] = field(default_factory=dict)
@@ -66,16 +69,16 @@ class StageResult:
         """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, info.notes, config_values(config), info.metrics, record.parts.inputs,
-                   _ports(record))
+                   info.peak_rss_mb, info.warnings, info.notes, config_values(config), add_timings(info.metrics, info.timings),
+                   info.timings, record.parts.inputs, _ports(record))
 
     def to_json(self) -> dict[str, Any]:
         """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
-            "reason": self.reason, "warnings": self.warnings, "notes": self.notes, "params": self.params, "inputs": self.inputs,
-            "outputs": self.outputs,
+            "reason": self.reason, "warnings": self.warnings, "notes": self.notes, "params": self.params, "timings": self.timings,
+            "inputs": self.inputs, "outputs": self.outputs,
         }
         return row | ({"error": self.error} if self.error else {})
 
@@ -124,7 +127,7 @@ class ClipRun:
 
     def forecast(self, clip: Path, options: Options) -> list[StagePlan]:
         """What would run and why, as far as it is known before anything runs."""
-        digests = {CLIP: clip_digest(clip, self.store)}
+        digests = {CLIP: source_digest(clip, self.store)}
         plans = []
         for name in self.select(options):
             unknown = [p for p in self.graph.step(name).deps if p not in digests]
@@ -154,12 +157,12 @@ class ClipRun:
         """
         steps = self.select(options)
         required = self.graph.above(options.start) if options.start else set()
-        source = clip_digest(clip, self.store)
-        digests = {CLIP: source}
+        source = Source(clip, self.store)
+        digests = {CLIP: source.digest}
         paths = {CLIP: clip}
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
         self.reporter.follows(Course(steps, self.graph.above, self.store.usual_seconds))
-        with in_use(self.store) as lease, self._writing_results(clip, source), runner:
+        with in_use(self.store) as lease, self._writing_results(clip, source.digest), runner:
             at = 0
             while at < len(steps):
                 name, following = steps[at], steps[at + 1:at + 1 + AHEAD]
@@ -181,7 +184,7 @@ class ClipRun:
                     with self._recording_failure(plan, parts.key, runner):
                         outcome, record = runner.run(
                             parts, plan.reason, {port: paths[port] for port in inputs}, forced=name in options.force,
-                            still_valid=lambda reads=CLIP in inputs: self._unchanged(clip, source) if reads else None)
+                            sources=(source,) if CLIP in inputs else ())
                 if outcome is Outcome.CACHED and parts.key in self._told:
                     outcome = self._told[parts.key]
                 elif outcome is Outcome.CACHED:
@@ -221,7 +224,7 @@ class ClipRun:
 
     def _record(self, plan: StagePlan, outcome: Outcome, record: Record) -> None:
         self.results.append(StageResult.of(plan, outcome, record, self.configs[plan.stage]))
-        self.metrics |= record.info.metrics
+        self.metrics |= self.results[-1].metrics
         self.folder.place(self.store, record)
 
     @contextlib.contextmanager
@@ -257,22 +260,6 @@ class ClipRun:
             "outputs": self.folder.outputs(ports),
             "metrics": self.metrics,
         }
-
-    def _unchanged(self, clip: Path, digest: str) -> None:
-        if clip_digest(clip, self.store) != digest:
-            raise BadInput(f"{clip} changed while it was being read; run again when it is complete")
-
-
-def clip_digest(clip: Path, store: Store) -> str:
-    """Tree digest of a file or folder. BadInput where it does not exist or cannot be read."""
-    if not clip.exists():
-        raise BadInput(f"{clip}: no such file or folder; give a video or a folder of photos")
-    try:
-        return tree_digest(clip, store.memo)[0]
-    except OSError as e:
-        raise BadInput(f"{clip}: cannot be read ({e.strerror})") from e
-    except CacheError as e:
-        raise BadInput(f"the clip cannot be read: {e}; take it out of the folder") from e
 
 
 def first_sentence(message: str) -> str:

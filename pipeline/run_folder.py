@@ -88,15 +88,15 @@ class RunFolder:
             raise BadInput(f"{self.clip}: no clip here{dead}; `gsac run CLIP --out {self.root}` puts it there")
         return self.clip.resolve()
 
-    def digest(self, port: str, store: Store) -> str:
-        """Tree digest of the file or folder at a port. BadInput where there is none."""
+    def require(self, port: str) -> Path:
+        """The file or folder at a port, links followed. BadInput where there is none."""
         if port == CLIP:
-            self.require_clip()
+            return self.require_clip()
         path = self.path(port)
         if not path.exists():
             maker = port.partition("/")[0]
             raise BadInput(f"{path} is missing; run `gsac stage {maker}` or `gsac run` first")
-        return tree_digest(path.resolve(), store.memo)[0]
+        return path.resolve()
 
     def prepare(self, clip: Path, project: Project, configs: dict[str, Any]) -> None:
         """Makes it the folder of this clip and these parameters."""

@@ -4,30 +4,34 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import errno
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gsac.cache import objects
-from gsac.cache.errors import FULL, CacheError, CacheFullError
+from gsac.cache.errors import CacheError, no_room
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
 from gsac.cache.publish import publish
 from gsac.cache.record import Record, RunInfo
 from gsac.cache.store import Store
-from gsac.pipeline.child import Child, LogReader, StageBugError, tail
+from gsac.pipeline.child import Child, LogReader, NoRoomError, StageBugError, tail
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.sources import Source
 from gsac.stages.contract import BadInput, StageError
 
 METRICS_OUTPUT = "metrics.json"
 """An output of this name is also kept in the action record."""
+READINGS = 3
+"""How often a stage reads a file that is written or replaced meanwhile, before its run gives up."""
 LITTLE_ROOM = 16 << 20
 """A stage that fails with fewer bytes than this free ran out of disk: many libraries do not say so themselves."""
 
@@ -99,10 +103,10 @@ class StageRunner:
         return self._child(name, log)
 
     def run(self, parts: KeyParts, reason: Reason, inputs: dict[str, Path], forced: bool = False,
-            still_valid: Callable[[], None] = lambda: None) -> tuple[Outcome, Record]:
+            sources: Iterable[Source] = ()) -> tuple[Outcome, Record]:
         """The stage's result: from the cache if it is there by now, else computed.
 
-        inputs: port -> read-only path; still_valid: called before publishing, raises if inputs changed.
+        inputs: port -> read-only path; sources: those of them that are the user's, and may be written while they are read.
         Raises StageError or BadInput as the stage fails, CacheError as the store does; then nothing is published.
         """
         name = parts.stage
@@ -111,24 +115,53 @@ class StageRunner:
             if there is not None and not forced:
                 return Outcome.CACHED, there
             models = self.keys.models.need(parts.models, self.reporter.note)
+            watched = [*sources, *(Source(path, self.store) for path in models.values())]
             self.reporter.starts(name, reason.value)
             scratch = self.store.partial(parts.key)
             if forced:
                 objects.remove(scratch)
-            with self.store.private(name) as folder:
-                try:
-                    info = self._compute(parts, inputs, models, folder, scratch)
-                except StageError as error:
-                    self._check_code(parts, error)
-                    raise
-                self._check_code(parts)
-                still_valid()
-                if METRICS_OUTPUT in outputs:
-                    info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
-                record = publish(self.store, parts, folder, outputs, info, replace=forced)
+            for _ in range(READINGS):
+                record = self._attempt(parts, inputs, models, watched, scratch, forced)
+                if record is not None:
+                    break
+            else:
+                raise BadInput(f"what stage {name} reads was written or replaced each of {READINGS} times that it was read "
+                               f"({', '.join(str(source.path) for source in watched)}); run again when it is left alone")
             objects.remove(scratch)
-        self.reporter.ends(name, Outcome.RAN, info.seconds)
+        self.reporter.ends(name, Outcome.RAN, record.info.seconds)
         return Outcome.RAN, record
+
+    def _attempt(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], watched: list[Source], scratch: Path,
+                 forced: bool) -> Record | None:
+        """Computes and publishes; None where a file was written or replaced meanwhile and holds again what the key says."""
+        with self.store.private(parts.stage) as folder:
+            try:
+                info = self._compute(parts, inputs, models, folder, scratch)
+            except StageError as error:
+                self._check_code(parts, error)
+                if self._all_untouched(parts.stage, watched, scratch):
+                    raise
+                return None
+            self._check_code(parts)
+            if not self._all_untouched(parts.stage, watched, scratch):
+                return None
+            outputs = self.keys.project.outputs(parts.stage)
+            if METRICS_OUTPUT in outputs:
+                info.metrics = json.loads((folder / METRICS_OUTPUT).read_text())
+            return publish(self.store, parts, folder, outputs, info, replace=forced)
+
+    def _all_untouched(self, name: str, watched: list[Source], scratch: Path) -> bool:
+        """Whether all that the stage read stayed as it was; else tells what did not, and drops the work on it in `scratch`.
+
+        BadInput where it is another by now.
+        """
+        touched = [source for source in watched if not source.is_untouched()]
+        if touched:
+            objects.remove(scratch)
+        for source in touched:
+            source.look_again()
+            self.reporter.note(f"{name}: {source.path} was written or replaced while it was read; it is read again")
+        return not touched
 
     def _check_code(self, parts: KeyParts, because: StageError | None = None) -> None:
         """StageError where the stage's code was edited since its key was made: what ran may be neither the old nor the new."""
@@ -152,6 +185,8 @@ class StageRunner:
                 self.reporter.progress(name, event["done"], event["total"], event["unit"])
             elif event["event"] == "resumed":
                 self.reporter.note(f"{name}: goes on from {event['unit'].removesuffix('s')} {event['done']} of {event['total']}")
+            elif event["event"] == "timing":
+                info.timings[event["name"]] = event["value"]
             else:
                 message = event["message"].removeprefix(f"{name}: ")  # the reporter names the stage
                 kept, tell = {"warning": (info.warnings, self.reporter.warning), "note": (info.notes, self.reporter.remark)}[
@@ -177,9 +212,11 @@ class StageRunner:
                 raise
             finally:
                 self._show_log(name, log, ended=True)
+        except NoRoomError as error:
+            raise no_room(error.errno, self.store.root, f" ({error})") from error
         except StageError as error:
             if not isinstance(error, BadInput) and shutil.disk_usage(folder).free < LITTLE_ROOM:
-                raise CacheFullError(f"no room left in the cache folder {self.store.root} ({error})", FULL) from error
+                raise no_room(errno.ENOSPC, self.store.root, f" ({error})") from error
             if not isinstance(error, StageBugError):  # another run would only fail in the same way
                 objects.remove(scratch)
             raise

@@ -1,4 +1,4 @@
-"""Installed versions of distributions, from the names of their `.dist-info` folders.
+"""Versions of the interpreter and of installed distributions, from the names of their `.dist-info` folders.
 
 `importlib.metadata` would read and parse each METADATA file: a third of what a run with nothing to do may cost.
 """
@@ -12,6 +12,14 @@ from functools import cache
 
 ABSENT = "absent"
 """The version of a package that is not installed: some are optional."""
+PYTHON = "python"
+"""The interpreter's name among packages."""
+
+
+def python_version() -> str:
+    """Of the interpreter that runs: `3.13.5`; another implementation than CPython is named."""
+    number = ".".join(map(str, sys.version_info[:3]))
+    return number if sys.implementation.name == "cpython" else f"{sys.implementation.name} {number}"
 
 
 def package_version(package: str) -> str:

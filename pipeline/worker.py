@@ -20,6 +20,7 @@ import traceback
 from pathlib import Path
 from typing import Any, TextIO
 
+from gsac.pipeline.errors import NO_ROOM, sentence
 from gsac.stages.contract import BadInput, Job, Stage, StageError, make_config
 
 LEAST_GAP_S = 0.1
@@ -60,6 +61,10 @@ class EventStream:
         """Sends a note for the user."""
         self.send("note", message=str(message))
 
+    def timing(self, name: str, value: Any) -> None:
+        """Sends a figure of this run for the cache record. value: as JSON holds it."""
+        self.send("timing", name=str(name), value=value)
+
 
 def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
@@ -80,7 +85,7 @@ def main() -> None:
         _work(order, events)
     except Exception as error:  # the parent must hear of any failure
         traceback.print_exc()
-        events.send("failed", kind=_kind(error), message=_message(error))
+        events.send("failed", kind=_kind(error), message=_message(error), errno=getattr(error, "errno", None))
     else:
         events.send("done", seconds=time.time() - order["started"], **cost())
     sys.stdout.flush()
@@ -102,6 +107,7 @@ def _work(order: dict[str, Any], events: EventStream) -> None:
         progress=events.progress,
         warn=events.warn,
         note=events.note,
+        timing=events.timing,
     ))
     check_outputs(stage, out)
 
@@ -145,6 +151,8 @@ def _peak_kb(fallback: int) -> int:
 def _kind(error: Exception) -> str:
     if isinstance(error, BadInput):
         return "bad input"
+    if isinstance(error, OSError) and error.errno in NO_ROOM:
+        return "no room"
     # An ArtifactError is known by name: toy stages in tests and a user's own need not import gsac.avatar.
     return "stage" if isinstance(error, StageError) or type(error).__name__ == "ArtifactError" else "bug"
 
@@ -152,6 +160,8 @@ def _kind(error: Exception) -> str:
 def _message(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "out of memory"
+    if _kind(error) == "no room":
+        return sentence(error)
     return str(error) if _kind(error) != "bug" else f"{type(error).__name__}: {error}"
 
 
@@ -159,7 +169,3 @@ def _leave_with_parent() -> None:
     while os.read(sys.stdin.fileno(), 1):
         pass
     os.killpg(os.getpgid(0), signal.SIGKILL)
-
-
-if __name__ == "__main__":
-    main()

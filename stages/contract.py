@@ -38,7 +38,12 @@ class Stage:
     config: type
     """Dataclass; its fields are the parameters `<stage>.<field>`, its defaults are params.yaml's."""
     packages: tuple[str, ...] = ()
-    """Distributions whose version is part of the key."""
+    """Distributions whose version is part of the key, Python's own beside them: all that its process loads and that may decide a
+    number."""
+    packages_on: Callable[[str], tuple[str, ...]] = lambda device: ()
+    """Those that it loads besides on a device class (cpu, cuda)."""
+    programs: Callable[[], dict[str, str]] = dict
+    """Programs that it runs, name -> path; their digests are part of the key."""
     models: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
     wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()
@@ -77,6 +82,9 @@ class Job:
     """Warns the user: a sentence that names the frame, file or parameter; kept in the cache record and the report."""
     note: Callable[[str], None] = lambda message: None
     """Tells the user what holds for nearly every clip and is no fault of this one; kept as warnings are."""
+    timing: Callable[[str, Any], None] = lambda name, value: None
+    """Tells a figure that another run of equal inputs would not repeat: name, and seconds, or a list of rows with seconds; kept in
+    the cache record, in no output."""
 
 
 class StageError(Exception):

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("cache", "avatar", "unity", "viewer", "turntable", "stages", "pipeline", "benchmarks")
-COMPILED = ("kernel", "njit", "intrinsic", "vectorize")
+COMPILED = ("kernel", "own_kernel", "njit", "intrinsic", "vectorize")
 """Decorators of numba, whose functions are typed by their calls; they say in their docstring what they work on."""
 ARRAY = re.compile(r"\b(np\.)?ndarray\b|\bTensor\b|\bspmatrix\b")
 SHAPE = re.compile(r"\((?=[^()]*(,|\.\.\.))[^()]*\)|\bscalar\b")

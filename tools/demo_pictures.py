@@ -138,9 +138,10 @@ def save(path: Path, image: np.ndarray) -> None:
     """image: (H, W, 3) uint8 BGR."""
     import cv2
 
+    from gsac.avatar.artifacts import write_image
+
     path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY]):
-        sys.exit(f"demo_pictures: cannot write {path}")
+    write_image(path, image, cv2.IMWRITE_JPEG_QUALITY, QUALITY)
     print(path)
 
 

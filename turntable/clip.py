@@ -8,12 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import wholebody
-from gsac.avatar.artifacts import write_arrays, write_frame
+from gsac.avatar.artifacts import write_arrays, write_frame, write_image
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.ffmpeg import ffmpeg_program
@@ -70,7 +69,7 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
             bare, drawn, joints = pose_person(person, params, t)
             picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
             frame = develop(picture, options, t, noise=turn)
-            cv2.imwrite(str(out / "mask" / f"{t:06d}.png"), picture.mask)
+            write_image(out / "mask" / f"{t:06d}.png", picture.mask)
             if video:
                 video.add(frame)
             if not turn or options.lossless:

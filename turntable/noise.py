@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from gsac.avatar.numba_kernel import own_kernel
 
 SIZE = 32
 
@@ -18,7 +19,7 @@ def sample_noise(noise: np.ndarray, points: np.ndarray, frequency: float | tuple
     return _sample_noise(noise, (points * np.asarray(frequency, np.float32)).astype(np.float32))
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def _sample_noise(noise, points):
     out = np.zeros((len(points), 3), np.float32)
     m = SIZE - 1

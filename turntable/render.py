@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
 
+from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.turntable.appearance import Appearance
 from gsac.turntable.person import MATERIALS
@@ -120,7 +120,7 @@ CORNERS_FIRST = np.array(sorted(((1.3 * x, 1.3 * y, 0) for x in range(-2, 3) for
 CORNERS_FIRST[4, 2] = 1
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@own_kernel(error_model="numpy", fastmath=True)
 def _light_points(material, normals, places, albedo, gloss, bump, openness, lamp_depth, turn, lamp, eye, key, sky, ground,
                   focal):
     """(n, 3) linear RGB that each point sends to the eye."""
@@ -158,7 +158,7 @@ def _light_points(material, normals, places, albedo, gloss, bump, openness, lamp
     return out
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@own_kernel(error_model="numpy", fastmath=True)
 def _unit(v):
     length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     if length > 0:
@@ -166,7 +166,7 @@ def _unit(v):
     return length
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@own_kernel(error_model="numpy", fastmath=True)
 def _unblocked(place, normal, lamp, turn, lamp_depth, focal):
     """Share of the shadow-map taps about a point, lifted 1 cm off its surface, that the lamp reaches."""
     size = lamp_depth.shape[0]
@@ -186,7 +186,7 @@ def _unblocked(place, normal, lamp, turn, lamp_depth, focal):
     return free / 25
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def _normals(vertices, faces):
     """(N, 3) float32 unit vertex normals, weighted by area."""
     out = np.zeros(vertices.shape, np.float32)

@@ -14,9 +14,11 @@ import multiprocessing
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gsac.avatar.cuda import why_not
 from gsac.benchmarks import training
+from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.train import STAGE
 
@@ -145,17 +147,19 @@ def _train_in_torch(case: training.Case, folder: Path, steps: int) -> dict:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        pool.apply(_in_torch, (case.inputs, folder, steps))
-    return json.loads((folder / "metrics.json").read_text())
+        timings = pool.apply(_in_torch, (case.inputs, folder, steps))
+    return add_timings(json.loads((folder / "metrics.json").read_text()), timings)
 
 
-def _in_torch(inputs: dict[str, Path], folder: Path, steps: int) -> None:
+def _in_torch(inputs: dict[str, Path], folder: Path, steps: int) -> dict[str, Any]:
     from gsac.benchmarks.gpu import baseline
     from gsac.stages.train import recipes, stage
 
     recipes.RECIPES["fast", "cuda"] = baseline.fit
     config = make_config(STAGE, {"device": "cuda", "gaussians": 12000, "steps": steps, "curve": CHECKPOINTS})
-    stage.run(Job(inputs, folder, config, device="cuda"))
+    timings: dict[str, Any] = {}
+    stage.run(Job(inputs, folder, config, device="cuda", timing=timings.__setitem__))
+    return timings
 
 
 if __name__ == "__main__":

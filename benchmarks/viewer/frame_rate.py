@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from gsac.avatar.artifacts import write_image
 from gsac.benchmarks.viewer.browser import WEBGPU, Browser
 from gsac.stages.contract import StageError
 
@@ -93,9 +94,7 @@ def measure(address: str, size: int, seconds: float, picture: Path | None) -> Fr
         time.sleep(seconds)
         frames, ended, done = page.run("window.drawn") - first, time.monotonic(), cpu_seconds(page.process.pid)
         if picture is not None:
-            import cv2
-
-            cv2.imwrite(str(picture), page.picture()[:, :, ::-1])
+            write_image(picture, page.picture()[:, :, ::-1])
         if page.errors:
             raise StageError(f"{address}: the page failed: {page.errors[0]}")
         return FrameRate(frames / (ended - began), (done - worked) / max(frames, 1))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.digest import tree_digest
 from gsac.cache.errors import IntegrityError
 from gsac.cache.lease import in_use
 from gsac.cache.roots import is_object
@@ -34,6 +33,7 @@ from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import clip_entries, read_rows, result_row, write_rows
 from gsac.pipeline.run import StageResult
 from gsac.pipeline.run_folder import LOGS, OWN_STORE, REPORT, RunFolder
+from gsac.pipeline.sources import Source
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.stages.contract import BadInput, StageError
 
@@ -57,10 +57,8 @@ class Task:
     name: str
     keys: Keys
     store: Store
-    digests: dict[str, str]
-    """Port -> tree digest of an input."""
-    paths: dict[str, Path]
-    """Port -> path of an input."""
+    sources: dict[str, Source]
+    """Port -> input, where it lies."""
     folder: RunFolder
     """Knows what was placed in it."""
     out: Path
@@ -96,10 +94,9 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -
     """On the inputs that lie in the folder of a run, the one here as DVC calls it."""
     run_folder, project, configs = open_run_folder(arguments, arguments.folder, only=arguments.name)
     store = checked_store(project, configs, arguments.name, run_folder.root, reporter)
-    ports = project.graph.step(arguments.name).deps
-    return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
-                {port: run_folder.path(port).resolve() for port in ports},
-                run_folder, run_folder.root / arguments.name, run_folder.root / LOGS, in_run=True)
+    sources = {port: Source(run_folder.require(port), store) for port in project.graph.step(arguments.name).deps}
+    return Task(arguments.name, Keys(project, configs, store), store, sources, run_folder, run_folder.root / arguments.name,
+                run_folder.root / LOGS, in_run=True)
 
 
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
@@ -108,9 +105,9 @@ def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) ->
     configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
     paths = fixture_paths(project, arguments.name, arguments.inputs)
     store = checked_store(project, configs, arguments.name, arguments.out, reporter)
-    digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
+    sources = {port: Source(path, store) for port, path in paths.items()}
     out = arguments.out.absolute()
-    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, RunFolder(out), out, out / LOGS)
+    return Task(arguments.name, Keys(project, configs, store), store, sources, RunFolder(out), out, out / LOGS)
 
 
 def checked_store(project: Project, configs: dict[str, Any], name: str, out: Path, reporter: PlainReporter) -> Store:
@@ -123,7 +120,7 @@ def checked_store(project: Project, configs: dict[str, Any], name: str, out: Pat
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
     """Runs the stage through the store; shows its outputs as `out/<output>`."""
     store, name = task.store, task.name
-    parts = task.keys.parts(name, task.digests)
+    parts = task.keys.parts(name, {port: source.digest for port, source in task.sources.items()})
     with in_use(store, [parts.key]):
         plan = plan_stage(store, parts, task.keys.project.outputs(name), force, shown_key(task))
         outcome, record = Outcome.CACHED, plan.cached
@@ -131,7 +128,8 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
             require_whole(task)
             try:
                 with StageRunner(task.keys, store, reporter, task.logs) as runner:
-                    outcome, record = runner.run(parts, plan.reason, task.paths, forced=force)
+                    outcome, record = runner.run(parts, plan.reason, {port: source.path for port, source in task.sources.items()},
+                                                 forced=force, sources=task.sources.values())
             except StageError as error:
                 raise StageFailedError(name, error, task.logs / f"{name}.log") from error
         if outcome is Outcome.CACHED:
@@ -142,7 +140,8 @@ def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
 
 def require_whole(task: Task) -> None:
     """IntegrityError where an input that lies in the cache is damaged."""
-    for port, path in task.paths.items():
+    for port, source in task.sources.items():
+        path = source.path.resolve()
         if is_object(path) and not task.store.is_whole(path):
             raise IntegrityError(f"{port} was damaged in the cache; `gsac stage {port.partition('/')[0]}` makes it again")
 

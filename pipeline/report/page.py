@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 TEMPLATE = "report.html.jinja"
 AVATAR = "avatar"
 """The section that stands at the top of the page, without a heading."""
+TRAINING = "training"
+"""The section of the curves over seconds."""
 
 
 @dataclass
@@ -45,10 +47,13 @@ class Section:
 
 
 def draw_sections(out_dir: Path, running: str) -> dict[str, Section]:
-    """By name, the sections that can be drawn while a stage runs: those of the stages before it. Reads the template as well."""
+    """By name, the sections that can be drawn while a stage runs: those of the stages before it. Reads the template as well.
+
+    Not the curves over seconds: those are in run.json, which is written at the run's end.
+    """
     read_template()
     drawn = make_sections(Results(out_dir), without=running)
-    return {section.ident: section for section in drawn if not section.absent}
+    return {section.ident: section for section in drawn if not section.absent and section.ident != TRAINING}
 
 
 def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path:
@@ -314,7 +319,7 @@ SECTIONS = (
      "frames that training never saw.", "train/heldout", lambda paint: paint.sheets.heldout_sheet(paint.results)),
     ("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
      "had.", "train/heldout/views.png", lambda paint: paint.sheets.views_sheet(paint.results)),
-    ("training", "Training", "How training went, over its seconds, without the time for judging.", "train/metrics.json", None,
+    (TRAINING, "Training", "How training went, over its seconds, without the time for judging.", "train/metrics.json", None,
      lambda paint: training_charts(paint.results, paint.charts)),
 )
 """Name, title, lead, port, function that draws the pictures, and function that draws the charts."""

@@ -10,8 +10,9 @@ from typing import Any
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.project import Project
-from gsac.pipeline.rows import Row, read_json, result_row, rows_of
+from gsac.pipeline.rows import Row, read_json, result_row, rows_of, timings_of
 from gsac.pipeline.run_folder import DAG, RUN
+from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import StageError
 
 
@@ -72,12 +73,12 @@ class Results:
 
     @cached_property
     def metrics(self) -> dict[str, Any]:
-        """metrics.json of train. AbsentError where there is none."""
+        """metrics.json of train, with the timings of its run. AbsentError where there is none."""
         path = self.path("train/metrics.json")
         content = read_json(path)
         if not isinstance(content, dict):
             raise AbsentError(f"{path.name} of train cannot be read.")
-        return content
+        return add_timings(content, timings_of(self.rows.get("train")))
 
     def done(self, stage: str) -> bool:
         """Whether there is a result of the stage, of the last run or an earlier one; without run.json it counts as done."""

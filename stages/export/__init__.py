@@ -27,6 +27,6 @@ STAGE = Stage(
         Output("unity", check_folder),
     ),
     config=ExportConfig,
-    packages=("numpy", "scipy"),
+    packages=("gsac", "numpy", "scipy", "numba", "llvmlite"),
     models=lambda config: config.models(),
 )

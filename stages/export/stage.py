@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from gsac.avatar.artifacts import Clip
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.files import write_file
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.gsac_file.write import avatar_bytes
@@ -62,7 +63,7 @@ def run(job: Job) -> None:
     }
 
     def write(name: str) -> None:
-        (job.out / name).write_bytes(files[name]())
+        write_file(job.out / name, files[name]())
 
     def write_package() -> None:
         (job.out / "unity").mkdir()

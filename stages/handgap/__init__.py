@@ -13,5 +13,5 @@ STAGE = Stage(
     inputs=("keypoints/keypoints.npz", "split/clip.json"),
     outputs=(Output("keypoints.npz", check_filled_keypoints),),
     config=HandgapConfig,
-    packages=("numpy", "scipy"),
+    packages=("numpy", "scipy", "threadpoolctl"),
 )

@@ -16,6 +16,6 @@ STAGE = Stage(
     inputs=("split/clip.json", "handgap/keypoints.npz", "face/face.npz", "segment/alpha"),
     outputs=(Output("body.npz", check_body),),
     config=SmplxConfig,
-    packages=("numpy", "scipy", "numba", "torch"),
+    packages=("numpy", "scipy", "numba", "llvmlite", "threadpoolctl", "opencv-contrib-python-headless", "OpenEXR", "torch"),
     models=lambda config: config.models(),
 )

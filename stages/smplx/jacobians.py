@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy import sparse
 
 from gsac.avatar.body import Body
+from gsac.avatar.numba_kernel import own_kernel
 
 
 @dataclass
@@ -139,7 +139,7 @@ def pull_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray,
     return rows
 
 
-@njit(cache=True, nogil=True)
+@own_kernel(nogil=True)
 def _place_points(start, joint, mass, moment, world, shift):
     x = np.zeros((len(world), len(start) - 1, 3))
     for t in range(len(world)):
@@ -152,7 +152,7 @@ def _place_points(start, joint, mass, moment, world, shift):
     return x
 
 
-@njit(cache=True, nogil=True)
+@own_kernel(nogil=True)
 def _pull_back(start, joint, mass, moment, moment_dirs, world, place, shift, shift_dirs, active, carries, covectors, rows):
     points, joints, size = len(start) - 1, len(active), rows.shape[2] - 3 * len(active) - 3
     own, shaped = moment_dirs.shape[2], shift_dirs.shape[2]

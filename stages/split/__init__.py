@@ -8,6 +8,7 @@ the aspect is kept. The same input gives the same bytes.
 """
 
 from gsac.avatar.artifacts import check_image_folder
+from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.stages.contract import Output, Stage
 from gsac.stages.split.check import check_clip
 from gsac.stages.split.config import SplitConfig
@@ -18,4 +19,5 @@ STAGE = Stage(
     outputs=(Output("frames", check_image_folder), Output("clip.json", check_clip)),
     config=SplitConfig,
     packages=("av", "imageio-ffmpeg", "numpy", "opencv-contrib-python-headless", "pillow", "pillow-heif"),
+    programs=lambda: {"ffmpeg": ffmpeg_program()},
 )

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.ffmpeg import ffmpeg_program
+from gsac.avatar.files import told_no_room
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
@@ -131,6 +132,8 @@ def _run(path: Path, video: Video, output: list[str], folder: Path | None,
         except BaseException:
             process.kill()
             raise
+    if folder is not None and (full := told_no_room(" ".join(errors), folder)):
+        raise full
     why = errors[-1] if errors else f"exit code {process.returncode}"
     if process.returncode != 0 and not ticks:
         raise BadInput(f"{path.name}: ffmpeg cannot decode it ({why}).")

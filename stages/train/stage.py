@@ -16,6 +16,7 @@ from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
+from gsac.avatar.files import write_file
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import LEAST_SIDE, Lpips
 from gsac.avatar.metrics import figures, summary
@@ -41,6 +42,8 @@ from gsac.stages.train.warmup import warm_up
 
 LOSS_ROWS = 20
 """Rows of the curve that have the loss."""
+TIMES = ("seconds", "cpu_seconds", "gpu_seconds")
+"""What a row of the curve holds that another run would not repeat: it goes to the engine, not into metrics.json."""
 LEAST_TURN = 270
 """Degrees of the person's turn below which the user is warned."""
 LEAST_SEEN = 0.8
@@ -224,7 +227,16 @@ class Run:
         gaussians.write(job.out / "avatar.npz", self.result.coarser)
         poses.to_params().write(job.out / "body.npz")
         write_frame(folder / "views.png", draw_all_round(gaussians, poses))
-        (job.out / "metrics.json").write_text(json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n")
+        figures = json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n"
+        write_file(job.out / "metrics.json", figures.encode())
+        self.tell_timings()
+
+    def tell_timings(self) -> None:
+        """Tells the engine how long training took, and where it went on from, which a run of equal inputs would not repeat."""
+        for name, value in (("seconds", round(float(self.seconds), 3)), ("cpu_seconds", round(float(self.cpu_seconds), 3)),
+                            ("gpu_seconds", self.curve[-1].get("gpu_seconds")), ("resumed_at_step", self.resumed_at),
+                            ("curve", [{key: row[key] for key in TIMES if key in row} for row in self.curve])):
+            self.job.timing(name, value)
 
     def metrics(self, gaussians: Gaussians, poses: Poses, folder: Path) -> dict:
         """The content of metrics.json. folder: where the images of the held-out frames go."""
@@ -257,18 +269,17 @@ class Run:
             },
             "light": None if gaussians.light is None else gaussians.light.tolist(),
             "n_gaussians": len(gaussians), "steps": self.curve[-1]["step"], "recipe": config.recipe,
-            "device": self.job.device, "gpu_seconds": self.curve[-1].get("gpu_seconds"), "seed": config.seed,
+            "device": self.job.device, "seed": config.seed,
             "image_size": [self.views[0].camera.width, self.views[0].camera.height],
-            "seconds": round(float(self.seconds), 3), "cpu_seconds": round(float(self.cpu_seconds), 3),
             "trained_frames": len(self.trained), "heldout_frames": [int(t) for t in held],
             "heldout": [{"frame": t, **figures(row), **{f"{name}_ttpo": value for name, value in figures(other).items()}}
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
-            "resumed_at_step": self.resumed_at, "lpips_in_loss": self.in_loss is not None,
+            "lpips_in_loss": self.in_loss is not None,
             "levels": judge_levels(gaussians, self.result.coarser, poses, held, self.views),
             "likeness": judge_likeness(gaussians, aligned, held, self.views),
             "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
-            "curve": self.curve,
+            "curve": [{key: value for key, value in row.items() if key not in TIMES} for row in self.curve],
         } | self.result.figures

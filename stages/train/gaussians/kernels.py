@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from gsac.avatar.numba_kernel import own_kernel
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@own_kernel(error_model="numpy", fastmath=True)
 def on_background(rgb, alpha, pixels, background, gain, image, target):
     """Composes render and frame over one colour: image = gain * rgb + (1 - alpha) bg, target likewise from the cut-out frame.
 
@@ -25,7 +26,7 @@ def on_background(rgb, alpha, pixels, background, gain, image, target):
                 target[y, x, c] = pixels[y, x, c] * byte + clear_target * background[c]
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@own_kernel(error_model="numpy", fastmath=True)
 def through_background(grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, grad_gain):
     """Backward pass of `on_background` plus mask_weight * mean((alpha - mask)^2), whose value it returns.
 
@@ -48,7 +49,7 @@ def through_background(grad_image, rgb, alpha, pixels, background, gain, mask_we
     return loss
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def adam_rows(value, grad, first, second, count, rate):
     """One Adam step (0.9, 0.99) of the rows of value (N, C) whose gradient is not zero; count: (N,) steps of each row.
 
@@ -70,7 +71,7 @@ def adam_rows(value, grad, first, second, count, rate):
             value[i, c] -= scale * first[i, c] / (math.sqrt(second[i, c] * unbias) + 1e-15)
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def adam(value, grad, first, second, count, rate):
     """One Adam step (0.9, 0.999) of all of value (N, C); count: steps so far, this one included."""
     scale = rate / (1 - 0.9**count)
@@ -83,7 +84,7 @@ def adam(value, grad, first, second, count, rate):
             value[i, c] -= scale * first[i, c] / (math.sqrt(second[i, c] * unbias) + 1e-15)
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def count_rows(grad, count):
     """Adds one to count (N,) where the row of grad (N, C) is not zero."""
     for i in range(grad.shape[0]):
@@ -93,7 +94,7 @@ def count_rows(grad, count):
                 break
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, largest, reach, pull):
     """Limits gaussians after a step, in place.
 

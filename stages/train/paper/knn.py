@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
+
+from gsac.avatar.numba_kernel import own_kernel
 
 K = 3
 """Gaussians of a neighbourhood, the gaussian itself included."""
@@ -36,7 +37,7 @@ class Neighbours:
         return gradient
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def _distances(places, index, factor, gradient):
     for i in range(index.shape[0]):
         for j in index[i]:
@@ -46,7 +47,7 @@ def _distances(places, index, factor, gradient):
                 gradient[j, c] -= pull
 
 
-@njit(cache=True, error_model="numpy")
+@own_kernel(error_model="numpy")
 def _spread(values, index, factor, gradient):
     k = index.shape[1]
     for i in range(index.shape[0]):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from gsac.avatar.lpips import Lpips
+from gsac.avatar.numba_kernel import own_kernel
 
 WINDOW = 256
 """px, side of the window that LPIPS sees."""
@@ -63,7 +63,7 @@ def perceptual(network: Lpips, image: np.ndarray, target: np.ndarray, background
     return weight * value
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@own_kernel(error_model="numpy", fastmath=True)
 def _magnitude(image, target, weight, gradient):
     tiny, loss = image.dtype.type(1e-6), 0.0
     for y in range(1, image.shape[0] - 1):

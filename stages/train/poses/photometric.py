@@ -11,12 +11,12 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
+from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.finite import require_finite
@@ -131,7 +131,7 @@ def _axes(poses: Poses, t: int) -> tuple[np.ndarray, np.ndarray]:
     return transforms[:, :, :3].astype(np.float32), places.astype(np.float32)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def compare(rgb, alpha, pixels, weight, colour, mask, slope, squares):
     """Residuals of a render, rgb (h, w, 3) and alpha (h, w), against its frame, pixels (h, w, 4); weight: of the mask's.
 
@@ -170,7 +170,7 @@ def compare(rgb, alpha, pixels, weight, colour, mask, slope, squares):
     return number
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def _rows(used, means, tensors, share, axes, places, focal, rows):
     """Two rows a gaussian of those used: its motion in the image by each unknown, times the root of its slope tensor [a b; b c]."""
     last = 3 * axes.shape[0]

@@ -60,18 +60,16 @@ def test_a_training_that_was_killed_and_goes_on_gives_the_bytes_of_an_unbroken_o
     assert done.returncode == -signal.SIGKILL, done.stderr
     steps, told = [], []
     broken.resumed = lambda *words: told.append(words)
+    timings = {}
+    broken.timing = timings.__setitem__
     broken.progress = lambda step, total, unit: unit == "steps" and steps.append(step)
     spent = Checkpoints(broken.scratch, broken.warn).read()["spent"][0]
     run(broken)
     assert steps[0] == stop + 1 if stop < values["steps"] else not steps
     assert told == [(stop, values["steps"], "steps")]
-    for name in ("avatar.npz", "body.npz"):
+    for name in ("avatar.npz", "body.npz", "metrics.json"):
         assert (whole.out / name).read_bytes() == (broken.out / name).read_bytes()
-    one, two = (json.loads((made.out / "metrics.json").read_text()) for made in (whole, broken))
-    assert one["resumed_at_step"] is None and two["resumed_at_step"] == stop
-    assert two["seconds"] > spent > 0.1
-    for row, other in zip(one["curve"], two["curve"], strict=True):
-        assert {**row, "seconds": 0, "cpu_seconds": 0} == {**other, "seconds": 0, "cpu_seconds": 0}
+    assert timings["resumed_at_step"] == stop and timings["seconds"] > spent > 0.1
 
 
 @pytest.mark.parametrize("spoil", [lambda b: b[:-100], lambda b: b[:1000] + bytes([b[1000] ^ 1]) + b[1001:], lambda b: b""],
