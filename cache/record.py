@@ -36,11 +36,11 @@ class RunInfo:
     peak_rss_mb: float = 0.0
     device: str = "cpu"
     metrics: dict[str, Any] = field(default_factory=dict)
-    timings: dict[str, Any] = field(default_factory=dict)
-    """Figures that another run of the key would not repeat, which for that reason are in no output."""
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     log_tail: str = ""
+    timings: dict[str, Any] = field(default_factory=dict)
+    """Figures that another run of the key would not repeat, which for that reason are in no output."""
 
 
 @dataclass(frozen=True)
