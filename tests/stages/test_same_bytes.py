@@ -8,9 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
+from gsac.avatar.binding import face_frames
+from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.network_files import ModelMissingError, model_path
+from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.cache.digest import tree_digest
 from gsac.pipeline.project import Project
 
@@ -23,38 +28,13 @@ import importlib, json, os, sys
 from pathlib import Path
 
 
-def draw_photos(folder):
-    import numpy as np
-    from PIL import Image
-    from gsac.avatar.binding import face_frames
-    from gsac.avatar.body import Body, BodyParams
-    from gsac.avatar.zbuffer import interpolate, rasterise
-
-    folder.mkdir()
-    body, frames, width, height = Body.load(), 6, 144, 256
-    pose = np.zeros((frames, 55, 3))
-    pose[:, 16, 2], pose[:, 17, 2] = -0.9, 0.9
-    for t, yaw in enumerate(np.linspace(-np.pi, np.pi, frames, endpoint=False) + 0.1):
-        pose[t, 0] = np.pi * np.array([np.cos(yaw / 2), 0, np.sin(yaw / 2)])
-    person = BodyParams.from_pose(pose, np.tile([0, 0, 3.3], (frames, 1)), np.zeros(body.num_betas), np.zeros((frames, 52)),
-                                  1.05 * height, (width / 2, height / 2), model=body.digest)
-    colours = 0.6 + 0.25 * np.sin(9 * body.v_template + [0.0, 1, 2])
-    wall = 0.3 + 0.1 * np.linspace(0, 1, height)[:, None, None]
-    for t in range(frames):
-        vertices = body.posed(person, [t])[0][0]
-        face, bary, _ = rasterise(vertices, body.faces, person.camera(width, height))
-        light = np.clip(face_frames(vertices, body.faces).R[..., 1] @ [0.3, -0.5, -0.8], 0, 1) * 0.5 + 0.5
-        shown = np.clip(interpolate(colours, body.faces, face, bary) * light[face][..., None], 0, 1)
-        Image.fromarray(np.uint8(np.where((face >= 0)[..., None], shown, wall) * 255)).save(folder / f"{t}.png")
-
-
 def run_stage(name, root, values, models):
     from gsac.stages.contract import Job, make_config
 
     stage = importlib.import_module(f"gsac.stages.{name}").STAGE
     out = root / name
     out.mkdir()
-    inputs = {port: root / port for port in stage.inputs}
+    inputs = {port: root.parent / port if port == "clip" else root / port for port in stage.inputs}
     config = make_config(stage, values)
     importlib.import_module(f"gsac.stages.{name}.stage").run(
         Job(inputs, out, config, {model: Path(models[model]) for model in stage.models(config)}))
@@ -76,12 +56,31 @@ def alone(work, *arguments):
 
 root, order = Path(sys.argv[1]), json.loads(sys.argv[2])
 root.mkdir()
-alone(draw_photos, root / "clip")
 for name, values in order["stages"].items():
     alone(run_stage, name, root, values, order["models"])
 """
 SMALL = {"smplx": {"rounds": 1, "iterations": 2},
-         "train": {"steps": 10, "gaussians": 300, "height": 128, "pose_test_steps": 2, "curve": 2}}
+         "train": {"steps": 4, "gaussians": 200, "height": 96, "holdout": 2, "pose_test_steps": 1, "curve": 2}}
+
+
+def draw_photos(folder: Path) -> None:
+    """A person of the open body who turns before a wall, small but such that the networks see a person."""
+    folder.mkdir()
+    body, frames, width, height = Body.load(), 4, 108, 192
+    pose = np.zeros((frames, 55, 3))
+    pose[:, 16, 2], pose[:, 17, 2] = -0.9, 0.9
+    for t, yaw in enumerate(np.linspace(-np.pi, np.pi, frames, endpoint=False) + 0.1):
+        pose[t, 0] = np.pi * np.array([np.cos(yaw / 2), 0, np.sin(yaw / 2)])
+    person = BodyParams.from_pose(pose, np.tile([0, 0, 3.3], (frames, 1)), np.zeros(body.num_betas), np.zeros((frames, 52)),
+                                  1.05 * height, (width / 2, height / 2), model=body.digest)
+    colours = 0.6 + 0.25 * np.sin(9 * body.v_template + [0.0, 1, 2])
+    wall = 0.3 + 0.1 * np.linspace(0, 1, height)[:, None, None]
+    for t in range(frames):
+        vertices = body.posed(person, [t])[0][0]
+        face, bary, _ = rasterise(vertices, body.faces, person.camera(width, height))
+        light = np.clip(face_frames(vertices, body.faces).R[..., 1] @ [0.3, -0.5, -0.8], 0, 1) * 0.5 + 0.5
+        shown = np.clip(interpolate(colours, body.faces, face, bary) * light[face][..., None], 0, 1)
+        Image.fromarray(np.uint8(np.where((face >= 0)[..., None], shown, wall) * 255)).save(folder / f"{t}.png")
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +93,9 @@ def two(tmp_path_factory) -> list[Path]:
     except ModelMissingError as missing:
         pytest.skip(str(missing))
     order = json.dumps({"stages": {name: SMALL.get(name, {}) for name in STAGES}, "models": models})
-    roots = [tmp_path_factory.mktemp("same") / name for name in ("one", "two")]
+    folder = tmp_path_factory.mktemp("same")
+    draw_photos(folder / "clip")
+    roots = [folder / "one", folder / "two"]
     cores = sorted(os.sched_getaffinity(0))
     running = [subprocess.Popen([sys.executable, "-P", "-c", CHAIN, str(root), order], stderr=subprocess.PIPE, text=True,
                                 env=os.environ | {"PYTHONHASHSEED": seed},
