@@ -39,6 +39,9 @@ CERTIFICATE_DAYS = 2
 class PageServer(http.server.ThreadingHTTPServer):
     """Serves the folder of one page under /TOKEN/NAME/, where TOKEN may be left out."""
 
+    request_queue_size = 128
+    """Connections that wait to be taken: with the 5 of Python's default a burst of them delays the next by seconds."""
+
     def __init__(self, page: Path, name: str, bound: tuple[str, int], host: str, token: str, certificate: Path | None) -> None:
         self.page, self.name, self.host, self.token = page, name, host, token
         self.scheme = "http" if certificate is None else "https"

@@ -19,6 +19,11 @@ from gsac.pipeline.commands.view import find_name, find_page
 from gsac.pipeline.page_server import make_certificate, serve
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
+from gsac.stages.export.fbx import avatar_fbx
+from gsac.stages.export.glb import glb_bytes
+from gsac.stages.export.ply import ply_bytes
+from gsac.stages.export.spz import spz_bytes
+from gsac.stages.export.stage import pose_gaussians
 from gsac.turntable import clip as turntable
 from gsac.viewer.page import page_bytes
 from support.figure import make_figure
@@ -116,6 +121,22 @@ def test_an_odd_request_is_answered_and_never_by_a_file(folder):
         for head in (b"X: y\r\n" * 200, b"X: " + b"y" * 70_000 + b"\r\n", b""):
             assert say(server, b"GET /me/viewer.html HTTP/1.1\r\n" + head + b"\r\n")[:10] == b"HTTP/1.0 4", head[:10]
         assert say(server, b"GET /me/viewer.html HTTP/1.1\r\n" + host + b"\r\n")[:12] == b"HTTP/1.0 200"
+
+
+def test_every_file_that_export_writes_is_served(folder):
+    figure, export = make_figure(), folder / "export"
+    gaussians = pose_gaussians(figure, figure.pose("T"))
+    splats = (*gaussians, figure.gaussians.rgb, figure.gaussians.opacity)
+    written = {"viewer.html": page_bytes(avatar_bytes(figure)), "avatar.gsac": avatar_bytes(figure),
+               "avatar.glb": glb_bytes(figure, *gaussians), "avatar.fbx": avatar_fbx(figure, gaussians[0]),
+               "avatar.ply": ply_bytes(*splats), "avatar.spz": spz_bytes(*splats)}
+    assert written.keys() == page_server.FILES.keys()
+    (export / "viewer.html").unlink()
+    for name, content in written.items():
+        (export / name).write_bytes(content)
+    with running(export / "viewer.html") as server:
+        for name, content in written.items():
+            assert ask(server, f"/me/{name}") == (200, content)
 
 
 def test_a_link_to_another_file_of_this_machine_is_not_served(folder):
