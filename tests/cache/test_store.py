@@ -39,7 +39,8 @@ def test_an_output_keeps_the_suffix_of_its_name(store, make, parts_of):
 
 
 def test_a_cached_stage_reports_the_time_and_memory_of_the_run_that_made_it(store, fill, parts_of):
-    info = RunInfo("2026-01-02T03:04:05Z", 61.5, 118.0, 940.0, "cpu", {"psnr_fg": 25.5}, ["hand 3 not seen"], [], "done\n")
+    info = RunInfo("2026-01-02T03:04:05Z", 61.5, 118.0, 940.0, "cpu", {"psnr_fg": 25.5}, timings={"seconds": 60.1},
+                   warnings=["hand 3 not seen"], log_tail="done\n")
     with store.private("train") as folder:
         publish(store, parts_of("train"), folder, fill(folder), info)
     assert Store(store.root).lookup(parts_of("train").key).info == info
