@@ -47,7 +47,7 @@ def read_body_file(path: Path) -> dict:
                             "SMPL-X is distributed as SMPLX_NEUTRAL.npz, SMPLX_MALE.npz and SMPLX_FEMALE.npz")
     a = _read_arrays(path)
     try:
-        with np.errstate(over="ignore"):  # a number beyond float32 becomes infinite, and is found
+        with np.errstate(over="ignore", invalid="ignore"):  # a number beyond float32 becomes infinite, and is found
             fields = _fields(path, a)
     except (ValueError, TypeError, IndexError, KeyError) as e:  # of an array that is of another kind or shape than it should be
         raise ArtifactError(f"{path}: it is not built as a body model ({e}); get the file again from where it came from") from e

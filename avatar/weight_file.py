@@ -51,7 +51,7 @@ def _safetensors(path: Path) -> dict[str, np.ndarray]:
         raise ValueError("the file ends within its header")
     if length > LARGEST_HEADER:
         raise ValueError(f"its header has {length} bytes; at most {LARGEST_HEADER} are read")
-    found, start, room = {}, 8 + length, len(data)
+    found, start, room = {}, 8 + length, len(data) - 8 - length
     for name, entry in json.loads(data[8:start]).items():
         if name == "__metadata__" or entry["dtype"] not in SAFETENSORS:
             continue

@@ -82,7 +82,8 @@ class _Document:
         self.left -= count * width
         if self.left < 0:
             raise ValueError(f"its accessors hold more than {MOST_NUMBERS} numbers in all; cut the motion")
-        rows = np.ndarray((count, width), kind.newbyteorder("<"), data, start, (stride, kind.itemsize)).astype(float)
+        with np.errstate(invalid="ignore"):  # what is not finite is found in the motion
+            rows = np.ndarray((count, width), kind.newbyteorder("<"), data, start, (stride, kind.itemsize)).astype(float)
         return rows / np.iinfo(kind).max if accessor.get("normalized") and kind.kind in "iu" else rows
 
 

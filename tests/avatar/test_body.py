@@ -151,3 +151,17 @@ def test_pickles_and_missing_files_are_refused_with_what_to_do(tmp_path):
     (tmp_path / "text.npz").write_text("hello")
     with pytest.raises(ArtifactError, match="not a readable"):
         Body.load(tmp_path / "text.npz")
+
+
+@pytest.mark.parametrize(("changes", "why"), [
+    ({"kintree_table": np.array([[0, *range(1, 55)], range(55)])}, "kintree_table names a parent that is no earlier joint"),
+    ({"shapedirs": np.zeros((400, 3, 501))}, "400 vertices and 501 shape directions; at most 50000 and 500 are read"),
+    ({"v_template": np.full((400, 3), 1e300)}, "v_template is not finite, or beyond float32"),
+    ({"v_template": np.full((400, 3), "x")}, "not built as a body model"),
+    ({"f": np.zeros((0, 3), int)}, "not built as a body model"),
+    ({"num_betas": np.zeros(3)}, "not built as a body model"),
+    ({"jaw_actions": np.zeros((2, 2))}, "not built as a body model"),
+    ({"keypoint_row": np.array([200]), "keypoint_vertex": np.array([0]), "keypoint_weight": np.array([1.0])}, "not built as a")])
+def test_an_array_of_another_kind_than_a_body_has_is_named(tmp_path, changes, why):
+    with pytest.raises(ArtifactError, match=rf"odd\.npz: .*{why}"):
+        Body.load(official_file(tmp_path / "odd.npz", **changes))

@@ -74,6 +74,14 @@ def test_pickled_objects_inside_are_refused(tmp_path, arrays):
         read_flame(written(tmp_path, arrays | {"v_template": np.array([{}], object)}))
 
 
+@pytest.mark.parametrize(("name", "array", "why"), [
+    ("v_template", np.full((5023, 3), "x"), "holds <U1, expected numbers"), ("f", np.zeros((9976, 3), bool), "holds bool"),
+    ("kintree_table", np.array([[0, 4, 3, 2, 1], range(5)]), "names a parent that is no earlier joint")])
+def test_arrays_of_another_kind_are_named(tmp_path, arrays, name, array, why):
+    with pytest.raises(ArtifactError, match=f"array {name} {why}"):
+        read_flame(written(tmp_path, arrays | {name: array}))
+
+
 def test_faces_and_weights_must_make_sense(tmp_path, arrays):
     with pytest.raises(ArtifactError, match="names vertex 5023"):
         read_flame(written(tmp_path, arrays | {"f": np.full((9976, 3), 5023)}))

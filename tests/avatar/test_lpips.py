@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from gsac.avatar import weight_file
 from gsac.avatar.lpips import NETS, SHIFT, Lpips, gather, shapes
 from gsac.avatar.weight_file import WeightsError, read_weights
 
@@ -176,6 +177,29 @@ def test_files_that_are_no_weights_are_refused_and_their_code_is_not_run(tmp_pat
         with pytest.raises(WeightsError, match=file):
             read_weights(tmp_path / file)
     assert "code of a file" not in capsys.readouterr().out
+
+
+def safetensors(head, data=bytes(64)):
+    text = json.dumps(head).encode()
+    return len(text).to_bytes(8, "little") + text + data
+
+
+def test_weights_that_say_more_than_their_file_holds_are_refused_with_the_bound(tmp_path, monkeypatch):
+    entry = {"dtype": "F32", "shape": [16], "data_offsets": [0, 64]}
+    (tmp_path / "twice.safetensors").write_bytes(safetensors({"a": entry, "b": entry}))
+    (tmp_path / "list.safetensors").write_bytes(safetensors([1]))
+    (tmp_path / "long.safetensors").write_bytes((17 << 20).to_bytes(8, "little") + bytes(17 << 20))
+    torch.save({"x": torch.zeros(1).expand(1 << 40)}, tmp_path / "wide.pth")
+    said = {"twice.safetensors": "b lies where another array lies", "list.safetensors": "cannot be read",
+            "long.safetensors": "its header has 17825792 bytes; at most 16777216",
+            "wide.pth": "1099511627776 numbers; at most 167772160"}
+    for file, words in said.items():
+        with pytest.raises(WeightsError, match=f"{file}.*{words}"):
+            read_weights(tmp_path / file)
+    monkeypatch.setattr(weight_file, "MOST_BYTES", 100)
+    torch.save({"x": torch.zeros(100)}, tmp_path / "large.pth")
+    with pytest.raises(WeightsError, match=r"large\.pth.* bytes when unpacked; at most 100 are read"):
+        read_weights(tmp_path / "large.pth")
 
 
 def test_a_network_in_another_precision_says_nearly_the_same_and_its_slope_points_the_same_way():
