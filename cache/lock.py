@@ -43,15 +43,15 @@ def shared(path: Path, alone: bool = False) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def if_free(path: Path) -> Iterator[bool]:
-    """True, with `path` locked alone, where no living process holds it; else False at once."""
+def if_free(path: Path) -> Iterator[bool | None]:
+    """True, with `path` locked alone, where no living process holds it; else False at once; None where there is no such file."""
     try:
         descriptor = os.open(path, os.O_RDWR)
     except FileNotFoundError:
-        yield True
+        yield None
         return
     try:
-        yield _try(descriptor, fcntl.LOCK_EX)
+        yield _try(descriptor, fcntl.LOCK_EX) and _is(path, descriptor)
     finally:
         os.close(descriptor)
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
+from gsac.cache.gc import sweep_store
+from gsac.cache.half_made import sweep
 from gsac.cache.store import Store
 from gsac.pipeline.keys import BODY
 from gsac.pipeline.params import Values, resolve
@@ -79,9 +82,12 @@ def answer_reporter(arguments: argparse.Namespace) -> PlainReporter:
 def open_store(reporter: PlainReporter, instead: Path | None = None) -> Store:
     """The store of GSAC_CACHE; it reports what it finds damaged.
 
-    Where it may only be read, results of this run go to `instead`, and what it holds is still used.
+    Where it may only be read, results of this run go to `instead`, and what it holds is still used. What killed processes left in
+    it and in the system's folder of temporary files is removed.
     """
     store = Store.open(say=reporter.note)
+    sweep_store(store)
+    sweep(Path(tempfile.gettempdir()))
     if instead is None or store.writable:
         return store
     reporter.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
 from gsac.cache.digest import tree_digest
 from gsac.cache.lease import in_use
+from gsac.cache.roots import OBJECT
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import (
     add_json,
@@ -71,8 +73,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput("--inputs and --out go together; without both, the folder of a run is used")
     if arguments.inputs is not None and arguments.folder != Path("."):
         raise BadInput(f"{arguments.folder} would be the folder of a run, but --inputs and --out were given; leave one out")
-    with progress_reporter(arguments) as reporter:
-        task = task_in_run_folder(arguments, reporter) if arguments.inputs is None else task_on_artifacts(arguments, reporter)
+    with progress_reporter(arguments) as reporter, contextlib.ExitStack() as held:
+        make_task = task_in_run_folder if arguments.inputs is None else task_on_artifacts
+        task = make_task(arguments, reporter, held)
         try:
             result = run_task(task, reporter, arguments.force)
         except StageFailedError as error:
@@ -88,25 +91,40 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
-    """On the inputs that lie in the folder of a run, the one here as DVC calls it."""
-    run_folder, project, configs = open_run_folder(arguments, arguments.folder, only=arguments.name)
+def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter, held: contextlib.ExitStack) -> Task:
+    """On the inputs that lie in the folder of a run, the one here as DVC calls it. held: until the task's end."""
+    run_folder = RunFolder.around(arguments.folder)
+    run_folder.say = reporter.note
+    held.enter_context(run_folder.hold())
+    run_folder, project, configs = open_run_folder(arguments, run_folder.root, only=arguments.name)
+    run_folder.say = reporter.note
     store = open_store(reporter, run_folder.root / OWN_STORE)
-    ports = project.graph.step(arguments.name).deps
-    return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in ports},
-                {port: run_folder.path(port).resolve() for port in ports},
-                run_folder, run_folder.root / arguments.name, run_folder.root / LOGS, in_run=True)
+    paths = {port: run_folder.path(port).resolve() for port in project.graph.step(arguments.name).deps}
+    lease_inputs(paths, held)
+    return Task(arguments.name, Keys(project, configs, store), store, {port: run_folder.digest(port, store) for port in paths},
+                paths, run_folder, run_folder.root / arguments.name, run_folder.root / LOGS, in_run=True)
 
 
-def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
-    """On the artifacts of --inputs, with outputs into --out."""
+def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter, held: contextlib.ExitStack) -> Task:
+    """On the artifacts of --inputs, with outputs into --out. held: until the task's end."""
     project = Project.at_hand()
-    store = open_store(reporter, arguments.out / OWN_STORE)
     configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
+    lease_inputs({port: arguments.inputs / port for port in project.graph.step(arguments.name).deps}, held)
     paths = fixture_paths(project, arguments.name, arguments.inputs)
+    folder = RunFolder(arguments.out)
+    folder.say = reporter.note
+    held.enter_context(folder.hold())
+    store = open_store(reporter, folder.root / OWN_STORE)
     digests = {port: tree_digest(path, store.memo)[0] for port, path in paths.items()}
-    out = arguments.out.absolute()
-    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, RunFolder(out), out, out / LOGS)
+    return Task(arguments.name, Keys(project, configs, store), store, digests, paths, folder, folder.root, folder.root / LOGS)
+
+
+def lease_inputs(paths: dict[str, Path], held: contextlib.ExitStack) -> None:
+    """Keeps gc from the objects, of whichever store, that the inputs are."""
+    for path in paths.values():
+        found = OBJECT.search(str(path.resolve()))
+        if found is not None:
+            held.enter_context(in_use(Store(Path(found.string[:found.start()])), [found[2]]))
 
 
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:
