@@ -118,7 +118,12 @@ class RunFolder:
             with alone_in(self.root, self._waiting):
                 for folder in (self.root, *filter(Path.is_dir, self.root.iterdir())):
                     sweep(folder)
+                here = self.root.stat()
                 yield
+        except FileNotFoundError as error:
+            if self.root.is_dir() and os.path.samestat(self.root.stat(), here):
+                raise
+            raise BadInput(f"{self.root} was removed while a command worked in it; run the command again") from error
         finally:
             for folder in self._made:
                 with contextlib.suppress(OSError):
@@ -158,6 +163,7 @@ class RunFolder:
         if into is None and os.path.lexists(folder) and (
                 not folder.is_dir() or (folder.is_symlink() and stands_in_the_way(record, folder, store, before))):
             keep_aside(folder, store.say)
+        folder.mkdir(exist_ok=True)  # not its parents: a folder that was removed meanwhile is not made anew
         if are_real(record.parts.stage):
             self._know({f"{record.parts.stage}/{output}": digest for output, digest in record.outputs.items()})
         after = place(store, record, folder, self._placed())

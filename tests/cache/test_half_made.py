@@ -111,4 +111,5 @@ def test_a_process_is_known_as_dead_by_number_start_and_boot():
     host, boot, space, number, started = this_process().split()
     assert not is_dead(this_process()) and not is_dead("") and not is_dead("nonsense")
     assert is_dead(" ".join((host, boot, space, number, "1"))) and is_dead(" ".join((host, "before", space, number, started)))
-    assert not is_dead(" ".join(("other", "before", space, "1", "1"))) and not is_dead(" ".join((host, boot, "pid:[1]", number, "1")))
+    assert not is_dead(" ".join(("other", "before", space, "1", "1")))
+    assert not is_dead(" ".join((host, boot, "pid:[1]", number, "1")))

@@ -58,7 +58,7 @@ def test_a_child_that_ends_by_itself_keeps_its_exit_code(tmp_path):
 @pytest.mark.slow
 def test_a_stage_ends_within_two_seconds_of_a_killed_run_and_the_next_start_leaves_no_temporary_file(toy, tmp_path):
     toy.edit("common.py", "import os\n", "import os\nimport tempfile\n")
-    toy.edit("common.py", "    time.sleep(job.config.pause_s)", "    tempfile.mkstemp()\n    sum(range(int(job.config.pause_s * 10**10)))")
+    toy.edit("common.py", "time.sleep(job.config.pause_s)", "tempfile.mkstemp(); sum(range(int(job.config.pause_s * 10**10)))")
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "join.pause_s=30", TMPDIR=str(temporary))
