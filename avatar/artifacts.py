@@ -119,7 +119,7 @@ def write_arrays(path: Path, **arrays: np.ndarray) -> None:
     import numpy as np
 
     content = io.BytesIO()
-    np.savez_compressed(content, **arrays)
+    np.savez_compressed(content, **arrays)  # pyright: ignore[reportArgumentType], the arrays have no such name
     write_file(path, content.getvalue())
 
 

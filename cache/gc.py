@@ -15,7 +15,7 @@ from pathlib import Path
 
 from gsac.cache import objects
 from gsac.cache.errors import from_os_error
-from gsac.cache.lease import live_keys
+from gsac.cache.lease import live_names
 from gsac.cache.lock import if_free, shared
 from gsac.cache.record import Record
 from gsac.cache.roots import Root, find_roots, gone
@@ -105,7 +105,7 @@ def collect(
             _choose(entries, {name: _bytes(path) for name, path in stored.items()}, keep_days, max_bytes)
             doomed = [entry for entry in entries if entry.doomed]
             named = {name for entry in entries if not entry.doomed for name in entry.names}
-            wanted = named | shown
+            wanted = named | shown | live_names(store)
             rubbish = [path for name, path in stored.items() if name not in wanted]
             temps = _orphans(store, locks)
             left = _abandoned(store, {entry.record.key for entry in entries})
@@ -133,9 +133,24 @@ def collect(
     return report
 
 
+def sweep_store(store: Store) -> None:
+    """Removes what killed processes left: private folders, leases, and partial work that no run will take up."""
+    with contextlib.suppress(OSError), contextlib.ExitStack() as locks:
+        for path in _orphans(store, locks):
+            objects.remove(path)
+        with if_free(store.root / "lock") as free:  # no run then takes up any of it
+            if free:
+                for path in _abandoned(store, {file.stem for file in store.record_files()} if _has_partial(store) else set()):
+                    objects.remove(path)
+
+
+def _has_partial(store: Store) -> bool:
+    return any((store.root / "partial").iterdir())
+
+
 def _entries(store: Store, grace_s: float, shown: set[str]) -> tuple[list[_Entry], list[Path]]:
     """Sound records, the longest unused first, and the files of records that are not sound."""
-    live, now = live_keys(store), time.time()
+    live, now = live_names(store), time.time()
     entries, broken = [], []
     for file in store.record_files():
         record, used = store.read(file), file.lstat().st_mtime
@@ -143,7 +158,8 @@ def _entries(store: Store, grace_s: float, shown: set[str]) -> tuple[list[_Entry
             broken.append(file)
         else:
             is_shown = not shown.isdisjoint(_names(record))
-            entries.append(_Entry(file, record, used, record.key in live, now - used < grace_s, is_shown))
+            is_live = not live.isdisjoint({record.key, *_names(record)})
+            entries.append(_Entry(file, record, used, is_live, now - used < grace_s, is_shown))
     return sorted(entries, key=lambda entry: entry.used), broken
 
 
@@ -184,14 +200,14 @@ def _orphans(store: Store, held: contextlib.ExitStack) -> list[Path]:
     orphans = []
     for name in sorted({path.stem for path in (store.root / "tmp").iterdir()}):
         folder = store.root / "tmp" / name
-        if held.enter_context(if_free(folder.with_suffix(".lock"))):
+        if held.enter_context(if_free(folder.with_suffix(".lock"))) is not False:
             orphans += [path for path in (folder, folder.with_suffix(".lock")) if path.exists()]
     return orphans
 
 
 def _abandoned(store: Store, done: set[str]) -> list[Path]:
     """Folders of partial/ that no living run uses and that are old, or whose key has its result."""
-    live = live_keys(store)
+    live = live_names(store)
     return [path for path in (store.root / "partial").iterdir()
             if path.name not in live and (path.name in done or _age(path) > PARTIAL_S)]
 

@@ -33,21 +33,21 @@ def single_flight(
 
 
 class Lease:
-    """The keys that a run in progress uses; `add` a key before looking it up."""
+    """What a run in progress uses, by key or by object; `add` it before looking it up."""
 
     def __init__(self, store: Store, file: Path | None, descriptor: int | None) -> None:
         self._store, self._file, self._descriptor = store, file, descriptor
 
-    def add(self, *keys: str) -> None:
-        """Keeps gc from removing the results of these keys."""
+    def add(self, *names: str) -> None:
+        """Keeps gc from removing the results of these keys and the objects of these names."""
         if self._descriptor is not None:
             with shared(self._store.root / "lock"):  # not while gc sweeps
-                os.write(self._descriptor, "".join(f"{key}\n" for key in keys).encode())
+                os.write(self._descriptor, "".join(f"{name}\n" for name in names).encode())
 
 
 @contextlib.contextmanager
-def in_use(store: Store, keys: Iterable[str] = ()) -> Iterator[Lease]:
-    """While open, gc keeps the records and outputs of these keys and of those added later."""
+def in_use(store: Store, names: Iterable[str] = ()) -> Iterator[Lease]:
+    """While open, gc keeps the records and outputs of these keys, the objects of these names, and those added later."""
     file = store.root / "leases" / f"{os.getpid()}-{os.urandom(6).hex()}.run"
     with contextlib.ExitStack() as held:
         try:
@@ -57,19 +57,19 @@ def in_use(store: Store, keys: Iterable[str] = ()) -> Iterator[Lease]:
                           "clear of each other, but `gsac cache gc` does not see runs on other machines")
         except OSError:
             lease = Lease(store, None, None)  # read-only: gc cannot run on it either
-        lease.add(*keys)
+        lease.add(*names)
         yield lease
 
 
-def live_keys(store: Store) -> set[str]:
-    """Keys that living runs use or compute; the leases of dead runs are removed."""
-    keys: set[str] = set()
+def live_names(store: Store) -> set[str]:
+    """Keys that living runs use or compute, and names of objects that they read; the leases of dead runs are removed."""
+    names: set[str] = set()
     for file in (store.root / "leases").glob("[!.]*"):
         with if_free(file) as free, contextlib.suppress(OSError):
             if free:
                 file.unlink()
             elif file.suffix == ".run":
-                keys.update(file.read_text().split())
+                names.update(file.read_text().split())
             else:
-                keys.add(file.stem)
-    return keys
+                names.add(file.stem)
+    return names

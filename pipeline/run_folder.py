@@ -2,7 +2,8 @@
 
     clip  dvc.yaml  params.yaml  dvc.lock
     <stage>/<output>        link into the store (a copy where links cannot be made)
-    export/<output>         the user's own files; .placed.json knows them as they were placed
+    export/<output>         the user's own files
+    .placed.json            real files as they were placed: what differs from it was edited
     logs/<stage>.log        what the stage printed
     run.json  metrics.json  report.html
 """
@@ -13,25 +14,28 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Iterable
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.digest import tree_digest
+from gsac.cache.digest import tree_digest, typed_digest
+from gsac.cache.folder_lock import alone_in
+from gsac.cache.half_made import half_made, sweep
 from gsac.cache.objects import object_name
 from gsac.cache.record import Record
 from gsac.cache.roots import find_links, register
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.params import to_yaml
-from gsac.pipeline.placing import is_link_to, link, place
+from gsac.pipeline.placing import are_real, is_known, is_link_to, keep_aside, link, place, stands_in_the_way
 from gsac.pipeline.project import Project, shipped_dag
 from gsac.stages.contract import BadInput
 
 DAG, LOCK, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "dvc.lock", "params.yaml", "run.json", "metrics.json", "report.html"
 LOGS = "logs"
 PLACED = ".placed.json"
-"""Port -> tree digest, of the real files that were placed here."""
+"""Port or file -> digests of the real files that were placed here: the last, and the one before while that may still lie there."""
 
 OWN_STORE = ".store"
 """Holds the results of a run whose cache cannot be written."""
@@ -42,6 +46,8 @@ class RunFolder:
 
     def __init__(self, root: Path):
         self.root = Path(root).absolute()
+        self.say: Callable[[str], None] = lambda message: print(message, file=sys.stderr, flush=True)
+        """Told of what was moved aside."""
         self._made: list[Path] = []
 
     @classmethod
@@ -98,16 +104,42 @@ class RunFolder:
             raise BadInput(f"{path} is missing; run `gsac stage {maker}` or `gsac run` first")
         return path.resolve()
 
+    @contextlib.contextmanager
+    def hold(self) -> Iterator[None]:
+        """Makes the folder and works in it alone: a second command waits, and says so. What killed ones left half made goes.
+
+        A folder that was made here and holds nothing at the end is removed.
+        """
+        if os.path.lexists(self.root) and not self.root.is_dir():
+            what = "a file" if self.root.exists() else "a link that leads to nothing"
+            raise BadInput(f"{self.root} is {what}; --out must be a folder")
+        self._made = [folder for folder in (self.root, *self.root.parents) if not folder.exists()]
+        try:
+            with alone_in(self.root, self._waiting):
+                for folder in (self.root, *filter(Path.is_dir, self.root.iterdir())):
+                    sweep(folder)
+                here = self.root.stat()
+                yield
+        except FileNotFoundError as error:
+            if self.root.is_dir() and os.path.samestat(self.root.stat(), here):
+                raise
+            raise BadInput(f"{self.root} was removed while a command worked in it; run the command again") from error
+        finally:
+            for folder in self._made:
+                with contextlib.suppress(OSError):
+                    folder.rmdir()
+
+    def _waiting(self) -> None:
+        self.say(f"another command works in {self.root}; this one waits for its end (Ctrl-C stops the wait)")
+
     def prepare(self, clip: Path, project: Project, configs: dict[str, Any]) -> None:
         """Makes it the folder of this clip and these parameters."""
-        self._refuse_foreign(project)
-        if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
-            raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
-                           "folder elsewhere")
-        self._made = [folder for folder in (self.root, *self.root.parents) if not folder.exists()]
+        self.refuse_foreign(clip, project)
         self.root.mkdir(parents=True, exist_ok=True)
-        write_text(self.root / DAG, project.dag.read_text())
-        write_text(self.root / PARAMS, to_yaml(configs, notes=False))
+        self.write(DAG, project.dag.read_text())
+        self.write(PARAMS, to_yaml(configs, notes=False))
+        if (self.root / LOGS).is_symlink() or (self.root / LOGS).is_file():
+            keep_aside(self.root / LOGS, self.say)
         if self.clip.is_symlink() or not self.clip.exists():
             if not self.clip.is_symlink() or os.readlink(self.clip) != str(clip):
                 link(clip, self.clip)
@@ -127,20 +159,38 @@ class RunFolder:
     def place(self, store: Store, record: Record, into: Path | None = None) -> None:
         """Shows a finished stage's outputs in `<stage>/`, or in the folder `into`; gc then keeps what is shown."""
         register(store, self.root)
-        before = self._placed()
-        after = place(store, record, into or self.root / record.parts.stage, before)
-        if after != before:
-            self.write_json(PLACED, after)
+        before, folder = self._placed(), into or self.root / record.parts.stage
+        if into is None and os.path.lexists(folder) and (
+                not folder.is_dir() or (folder.is_symlink() and stands_in_the_way(record, folder, store, before))):
+            keep_aside(folder, store.say)
+        folder.mkdir(exist_ok=True)  # not its parents: a folder that was removed meanwhile is not made anew
+        if are_real(record.parts.stage):
+            self._know({f"{record.parts.stage}/{output}": digest for output, digest in record.outputs.items()})
+        after = place(store, record, folder, self._placed())
+        if after != self._placed():
+            self._write_placed(after)
 
     def objects(self) -> set[str]:
         """Names of the store's objects that this folder shows, as links or as copies."""
-        return {*find_links(self.root).values(), *(object_name(digest, port) for port, digest in self._placed().items())}
+        copies = {object_name(digest, port) for port, placed in self._placed().items() if "/" in port for digest in placed.split()}
+        return {*find_links(self.root).values(), *copies}
 
     def _placed(self) -> dict[str, str]:
         with contextlib.suppress(OSError, ValueError):
             placed = json.loads((self.root / PLACED).read_text())
-            return placed if isinstance(placed, dict) else {}
+            return {str(name): str(digests) for name, digests in placed.items()} if isinstance(placed, dict) else {}
         return {}
+
+    def _know(self, coming: dict[str, str]) -> None:
+        """Notes what is about to be placed, so that it is known even if the process is killed right after. Name -> digest."""
+        placed = self._placed()
+        known = {name: " ".join([*placed.get(name, "").split()[-1:], digest]) for name, digest in coming.items()
+                 if placed.get(name, "").split()[-1:] != [digest]}
+        if known:
+            self._write_placed(placed | known)
+
+    def _write_placed(self, placed: dict[str, str]) -> None:
+        write_text(self.root / PLACED, json.dumps(placed, indent=1) + "\n")
 
     def shows(self, store: Store, record: Record) -> bool:
         """Whether the outputs in this folder are those of the record."""
@@ -152,10 +202,11 @@ class RunFolder:
             return True
         return path.exists() and tree_digest(path.resolve(), store.memo)[0] == record.outputs[output]
 
-    def _refuse_foreign(self, project: Project) -> None:
-        """BadInput where the folder holds files of another project, which would be overwritten."""
-        if self.root.exists() and not self.root.is_dir():
-            raise BadInput(f"{self.root} is a file; --out must be a folder")
+    def refuse_foreign(self, clip: Path, project: Project) -> None:
+        """BadInput where the folder is that of the photos, or holds files of another project, which would be overwritten."""
+        if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
+            raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
+                           "folder elsewhere")
         if self.root == project.dag.parent:
             raise BadInput(f"--out {self.root} is where gsac itself lies; choose another folder")
         if (self.root / DAG).exists():
@@ -170,24 +221,57 @@ class RunFolder:
                                "over; choose another folder, or move it away")
 
     def write_json(self, name: str, content: Any) -> None:
-        """Writes a JSON file into the folder."""
-        write_text(self.root / name, json.dumps(content, indent=1) + "\n")
+        """Writes one of the folder's own files as JSON."""
+        self.write(name, json.dumps(content, indent=1) + "\n")
+
+    def write(self, name: str, text: str, is_ours: Callable[[Path], bool] = lambda path: True) -> None:
+        """Writes one of the folder's own files whole or not at all; one that the user edited is moved aside.
+
+        is_ours: whether a file is of gsac's making, asked where no file of this name was placed here before.
+        """
+        self._make_way(name, is_ours)
+        self._know({name: text_digest(text)})
+        write_text(self.root / name, text)
+
+    def forget(self, name: str) -> None:
+        """Removes one of the folder's own files; one that the user edited is moved aside."""
+        self._make_way(name)
+        (self.root / name).unlink(missing_ok=True)
+
+    def _make_way(self, name: str, is_ours: Callable[[Path], bool] = lambda path: True) -> None:
+        path, placed = self.root / name, self._placed().get(name)
+        if not os.path.lexists(path):
+            return
+        with contextlib.suppress(OSError):
+            if not path.is_symlink() and (is_ours(path) if placed is None else is_known(text_digest(path.read_bytes()), placed)):
+                return
+        keep_aside(path, self.say)
 
     def outputs(self, ports: Iterable[str]) -> dict[str, str]:
         """Port -> absolute path, of the ports that the folder shows."""
         return {port: str(self.path(port)) for port in ports if self.path(port).exists()}
 
 
+def avatar_name(clip: Path, number: int = 1) -> str:
+    """Name of a clip's folder: `<clip>-avatar`, where the ending of a video is left out. number: of clips of that name, if not
+    the first."""
+    name = clip.name if clip.is_dir() else clip.stem
+    return f"{name}{f'-{number}' if number > 1 else ''}-avatar"
+
+
+def text_digest(text: str | bytes) -> str:
+    """Digest of a file of the folder's own by its content."""
+    return typed_digest("text", text.encode() if isinstance(text, str) else text)
+
+
 def write_text(path: Path, text: str) -> None:
     """Writes a file whole or not at all; a file of equal content is left untouched."""
-    with contextlib.suppress(OSError, UnicodeDecodeError):
-        if path.read_text() == text:
+    with contextlib.suppress(OSError):
+        if path.read_bytes() == text.encode():
             return
-    temp = path.with_name(f".{path.name}-{os.getpid()}")
     try:
-        temp.write_text(text)
-        os.replace(temp, path)
+        with half_made(path.parent) as (folder, _):
+            (folder / path.name).write_text(text, encoding="utf-8")
+            os.replace(folder / path.name, path)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            temp.unlink()
         raise OSError(error.errno, error.strerror, str(path)) from error

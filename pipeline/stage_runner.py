@@ -14,6 +14,7 @@ from typing import Any
 
 from gsac.cache import objects
 from gsac.cache.errors import CacheError, no_room
+from gsac.cache.half_made import half_made
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import single_flight
 from gsac.cache.publish import publish
@@ -60,6 +61,9 @@ class StageRunner:
     """By stage."""
     leaving: list[Child] = field(default_factory=list)
     """Processes that may not have ended yet, which takes a while where they held much memory."""
+    _kept: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
+    _waiting_room: Path | None = None
+    """Folder for the logs of prepared processes."""
 
     def __enter__(self) -> StageRunner:
         return self
@@ -68,6 +72,7 @@ class StageRunner:
         self._drop()
         while self.leaving:
             self.leaving.pop().close()
+        self._kept.close()
 
     def prepare(self, *names: str) -> None:
         """Starts a process a stage, which loads the stage's code while its inputs are made; ends the prepared ones of others."""
@@ -76,7 +81,7 @@ class StageRunner:
             if name not in self.prepared:
                 with contextlib.suppress(CacheError, BadInput):  # raised again when the stage's turn comes
                     code = self.keys.code(name)
-                    self.prepared[name] = Prepared(code, self._child(name, self._log(name, ".next")))
+                    self.prepared[name] = Prepared(code, self._child(name, self._early_log(name)))
 
     def _drop(self, keep: tuple[str, ...] = ()) -> None:
         for name in self.prepared.keys() - set(keep):
@@ -85,12 +90,18 @@ class StageRunner:
             child.log.unlink(missing_ok=True)
 
     def _child(self, name: str, log: Path) -> Child:
-        self.logs.mkdir(parents=True, exist_ok=True)
+        self.logs.mkdir(exist_ok=True)
         project, device = self.keys.project, self.keys.device_of(name) or self.keys.device
         return Child(f"{project.package}.{name}", project.entry(name), device, log)
 
-    def _log(self, name: str, more: str = "") -> Path:
-        return self.logs / f"{name}.log{more}"
+    def _log(self, name: str) -> Path:
+        return self.logs / f"{name}.log"
+
+    def _early_log(self, name: str) -> Path:
+        if self._waiting_room is None:
+            self.logs.mkdir(exist_ok=True)
+            self._waiting_room, _ = self._kept.enter_context(half_made(self.logs))
+        return self._waiting_room / self._log(name).name
 
     def _take_child(self, parts: KeyParts) -> Child:
         """A process for the stage: the prepared one, if it has loaded the code that the key names, else a new one."""

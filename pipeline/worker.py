@@ -1,7 +1,7 @@
 """The child process of one stage: builds the Job, runs it, checks what it wrote, and sends events to its parent.
 
 Reads two JSON lines from stdin: which modules to load and the file descriptor for events; later, once inputs are there, the order.
-Stdin stays open as long as the parent lives; when it closes, the child and its children go.
+Stdin stays open as long as the parent lives; when it closes, the child and its children are killed.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from gsac.pipeline.errors import NO_ROOM, sentence
+from gsac.pipeline.tether import tether
 from gsac.stages.contract import BadInput, Job, Stage, StageError, make_config
 
 LEAST_GAP_S = 0.1
@@ -69,6 +70,7 @@ class EventStream:
 def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     start = json.loads(sys.stdin.readline())
+    tether(start["events"])
     os.set_inheritable(start["events"], False)
     events = EventStream(os.fdopen(start["events"], "w"))
     with contextlib.suppress(Exception):  # it fails again, and is reported, once there is an order
@@ -80,7 +82,6 @@ def main() -> None:
     if not line:
         return
     order = start | json.loads(line)
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
     try:
         _work(order, events)
     except Exception as error:  # the parent must hear of any failure
@@ -165,7 +166,3 @@ def _message(error: Exception) -> str:
     return str(error) if _kind(error) != "bug" else f"{type(error).__name__}: {error}"
 
 
-def _leave_with_parent() -> None:
-    while os.read(sys.stdin.fileno(), 1):
-        pass
-    os.killpg(os.getpgid(0), signal.SIGKILL)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import shutil
+import os
 import time
 from pathlib import Path
 
+from gsac.cache.half_made import half_made
 from gsac.pipeline.commands.options import open_store, progress_reporter
 from gsac.pipeline.commands.run import run_clip
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import resolve
+from gsac.pipeline.placing import keep_aside
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import PlainReporter
 
@@ -41,10 +43,12 @@ def make_truth_clip(folder: Path, reporter: PlainReporter) -> Path:
 
     reporter.starts("truth", f"a clip is made in {folder}")
     began = time.monotonic()
-    part = folder.with_name(f"{folder.name}.part")
-    made = make_clip(part, seed=1, progress=lambda done, total, unit: reporter.progress("truth", done, total, unit))
-    if folder.exists():
-        shutil.rmtree(folder)
-    part.rename(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with half_made(folder.parent) as (temp, _):
+        made = make_clip(temp / folder.name, seed=1,
+                         progress=lambda done, total, unit: reporter.progress("truth", done, total, unit))
+        if os.path.lexists(folder):
+            keep_aside(folder, reporter.note)
+        (temp / folder.name).rename(folder)
     reporter.ends("truth", Outcome.RAN, time.monotonic() - began)
     return folder / made.name

@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 from gsac.cache.errors import CacheFolderError
+from gsac.cache.gc import sweep_store
+from gsac.cache.half_made import sweep
 from gsac.cache.store import Store
 from gsac.pipeline.keys import BODY
 from gsac.pipeline.params import Values, resolve
@@ -78,8 +81,12 @@ def answer_reporter(arguments: argparse.Namespace) -> PlainReporter:
 
 
 def open_store(reporter: PlainReporter) -> Store:
-    """The store of GSAC_CACHE; it reports what it finds damaged."""
-    return Store.open(say=reporter.note)
+    """The store of GSAC_CACHE; it reports what it finds damaged. What killed processes left in it and in the system's folder of
+    temporary files is removed."""
+    store = Store.open(say=reporter.note)
+    sweep_store(store)
+    sweep(Path(tempfile.gettempdir()))
+    return store
 
 
 def writable_store(store: Store, instead: Path, reporter: PlainReporter) -> Store:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import shutil
 import zipfile
@@ -12,11 +13,12 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from gsac.cache.digest import tree_files
+from gsac.cache.half_made import half_made
 from gsac.pipeline.commands.options import add_force, add_json, require_free
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import recovery, require_files
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.run_folder import DAG, METRICS, PARAMS, REPORT
+from gsac.pipeline.run_folder import DAG, METRICS, PARAMS, REPORT, RunFolder
 from gsac.stages.contract import BadInput
 
 EXPORT, VIEWER, README = "export", "viewer.html", "README.txt"
@@ -53,8 +55,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if out.suffix.lower() != ".zip" or not out.parent.is_dir():
         raise BadInput(f"--out {out}: expected a file .zip in a folder that exists")
     require_free(out, arguments.force)
-    members = {name: source for name, source in gather(folder).items() if source != out}
-    size = write_zip(out, folder.name, members)
+    with RunFolder(folder).hold() if folder.is_dir() else contextlib.nullcontext():
+        members = {name: source for name, source in gather(folder).items() if source != out}
+        size = write_zip(out, folder.name, members)
     if arguments.json:
         emit({"stages": [], "outputs": {"zip": str(out)}, "metrics": {"files": len(members), "bytes": size}})
     else:
@@ -112,9 +115,8 @@ def write_zip(out: Path, name: str, members: dict[str, Path | str]) -> int:
 
     Returns the zip's size in bytes.
     """
-    temp = out.with_name(f".{out.name}-{os.getpid()}")
-    try:
-        with zipfile.ZipFile(temp, "w") as archive:
+    with half_made(out.parent) as (temp, _):
+        with zipfile.ZipFile(temp / out.name, "w") as archive:
             for member, source in members.items():
                 info = zipfile.ZipInfo(f"{name}/{member}", NEVER)
                 info.compress_type, info.create_system, info.external_attr = zipfile.ZIP_DEFLATED, 3, 0o644 << 16
@@ -124,7 +126,5 @@ def write_zip(out: Path, name: str, members: dict[str, Path | str]) -> int:
                 info.file_size = source.stat().st_size
                 with source.open("rb") as reading, archive.open(info, "w") as writing:
                     shutil.copyfileobj(reading, writing, 1 << 20)
-        os.replace(temp, out)
-    finally:
-        temp.unlink(missing_ok=True)
+        os.replace(temp / out.name, out)
     return out.stat().st_size

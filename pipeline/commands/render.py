@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gsac.avatar.video import ENCODERS, TRANSPARENT
+from gsac.cache.half_made import half_made
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import require_file
@@ -109,14 +110,18 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
         plan = (turntable(avatar, arguments.seconds or TURN_S, arguments.fps) if motion is None
                 else performance(motion, arguments.fps, arguments.seconds, arguments.yaw))
         size = size or (min(max(2 * math.ceil(fit_aspect(avatar, plan) * HEIGHT / 2), WIDTHS[0]), WIDTHS[1]), HEIGHT)
-        with Video(out, *size, arguments.fps, background is None) if out.suffix else Pictures(out) as video:
-            for done, frame in enumerate(draw_frames(avatar, plan, *size, background, shadow=not arguments.no_shadow, floor=floor)):
-                reporter.progress("render", done, len(plan), "frames")
-                video.add(frame)
+        with half_made(out.parent) as (folder, _):
+            made = folder / out.name
+            with Video(made, *size, arguments.fps, background is None) if out.suffix else Pictures(made) as video:
+                for done, frame in enumerate(draw_frames(avatar, plan, *size, background, shadow=not arguments.no_shadow,
+                                                         floor=floor)):
+                    reporter.progress("render", done, len(plan), "frames")
+                    video.add(frame)
+            made.replace(out)
     except ArtifactError as e:
         raise BadInput(str(e)) from e
     except VideoError as e:
-        raise StageError(str(e)) from e
+        raise StageError(str(e).replace(str(made), str(out))) from e
     seconds = time.monotonic() - began
     reporter.ends("render", Outcome.RAN, seconds)
     return len(plan), size, seconds

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gsac.pipeline.lost_files import require_files
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.run_folder import RUN
+from gsac.pipeline.run_folder import RUN, RunFolder
 from gsac.stages.contract import BadInput
 
 
@@ -25,5 +25,6 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
     if not Results(arguments.folder).has_run:
         raise BadInput(f"{arguments.folder / RUN}: not the record of a run; run the clip again to write it anew")
-    print(write_report(arguments.folder))
+    with RunFolder(arguments.folder).hold():
+        print(write_report(arguments.folder))
     return ExitCode.OK

@@ -25,7 +25,7 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.report.refresh import EarlySections, refresh_report
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import ClipRun, Options
-from gsac.pipeline.run_folder import OWN_STORE, RunFolder
+from gsac.pipeline.run_folder import OWN_STORE, RunFolder, avatar_name
 from gsac.stages.contract import BadInput
 
 MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
@@ -60,17 +60,20 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
             return dry_run(clip_run, clip, options, reporter, arguments.json)
-        other = find_other_clip(run_folder, clip, store)
-        if other is not None and not arguments.replace:
-            raise BadInput(f"{run_folder.root} holds the avatar of {other}; give another --out, or --replace to put this clip's "
-                           "there")
-        run_folder.prepare(clip, project, configs)
-        if other is not None:
-            forget_results(run_folder)
-        own = writable_store(store, run_folder.root / OWN_STORE, reporter)
-        if own is not store:
-            clip_run = ClipRun(project, configs, own, run_folder, reporter)
-        return carry_out(clip_run, clip, options, reporter, arguments.json)
+        run_folder.say = reporter.note
+        run_folder.refuse_foreign(clip, project)
+        with run_folder.hold():
+            other = find_other_clip(run_folder, clip, store)
+            if other is not None and not arguments.replace:
+                raise BadInput(f"{run_folder.root} holds the avatar of {other}; give another --out, or --replace to put this "
+                               "clip's there")
+            run_folder.prepare(clip, project, configs)
+            if other is not None:
+                forget_results(run_folder)
+            own = writable_store(store, run_folder.root / OWN_STORE, reporter)
+            if own is not store:
+                clip_run = ClipRun(project, configs, own, run_folder, reporter)
+            return carry_out(clip_run, clip, options, reporter, arguments.json)
 
 
 def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
@@ -127,7 +130,7 @@ def find_clip(path: Path) -> Path:
 
 def default_out(clip: Path) -> Path:
     """`<clip>-avatar` here."""
-    return Path.cwd() / f"{clip.stem}-avatar"
+    return Path.cwd() / avatar_name(clip)
 
 
 def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> None:
@@ -135,6 +138,9 @@ def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> No
     project = Project.at_hand()
     configs = resolve(project)
     run_folder = RunFolder(out)
-    run_folder.prepare(find_clip(clip), project, configs)
-    store = writable_store(store, out / OWN_STORE, reporter)
-    carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(), reporter, json=False)
+    run_folder.say = reporter.note
+    run_folder.refuse_foreign(find_clip(clip), project)
+    with run_folder.hold():
+        run_folder.prepare(find_clip(clip), project, configs)
+        store = writable_store(store, out / OWN_STORE, reporter)
+        carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(), reporter, json=False)

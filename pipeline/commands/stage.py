@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gsac.cache.errors import IntegrityError
 from gsac.cache.lease import in_use
-from gsac.cache.roots import is_object
+from gsac.cache.roots import OBJECT, is_object
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import (
     add_json,
@@ -73,8 +74,9 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput("--inputs and --out go together; without both, the folder of a run is used")
     if arguments.inputs is not None and arguments.folder != Path("."):
         raise BadInput(f"{arguments.folder} would be the folder of a run, but --inputs and --out were given; leave one out")
-    with progress_reporter(arguments) as reporter:
-        task = task_in_run_folder(arguments, reporter) if arguments.inputs is None else task_on_artifacts(arguments, reporter)
+    with progress_reporter(arguments) as reporter, contextlib.ExitStack() as held:
+        make_task = task_in_run_folder if arguments.inputs is None else task_on_artifacts
+        task = make_task(arguments, reporter, held)
         try:
             result = run_task(task, reporter, arguments.force)
         except StageFailedError as error:
@@ -90,24 +92,35 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
-    """On the inputs that lie in the folder of a run, the one here as DVC calls it."""
-    run_folder, project, configs = open_run_folder(arguments, arguments.folder, only=arguments.name)
+def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter, held: contextlib.ExitStack) -> Task:
+    """On the inputs that lie in the folder of a run, the one here as DVC calls it. held: until the task's end."""
+    run_folder = RunFolder.around(arguments.folder)
+    run_folder.say = reporter.note
+    held.enter_context(run_folder.hold())
+    run_folder, project, configs = open_run_folder(arguments, run_folder.root, only=arguments.name)
+    run_folder.say = reporter.note
     store = checked_store(project, configs, arguments.name, run_folder.root, reporter)
-    sources = {port: Source(run_folder.require(port), store) for port in project.graph.step(arguments.name).deps}
+    paths = {port: run_folder.require(port) for port in project.graph.step(arguments.name).deps}
+    lease_inputs(paths, held)
+    sources = {port: Source(path, store) for port, path in paths.items()}
     return Task(arguments.name, Keys(project, configs, store), store, sources, run_folder, run_folder.root / arguments.name,
                 run_folder.root / LOGS, in_run=True)
 
 
-def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter) -> Task:
-    """On the artifacts of --inputs, with outputs into --out."""
+
+
+def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter, held: contextlib.ExitStack) -> Task:
+    """On the artifacts of --inputs, with outputs into --out. held: until the task's end."""
     project = Project.at_hand()
     configs = resolve(project, arguments.params, arguments.set, only=arguments.name)
+    lease_inputs({port: arguments.inputs / port for port in project.graph.step(arguments.name).deps}, held)
     paths = fixture_paths(project, arguments.name, arguments.inputs)
-    store = checked_store(project, configs, arguments.name, arguments.out, reporter)
+    folder = RunFolder(arguments.out)
+    folder.say = reporter.note
+    held.enter_context(folder.hold())
+    store = checked_store(project, configs, arguments.name, folder.root, reporter)
     sources = {port: Source(path, store) for port, path in paths.items()}
-    out = arguments.out.absolute()
-    return Task(arguments.name, Keys(project, configs, store), store, sources, RunFolder(out), out, out / LOGS)
+    return Task(arguments.name, Keys(project, configs, store), store, sources, folder, folder.root, folder.root / LOGS)
 
 
 def checked_store(project: Project, configs: dict[str, Any], name: str, out: Path, reporter: PlainReporter) -> Store:
@@ -115,6 +128,14 @@ def checked_store(project: Project, configs: dict[str, Any], name: str, out: Pat
     store = open_store(reporter)
     Keys(project, configs, store).check([name])
     return writable_store(store, out / OWN_STORE, reporter)
+
+
+def lease_inputs(paths: dict[str, Path], held: contextlib.ExitStack) -> None:
+    """Keeps gc from the objects, of whichever store, that the inputs are."""
+    for path in paths.values():
+        found = OBJECT.search(str(path.resolve()))
+        if found is not None:
+            held.enter_context(in_use(Store(Path(found.string[:found.start()])), [found[2]]))
 
 
 def run_task(task: Task, reporter: PlainReporter, force: bool) -> StageResult:

@@ -10,6 +10,7 @@ import tempfile
 import webbrowser
 from pathlib import Path
 
+from gsac.cache.half_made import half_made
 from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.page_server import PAGE, PageServer, find_network_address, make_certificate, serve
@@ -36,8 +37,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with half_made(Path(tempfile.gettempdir())) as (folder, _):
         page = find_page(arguments.avatar, folder)
         with open_server(page, find_name(arguments.avatar), arguments, folder) as server:
             print(server.url, flush=True)

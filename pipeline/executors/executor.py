@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from gsac.pipeline.run_folder import avatar_name
+
 
 @dataclass(frozen=True)
 class ClipJob:
@@ -20,7 +22,7 @@ class ClipJob:
     @property
     def name(self) -> str:
         """Its clip's, with its folder's number where clips of a batch have the same."""
-        return self.clip.name if self.out.name == f"{self.clip.stem}-avatar" else f"{self.clip.name} ({self.out.name})"
+        return self.clip.name if self.out.name == avatar_name(self.clip) else f"{self.clip.name} ({self.out.name})"
 
 
 @dataclass

@@ -7,7 +7,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Hear
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.tether import tethered
 
 THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Shared out among the clips that run at once, where the user has not set them."""
@@ -51,23 +51,19 @@ class LocalExecutor:
     def _run(self, job: ClipJob) -> ClipResult:
         began = time.monotonic()
         with tempfile.TemporaryFile() as out:
-            process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "gsac.pipeline.cli", "run", str(job.clip), "--out", str(job.out), "--json",
-                 *job.arguments],
-                stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, text=True, errors="replace", env=self._environment,
-                start_new_session=True,
-            )
-            assert process.stderr is not None
-            self._running.add(process)
             said = []
-            try:
-                with process.stderr as lines:
-                    for line in lines:
-                        said.append(line.rstrip("\n"))
-                        self._hear(job, said[-1])
-                process.wait()
-            finally:
-                self._running.discard(process)
+            with tethered("gsac.pipeline.cli", "run", str(job.clip), "--out", str(job.out), "--json", *job.arguments,
+                          stdout=out, stderr=subprocess.PIPE, text=True, errors="replace", env=self._environment) as process:
+                assert process.stderr is not None
+                self._running.add(process)
+                try:
+                    with process.stderr as lines:
+                        for line in lines:
+                            said.append(line.rstrip("\n"))
+                            self._hear(job, said[-1])
+                    process.wait()
+                finally:
+                    self._running.discard(process)
             out.seek(0)
             summary = _summary(out.read())
         return ClipResult(job, process.returncode, time.monotonic() - began, _error(process.returncode, said), summary)

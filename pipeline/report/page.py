@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import functools
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -15,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from gsac.pipeline.report.frame_links import FrameLinks
-from gsac.pipeline.report.origin import drawn_from, shown_stages
+from gsac.pipeline.report.origin import drawn_from, read_origin, shown_stages
 from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
 from gsac.pipeline.report.tables import parameters, provenance, stage_rows, totals
 from gsac.pipeline.rows import read_json
-from gsac.pipeline.run_folder import REPORT, RUN
+from gsac.pipeline.run_folder import REPORT, RUN, RunFolder
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -57,17 +56,13 @@ def draw_sections(out_dir: Path, running: str) -> dict[str, Section]:
 
 
 def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path:
-    """Writes `report.html` into a run's folder, whole or not at all, and returns its path. drawn: of this run, by `draw_sections`.
+    """Writes `report.html` into a run's folder, and returns its path. drawn: of this run, by `draw_sections`.
 
     Needs neither run.json nor any artifact: the page says what is missing. Raises OSError only.
     """
     results = Results(out_dir)
-    page = results.root / REPORT
-    text = render(results, drawn or {})
-    temp = page.with_name(f".{REPORT}-{os.getpid()}")
-    temp.write_text(text, encoding="utf-8")
-    os.replace(temp, page)
-    return page
+    RunFolder(results.root).write(REPORT, render(results, drawn or {}), lambda page: read_origin(page) is not None)
+    return results.root / REPORT
 
 
 def render(results: Results, drawn: dict[str, Section]) -> str:

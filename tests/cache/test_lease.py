@@ -2,7 +2,7 @@ import signal
 import threading
 import time
 
-from gsac.cache.lease import in_use, live_keys, single_flight
+from gsac.cache.lease import in_use, live_names, single_flight
 from gsac.cache.lock import shared
 
 COMPUTE_ONCE = """
@@ -84,14 +84,14 @@ def test_a_key_is_free_again_after_a_failure(store):
 def test_keys_are_live_while_their_run_lives_and_no_longer(store, child):
     with in_use(store, ["a" * 64]) as lease, single_flight(store, "c" * 64):
         lease.add("b" * 64)
-        assert live_keys(store) == {"a" * 64, "b" * 64, "c" * 64}
-    assert live_keys(store) == set()
+        assert live_names(store) == {"a" * 64, "b" * 64, "c" * 64}
+    assert live_names(store) == set()
     holder = child(HOLD)
     assert holder.stdout.readline() == "held\n"
-    assert live_keys(store) == {"k" * 64}
+    assert live_names(store) == {"k" * 64}
     holder.kill()
     holder.wait()
-    assert live_keys(store) == set()
+    assert live_names(store) == set()
     assert list((store.root / "leases").iterdir()) == []
 
 

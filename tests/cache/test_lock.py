@@ -10,7 +10,7 @@ import pytest
 
 from gsac.cache import lock
 from gsac.cache.gc import collect
-from gsac.cache.lease import in_use, live_keys, single_flight
+from gsac.cache.lease import in_use, live_names, single_flight
 from gsac.cache.lock import exclusive, if_free, shared
 from gsac.cache.store import Store
 from gsac.cache.verify import verify
@@ -53,7 +53,7 @@ def test_a_store_without_links_locks_or_modes_keeps_heals_and_collects_results(s
         assert found is None
         record = make(parts_of())
         lease.add(record.key)
-        assert live_keys(store) == {record.key}
+        assert live_names(store) == {record.key}
     assert store.lookup(record.key, deep=True) == record
     assert make(parts_of(), "second") == record
     forced = make(parts_of(), "third", replace=True)
@@ -120,10 +120,10 @@ def test_where_locks_are_refused_a_killed_holder_frees_its_key_all_the_same(stor
     assert holder.stdout.readline() == "held\n"
     with if_free(store.root / "leases" / f"{'k' * 64}.lock") as free:
         assert not free
-    assert live_keys(store) == {"k" * 64}
+    assert live_names(store) == {"k" * 64}
     holder.kill()
     holder.wait()
-    assert live_keys(store) == set()
+    assert live_names(store) == set()
 
 
 def test_a_lock_that_cannot_be_taken_for_another_reason_is_an_error(store, poor_store):
@@ -169,7 +169,7 @@ def test_what_stands_in_the_place_of_the_stores_own_files_never_fails_every_run(
         with in_use(store) as lease, single_flight(store, parts_of(trial=trial).key):
             record = make(parts_of(trial=trial), store=store)
             lease.add(record.key)
-            assert live_keys(store) == {record.key}
+            assert live_names(store) == {record.key}
         assert store.lookup(record.key) == record
         collect(store)
     assert len(said) == (kind == "file" and name not in ("lock", "memo.sqlite"))

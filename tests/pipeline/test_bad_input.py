@@ -3,13 +3,16 @@
 import io
 import json
 import os
+import shutil
 import signal
 import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 import gsac
+from gsac.pipeline import errors
 from gsac.pipeline.cli import execute
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.pace import Pace
@@ -176,3 +179,19 @@ def test_status_knows_the_results_that_a_run_kept_beside_a_cache_that_cannot_be_
     assert (toy.out / ".store").is_dir()
     assert toy.gsac("status", toy.out).code == ExitCode.OK
     assert "up to date" in toy.gsac("explain", "join", toy.out).out
+
+
+def test_a_missing_file_of_the_programs_own_is_not_the_users_mistake(tmp_path):
+    ours = Path(errors.__file__).with_name("missing.jinja")
+    for path, code in ((ours, None), (Path(pytest.__file__), None), (tmp_path / "clip.mp4", ExitCode.USAGE),
+                       (Path(errors.__file__).parents[1] / "clips" / "mine.mp4", ExitCode.USAGE)):
+        assert errors.exit_code(FileNotFoundError(2, "No such file or directory", str(path))) == code
+
+
+def test_a_folder_that_is_removed_while_a_run_works_in_it_is_named(toy):
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "cut.pause_s=0.5")
+    toy.wait_for(lambda: "cut" in toy.runs)
+    shutil.rmtree(toy.out)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 2 and f"{toy.out} was removed while a command worked in it" in said and "Traceback" not in said
+    assert toy.run().code == 0

@@ -4,6 +4,9 @@ import json
 
 import pytest
 
+from gsac.pipeline.batch import make_jobs
+from gsac.pipeline.commands.run import default_out
+
 
 @pytest.fixture
 def other(toy):
@@ -83,3 +86,27 @@ def test_a_mistake_takes_nothing_that_was_there(toy):
 def test_what_was_finished_before_a_mistake_stays(toy):
     assert toy.run("--set", "left.trouble=bad input").code == 2
     assert (toy.out / "cut" / "words").exists() and (toy.out / "run.json").exists()
+
+
+def test_folders_of_photos_whose_names_differ_behind_a_dot_have_folders_of_their_own(tmp_path):
+    clips = [tmp_path / "turn.v1", tmp_path / "turn.v2", tmp_path / "turn.mp4", tmp_path / "b" / "turn.mp4"]
+    for clip in clips[:2]:
+        clip.mkdir()
+    names = ["turn.v1-avatar", "turn.v2-avatar", "turn-avatar"]
+    assert [default_out(clip).name for clip in clips] == [*names, "turn-avatar"]
+    jobs = make_jobs(clips, tmp_path, ())
+    assert [job.out.name for job in jobs] == [*names, "turn-2-avatar"]
+    assert [job.name for job in jobs] == ["turn.v1", "turn.v2", "turn.mp4", "turn.mp4 (turn-2-avatar)"]
+
+
+@pytest.mark.parametrize("lost", ["run.json", "clip"])
+def test_a_folder_that_has_lost_its_record_or_its_clip_is_still_the_other_clips(toy, other, lost):
+    toy.ran()
+    if lost == "run.json":
+        (toy.out / lost).unlink()
+    else:
+        run = json.loads((toy.out / "run.json").read_text())
+        (toy.out / "run.json").write_text(json.dumps(run | {"clip_digest": None}))
+        toy.clip.unlink()
+    done = toy.gsac("run", other, "--out", toy.out)
+    assert done.code == 2 and f"holds the avatar of {toy.clip}" in done.err and toy.result == "ALPHA ALPHA"

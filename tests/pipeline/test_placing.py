@@ -180,7 +180,7 @@ def test_a_stage_alone_places_as_a_run_does(exporting):
     (toy.out / "export" / "out.txt").write_text("mine")
     done = toy.gsac("stage", "export", cwd=toy.out)
     assert done.code == 0 and (toy.out / "export" / "out-kept.txt").read_text() == "mine" and "out-kept.txt" in done.err
-    assert json.loads((toy.out / ".placed.json").read_text()).keys() == {"export/out.txt", "export/metrics.json"}
+    assert {"export/out.txt", "export/metrics.json"} <= json.loads((toy.out / ".placed.json").read_text()).keys()
 
 
 def test_a_readers_own_copy_in_the_place_of_a_link_is_not_removed(toy):

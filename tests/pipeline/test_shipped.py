@@ -69,6 +69,7 @@ def test_docker_compose_accepts_its_file():
     for service in services.values():
         dockerfile = (ROOT / service["build"]["dockerfile"]).read_text()
         assert '"batch", "/clips"' in dockerfile
+        assert "GSAC_COPY=1" in dockerfile, "links into the volume /cache lead nowhere on the host"
         assert {volume.rsplit(":ro", 1)[0].rsplit(":", 1)[1] for volume in service["volumes"]} == {"/clips", "/avatars", "/cache"}
 
 
