@@ -106,7 +106,7 @@ def _probe(container: av.container.InputContainer, path: Path) -> Video:
     hidden_alpha = codec in ("vp8", "vp9") and tags.get("alpha_mode") == "1"
     rate = stream.average_rate or stream.guessed_rate
     return Video(
-        stream=stream.index, ticks=ticks, time_base=stream.time_base, declared_frames=stream.frames,
+        stream=stream.index, ticks=ticks, time_base=stream.time_base or Fraction(1, 1_000_000), declared_frames=stream.frames,
         width=width, height=height, transfer=int(picture.color_trc), primaries=int(picture.color_primaries),
         matrix=int(picture.colorspace), has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
         decoder={"vp8": "libvpx", "vp9": "libvpx-vp9"}[codec] if hidden_alpha else None,

@@ -157,7 +157,7 @@ def test_nothing_of_the_users_is_removed_by_a_run(case, word, finished, out, cap
     for path in set(after) - set(before):
         assert any(str(place) in said for place in (Path(path), *Path(path).parents) if "-kept" in place.name), said
     if code != ExitCode.OK:
-        assert code == ExitCode.USAGE and after == before and str(out) in said
+        assert code == ExitCode.USAGE and after == before and str(out) in said, said
     assert not list((out.parent / "elsewhere").rglob("*kept*")), "a folder of the user's is left as it is"
 
 
