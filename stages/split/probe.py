@@ -102,6 +102,8 @@ def _probe(container: InputContainer, path: Path) -> Video:
         width, height = height, width
     _check_size(path, width, height)
 
+    if stream.time_base is None:
+        raise BadInput(f"{path.name}: its frames have no times; the file is damaged. Copy it from the phone again.")
     codec = stream.codec_context.name
     tags = {key.lower(): value for key, value in (dict(container.metadata) | dict(stream.metadata)).items()}
     hidden_alpha = codec in ("vp8", "vp9") and tags.get("alpha_mode") == "1"
