@@ -9,6 +9,7 @@ from pathlib import Path
 import av
 import av.container
 import numpy as np
+from av.container import InputContainer
 
 from gsac.stages.contract import BadInput
 
@@ -69,7 +70,7 @@ def file_url(path: Path) -> str:
     return f"file:{path.absolute()}"
 
 
-def _open(path: Path) -> av.container.InputContainer:
+def _open(path: Path) -> InputContainer:
     return av.open(file_url(path), options=LIMITS, metadata_errors="ignore")
 
 
@@ -78,7 +79,7 @@ def _is_text(path: Path) -> bool:
         return not any(byte < 32 and chr(byte) not in "\t\r\n" for byte in file.read(64))
 
 
-def _probe(container: av.container.InputContainer, path: Path) -> Video:
+def _probe(container: InputContainer, path: Path) -> Video:
     streams = [s for s in container.streams.video if not s.disposition & av.stream.Disposition.attached_pic]
     if not streams:
         raise BadInput(f"{path.name}: holds no video stream; expected a video of one person or a folder of photos.")
@@ -101,6 +102,8 @@ def _probe(container: av.container.InputContainer, path: Path) -> Video:
         width, height = height, width
     _check_size(path, width, height)
 
+    if stream.time_base is None:
+        raise BadInput(f"{path.name}: its frames have no times; the file is damaged. Copy it from the phone again.")
     codec = stream.codec_context.name
     tags = {key.lower(): value for key, value in (dict(container.metadata) | dict(stream.metadata)).items()}
     hidden_alpha = codec in ("vp8", "vp9") and tags.get("alpha_mode") == "1"
@@ -119,7 +122,7 @@ def _check_size(path: Path, width: int, height: int) -> None:
                        "Export it smaller.")
 
 
-def _first_picture(container: av.container.InputContainer, stream: av.VideoStream, path: Path) -> av.VideoFrame:
+def _first_picture(container: InputContainer, stream: av.VideoStream, path: Path) -> av.VideoFrame:
     error = "no packet of it decodes"
     for packet in container.demux(stream):
         try:
