@@ -59,6 +59,8 @@ class Chain:
         self.temporary.mkdir(exist_ok=True)
         self.heard = subject.root / "stderr.txt"
         self.known: set[str] = set()
+        self.at_work: set[int] = set()
+        """Processes of the run that is killed, as they were right before."""
         began = time.monotonic()
         self._rerun()
         self.whole_s = time.monotonic() - began
@@ -132,7 +134,7 @@ class Chain:
 
     def _outlived(self) -> None:
         """Waits for the end of what the run has started, and tells of what outlives it for long."""
-        began, alive = time.monotonic(), set()
+        began, alive, self.at_work = time.monotonic(), self.at_work, set()
         while alive := {*processes_with(self.temporary), *filter(is_alive, alive)}:
             time.sleep(0.005)
             if time.monotonic() - began > 30:
@@ -187,6 +189,7 @@ def kill_at_random(subject: Subject, trials: int, seed: int, attack: str, end: f
             process.wait(pick.uniform(0.05, 0.8) * chain.whole_s)
         killed = process.poll() is None
         if killed:
+            chain.at_work = {*processes_with(chain.temporary)}
             process.kill()
             process.wait()
             tally.where[chain._stage()] += 1
