@@ -1,11 +1,11 @@
-# make setup | demo | test | test-fast: each from an empty machine with Python 3.11 or 3.12, nothing else.
+# make setup | demo | test | test-fast | attack: each from an empty machine with Python 3.11 or 3.12, nothing else.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3)
 TORCH ?= torch==2.13.0
 BIN := .venv/bin
 READY := .venv/.gsac-ready
 
-.PHONY: setup demo test test-fast params docs shaders lint debian
+.PHONY: setup demo test test-fast attack params docs shaders lint debian
 
 setup: $(READY)
 
@@ -28,6 +28,10 @@ test: setup debian lint
 
 test-fast: setup
 	$(BIN)/python -m pytest -m 'not slow' -n 2
+
+# The long versions of what the tests try in small: hours, for the table in docs/lab/attacks.md.
+attack: setup debian
+	PYTHONPATH=tests $(BIN)/python -m attack
 
 # Some tests use Debian packages; where they may not be installed, those tests skip and name them.
 debian:

@@ -79,6 +79,11 @@ def _named_holder(file: Path, waiting: Callable[[], None]) -> Iterator[None]:
                 if is_dead(file.read_text()):
                     file.unlink()
                     continue
+        except OSError as error:
+            if error.errno not in (errno.EROFS, errno.EACCES, errno.EPERM):
+                raise
+            yield  # a folder that can only be read here is only read
+            return
         if not said:
             waiting()
         said = True

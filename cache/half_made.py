@@ -21,6 +21,12 @@ NAME = re.compile(r"\.gsac-[0-9a-f]{16}")
 MARK = "gsac-made"
 
 
+def temporary_folder() -> Path:
+    """The system's folder for temporary files. `tempfile` tries its by writing a file, which a kill leaves there."""
+    named = [os.environ[name] for name in ("TMPDIR", "TEMP", "TMP") if os.environ.get(name)]
+    return next((Path(name).absolute() for name in (*named, "/tmp", "/var/tmp") if os.access(name, os.W_OK | os.X_OK)), Path.cwd())
+
+
 @contextlib.contextmanager
 def half_made(parent: Path) -> Iterator[tuple[Path, int]]:
     """An empty folder in `parent`, removed at the end, and its descriptor, whose lock a child process may inherit.

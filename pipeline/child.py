@@ -8,13 +8,12 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.half_made import half_made
+from gsac.cache.half_made import half_made, temporary_folder
 from gsac.stages.contract import BadInput, StageError
 
 GRACE_S = 2.0
@@ -50,7 +49,7 @@ class Child:
         """declaration, entry: modules of the stage; device: what it will run on; log: file for its stdout and stderr."""
         self.log = log
         self._kept = contextlib.ExitStack()
-        temporary, lock = self._kept.enter_context(half_made(Path(tempfile.gettempdir())))
+        temporary, lock = self._kept.enter_context(half_made(temporary_folder()))
         self._events, write = os.pipe()
         try:
             with log.open("wb") as log_stream:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from gsac.cache.errors import CacheFolderError
 from gsac.cache.gc import sweep_store
-from gsac.cache.half_made import sweep
+from gsac.cache.half_made import sweep, temporary_folder
 from gsac.cache.store import Store
 from gsac.pipeline.keys import BODY
 from gsac.pipeline.params import Values, resolve
@@ -85,7 +84,7 @@ def open_store(reporter: PlainReporter) -> Store:
     temporary files is removed."""
     store = Store.open(say=reporter.note)
     sweep_store(store)
-    sweep(Path(tempfile.gettempdir()))
+    sweep(temporary_folder())
     return store
 
 

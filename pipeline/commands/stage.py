@@ -107,8 +107,6 @@ def task_in_run_folder(arguments: argparse.Namespace, reporter: PlainReporter, h
                 run_folder.root / LOGS, in_run=True)
 
 
-
-
 def task_on_artifacts(arguments: argparse.Namespace, reporter: PlainReporter, held: contextlib.ExitStack) -> Task:
     """On the artifacts of --inputs, with outputs into --out. held: until the task's end."""
     project = Project.at_hand()

@@ -6,11 +6,10 @@ import argparse
 import contextlib
 import os
 import sys
-import tempfile
 import webbrowser
 from pathlib import Path
 
-from gsac.cache.half_made import half_made
+from gsac.cache.half_made import half_made, temporary_folder
 from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.page_server import PAGE, PageServer, find_network_address, make_certificate, serve
@@ -37,7 +36,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    with half_made(Path(tempfile.gettempdir())) as (folder, _):
+    with half_made(temporary_folder()) as (folder, _):
         page = find_page(arguments.avatar, folder)
         with open_server(page, find_name(arguments.avatar), arguments, folder) as server:
             print(server.url, flush=True)

@@ -27,6 +27,8 @@ from .tally import Fault, Tally
 
 OUTLIVES_S = 2.0
 """A process whose parent was killed ends within this time."""
+SETTLES_S = 0.05
+"""A dying process loses its environment, by which it is found here, a moment before its locks."""
 RERUN_S = 600.0
 CALLS = ("rename", "link", "symlink", "unlink", "rmdir", "mkdir", "fsync", "fchmodat", "chmod", "flock", "ftruncate", "write")
 """System calls at which a run is killed."""
@@ -56,6 +58,9 @@ class Chain:
         self.temporary = subject.root / "temporary"
         self.temporary.mkdir(exist_ok=True)
         self.heard = subject.root / "stderr.txt"
+        self.known: set[str] = set()
+        self.at_work: set[int] = set()
+        """Processes of the run that is killed, as they were right before."""
         began = time.monotonic()
         self._rerun()
         self.whole_s = time.monotonic() - began
@@ -99,7 +104,8 @@ class Chain:
     def _judge_end(self) -> None:
         if self._bytes() != self.reference:
             self.tally.fault(Fault.WRONG, "a whole run gave other bytes")
-        if left := find_leftovers(self.subject.cache, self.subject.out, self.temporary):
+        if left := [*{*find_leftovers(self.subject.cache, self.subject.out, self.temporary)} - self.known]:
+            self.known.update(left)
             self.tally.fault(Fault.LEFT, ", ".join(left[:3]))
         self.clear()
 
@@ -112,7 +118,8 @@ class Chain:
             with RunFolder(self.subject.out).hold():
                 pass
         left = find_leftovers(self.subject.cache, self.subject.out, self.temporary)
-        left = [path for path in left if "/partial/" not in path]  # the next run of that key goes on from there
+        left = [path for path in left if "/partial/" not in path and path not in self.known]  # the next run takes up the partial
+        self.known.update(left)
         if left:
             self.tally.fault(Fault.LEFT, f"{', '.join(left[:3])} after {self._stage()}")
 
@@ -127,13 +134,14 @@ class Chain:
 
     def _outlived(self) -> None:
         """Waits for the end of what the run has started, and tells of what outlives it for long."""
-        began = time.monotonic()
-        while alive := processes_with(self.temporary):
+        began, alive, self.at_work = time.monotonic(), self.at_work, set()
+        while alive := {*processes_with(self.temporary), *filter(is_alive, alive)}:
             time.sleep(0.005)
             if time.monotonic() - began > 30:
                 break
         lasted = time.monotonic() - began
         self.tally.longest_s = max(self.tally.longest_s, lasted)
+        time.sleep(SETTLES_S)
         if lasted > OUTLIVES_S:
             self.tally.fault(Fault.STUCK, f"{len(alive)} processes outlived the run by {lasted:.1f} s, in {self._stage()}")
 
@@ -163,6 +171,13 @@ def processes_with(temporary: Path) -> list[int]:
     return found
 
 
+def is_alive(process: int) -> bool:
+    """Whether a process runs, and does not only wait to be buried."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
+    return False
+
+
 def kill_at_random(subject: Subject, trials: int, seed: int, attack: str, end: float = float("inf")) -> Tally:
     """Kills runs at random moments until there are so many trials, or until the clock (time.monotonic) shows `end`."""
     tally, pick = Tally(attack), random.Random(seed)
@@ -171,9 +186,10 @@ def kill_at_random(subject: Subject, trials: int, seed: int, attack: str, end: f
     def kill() -> bool:
         process = chain.start()
         with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(pick.uniform(0.0, chain.whole_s * 0.6))
+            process.wait(pick.uniform(0.05, 0.8) * chain.whole_s)
         killed = process.poll() is None
         if killed:
+            chain.at_work = {*processes_with(chain.temporary)}
             process.kill()
             process.wait()
             tally.where[chain._stage()] += 1

@@ -75,6 +75,18 @@ def test_a_folder_that_its_holder_removed_is_made_anew(tmp_path, holder):
         assert second.returncode != 0, "the new one is locked"
 
 
+def test_a_folder_that_can_only_be_read_is_read_without_a_lock(tmp_path, monkeypatch):
+    def refuse(path, flags, *more):
+        raise OSError(errno.EROFS, "Read-only file system", str(path))
+
+    monkeypatch.setattr(folder_lock, "try_lock", lambda descriptor: None)
+    with monkeypatch.context() as patched:
+        descriptor = folder_lock.os.open(tmp_path, folder_lock.os.O_RDONLY)
+        patched.setattr(folder_lock.os, "open", lambda path, flags, *more: refuse(path, flags) if more else descriptor)
+        with alone_in(tmp_path, lambda: None):
+            assert list(tmp_path.iterdir()) == []
+
+
 def test_the_holder_of_another_machine_is_left_in_peace(tmp_path, monkeypatch):
     monkeypatch.setattr(folder_lock, "try_lock", lambda descriptor: None)
     monkeypatch.setattr(folder_lock.time, "sleep", lambda seconds: (_ for _ in ()).throw(KeyboardInterrupt))

