@@ -11,7 +11,6 @@ from types import SimpleNamespace
 
 import pytest
 
-import gsac
 from gsac.pipeline import errors
 from gsac.pipeline.cli import execute
 from gsac.pipeline.outcomes import ExitCode
@@ -138,9 +137,9 @@ def test_a_stage_that_fails_on_a_full_disk_says_so_whatever_its_library_said(toy
 
     for name, value in toy.env.items():
         monkeypatch.setenv(name, value)
-    monkeypatch.setattr("gsac.__path__", [*gsac.__path__, str(toy.root / "lib" / "gsac")], raising=False)
     monkeypatch.setattr(stage_runner.shutil, "disk_usage", lambda folder: SimpleNamespace(free=free))
-    code = execute(["run", str(toy.clip), "--out", str(toy.out), "--set", "cut.trouble=stage"])
+    with toy.importable():
+        code = execute(["run", str(toy.clip), "--out", str(toy.out), "--set", "cut.trouble=stage"])
     assert code == ExitCode.FAILED and words in capsys.readouterr().err
 
 

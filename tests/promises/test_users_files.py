@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -35,12 +34,9 @@ def out(finished, tmp_path, monkeypatch):
     """A folder of its own with the finished run; commands in this process see the project."""
     for name in ("GSAC_STAGES", "GSAC_CACHE", "TOY_RUNS", "PYTHONPATH"):
         monkeypatch.setenv(name, finished.env[name])
-    monkeypatch.setattr(sys, "path", [*sys.path, str(finished.root / "lib")])
-    import gsac
-
-    monkeypatch.setattr(gsac, "__path__", [*gsac.__path__, str(finished.root / "lib" / "gsac")])
     shutil.copytree(finished.out, tmp_path / "out", symlinks=True)
-    return tmp_path / "out"
+    with finished.importable():
+        yield tmp_path / "out"
 
 
 def put(path: Path) -> None:

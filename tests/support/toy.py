@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -10,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 DAG = """stages:
@@ -162,6 +163,15 @@ def run(job):
 }
 
 
+def forget_toys() -> None:
+    """Drops the modules of all toy projects from this process, and where they were found."""
+    from gsac.cache import code
+
+    for name in [name for name in sys.modules if name.startswith("gsac.toy")]:
+        del sys.modules[name]
+    code._installed.cache_clear()
+
+
 @dataclasses.dataclass
 class Done:
     """One finished `gsac`."""
@@ -203,6 +213,20 @@ class Toy:
             body = BODIES.get(name, BODIES["side"]).replace("NAME", name)
             self.write(f"{name}/stage.py", "from gsac.toy.common import begin, end, spell\n" + body)
         self.set_package_version("1.0")
+
+    @contextlib.contextmanager
+    def importable(self) -> Iterator[None]:
+        """Commands in this process see the project, and not another toy's that was imported before."""
+        import gsac
+
+        paths, here = list(sys.path), gsac.__path__
+        forget_toys()
+        gsac.__path__, sys.path[:] = [*here, str(self.root / "lib" / "gsac")], [*paths, str(self.root / "lib")]
+        try:
+            yield
+        finally:
+            forget_toys()
+            gsac.__path__, sys.path[:] = here, paths
 
     def write(self, path: str, text: str) -> None:
         file = self.package / path
