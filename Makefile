@@ -32,6 +32,9 @@ test-fast: setup
 # The long versions of what the tests try in small: hours, for the table in docs/lab/attacks.md.
 attack: setup debian
 	PYTHONPATH=tests $(BIN)/python -m attack
+	GSAC_TRIALS=3000 $(BIN)/python -m pytest -q tests/promises/test_poisoned_records.py
+	PYTHONPATH=tests $(BIN)/python -m support.readers 100000
+	GSAC_READER_MUTANTS=60000 $(BIN)/python -m pytest -q -s tests/viewer/test_reader_attack.py -k fuzz
 
 # Some tests use Debian packages; where they may not be installed, those tests skip and name them.
 debian:

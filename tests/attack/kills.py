@@ -157,8 +157,7 @@ class Chain:
     def _bytes(self) -> dict[str, str]:
         """Digests of what the folder holds, without what tells of times."""
         found = [path for path in sorted(self.subject.out.glob("*/*")) if path.parent.name != "logs" and path.name not in TIMES]
-        return {str(path.relative_to(self.subject.out)): tree_digest(path.resolve(), NO_MEMO)[0] for path in found
-                if path.name != "metrics.json"}
+        return {str(path.relative_to(self.subject.out)): tree_digest(path.resolve(), NO_MEMO)[0] for path in found}
 
 
 def processes_with(temporary: Path) -> list[int]:
