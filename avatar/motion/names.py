@@ -58,7 +58,7 @@ def split_side(name: str) -> tuple[str, str]:
         elif word in NOISE or (word.isdigit() and i and words[i - 1].lower() == "bip"):
             continue
         else:
-            out.append(str(int(word)) if word.isdigit() else word)
+            out.append((word.lstrip("0") or "0") if word.isdigit() else word)
     return side, "".join(out)
 
 

@@ -141,6 +141,11 @@ def test_a_name_without_a_side_is_no_limb():
     assert match(["Thigh", "Foot", "Head"]) == {"head": 2}
 
 
+def test_a_number_in_a_joints_name_may_be_of_any_length():
+    assert split_side("Spine02") == ("", "spine2") and split_side("spine_00") == ("", "spine0")
+    assert split_side("spine" + "0" * 3 + "7" * 5000) == ("", "spine" + "7" * 5000)
+
+
 @pytest.mark.footage
 @pytest.mark.parametrize("name", ["dab", "jesse_dance", "jumping_jacks", "wave_hello"])
 def test_recorded_motions_point_every_limb_where_the_dancer_does(skeleton, name):
