@@ -13,10 +13,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from gsac.cache.lock import REFUSED
 from gsac.cache.owner import is_dead, this_process
 
-REFUSED = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EPERM)
-"""errno of file systems without locks on folders."""
 HOLDER = ".gsac-lock"
 POLL_S = 0.2
 

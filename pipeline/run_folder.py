@@ -114,6 +114,7 @@ class RunFolder:
             what = "a file" if self.root.exists() else "a link that leads to nothing"
             raise BadInput(f"{self.root} is {what}; --out must be a folder")
         self._made = [folder for folder in (self.root, *self.root.parents) if not folder.exists()]
+        here = None
         try:
             with alone_in(self.root, self._waiting):
                 for folder in (self.root, *filter(Path.is_dir, self.root.iterdir())):
@@ -121,6 +122,8 @@ class RunFolder:
                 here = self.root.stat()
                 yield
         except FileNotFoundError as error:
+            if here is None:
+                raise BadInput(f"{self.root} cannot be made ({error.strerror}); choose another --out") from error
             if self.root.is_dir() and os.path.samestat(self.root.stat(), here):
                 raise
             raise BadInput(f"{self.root} was removed while a command worked in it; run the command again") from error

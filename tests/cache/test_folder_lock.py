@@ -9,6 +9,7 @@ import pytest
 
 from gsac.cache import folder_lock
 from gsac.cache.folder_lock import HOLDER, alone_in
+from support.children import starter
 
 HOLD = """
 import sys
@@ -25,19 +26,8 @@ with folder_lock.alone_in(Path(sys.argv[1]), lambda: None):
 @pytest.fixture
 def holder(tmp_path):
     """holder(*arguments): a process that works in tmp_path / "out"."""
-    started = []
-
-    def start(*arguments):
-        process = subprocess.Popen([sys.executable, "-c", HOLD, str(tmp_path / "out"), *arguments], stdin=subprocess.PIPE,
-                                   stdout=subprocess.PIPE, text=True)
-        started.append(process)
-        process.stdout.readline()
-        return process
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
+    with starter(HOLD, tmp_path / "out") as start:
+        yield start
 
 
 @pytest.mark.parametrize("locks", [True, False])

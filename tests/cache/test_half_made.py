@@ -1,14 +1,13 @@
 """Folders of work in progress: removed by their owner, or after its death by the next that comes; nothing else ever is."""
 
 import errno
-import subprocess
-import sys
 
 import pytest
 
 from gsac.cache import folder_lock
 from gsac.cache.half_made import MARK, half_made, sweep
 from gsac.cache.owner import is_dead, this_process
+from support.children import starter
 
 MAKE = """
 import sys
@@ -30,19 +29,8 @@ with half_made(Path(sys.argv[1])) as (folder, _):
 @pytest.fixture
 def maker(tmp_path):
     """maker(*arguments): a process that is making something in tmp_path."""
-    started = []
-
-    def start(*arguments):
-        process = subprocess.Popen([sys.executable, "-c", MAKE, str(tmp_path), *arguments], stdin=subprocess.PIPE,
-                                   stdout=subprocess.PIPE, text=True)
-        started.append(process)
-        process.stdout.readline()
-        return process
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
+    with starter(MAKE, tmp_path) as start:
+        yield start
 
 
 def kill(process):

@@ -194,3 +194,10 @@ def test_a_folder_that_is_removed_while_a_run_works_in_it_is_named(toy):
     _, said = process.communicate(timeout=60)
     assert process.returncode == 2 and f"{toy.out} was removed while a command worked in it" in said and "Traceback" not in said
     assert toy.run().code == 0
+
+
+def test_an_output_folder_that_cannot_be_made_is_named(tmp_path, capsys):
+    clip = tmp_path / "clip.mp4"
+    clip.write_bytes(b"0")
+    assert execute(["run", str(clip), "--out", "/proc/avatar"]) == ExitCode.USAGE
+    assert "/proc/avatar cannot be made (No such file or directory); choose another --out" in capsys.readouterr().err
