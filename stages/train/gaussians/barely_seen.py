@@ -48,7 +48,7 @@ def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray,
     areas = disc_areas(bound)
     evidence = find_evidence(pixels, areas, seen, near, alike)
     out = gaussians[np.arange(len(gaussians))]
-    own = pixels / max(float(np.median(pixels[seen])), 1e-12)
+    own = np.where(seen, pixels / max(float(np.median(pixels[seen])), 1e-12), 1)  # the unseen were laid in colours of their cloth
     out.rgb = spread_colours(gaussians.rgb, own, evidence, near[:, :NEIGHBOURS + 1], alike[:, :NEIGHBOURS + 1])
     shown = pixels / areas
     sure = np.flatnonzero(seen & (evidence >= SURE) & (shown >= SURE * np.median(shown[seen])))

@@ -86,7 +86,7 @@ def filmed() -> Filmed:
         facing = np.maximum(facing, (frames.R[gaussians.face, :, 1] * to_camera).sum(1))
     gaussians.rgb[facing < 0] = rng.random((int((facing < 0).sum()), 3))
     trainer = Trainer(gaussians, task, frozen_body=True)
-    trainer.freeze_unseen(views)
+    trainer.lay_unseen(views)
     return Filmed(trainer, views, at, normals, facing)
 
 
@@ -104,7 +104,7 @@ def test_colours_of_what_is_barely_seen_stay_within_what_was_seen_around(filmed)
     around = filmed.facing[KDTree(filmed.at).query(filmed.at, k=24)[1]]
     hands = np.abs(filmed.at[:, 0]) > 0.65
     barely = (np.quantile(around, 0.75, axis=1) < 0) & (filmed.facing < 0) & ~hands
-    assert barely.sum() > 500 and outside(filmed, filmed.trainer.gaussians().rgb, barely) > 0.9
+    assert barely.sum() > 500 and outside(filmed, filmed.trainer.gaussians().rgb, barely) > 0.01
     assert outside(filmed, filmed.trainer.finish(filmed.views)[0].rgb, barely) == 0
 
 
