@@ -23,6 +23,8 @@ class TrainConfig:
     """Which body; the same as smplx.body_model."""
     recipe: str = "fast"
     """Which optimisation fits the gaussians: fast; or paper, with one gaussian a face and its own rates."""
+    paper_text: bool = False
+    """Whether recipe paper has its losses as the paper's text: L2 and SSIM without alpha times mask, squared Sobel, no Dice."""
     device: str = AUTO
     """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
     gaussians: int | str = AUTO

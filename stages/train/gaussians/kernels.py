@@ -73,7 +73,7 @@ def adam_rows(value, grad, first, second, count, rate):
 
 @own_kernel(error_model="numpy")
 def adam(value, grad, first, second, count, rate):
-    """One Adam step (0.9, 0.999) of all of value (N, C); count: steps so far, this one included."""
+    """One Adam step (0.9, 0.999, 1e-8) of all of value (N, C), recipe `paper`'s; count: steps so far, this one included."""
     scale = rate / (1 - 0.9**count)
     unbias = 1 / (1 - 0.999**count)
     for i in range(value.shape[0]):
@@ -81,7 +81,7 @@ def adam(value, grad, first, second, count, rate):
             g = np.float64(grad[i, c])
             first[i, c] += 0.1 * (g - first[i, c])
             second[i, c] += 0.001 * (g * g - second[i, c])
-            value[i, c] -= scale * first[i, c] / (math.sqrt(second[i, c] * unbias) + 1e-15)
+            value[i, c] -= scale * first[i, c] / (math.sqrt(second[i, c] * unbias) + 1e-8)
 
 
 @own_kernel(error_model="numpy")

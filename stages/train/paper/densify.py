@@ -1,6 +1,7 @@
 """Densification of recipe `paper`: clones or splits gaussians with a large gradient of their place in the image.
 
-3DGS (Kerbl et al. 2023) as HAHA sets it: eleven events of a 3000-step run, nothing is pruned.
+3DGS (Kerbl et al. 2023) as HAHA sets it: eleven events of a 3000-step run, gradients summed between the first step and the last
+that may be one, nothing is pruned.
 """
 
 from __future__ import annotations
@@ -8,13 +9,11 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gsac.avatar.logistic import logit
-from gsac.avatar.rotation import to_xyzw
 
 FIRST, LAST, EVERY, PHASE = 100, 2500, 201, 99
-"""Events are the steps strictly between FIRST and LAST that leave PHASE when divided by EVERY."""
+"""Gradients are summed in the steps strictly between FIRST and LAST; events are those that leave PHASE when divided by EVERY."""
 LARGEST = 0.1
 """Scales are LARGEST * sigmoid(logit), in units of the face."""
 THRESHOLD = 5e-5
@@ -23,6 +22,8 @@ SMALL = 0.005
 """Largest scale, in units of the face, up to which a gaussian is cloned and not split."""
 SHRINK, SHIFT = 1.6, 0.2
 """Of a split: what the scales are divided by, and the share of the parent's deviation by which the halves are moved."""
+ABOVE = 1e-5
+"""Added to a split's scales as shares of LARGEST, before their logit."""
 
 
 class Growable(Protocol):
@@ -37,13 +38,18 @@ class Growable(Protocol):
         """Adds rows: new: name -> (n, C), bound as their parents (n,) are."""
 
 
+def counts(step: int) -> bool:
+    """Whether the gradients of this step, from 0, are summed."""
+    return FIRST < step < LAST
+
+
 def due(step: int) -> bool:
     """Whether gaussians are added after this step, from 0."""
-    return FIRST < step < LAST and step % EVERY == PHASE
+    return counts(step) and step % EVERY == PHASE
 
 
 class Densifier:
-    """Sums, since the last event, of the gradient lengths of N gaussians: length (N,) and hits (N,), the images they were in."""
+    """Sums of the gradient lengths of N gaussians: length (N,) and hits (N,), the images they were in; anew when some are added."""
 
     def __init__(self, count: int):
         self.reset(count)
@@ -52,8 +58,10 @@ class Densifier:
         """Empties the sums, for `count` gaussians."""
         self.length, self.hits = np.zeros(count), np.zeros(count, np.int64)
 
-    def note(self, gradient: np.ndarray, visible: np.ndarray) -> None:
-        """Adds one image. gradient: (N, 2), -1..1 across the frame; visible: (N,) bool."""
+    def note(self, step: int, gradient: np.ndarray, visible: np.ndarray) -> None:
+        """Adds one image where the step counts. gradient: (N, 2), -1..1 across the frame; visible: (N,) bool."""
+        if not counts(step):
+            return
         self.length += np.where(visible, np.linalg.norm(gradient, axis=1), 0)
         self.hits += visible
 
@@ -61,29 +69,35 @@ class Densifier:
         """Grows the gaussians where the step is an event. New ones start with empty Adam moments."""
         if not due(step):
             return
-        chosen = np.flatnonzero(self.length / np.maximum(self.hits, 1) >= THRESHOLD)
-        gaussians.append(chosen, make_children(gaussians.values, chosen, rng))
-        self.reset(len(gaussians.face))
+        chosen = self.choose()
+        if len(chosen):
+            parents, new = make_children(gaussians.values, chosen, rng)
+            gaussians.append(parents, new)
+            self.reset(len(gaussians.face))
+
+    def choose(self) -> np.ndarray:
+        """(n,) indices of the gaussians whose mean gradient is large."""
+        return np.flatnonzero(self.length / np.maximum(self.hits, 1) >= THRESHOLD)
 
 
-def make_children(values: dict[str, np.ndarray], chosen: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Rows (n, C) to append, one for each chosen (n,); parents that split are changed in place.
+def make_children(values: dict[str, np.ndarray], chosen: np.ndarray,
+                  rng: np.random.Generator) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """The parents (n,) of the rows to append, clones first, and the rows (n, C); parents that split are changed in place.
 
-    values: mu (N, 3), quat (N, 4), scale_logit (N, 3), and others (N, C) that are copied. Both halves of a split are moved by
-    samples of the parent, its deviation times SHIFT, away from the body along the face's normal (y).
+    values: mu (N, 3), scale_logit (N, 3), and others (N, C) that are copied; chosen: (n,) indices. A split moves the parent by a
+    sample of its deviations times SHIFT, in the frame of its face and away from the body (y), and the child by another one from
+    there.
     """
-    new = {name: value[chosen].copy() for name, value in values.items()}
-    act = LARGEST / (1 + np.exp(-new["scale_logit"].astype(np.float64)))
+    act = LARGEST / (1 + np.exp(-values["scale_logit"][chosen].astype(np.float64)))
     split = act.max(1) > SMALL
-    parents, act = chosen[split], act[split]
-    if len(parents):
-        turn = Rotation.from_quat(to_xyzw(new["quat"][split]))
-        shifts = [turn.apply(rng.normal(size=act.shape) * act * SHIFT) for _ in range(2)]
-        for shift in shifts:
-            shift[:, 1] = np.abs(shift[:, 1])
-        share = act / SHRINK / LARGEST
-        logits = logit(share).astype(np.float32)
-        new["mu"][split] += shifts[0].astype(np.float32)
-        values["mu"][parents] += shifts[1].astype(np.float32)
-        new["scale_logit"][split] = values["scale_logit"][parents] = logits
-    return new
+    act = act[split]
+    chosen, halved = np.concatenate([chosen[~split], chosen[split]]), chosen[split]
+    if len(halved):
+        shifts = rng.normal(size=(2, *act.shape)) * act * SHIFT
+        shifts[..., 1] = np.abs(shifts[..., 1])
+        values["mu"][halved] += shifts[0].astype(np.float32)
+        values["scale_logit"][halved] = logit(act / SHRINK / LARGEST + ABOVE).astype(np.float32)
+    new = {name: value[chosen].copy() for name, value in values.items()}
+    if len(halved):
+        new["mu"][-len(halved):] += shifts[1].astype(np.float32)
+    return chosen, new

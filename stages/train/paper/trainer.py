@@ -1,76 +1,91 @@
-"""Recipe `paper`: the first stage of HAHA (Svitov et al. 2024) as GSAC uses it; the baseline that `fast` is measured against.
+"""Recipe `paper`: the first stage of HAHA (Svitov et al. 2024) as GSAC trains by it; the baseline that `fast` is measured against.
 
-One gaussian a face, random colours, opacity fixed, four frames a step, densification by the gradient of the image places, pose
-and betas learned. Everything is computed on the person's box but scaled to the whole frame: outside of the box render and frame
-are the same background. Known departures, all of them small: neighbours and their distances are taken at rest; jaw and expression
-stay as fitted (their rate could move them by 0.015 at most); each frame's pose has Adam moments of its own. LPIPS is in the loss
-where the user has brought its network: no package has it, and it takes nearly all of the time.
+One gaussian a face, random colours, opacity fixed, four frames a step, densification by the gradient of the image places, poses
+with jaw and expression, and betas learned; losses, neighbours, Adam and growth as in the published code, of which the text of the
+paper differs (`train.paper_text`). Only the box of a square frame that can show the person is computed. Known departures:
+
+- gaussians are drawn, and their gradient taken, by our rule (avatar/draw_rule.py): alpha up to 0.999, the published rasteriser 0.99;
+  exact gradients, where that one has another one of alpha, which only Dice has a part in;
+- the body has our number of betas, expressions and joints' correctives, and poses come from our own fit;
+- masks are soft; images have the size of `train.height`, the published ones are 1080 px wide;
+- the colours that are handed out are clipped to 0..1.
+
+LPIPS is in the loss where the user has brought its network: no package has it, and on a CPU it takes nearly all of the time.
 """
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from gsac.avatar import losses
-from gsac.avatar.binding import face_frames
+from gsac.avatar.binding import bind_backward
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import sigmoid
-from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backward, screen_gradients
+from gsac.avatar.raster import BoundGradients, Rendering, render_backward, render_bound, screen_gradients
 from gsac.avatar.threads import Workspace
-from gsac.stages.train.checkpoint import State, loop_state
+from gsac.stages.train.checkpoint import State
 from gsac.stages.train.finite import named_gradients, named_pose, require_finite
-from gsac.stages.train.gaussians.kernels import adam, on_background, through_background
+from gsac.stages.train.gaussians.kernels import adam
+from gsac.stages.train.paper.batches import Batches, draw_batches
+from gsac.stages.train.paper.body_adam import BodyAdam
 from gsac.stages.train.paper.densify import LARGEST, Densifier
-from gsac.stages.train.paper.knn import Neighbours
-from gsac.stages.train.paper.losses import dice, perceptual, sobel_magnitude
-from gsac.stages.train.task import LPIPS_WEIGHT, Fit, Task
-from gsac.stages.train.views import View, person_crop
+from gsac.stages.train.paper.knn import pull_together
+from gsac.stages.train.paper.losses import Picture, dice, picture_loss
+from gsac.stages.train.paper.square import side_of, square_crop
+from gsac.stages.train.task import Fit, Task
+from gsac.stages.train.views import View
 
 STEPS = 3000
 BATCH = 4
 SCALE_LOGITS, OPACITY_LOGIT = (-1.0, -2.0, -1.0), 6.0
 MU_RATE, MU_DECAY = 1.6e-4, 0.01
 RATES = {"rgb": 5e-3, "quat": 5e-3, "scale_logit": 5e-3}
-POSE_RATE = 2e-4
-"""Of orientation, body pose, translation and betas; the hands' is a tenth (`Poses`)."""
-SSIM, SOBEL, KNN, DICE = 0.1, 1.0, 0.01, 0.1
-"""Weights of the losses beside L2."""
+KNN = 0.01
+"""Weight of the neighbour term beside L2."""
 KEPT = ("face", "values", "first", "second")
 """Attributes of Trainer that go into a checkpoint as they are."""
 
 
 def fit(task: Task) -> Fit:
     """The whole training. Raises StageError that names the step and the quantity that is no longer finite."""
-    steps = task.config.steps or STEPS
     rng = np.random.default_rng(task.config.seed)
-    views = {int(t): person_crop(task.views[t]) for t in task.trained}
+    views, batches = crop_views(task), plan_batches(task)
     trainer = Trainer(task, rng)
-    batch = min(BATCH, len(task.trained))
-    order: list[int] = []
-    begin = 0
+    steps, begin = len(batches.order), 0
     if task.resumed is not None:
         trainer.restore(task.resumed["trainer"])
-        begin, order, rng.bit_generator.state = (task.resumed[name] for name in ("step", "order", "rng"))
+        begin, rng.bit_generator.state = task.resumed["step"], task.resumed["rng"]
     for step in range(begin, steps):
-        if len(order) < batch:  # what is left of the last round is dropped
-            order = [int(t) for t in rng.permutation(task.trained)]
-        frames, order = order[:batch], order[batch:]
-        loss = trainer.step({t: views[t] for t in frames}, step, steps)
+        frames = [int(t) for t in task.trained[batches.order[step]]]
+        loss = trainer.step({t: views[t] for t in frames}, step, steps, batches.background[step], batches.centre[step])
         trainer.densifier.grow(step, trainer, rng)
         task.checkpoint(step + 1, steps, loss, trainer.gaussians)
-        task.keep(step + 1, steps, partial(loop_state, step + 1, order, rng, trainer))
+        task.keep(step + 1, steps, lambda done=step + 1: {"step": done, "rng": rng.bit_generator.state, "trainer": trainer.state()})
         task.progress(step + 1, steps, "steps")
     return Fit(trainer.gaussians(), np.ones(len(trainer.face), bool))
+
+
+def crop_views(task: Task) -> dict[int, View]:
+    """Trained frame -> the part of its square frame that is computed."""
+    side = side_of(task.views)
+    return {int(t): square_crop(task.views[t], side, task.poses.vertices(t)) for t in task.trained}
+
+
+def plan_batches(task: Task) -> Batches:
+    """What the steps of the task see."""
+    vertices = len(task.poses.body.v_template)
+    return draw_batches(len(task.trained), min(BATCH, len(task.trained)), task.config.steps or STEPS, vertices, task.config.seed)
+
+
+def mu_rate(step: int | np.ndarray, steps: int) -> float | np.ndarray:
+    """Adam rate of the places at a step, from 0, or at steps (n,): HAHA's scheduler is one ahead."""
+    return MU_RATE * MU_DECAY ** ((step + 1) / steps)
 
 
 class Trainer:
     """The gaussians, their Adam state, and one step."""
 
     def __init__(self, task: Task, rng: np.random.Generator):
-        self.poses, self.faces = task.poses, task.poses.body.faces
-        self.frames = face_frames(task.poses.rest(int(task.trained[0]))[0], self.faces)
+        self.poses, self.faces, self.text = task.poses, task.poses.body.faces, task.config.paper_text
         count = len(self.faces)
         self.face = np.arange(count, dtype=np.int32)
         self.values = {"mu": np.zeros((count, 3)), "quat": np.tile([1.0, 0, 0, 0], (count, 1)),
@@ -78,24 +93,21 @@ class Trainer:
         self.values = {name: value.astype(np.float32) for name, value in self.values.items()}
         self.first = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.second = {name: np.zeros_like(v) for name, v in self.values.items()}
-        self.frame_size = task.views[0].camera.width, task.views[0].camera.height
-        self.lpips = task.lpips
-        self.densifier = Densifier(count)
-        self.neighbours = Neighbours()
-        self.workspace, self.losses = Workspace(), Workspace()
-        self.rng = rng
+        self.side, self.lpips = side_of(task.views), task.lpips
+        self.densifier, self.body = Densifier(count), BodyAdam(task.poses)
+        self.workspaces = [Workspace() for _ in range(min(BATCH, len(task.trained)))]
+        self.losses = Workspace()
 
     def state(self) -> State:
         """For a checkpoint, without the poses."""
         return {name: getattr(self, name) for name in KEPT} | {
-            "frames": self.frames._asdict(), "neighbours": self.neighbours.index,
-            "length": self.densifier.length, "hits": self.densifier.hits}
+            "body": self.body.state(), "length": self.densifier.length, "hits": self.densifier.hits}
 
     def restore(self, state: State) -> None:
         """Takes the place of the trainer that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])
-        self.frames, self.neighbours.index = self.frames._replace(**state["frames"]), state["neighbours"]
+        self.body.restore(state["body"])
         self.densifier.length, self.densifier.hits = state["length"], state["hits"]
 
     def gaussians(self) -> Gaussians:
@@ -111,31 +123,36 @@ class Trainer:
         return Gaussians(self.face, v["mu"], v["quat"], np.log(LARGEST) - np.log1p(np.exp(-v["scale_logit"])), v["rgb"],
                          opacity)
 
-    def step(self, views: dict[int, View], number: int, steps: int) -> float:
-        """Step `number` of `steps` on a batch: frame -> view. Returns its loss without the neighbour term."""
-        shown, share = self.shown(), 1 / len(views)
-        total, loss = {name: np.zeros_like(v) for name, v in self.values.items()}, 0.0
+    def step(self, views: dict[int, View], number: int, steps: int, backgrounds: np.ndarray, centres: np.ndarray) -> float:
+        """Step `number`, from 0, of `steps` on a batch: frame -> view. Returns its loss.
+
+        backgrounds: (B, 3) in 0..1; centres: (B,) vertices in the middle of the windows that LPIPS sees.
+        """
+        shown = self.shown()
+        total = {name: np.zeros_like(v) for name, v in self.values.items()}
+        vertices = {t: self.poses.vertices(t) for t in views}
+        renderings = {t: render_bound(vertices[t], self.faces, shown, view.camera, workspace)
+                      for (t, view), workspace in zip(views.items(), self.workspaces, strict=False)}
+        pictures = {t: Picture(renderings[t].rgb, renderings[t].alpha, view.pixels, background, view.corner, self.side)
+                    for (t, view), background in zip(views.items(), backgrounds, strict=True)}
+        loss, slope = (0.0, 0.0) if self.text else dice(list(pictures.values()))
         moves = {}
-        for t, view in views.items():
-            value, grads = self._image(t, view, shown, share)
+        for (t, view), vertex in zip(views.items(), centres, strict=True):
+            centre = view.camera.project(vertices[t][vertex]) + view.corner
+            value, grads = self._gradients(renderings[t], pictures[t], centre, slope, 1 / len(views), number)
             require_finite(f"at step {number}", named_gradients(grads))
             loss += value
-            total["mu"] += grads.mu
-            total["quat"] += grads.quat
-            total["scale_logit"] += grads.log_scale / (1 + np.exp(self.values["scale_logit"]))
-            total["rgb"] += grads.rgb
-            moves[t] = grads.vertices.copy()
-        self._pull_together(total, number)
+            for name, gradient in (("mu", grads.mu), ("quat", grads.quat), ("rgb", grads.rgb),
+                                   ("scale_logit", grads.log_scale / (1 + np.exp(self.values["scale_logit"])))):
+                total[name] += gradient
+            moves[t] = grads.vertices
         require_finite(f"at step {number}",
                        {"loss": loss, **{f"gradient of {name}": gradient for name, gradient in total.items()}})
-        rates = RATES | {"mu": MU_RATE * MU_DECAY ** (number / steps)}
-        for name, rate in rates.items():
+        for name, rate in (RATES | {"mu": mu_rate(number, steps)}).items():
             adam(self.values[name], total[name], self.first[name], self.second[name], number + 1, rate)
-        betas = np.zeros(len(self.poses.betas))
-        for t, grad_vertices in moves.items():
-            betas += self.poses.shape_gradient(*self.poses.step(t, grad_vertices, POSE_RATE, 0.0))
+        self.body.step(moves)
+        for t in moves:
             require_finite(f"after step {number}", named_pose(self.poses, t))
-        self.poses.step_betas(betas, POSE_RATE)
         require_finite(f"after step {number}", self.values | {"betas": self.poses.betas})
         return float(loss)
 
@@ -147,42 +164,17 @@ class Trainer:
             for moments in (self.first, self.second):
                 moments[name] = np.concatenate([moments[name], np.zeros_like(rows)])
 
-    def _image(self, t: int, view: View, shown: Gaussians, share: float) -> tuple[float, BoundGradients]:
-        """Loss of one frame times its share of the batch, and its gradients."""
-        vertices = self.poses.vertices(t)
-        rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
-        background = self.rng.random(3).astype(np.float32)
-        image, target = np.empty_like(rendering.rgb), np.empty_like(rendering.rgb)
-        gain, grad_gain = np.ones(3, np.float32), np.empty(3)
-        on_background(rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
-        frame = self.frame_size[0] * self.frame_size[1]
-        part = share * rendering.alpha.size / frame  # a mean over the box as its part of the mean over the whole frame
-        loss, gradient = losses.l2(image, target, factor=part, workspace=self.losses)
-        loss *= part
-        similarity = losses.ssim(image, target, factor=-SSIM * part, gradient=gradient, workspace=self.losses).value
-        loss += SSIM * part * (1 - similarity)
-        loss += sobel_magnitude(image, target, SOBEL * share / frame, gradient)
-        if self.lpips is not None:
-            centre = view.camera.project(vertices[[self.rng.integers(len(vertices))]])[0] + view.corner
-            loss += perceptual(self.lpips, image, target, background, np.array(view.corner), self.frame_size, centre,
-                               LPIPS_WEIGHT * share, gradient)
-        grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(rendering.alpha)
-        through_background(gradient, rendering.rgb, rendering.alpha, view.pixels, background, gain, 0.0, grad_rgb, grad_alpha,
-                           grad_gain)
-        loss += dice(rendering.alpha, view.pixels, frame - rendering.alpha.size, DICE * share, grad_alpha)
-        grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
-        places, visible = screen_gradients(rendering.state)
-        self.densifier.note(places * np.array(self.frame_size) / 2, visible)
-        return loss, grads
-
-    def _pull_together(self, total: dict[str, np.ndarray], number: int) -> None:
-        """Adds the gradients of the neighbour term."""
-        v = self.values
-        turn, k = self.frames.R[self.face], self.frames.k[self.face, None]
-        places = self.frames.T[self.face] + k * np.einsum("nij,nj->ni", turn, v["mu"])
-        grad_places = self.neighbours.distance_gradient(places, KNN, number)
-        total["mu"] += k * np.einsum("nji,nj->ni", turn, grad_places)
-        act = LARGEST / (1 + np.exp(-v["scale_logit"]))
-        total["scale_logit"] += self.neighbours.spread_gradient(act, KNN) * act * (1 - act / LARGEST)
-        for name in ("quat", "rgb"):
-            total[name] += self.neighbours.spread_gradient(v[name], KNN)
+    def _gradients(self, rendering: Rendering, picture: Picture, centre: np.ndarray, slope: float, share: float,
+                   number: int) -> tuple[float, BoundGradients]:
+        """Loss of one frame times its share of the batch, and its gradients and those of the batch's Dice (slope)."""
+        state = rendering.state
+        loss, grad_rgb, grad_alpha = picture_loss(picture, share, self.text, self.losses, self.lpips, centre)
+        grad_alpha += np.float32(slope) * (1 - picture.mask)
+        grads = render_backward(state, grad_rgb, grad_alpha)
+        places, visible = screen_gradients(state)
+        self.densifier.note(number, places * self.side / 2, visible)
+        pull = pull_together(state.means, state.rotations, state.scales, self.values["rgb"], KNN * share)
+        bound = bind_backward(*state.bound, grads.means + pull.places, grads.rotations + pull.rotations,
+                              grads.scales + pull.scales)
+        return loss + pull.value, BoundGradients(bound.mu, bound.quat, bound.log_scale, grads.rgb + pull.rgb, grads.opacity,
+                                                 bound.vertices)

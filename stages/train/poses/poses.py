@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gsac.avatar.body import Body, BodyParams, split_pose
-from gsac.avatar.joints import BODY, JAW_EYES
+from gsac.avatar.joints import BODY, JAW, JAW_EYES
 from gsac.avatar.skinning import joint_transforms, skin, skin_backward
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.choose_heldout import carry_corrections
@@ -42,12 +42,16 @@ def carry_to_untrained(poses: Poses, trained: np.ndarray) -> Poses:
     return out
 
 
-def adam_move(moments: np.ndarray, count: int, grad: np.ndarray, rate: float) -> np.ndarray:
-    """(...) to subtract at the count-th gradient, grad (...); moments (2, ...) are updated in place."""
+def adam_move(moments: np.ndarray, count: int, grad: np.ndarray, rate: float, fresh: float = 0.01,
+              tiny: float = 1e-12) -> np.ndarray:
+    """(...) to subtract at the count-th gradient, grad (...); moments (2, ...) are updated in place.
+
+    fresh: share of a new square in the second moment; tiny: least of its root.
+    """
     first, second = moments
     first += 0.1 * (grad - first)
-    second += 0.01 * (grad**2 - second)
-    return rate * (first / (1 - 0.9**count)) / (np.sqrt(second / (1 - 0.99**count)) + 1e-12)
+    second += fresh * (grad**2 - second)
+    return rate * (first / (1 - 0.9**count)) / (np.sqrt(second / (1 - (1 - fresh)**count)) + tiny)
 
 
 class Poses:
@@ -114,7 +118,8 @@ class Poses:
             if self.shaped is None:
                 self.shaped = self.body.rest(self.betas, None, p.joint_offset)
             if t not in self.moved:
-                expression = np.asarray(self.body.effective_expression(p, t) + self.expression[t], np.float32)
+                jaw = self.body.jaw_actions @ self.pose[t, JAW].astype(np.float32)
+                expression = np.asarray(p.expression[t] + jaw + self.expression[t], np.float32)
                 self.moved[t] = self.body.exprdirs @ expression if expression.any() else np.float32(0)
             vertices, joints = self.shaped
             self.rests[t] = np.ascontiguousarray(vertices + self.moved[t], np.float32), np.asarray(joints, np.float64)
