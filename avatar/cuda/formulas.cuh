@@ -336,13 +336,14 @@ template <class real> FORMULA void adam_row(real *value, const real *grad, real 
     }
 }
 
-// Adam (0.9, 0.99) of one number that is pulled to zero; n: steps so far, this one counted.
+// Adam (0.9, 1 - fresh, tiny) of one number that is pulled to zero; n: steps so far, this one counted.
 template <class real>
-FORMULA void adam_pulled(real &value, real grad, real &first, real &second, int n, real rate, real pull, real unit) {
+FORMULA void adam_pulled(real &value, real grad, real &first, real &second, int n, real rate, real pull, real unit,
+                         real fresh = real(0.01), real tiny = real(1e-12)) {
     grad += 2 * pull * value / (unit * unit);
     first += real(0.1) * (grad - first);
-    second += real(0.01) * (grad * grad - second);
-    value -= rate * (first / (1 - pow(real(0.9), real(n)))) / (sqrt(second / (1 - pow(real(0.99), real(n)))) + real(1e-12));
+    second += fresh * (grad * grad - second);
+    value -= rate * (first / (1 - pow(real(0.9), real(n)))) / (sqrt(second / (1 - pow(1 - fresh, real(n)))) + tiny);
 }
 
 // Bounds of stages/train/gaussians/kernels.py `limit`, for one gaussian.

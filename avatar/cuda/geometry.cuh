@@ -1,6 +1,7 @@
 // From poses to tile lists: skinning, binding + projection, and the list of gaussians of every tile.
 // `Scene` is made by structs.py; `Plan`, `Frame`, `State` and `Now` are below.
 
+constexpr double PULL_UNIT = 1.0 / (1ll << 60);  // sums of whole numbers have no order: one seed gives one result
 constexpr int TILE = 16, PIXELS = TILE * TILE, SEGMENT = 128, HEAVY = 256;
 
 // Frame, rates and background of a step, copied from plan and frames by the first kernel: the others read them with one load.
@@ -50,6 +51,7 @@ extern "C" __global__ void __launch_bounds__(256) skin(Scene s) {
         Now &now = s.now[b];
         now.frame = frame;
         now.plan = plan;
+        now.plan.centre = s.centres ? s.centres[state.step * s.batch + b] : b == 0 ? plan.centre : -1;
         for (int c = 0; c < 3; ++c) {
             now.background[c] = s.background[3 * (state.step * s.batch + b) + c];
             now.gain[c] = s.gain[3 * frame.pose + c];

@@ -77,11 +77,22 @@ FORMULA void load_row(const float *from, float *to) {
     }
 }
 
-// Strength of the grey image's edge at a place in shared memory.
-FORMULA float edge(float (*v)[WIDE * PITCH], int at) {
-    float across = grey(v[0][at + 1] - v[0][at - 1], v[1][at + 1] - v[1][at - 1], v[2][at + 1] - v[2][at - 1]);
-    float down = grey(v[0][at + PITCH] - v[0][at - PITCH], v[1][at + PITCH] - v[1][at - PITCH], v[2][at + PITCH] - v[2][at - PITCH]);
-    return strength(across, down);
+// What L2 and SSIM see of a pixel: in recipe `paper` both images times alpha times mask, a factor that passes no gradient.
+FORMULA float seen_of(const Scene &s, const Pixel &pixel) { return s.masked ? pixel.alpha * pixel.mask : 1; }
+
+FORMULA float3 operator*(float3 a, float f) { return {a.x * f, a.y * f, a.z * f}; }
+
+// Grey render and target at a place of the square frame: outside of the box background, beyond the square zero.
+FORMULA float2 greys_at(const Scene &s, const Place &p, int x, int y) {
+    const Now &now = s.now[p.b];
+    int in_x = x + now.frame.left, in_y = y + now.frame.top;
+    if (in_x < 0 || in_y < 0 || in_x >= s.whole_width || in_y >= s.whole_height) return {0, 0};
+    if (x >= 0 && y >= 0 && x < p.width && y < p.height) {
+        Pixel pixel = pixel_of(s, p, x, y);
+        return {grey(pixel.image.x, pixel.image.y, pixel.image.z), grey(pixel.target.x, pixel.target.y, pixel.target.z)};
+    }
+    float ground = grey(now.background[0], now.background[1], now.background[2]);
+    return {ground, ground};
 }
 
 // (blocks). The tile's share of the loss, and SSIM's slopes by the window means: dS/dmx, dS/dq, dS/dp for three channels.
@@ -93,13 +104,16 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
     for (int item = blockIdx.x; item < total; item += gridDim.x) {
         const Place p = place_of(s, s.near[item]);
         const float share = share_of(s, p);
-        float loss = 0, shown = 0, masked = 0, both = 0;
+        float loss = 0, shown = 0, masked = 0, both = 0, squared = 0;
         __syncthreads();
         for (int e = tid; e < WIDE * WIDE; e += PIXELS) {
             int r = e / WIDE, c = e % WIDE, x = p.left + c - REACH, y = p.top + r - REACH;
             Pixel pixel = {};
             if (x >= 0 && y >= 0 && x < p.width && y < p.height) {
                 pixel = pixel_of(s, p, x, y);
+                float seen = seen_of(s, pixel);
+                pixel.image = pixel.image * seen;
+                pixel.target = pixel.target * seen;
                 if (r >= REACH && c >= REACH && r < REACH + TILE && c < REACH + TILE) {
                     float dx = pixel.image.x - pixel.target.x, dy = pixel.image.y - pixel.target.y;
                     float dz = pixel.image.z - pixel.target.z, da = pixel.alpha - pixel.mask;
@@ -107,6 +121,7 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
                     shown += pixel.alpha;
                     masked += pixel.mask;
                     both += pixel.alpha * pixel.mask;
+                    squared += pixel.mask * pixel.mask;
                 }
             }
             int to = r * PITCH + c;
@@ -180,18 +195,24 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
             }
         }
         if (s.edges > 0) {
-            int r = tid / TILE, c = tid % TILE, x = p.left + c, y = p.top + r;
-            if (x > 0 && y > 0 && x < p.width - 1 && y < p.height - 1) {
-                int at = (r + REACH) * PITCH + c + REACH;
-                float own = edge(image, at), real = edge(target, at);
-                loss += 3 * share * s.edges * fabsf(own - real);
+            float *own = image[0], *real = target[0];
+            __syncthreads();
+            for (int e = tid; e < 18 * 18; e += PIXELS) {
+                float2 greys = greys_at(s, p, p.left + e % 18 - 1, p.top + e / 18 - 1);
+                own[e] = greys.x;
+                real[e] = greys.y;
             }
+            __syncthreads();
+            int r = tid / TILE, c = tid % TILE, at = (r + 1) * 18 + c + 1;
+            if (p.left + c < p.width && p.top + r < p.height)
+                loss += 3 * share * s.edges * fabsf(strength(own[at + 1] - own[at - 1], own[at + 18] - own[at - 18])
+                                                    - strength(real[at + 1] - real[at - 1], real[at + 18] - real[at - 18]));
         }
         loss = sum_block(loss, scratch);
         if (tid == 0) s.tile_loss[p.tile] = loss;
         if (s.dice_weight > 0) {
-            float *to = s.overlap + 3 * p.tile, sums[3] = {shown, masked, both};
-            for (int k = 0; k < 3; ++k) {
+            float *to = s.overlap + 4 * p.tile, sums[4] = {shown, masked, both, squared};
+            for (int k = 0; k < 4; ++k) {
                 __syncthreads();
                 float sum = sum_block(sums[k], scratch);
                 if (tid == 0) to[k] = sum;
@@ -214,8 +235,9 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
         Pixel pixel = {};
         float sobel[3] = {}, grad[3] = {};
         if (inside) pixel = pixel_of(s, p, x, y);
-        const float image[3] = {pixel.image.x, pixel.image.y, pixel.image.z};
-        const float target[3] = {pixel.target.x, pixel.target.y, pixel.target.z};
+        const float seen = seen_of(s, pixel);
+        const float image[3] = {seen * pixel.image.x, seen * pixel.image.y, seen * pixel.image.z};
+        const float target[3] = {seen * pixel.target.x, seen * pixel.target.y, seen * pixel.target.z};
         if (s.sobel > 0) {
             // the difference image with two pixels around the tile, its responses with one, in the slopes' room
             float(*d)[WIDE * PITCH] = slope, (*across)[WIDE * PITCH] = slope + 3, (*down)[WIDE * PITCH] = slope + 6;
@@ -251,18 +273,16 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
             float *own = slope[0], *real = slope[1], *across = slope[2], *down = slope[3];
             __syncthreads();
             for (int e = tid; e < 20 * 20; e += PIXELS) {
-                int ex = p.left + e % 20 - 2, ey = p.top + e / 20 - 2;
-                Pixel other = {};
-                if (ex >= 0 && ey >= 0 && ex < p.width && ey < p.height) other = pixel_of(s, p, ex, ey);
-                own[e] = grey(other.image.x, other.image.y, other.image.z);
-                real[e] = grey(other.target.x, other.target.y, other.target.z);
+                float2 greys = greys_at(s, p, p.left + e % 20 - 2, p.top + e / 20 - 2);
+                own[e] = greys.x;
+                real[e] = greys.y;
             }
             __syncthreads();
             for (int e = tid; e < 18 * 18; e += PIXELS) {
                 int ex = p.left + e % 18 - 1, ey = p.top + e / 18 - 1, at = (e / 18 + 1) * 20 + e % 18 + 1;
                 float gx = own[at + 1] - own[at - 1], gy = own[at + 20] - own[at - 20];
                 float tx = real[at + 1] - real[at - 1], ty = real[at + 20] - real[at - 20];
-                bool counted = ex > 0 && ey > 0 && ex < p.width - 1 && ey < p.height - 1;
+                bool counted = ex >= 0 && ey >= 0 && ex < p.width && ey < p.height;
                 float factor = counted ? strength_slope(strength(gx, gy), strength(tx, ty), 3 * share * s.edges) : 0;
                 across[e] = factor * gx;
                 down[e] = factor * gy;
@@ -270,9 +290,9 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
             __syncthreads();
             int at = (r + 1) * 18 + c + 1;
             float slope_grey = across[at - 1] - across[at + 1] + down[at - 18] - down[at + 18];
-            sobel[0] += 0.299f * slope_grey;
-            sobel[1] += 0.587f * slope_grey;
-            sobel[2] += 0.114f * slope_grey;
+            sobel[0] += grey(1.0f, 0.0f, 0.0f) * slope_grey;
+            sobel[1] += grey(0.0f, 1.0f, 0.0f) * slope_grey;
+            sobel[2] += grey(0.0f, 0.0f, 1.0f) * slope_grey;
         }
         if (s.ssim > 0) {
             __syncthreads();
@@ -315,15 +335,17 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
             __syncthreads();
         }
         const Now &now = s.now[p.b];
-        if (p.b == 0 && now.plan.centre >= 0) {
+        float lpips[3] = {};
+        if (now.plan.centre >= 0) {
             int wx = x - now.window_left, wy = y - now.window_top;
             if (wx >= 0 && wy >= 0 && wx < s.window_width && wy < s.window_height)
-                for (int k = 0; k < 3; ++k) grad[k] += s.perceptual * s.window_slope[3 * (wy * s.window_width + wx) + k];
+                for (int k = 0; k < 3; ++k)
+                    lpips[k] = s.perceptual * s.window_slope[3 * ((size_t(p.b) * s.window_height + wy) * s.window_width + wx) + k];
         }
         float4 out = {0, 0, 0, 6 * share * s.mask * (pixel.alpha - pixel.mask)};
-        if (s.dice_weight > 0) out.w += s.dice[3 * p.b] * (1 - pixel.mask) - s.dice[3 * p.b + 1];
+        if (s.dice_weight > 0) out.w += s.dice[0] * (1 - pixel.mask);
         for (int k = 0; k < 3; ++k) {
-            grad[k] += 2 * share * (image[k] - target[k]) + sobel[k];
+            grad[k] = seen * (grad[k] + 2 * share * (image[k] - target[k])) + lpips[k] + sobel[k];
             out.w -= grad[k] * now.background[k];
         }
         out.x = now.gain[0] * grad[0];

@@ -14,7 +14,7 @@ SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "i
            "offsets.cuh", "shape.cuh", "paper.cuh")
 KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "cut_window", "image_gradient", "blend_backward",
            "gaussian_step", "gather", "joint_step", "offset_step", "shape_gradient", "shape_step", "expression_step",
-           "place_joints", "dice", "neighbourhood", "nearest", "paper_step")
+           "place_joints", "dice", "pose_gaussians", "nearest", "neighbourhood", "paper_step")
 OPTIONS = ("--std=c++17", "--extra-device-vectorization")
 
 

@@ -1,23 +1,22 @@
-"""The trainer of recipe `paper`: one image size, no limits, a neighbour term, and gaussians that grow in number."""
+"""The trainer of recipe `paper`: square frames, no limits, a neighbour term, and gaussians that grow in number."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
-from gsac.avatar.binding import face_frames
 from gsac.avatar.cuda.arrays import Shot
-from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, draw_plan
+from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, rates_of
 from gsac.avatar.cuda.trainer import CudaTrainer, opacity_logit
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import sigmoid
+from gsac.avatar.lpips import Lpips
 
 NEAREST = 3
 """Gaussians of a neighbourhood, the gaussian itself included."""
-COLUMNS = 10
-"""Values of a gaussian that its neighbours are compared with."""
+POSED, PULL = 10, 13
+"""Numbers of a posed gaussian, and of its gradient by the neighbour term."""
 ROWS = {"mu": slice(0, 3), "quat": slice(3, 7), "scale_logit": slice(7, 10), "rgb": slice(10, 13)}
 """Rows of Adam's moments on the device."""
 
@@ -47,9 +46,20 @@ class PaperGaussians:
 
 @dataclass(kw_only=True)
 class PaperRecipe(Recipe):
-    """All rates but that of `mu`, which falls to `mu_decay` of it, are constant; losses are a mean over the whole frame."""
+    """All rates but those of `mu` are constant; losses are means over the square frame, whose size `frame_size` is."""
 
-    mu_decay: float = 1.0
+    order: np.ndarray
+    """(steps, batch) int32, indices of frames."""
+    background: np.ndarray
+    """(steps, batch, 3) float32 in 0..1."""
+    centre: np.ndarray
+    """(steps, batch) int32, vertices in the middle of the windows that LPIPS sees."""
+    mu_rates: np.ndarray
+    """(steps,) Adam rates of the places."""
+    counts: np.ndarray
+    """(steps,) bool, whether the gradients of the places in the image are summed."""
+    masked: bool = True
+    """Whether L2 and SSIM see the images times alpha times mask."""
     edges: float = 0.0
     """Weight of the edge strength in grey."""
     dice: float = 0.0
@@ -58,30 +68,23 @@ class PaperRecipe(Recipe):
     """Weight of the neighbour term."""
     scale_limit: float = 0.0
     """Scales are scale_limit * sigmoid(logit), in units of the face."""
-    renew: int = 50
-    """Steps between two searches for the neighbours."""
 
 
 class PaperTrainer(CudaTrainer):
-    """As CudaTrainer, with one level of shots; starts from PaperGaussians. The buffer `log_scale` holds their logits."""
+    """As CudaTrainer, with one level of shots, cut from square frames; starts from PaperGaussians, and the buffer `log_scale` holds
+    their logits. LPIPS of a network is in the loss of every frame of every step."""
 
     recipe: PaperRecipe
 
     def plan(self, levels: int) -> DrawnPlan:
-        """As `CudaTrainer.plan`, with the recipe's own decay of the rates."""
+        """As `CudaTrainer.plan`, with the recipe's own frames, backgrounds and decay of the rates."""
         recipe = self.recipe
-        drawn = draw_plan(recipe, self.frames, levels)
-        done = np.arange(recipe.steps) / max(recipe.steps, 1)
-        for name, rate in (("mu", recipe.mu_rate * recipe.mu_decay**done), ("quat", recipe.quat_rate), ("rgb", recipe.rgb_rate),
-                           ("log_scale", recipe.scale_rate), ("pose", recipe.pose_rate)):
-            drawn.rates[name] = rate
-        return drawn
-
-    def _advance(self, stop: int) -> None:
-        while (at := self.state().step) < stop:
-            if not self.linked or at % self.recipe.renew == 0:
-                self._find_neighbours()
-            super()._advance(min(stop, at - at % self.recipe.renew + self.recipe.renew))
+        rates = rates_of(recipe, np.arange(recipe.steps) / max(recipe.steps, 1), levels)
+        for name, values in (("mu", recipe.mu_rates), ("quat", recipe.quat_rate), ("rgb", recipe.rgb_rate),
+                             ("log_scale", recipe.scale_rate), ("pose", recipe.pose_rate), ("expression", recipe.expression_rate),
+                             ("counts", recipe.counts)):
+            rates[name] = values
+        return DrawnPlan(recipe.order, recipe.background, rates)
 
     def gaussians(self) -> Gaussians:
         """A copy as they stand: rotations of length one, colours in 0..1."""
@@ -96,7 +99,7 @@ class PaperTrainer(CudaTrainer):
         return {"mu": b["mu"].read(), "quat": b["quat"].read(), "scale_logit": b["log_scale"].read(), "rgb": b["rgb"].read()}
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
-        """Since the start, or since the last `grow`: (N,) sums of the lengths of the gradients by the place in the image, -1..1
+        """Since the first step that counts, or since the last `grow`: (N,) sums of the lengths of the gradients by the place in the image, -1..1
         across the frame, and (N,) numbers of images that each gaussian was in."""
         return self.buffers["pulled"].read(), self.buffers["hits"].read()
 
@@ -116,11 +119,16 @@ class PaperTrainer(CudaTrainer):
 
     def _numbers(self, levels: list[list[Shot]]) -> None:
         super()._numbers(levels)
-        recipe, (width, height) = self.recipe, self.recipe.frame_size
-        for name, value in (("area", width * height), ("half_width", width / 2), ("half_height", height / 2),
+        recipe, (side, _) = self.recipe, self.recipe.frame_size
+        for name, value in (("area", side * side), ("half_side", side / 2), ("whole_width", side), ("whole_height", side),
                             ("edges", recipe.edges), ("dice_weight", recipe.dice), ("knn", recipe.knn),
-                            ("scale_limit", recipe.scale_limit)):
+                            ("scale_limit", recipe.scale_limit), ("masked", recipe.masked)):
             setattr(self.scene, name, value)
+
+    def _open_window(self, network: Lpips) -> None:
+        super()._open_window(network, self.batch, "float32")
+        self.arrays.upload("centres", self.recipe.centre, np.int32)
+        self.scene.perceptual = self.recipe.perceptual
 
     def _values(self, gaussians: PaperGaussians) -> dict[str, np.ndarray]:
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.scale_logit, "rgb": gaussians.rgb,
@@ -128,46 +136,27 @@ class PaperTrainer(CudaTrainer):
 
     def _upload_gaussians(self, values: dict[str, np.ndarray]) -> None:
         super()._upload_gaussians(values)
-        arrays = self.arrays
-        at_rest = face_frames(self.body.rest[0], self.body.faces)
-        rows = np.concatenate([at_rest.R.reshape(-1, 9), at_rest.T, at_rest.k[:, None]], 1)
-        self.rest_frame = rows[self.face].astype(np.float32)
-        arrays.upload("rest_frame", self.rest_frame, np.float32)
-        arrays.allocate("pulled", self.count, np.float32).fill(0)
-        arrays.allocate("hits", self.count, np.int32).fill(0)
-        arrays.allocate("nearest_gaussian", (self.count, NEAREST), np.int32).fill(0)
-        arrays.allocate("near_of_start", self.count + 1, np.int32)
-        arrays.allocate("near_of", self.count * NEAREST, np.int32)
-        self.linked = False
+        self.arrays.allocate("pulled", self.count, np.float32).fill(0)
+        self.arrays.allocate("hits", self.count, np.int32).fill(0)
+        self.arrays.allocate("nearest_gaussian", (self.batch, self.count, NEAREST), np.int32).fill(255)
 
     def _make_scratch(self) -> None:
         super()._make_scratch()
         tiles, n = self.batch * self.scene.max_tiles, self.count
-        for name, shape in (("overlap", (tiles, 3)), ("dice", (self.batch, 3)), ("place", (n, 3)), ("hood", (n, 2 * COLUMNS))):
-            self.arrays.allocate(name, shape, np.float32)
+        for name, shape, kind in (("overlap", (tiles, 4), np.float32), ("dice", 2, np.float32),
+                                  ("posed", (self.batch, n, POSED), np.float32), ("hull", (self.batch, -(-n // 128), 6), np.float32),
+                                  ("pull", (self.batch, n, PULL), np.int64), ("pull_value", self.batch, np.int64)):
+            self.arrays.allocate(name, shape, kind)
             self.arrays.scratch.append(name)
 
     def _grids(self) -> dict[str, tuple[tuple[int, int], int]]:
         blocks, grids = -(-self.count // 128), {}
         for name, grid in super()._grids().items():
-            if name == "image_gradient":
-                grids["dice"] = ((self.batch, 1), 256)
+            if name == "image_gradient" and self.recipe.dice:
+                grids["dice"] = ((1, 1), 256)
             if name == "gaussian_step":
-                grids |= {"neighbourhood": ((blocks, 1), 128), "paper_step": ((blocks, 1), 128)}
+                grids |= {each: ((blocks, self.batch), 128) for each in ("pose_gaussians", "nearest", "neighbourhood")}
+                grids["paper_step"] = ((blocks, 1), 128)
             else:
                 grids[name] = grid
         return grids
-
-    def _find_neighbours(self) -> None:
-        """Searches all pairs as the gaussians stand now: about a millisecond on the device."""
-        b, count = self.buffers, self.count
-        f, mu = self.rest_frame, b["mu"].read()
-        b["place"].write(f[:, 9:12] + f[:, 12:] * np.einsum("nij,nj->ni", f[:, :9].reshape(-1, 3, 3), mu))
-        self.device.launch("nearest", (-(-count // 128), 1), 128, self.scene)
-        self.device.wait()
-        index = b["nearest_gaussian"].read()
-        links = csr_matrix((np.ones(index.size, np.int8), index.reshape(-1), np.arange(0, index.size + 1, NEAREST)), (count, count))
-        back = links.tocsc()
-        b["near_of_start"].write(back.indptr)
-        b["near_of"].write(back.indices)
-        self.linked = True

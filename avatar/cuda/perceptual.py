@@ -1,6 +1,6 @@
-"""LPIPS of a window of the image, for the loss of late steps: value and gradient by torch's convolutions, recorded as a graph.
+"""LPIPS of windows of the images, for the loss: value and gradient by torch's convolutions, recorded as a graph.
 
-The kernel `cut_window` fills `Window.images`, `image_gradient` adds `Window.slope`; nothing waits for the host in between.
+The kernel `cut_window` fills `Windows.images`, `image_gradient` adds `Windows.slopes`; nothing waits for the host in between.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ def why_not() -> str | None:
     return f"the torch {torch.__version__} that is installed cannot use the GPU; install a build for CUDA from pytorch.org"
 
 
-class Window:
-    """images: (2, height, width, 3), render and target in 0..1; value: scalar LPIPS; slope: (height, width, 3), by the render."""
+class Windows:
+    """images: (count, 2, height, width, 3), renders and targets in 0..1; values: (count,) LPIPS; slopes: (count, height, width, 3), by
+    the renders."""
 
-    def __init__(self, device: Device, network: Lpips, width: int, height: int, precision: str = "bfloat16"):
-        """width, height: px; precision: torch's name of the convolutions' type."""
+    def __init__(self, device: Device, network: Lpips, size: tuple[int, int, int], precision: str = "bfloat16"):
+        """size: count, height and width, px; precision: torch's name of the convolutions' type."""
         import torch
 
-        self._torch, self.network = torch, network.to("cuda", getattr(torch, precision))
-        self.images = torch.zeros((2, height, width, 3), device="cuda")
-        self.slope, self.value = torch.zeros((height, width, 3), device="cuda"), torch.zeros((), device="cuda")
+        self._torch, self.network, self.size = torch, network.to("cuda", getattr(torch, precision)), size
+        count, height, width = size
+        self.images = torch.zeros((count, 2, height, width, 3), device="cuda")
+        self.slopes, self.values = torch.zeros((count, height, width, 3), device="cuda"), torch.zeros(count, device="cuda")
         self.stream = torch.cuda.ExternalStream(int(device.stream))
         self._graph = torch.cuda.CUDAGraph()
         # deterministic: one seed gives one avatar
@@ -53,7 +55,8 @@ class Window:
             self._graph.replay()
 
     def _compute(self) -> None:
-        image = self.images[0].detach().requires_grad_()
-        value = self.network.compare(image, self.images[1])
-        self.slope.copy_(self._torch.autograd.grad(value, image)[0])
-        self.value.copy_(value.detach())
+        for (render, target), slope, value in zip(self.images, self.slopes, self.values, strict=True):
+            image = render.detach().requires_grad_()
+            found = self.network.compare(image, target)
+            slope.copy_(self._torch.autograd.grad(found, image)[0])
+            value.copy_(found.detach())

@@ -67,7 +67,13 @@ class Recipe:
     smoothness: float = 0.0
     """lambda of the displacement's smoothing."""
     hand_share: float = 1.0
-    """Pose rate of the fingers relative to the body's; jaw and eyes stay."""
+    """Pose rate of the fingers relative to the body's; the eyes stay."""
+    jaw_share: float = 0.0
+    """Pose rate of the jaw relative to the body's."""
+    fresh: float = 0.01
+    """Share of a new square in the second moment of Adam, of poses, betas and expressions."""
+    tiny: float = 1e-12
+    """Least root of that moment."""
     perceptual: float = 0.0
     """Weight of LPIPS, of a window of one of a step's frames, where the trainer is given a network; as a mean over the frames."""
     perceptual_steps: int = 0

@@ -34,8 +34,8 @@ extern "C" __global__ void __launch_bounds__(256) shape_gradient(Scene s) {
     for (unsigned k = 0; k < gridDim.x; ++k) g += __ldcg(s.beta_part + k * s.beta_count + tid);
     g /= s.batch;
     double first = s.beta_first[tid] += 0.1 * (g - s.beta_first[tid]);
-    double second = s.beta_second[tid] += 0.01 * (g * g - s.beta_second[tid]);
-    double move = -s.now[0].plan.betas * (first / (1 - pow(0.9, n))) / (sqrt(second / (1 - pow(0.99, n))) + 1e-12);
+    double second = s.beta_second[tid] += s.fresh * (g * g - s.beta_second[tid]);
+    double move = -s.now[0].plan.betas * (first / (1 - pow(0.9, n))) / (sqrt(second / (1 - pow(1 - s.fresh, n))) + s.tiny);
     s.betas[tid] += move;
     s.beta_move[tid] = float(move);
 }
@@ -67,8 +67,8 @@ extern "C" __global__ void __launch_bounds__(256) expression_step(Scene s) {
     sum = sum_block(sum, scratch);
     if (threadIdx.x > 0) return;
     size_t at = size_t(now.frame.pose) * s.expression_count + blockIdx.x;
-    adam_pulled(s.expression[at], double(sum), s.expression_first[at], s.expression_second[at], s.pose_steps[now.frame.pose],
-                double(now.plan.expression), double(s.pose_pull), double(s.expression_unit));
+    adam_pulled(s.expression[at], double(sum) / s.batch, s.expression_first[at], s.expression_second[at], s.pose_steps[now.frame.pose],
+                double(now.plan.expression), double(s.pose_pull), double(s.expression_unit), s.fresh, s.tiny);
 }
 
 // One block, after the step's pose update: the joints at rest.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ctypes
 
-INT, FLOAT, LONG = ctypes.c_int, ctypes.c_float, ctypes.c_longlong
-_NAMES = {INT: "int", FLOAT: "float", LONG: "long long"}
+INT, FLOAT, DOUBLE, LONG = ctypes.c_int, ctypes.c_float, ctypes.c_double, ctypes.c_longlong
+_NAMES = {INT: "int", FLOAT: "float", DOUBLE: "double", LONG: "long long"}
 MOST_BATCH = 16
 
 FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT, "fy": FLOAT, "cx": FLOAT, "cy": FLOAT, "rest": INT,
@@ -14,9 +14,11 @@ FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT,
 left, top: px, its corner in the whole frame."""
 
 PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
-        "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT, "expression": FLOAT, "joints": FLOAT, "centre": INT}
+        "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT, "expression": FLOAT, "joints": FLOAT, "centre": INT,
+        "counts": INT}
 """Of one step. level: size of the images; place_pull: share of its way that a gaussian is pulled back; offset: m of a step of the
-displacement; centre: vertex in the middle of the window that LPIPS sees, -1 for no LPIPS; the others: Adam rates."""
+displacement; centre: vertex in the middle of the window that LPIPS sees, -1 for no LPIPS; counts: whether the gradients of the
+places in the image are summed; the others: Adam rates."""
 
 STATE = dict.fromkeys((
     "step", "stop", "overflow", "needed", "most", "pairs", "listed", "checkpoints", "heavy", "light", "near", "segments",
@@ -45,8 +47,8 @@ POINTERS = {
     "expression_dirs": "float", "expression": "double", "expression_first": "double", "expression_second": "double",
     "worn": "float", "joint_offset": "double", "joint_first": "double", "joint_second": "double", "joint_share": "double",
     "gain": "float", "gain_part": "float", "overlap": "float", "dice": "float",
-    "nearest_gaussian": "int", "near_of_start": "int", "near_of": "int",
-    "rest_frame": "float", "place": "float", "hood": "float", "pulled": "float", "hits": "int",
+    "nearest_gaussian": "int", "posed": "float", "hull": "float", "pull": "long long", "pull_value": "long long",
+    "pulled": "float", "hits": "int", "centres": "int",
     "window": "float", "window_slope": "float", "window_value": "float",
     "grad_out": "float", "pose_grad_out": "double",
 }
@@ -54,11 +56,12 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
            "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
            "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
-           "area": FLOAT, "half_width": FLOAT, "half_height": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT,
-           "scale_limit": FLOAT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
-           "perceptual": FLOAT, "expression_count": INT, "expression_unit": FLOAT, "joint_unit": FLOAT}
-"""area: pixels that a frame's losses are a mean over, 0: its own; it and the next seven are recipe `paper`'s (paper.cuh); the next
-five are LPIPS' (perceptual.cuh), the last three belong to expressions and joints at rest (shape.cuh)."""
+           "area": FLOAT, "half_side": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT, "masked": INT,
+           "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
+           "perceptual": FLOAT, "expression_count": INT, "expression_unit": FLOAT, "joint_unit": FLOAT,
+           "fresh": DOUBLE, "tiny": DOUBLE}
+"""area: pixels that a frame's losses are a mean over, 0: its own; it and the next six are recipe `paper`'s (paper.cuh); the next five
+are LPIPS' (perceptual.cuh), the next three belong to expressions and joints at rest (shape.cuh), the last two to Adam of the body."""
 
 
 class Frame(ctypes.Structure):

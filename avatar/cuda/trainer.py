@@ -45,7 +45,7 @@ class CudaTrainer:
         drawn = self.plan(len(levels))
         self.batch, self.order, self.rates = drawn.order.shape[1], drawn.order, drawn.rates
         self._numbers(levels)
-        self.window, self.late = None, recipe.steps
+        self.windows, self.late = None, recipe.steps
         if network is not None and recipe.perceptual_steps:
             self._open_window(network)
         self._upload(levels, drawn, pose, transl, gaussians)
@@ -132,8 +132,9 @@ class CudaTrainer:
         for _ in range(steps):
             for name in self.grids:
                 if name == "image_gradient":
-                    self.device.launch("cut_window", (-(-self.window.slope[..., 0].numel() // 256), 1), 256, self.scene)
-                    self.window.launch()
+                    count, height, width = self.windows.size
+                    self.device.launch("cut_window", (-(-height * width // 256), count), 256, self.scene)
+                    self.windows.launch()
                 self.launch(name)
 
     def step(self) -> None:
@@ -231,12 +232,12 @@ class CudaTrainer:
         scene.max_pixels = max(h * w for h, w in sizes)
         scene.max_tiles = max(-(-h // TILE) * -(-w // TILE) for h, w in sizes)
         for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach", "offset_every",
-                     "expression_unit", "joint_unit"):
+                     "expression_unit", "joint_unit", "fresh", "tiny"):
             setattr(scene, name, getattr(recipe, name))
 
-    def _open_window(self, network: Lpips) -> None:
-        """Prepares LPIPS of a window for the last steps."""
-        from gsac.avatar.cuda.perceptual import SIDE, Window
+    def _open_window(self, network: Lpips, windows: int = 1, precision: str = "bfloat16") -> None:
+        """Prepares LPIPS of windows of a step's first frames for the last steps. precision: of `perceptual.Windows`."""
+        from gsac.avatar.cuda.perceptual import SIDE, Windows
 
         recipe, scene = self.recipe, self.scene
         self.late = max(recipe.steps - recipe.perceptual_steps, 0)
@@ -245,9 +246,9 @@ class CudaTrainer:
         scene.whole_width, scene.whole_height = recipe.frame_size
         scene.window_width, scene.window_height = (min(SIDE, side) for side in recipe.frame_size)
         scene.perceptual = recipe.perceptual * self.batch  # only the first frame of a batch has it
-        self.window = Window(self.device, network, scene.window_width, scene.window_height)
-        for name, tensor in (("window", self.window.images), ("window_slope", self.window.slope),
-                             ("window_value", self.window.value)):
+        self.windows = Windows(self.device, network, (windows, scene.window_height, scene.window_width), precision)
+        for name, tensor in (("window", self.windows.images), ("window_slope", self.windows.slopes),
+                             ("window_value", self.windows.values)):
             setattr(scene, name, tensor.data_ptr())
 
     def _grids(self) -> dict[str, tuple[tuple[int, int], int]]:

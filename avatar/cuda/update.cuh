@@ -4,6 +4,22 @@ struct Slopes {
     float mu[3], quat[4], log_scale[3], rgb[3], logit;
 };
 
+// Recipe `paper`: adds the pull of a gaussian's neighbours (paper.cuh), in frame b of the batch, to its gradient as it is posed.
+FORMULA void add_pull(const Scene &s, int at, const Bound<float> &posed, Bound<float> &grad, float *rgb) {
+    const long long *from = s.pull + 13 * size_t(at);
+    float pull[13], q[4];
+    for (int c = 0; c < 13; ++c) pull[c] = float(from[c] * PULL_UNIT);
+    Vec<float> column[3] = {posed.column[0], posed.column[1], posed.column[2]};
+    quat_of(column, q);
+    through_quat(q, pull + 3, column);
+    grad.mean = grad.mean + vec(pull);
+    for (int j = 0; j < 3; ++j) {
+        grad.column[j] = grad.column[j] + column[j];
+        grad.scale[j] += pull[7 + j];
+        rgb[j] += pull[10 + j];
+    }
+}
+
 // Gradient of a gaussian: its moments summed over tiles and frames of the batch in a fixed order. Leaves those of its corners.
 FORMULA Slopes slopes_of(const Scene &s, int i) {
     Slopes g = {};
@@ -14,7 +30,7 @@ FORMULA Slopes slopes_of(const Scene &s, int i) {
         ushort4 box = ((const ushort4 *)s.box)[at];
         int tiles = (box.y - box.x) * (box.w - box.z);
         float *corners = s.corner_grad + 9 * size_t(at);
-        if (tiles == 0) {
+        if (tiles == 0 && !s.pull) {
             for (int c = 0; c < 9; ++c) corners[c] = 0;
             continue;
         }
@@ -25,7 +41,13 @@ FORMULA Slopes slopes_of(const Scene &s, int i) {
             for (int c = 0; c < 9; ++c) m[c] += from[c];
         Posed own = posed(s, b, i);
         Splat<float> splat = project(own.lens, own.bound, own.opacity);
-        Bound<float> bound = project_backward(own.lens, own.bound, splat, m);
+        Bound<float> bound = {};
+        if (tiles) bound = project_backward(own.lens, own.bound, splat, m);
+        if (s.pull) {
+            float rgb[3] = {};
+            add_pull(s, at, own.bound, bound, rgb);
+            for (int c = 0; c < 3; ++c) g.rgb[c] += share * rgb[c];
+        }
         BindGradient<float> grad = bind_backward(own.face, own.turn, own.mu, own.log_scale, bound);
         for (int c = 0; c < 3; ++c) {
             corners[3 * c] = grad.corner[c].x;
@@ -39,11 +61,9 @@ FORMULA Slopes slopes_of(const Scene &s, int i) {
         g.mu[2] += share * grad.mu.z;
         for (int c = 0; c < 4; ++c) g.quat[c] += share * grad.quat[c];
         g.logit += share * m[0] * (1 - own.opacity);  // dL/do = m / o, do/dlogit = o (1 - o)
-        if (s.pulled) {
+        if (tiles && s.now[b].plan.counts) {
             float x = 2 * splat.ha * m[1] + splat.b * m[2], y = splat.b * m[1] + 2 * splat.hc * m[2];
-            x *= s.half_width;
-            y *= s.half_height;
-            pulled += share * sqrtf(x * x + y * y);
+            pulled += share * s.half_side * sqrtf(x * x + y * y);
             hits += 1;
         }
     }
@@ -201,15 +221,15 @@ FORMULA void pose_step(const Scene &s, int b) {
     if (tid < 55) rodrigues_backward(s.pose + (now.frame.pose * 56 + j) * 3, g_local, turn);
     if (tid < 56) {
         size_t at = (size_t(now.frame.pose) * 56 + tid) * 3;
-        double scale = 1 / (1 - pow(0.9, double(n))), unbias = 1 / (1 - pow(0.99, double(n)));
+        double scale = 1 / (1 - pow(0.9, double(n))), unbias = 1 / (1 - pow(1 - s.fresh, double(n)));
         double unit = tid < 55 ? s.turn_unit : s.shift_unit, share = s.pose_share[tid];
         for (int c = 0; c < 3; ++c) {
             double g = tid < 55 ? turn[c] : double(transl[c]);
             if (s.pose_grad_out) s.pose_grad_out[(size_t(b) * 56 + tid) * 3 + c] = g;
-            g += 2 * s.pose_pull * (s.pose[at + c] - s.fit[at + c]) / (unit * unit);
+            g = g / s.batch + 2 * s.pose_pull * (s.pose[at + c] - s.fit[at + c]) / (unit * unit);
             double first = s.pose_first[at + c] += 0.1 * (g - s.pose_first[at + c]);
-            double second = s.pose_second[at + c] += 0.01 * (g * g - s.pose_second[at + c]);
-            s.pose[at + c] -= share * now.plan.pose * first * scale / (sqrt(second * unbias) + 1e-12);
+            double second = s.pose_second[at + c] += s.fresh * (g * g - s.pose_second[at + c]);
+            s.pose[at + c] -= share * now.plan.pose * first * scale / (sqrt(second * unbias) + s.tiny);
         }
     }
     __syncthreads();
@@ -247,8 +267,9 @@ extern "C" __global__ void __launch_bounds__(512) joint_step(Scene s) {
         for (int t = tid; t < tiles; t += 512)
             if (s.near_flag[b * s.max_tiles + t]) loss += s.tile_loss[b * s.max_tiles + t];
         loss = sum_block(loss, scratch);
-        if (s.dice_weight > 0) loss += s.dice[3 * b + 2];
-        if (b == 0 && now.plan.centre >= 0) loss += s.perceptual * *s.window_value;
+        if (s.dice_weight > 0) loss += s.dice[1];
+        if (s.pull) loss += float(s.pull_value[b] * PULL_UNIT);
+        if (now.plan.centre >= 0) loss += s.perceptual * s.window_value[b];
         if (tid == 0) s.losses[state.step * s.batch + b] = loss;
         if (s.gain_part) gain_step(s, b, scratch);
     } else {

@@ -10,7 +10,7 @@ from gsac.avatar.cuda.arrays import JOINTS, SEGMENT, TILE, Arrays, BodyArrays, S
 from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.smoothing import smoothing_series
 from gsac.avatar.cuda.structs import FRAME
-from gsac.avatar.joints import BODY, FINGERS, JAW_EYES
+from gsac.avatar.joints import BODY, FINGERS, JAW, JAW_EYES
 
 NOW = 256
 """Bytes kept for each frame of the batch's `Now`; at least the struct's."""
@@ -44,7 +44,7 @@ def upload_body(arrays: Arrays, body: BodyArrays, recipe: Recipe, pose: np.ndarr
     joint_start, joint_vertex, joint_weight = joint_vertices(body.skin_index, body.skin_weight, JOINTS)
     both = np.concatenate([np.asarray(pose, np.float64), np.asarray(transl, np.float64)[:, None]], 1)
     share = np.full(JOINTS + 1, recipe.hand_share)
-    share[BODY], share[JAW_EYES], share[JOINTS] = 1, 0, 1
+    share[BODY], share[JAW_EYES], share[JAW], share[JOINTS] = 1, 0, recipe.jaw_share, 1
     for name, array, kind in (
             ("rest", body.rest, np.float32), ("joints", body.joints, np.float32), ("parents", body.parents, np.int32),
             ("joint_level", level, np.int32), ("child_start", child_start, np.int32), ("child", child, np.int32),

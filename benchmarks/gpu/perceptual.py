@@ -8,7 +8,7 @@ import numpy as np
 
 from gsac.avatar.cuda import perceptual
 from gsac.avatar.cuda.device import Device
-from gsac.avatar.cuda.perceptual import SIDE, Window
+from gsac.avatar.cuda.perceptual import SIDE, Windows
 from gsac.avatar.lpips import Lpips, shapes
 
 PRECISIONS = ("float32", "float16", "bfloat16")
@@ -39,18 +39,18 @@ def measure(device: Device) -> None:
     value, slope = network.gradient(image, other, scaled=False)
     for precision in PRECISIONS:
         began = perf_counter()
-        window = Window(device, network, SIDE, SIDE, precision)
+        windows = Windows(device, network, (1, SIDE, SIDE), precision)
         made = perf_counter() - began
-        window.images.copy_(torch.from_numpy(np.stack([image, other])))
+        windows.images.copy_(torch.from_numpy(np.stack([image, other])))
         torch.cuda.synchronize()
         begin, end, times = device.event(), device.event(), []
         for _ in range(30):
             device.mark(begin)
-            window.launch()
+            windows.launch()
             device.mark(end)
             times.append(device.milliseconds(begin, end))
-        own = window.slope.cpu().numpy()
+        own = windows.slopes[0].cpu().numpy()
         off, size = np.linalg.norm(own - slope), np.linalg.norm(slope)
         print(f"LPIPS of {SIDE}x{SIDE}, {precision}: {np.median(times):.2f} ms, ready after {made:.1f} s; value off by "
-              f"{abs(float(window.value) / value - 1):.1e}, slope by {off / size:.1e}, cosine "
+              f"{abs(float(windows.values) / value - 1):.1e}, slope by {off / size:.1e}, cosine "
               f"{(own * slope).sum() / size / np.linalg.norm(own):.4f}", flush=True)

@@ -65,11 +65,11 @@ def kernel_microseconds(trainer: CudaTrainer, repeats: int = 40) -> dict[str, fl
 
 
 def nearest_milliseconds(trainer: PaperTrainer) -> float:
-    """Median time of the nearest-neighbour search."""
+    """Median time of the nearest-neighbour search, of a batch."""
     device, begin, end, times = trainer.device, trainer.device.event(), trainer.device.event(), []
     for _ in range(5):
         device.mark(begin)
-        device.launch("nearest", (-(-trainer.count // 128), 1), 128, trainer.scene)
+        device.launch("nearest", *trainer.grids["nearest"], trainer.scene)
         device.mark(end)
         times.append(device.milliseconds(begin, end))
     return float(np.median(times))
@@ -154,7 +154,8 @@ def least_bytes(trainer: CudaTrainer) -> dict[str, float]:
         "gaussian_step": slopes + n * 4 * 14 * 6,
         "gather": batch * (n * 36 + v * 12) + n * 12,
         "joint_step": batch * v * 24 + v * 32,
-        "dice": batch * s.max_tiles + state.near * 12, "neighbourhood": n * (52 + 12 + 12 + 16 + 12 + 12 + 12 + 80),
-        "paper_step": slopes + n * (12 + 80 + 12 + 16 + 52 + 4 * 13 * 6),
+        "dice": batch * s.max_tiles + state.near * 16, "pose_gaussians": batch * (posed + n * (40 + 104)), "nearest": batch * n * (40 + 24),
+        "neighbourhood": batch * n * (12 + 40 + 12 + 2 * 104),
+        "paper_step": slopes + batch * n * 104 + n * 4 * 13 * 6,
         "shape_gradient": batch * v * 12 + s.beta_count * v * 12, "shape_step": s.beta_count * v * 12 + v * 24,
         "expression_step": s.expression_count * v * 12 + batch * v * 12, "place_joints": batch * 660}

@@ -11,10 +11,11 @@ import numpy as np
 from gsac.avatar.cuda.arrays import BodyArrays, Shot
 from gsac.avatar.cuda.device import DeviceError
 from gsac.avatar.cuda.kernels import CompileError
-from gsac.avatar.cuda.paper import PaperGaussians
+from gsac.avatar.cuda.paper import PaperGaussians, PaperRecipe
 from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import JAW
 from gsac.avatar.lpips import Lpips
 from gsac.stages.contract import StageError
 from gsac.stages.train.finite import require_finite
@@ -23,7 +24,7 @@ from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
 
 LPIPS_STEPS = 200
-"""Steps, the last of a training or a refit, that have LPIPS of a window where it is in the loss: 2.3 ms more each."""
+"""Steps of recipe `fast`, the last of a training or a refit, that have LPIPS of a window where it is in the loss: 2.3 ms each."""
 
 Kind = TypeVar("Kind", bound=CudaTrainer)
 
@@ -58,8 +59,11 @@ def body_arrays(poses: Poses, frames: np.ndarray, recipe: Recipe) -> BodyArrays:
         if at == len(rests):
             rests.append(vertices)
         rest_of.append(at)
+    expression = body.exprdirs if recipe.expression_rate else None
+    if isinstance(recipe, PaperRecipe):  # a jaw without skin opens the mouth by expressions: its turn is three more of them
+        expression = np.concatenate([body.exprdirs, body.exprdirs @ body.jaw_actions], 2)
     arrays = BodyArrays(np.stack(rests), np.array(rest_of), joints, np.asarray(body.parents), body.skin_index, body.skin_weight,
-                        np.asarray(body.faces), expression=body.exprdirs if recipe.expression_rate else None)
+                        np.asarray(body.faces), expression=expression)
     if not recipe.beta_rate:
         return arrays
     shape = body.shapedirs[:, :, :len(poses.betas)]
@@ -91,7 +95,10 @@ def hand_back(trainer: CudaTrainer, task: Task) -> None:
         poses.betas = np.array(poses.params.betas, np.float64) + trainer.betas()
         poses.forget_rests()
     if trainer.recipe.expression_rate:
-        poses.expression[task.trained] = trainer.expressions()
+        learned, size = trainer.expressions(), poses.expression.shape[1]
+        poses.expression[task.trained] = learned[:, :size]
+        if learned.shape[1] > size:
+            poses.pose[task.trained, JAW] += learned[:, size:]
         poses.forget_expressions()
     if trainer.recipe.joint_rate:
         poses.joint_offset = trainer.joint_offset()

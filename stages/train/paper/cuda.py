@@ -1,4 +1,4 @@
-"""Recipe `paper` on the GPU: `trainer.fit` with its steps inside `PaperTrainer`; frames and backgrounds come in another order."""
+"""Recipe `paper` on the GPU: `trainer.fit` with its steps inside `PaperTrainer`, on the same frames and backgrounds."""
 
 from __future__ import annotations
 
@@ -6,23 +6,21 @@ import numpy as np
 
 from gsac.avatar.cuda.paper import PaperGaussians, PaperRecipe, PaperTrainer
 from gsac.avatar.logistic import sigmoid
-from gsac.stages.train.gpu import LPIPS_STEPS, hand_back, open_trainer, train_until
+from gsac.stages.train.gpu import hand_back, open_trainer, train_until
+from gsac.stages.train.paper import body_adam, densify, losses
 from gsac.stages.train.paper import trainer as paper
-from gsac.stages.train.paper.densify import LARGEST, Densifier, due
-from gsac.stages.train.paper.knn import RENEW
+from gsac.stages.train.paper.square import side_of
 from gsac.stages.train.poses.poses import HAND_SHARE
 from gsac.stages.train.task import LPIPS_WEIGHT, Fit, Task
-from gsac.stages.train.views import person_crop
 
 
 def fit(task: Task) -> Fit:
     """As `trainer.fit`. Raises StageError also where the GPU fails."""
     rng, recipe = np.random.default_rng(task.config.seed), make_recipe(task)
     gaussians = init_gaussians(len(task.poses.body.faces), rng)
-    densifier = Densifier(len(gaussians))
-    views = {int(t): person_crop(task.views[t]) for t in task.trained}
+    densifier, views = densify.Densifier(len(gaussians)), paper.crop_views(task)
     with open_trainer(PaperTrainer, task.poses, task.trained, [views], gaussians, recipe, task.lpips) as trainer:
-        for event in filter(due, range(recipe.steps)):
+        for event in filter(densify.due, range(recipe.steps)):
             train_until(trainer, task, event + 1)
             densifier.length, densifier.hits = trainer.pulls()
             densifier.grow(event, GpuGaussians(trainer), rng)
@@ -33,14 +31,18 @@ def fit(task: Task) -> Fit:
 
 
 def make_recipe(task: Task) -> PaperRecipe:
-    """The published rates and weights for the task's frames."""
-    camera = task.views[0].camera
+    """The published rates and weights for the task's frames, and what its steps see."""
+    side, batches, text = side_of(task.views), paper.plan_batches(task), task.config.paper_text
+    steps, batch = batches.order.shape
     return PaperRecipe(
-        steps=task.config.steps or paper.STEPS, batch=min(paper.BATCH, len(task.trained)), seed=task.config.seed,
-        mu_rate=paper.MU_RATE, mu_decay=paper.MU_DECAY, rgb_rate=paper.RATES["rgb"], quat_rate=paper.RATES["quat"],
-        scale_rate=paper.RATES["scale_logit"], pose_rate=paper.POSE_RATE, beta_rate=paper.POSE_RATE, hand_share=HAND_SHARE,
-        ssim=paper.SSIM, edges=paper.SOBEL, dice=paper.DICE, knn=paper.KNN, scale_limit=LARGEST,
-        frame_size=(camera.width, camera.height), renew=RENEW, perceptual=LPIPS_WEIGHT, perceptual_steps=LPIPS_STEPS)
+        steps=steps, batch=batch, seed=task.config.seed, order=batches.order, background=batches.background, centre=batches.centre,
+        mu_rates=paper.mu_rate(np.arange(steps), steps), counts=np.array([densify.counts(step) for step in range(steps)]),
+        rgb_rate=paper.RATES["rgb"], quat_rate=paper.RATES["quat"], scale_rate=paper.RATES["scale_logit"],
+        pose_rate=body_adam.RATE, beta_rate=body_adam.RATE, expression_rate=HAND_SHARE * body_adam.RATE, hand_share=HAND_SHARE,
+        jaw_share=HAND_SHARE, fresh=body_adam.FRESH, tiny=body_adam.TINY, masked=not text, ssim=losses.SSIM,
+        sobel=losses.TEXT_SOBEL * losses.SOBEL if text else 0.0, edges=0.0 if text else losses.SOBEL,
+        dice=0.0 if text else losses.DICE, knn=paper.KNN, scale_limit=densify.LARGEST, frame_size=(side, side),
+        perceptual=LPIPS_WEIGHT, perceptual_steps=steps)
 
 
 def init_gaussians(count: int, rng: np.random.Generator) -> PaperGaussians:

@@ -10,6 +10,8 @@ from gsac.stages.train.views import MARGIN, View
 
 SHOWN = 25
 """Of 255: a mask above it is of the person."""
+CLEAR = 10
+"""px of background around all that is shown, at least: no window of SSIM that sees it, 11 px wide, then sees beyond the box."""
 
 
 def side_of(views: list[View]) -> int:
@@ -28,7 +30,7 @@ def square_crop(view: View, side: int, vertices: np.ndarray) -> View:
     places = camera.project(vertices[vertices[:, 2] > 0])
     points = np.concatenate([np.stack([columns, rows], 1), np.stack([columns, rows], 1) + 1, places]) + shift
     first, last = points.min(0), points.max(0)
-    margin = np.ceil(MARGIN * (last[1] - first[1])) + 4
+    margin = np.ceil(MARGIN * (last[1] - first[1])) + CLEAR
     x0, y0 = np.clip(np.floor(first - margin), 0, side - 1).astype(int)
     x1, y1 = np.clip(np.ceil(last + margin), (x0 + 1, y0 + 1), side).astype(int)
     pixels = np.zeros((y1 - y0, x1 - x0, 4), np.uint8)

@@ -60,8 +60,8 @@ def test_the_window_is_the_cpus_and_its_slope_and_value_come_into_gradient_and_l
         found.append((np.where(reached[..., None], slope[..., :3], 0), trainer.losses()[0, 0]))
         if steps:
             shown = np.where(reached[..., None], image, 0)
-            window, value = trainer.window, float(trainer.window.value)
-            images, own = window.images.cpu().numpy(), window.slope.cpu().numpy()
+            windows, value = trainer.windows, float(trainer.windows.values)
+            images, own = windows.images[0].cpu().numpy(), windows.slopes[0].cpu().numpy()
             vertex = trainer.buffers["vertices"].read()[0, trainer.rates["centre"][0]]
         trainer.close()
     (slope, loss), (without, plain) = found
@@ -82,7 +82,7 @@ def test_the_window_is_the_cpus_and_its_slope_and_value_come_into_gradient_and_l
     assert loss - plain == pytest.approx(WEIGHT * value, rel=1e-4)
 
 
-def through_features_of(window, network, images, monkeypatch):
+def through_features_of(windows, network, images, monkeypatch):
     """Value and slope (h, w, 3) by float32 sums on the CPU, of weights rounded as the window's and through its features.
 
     Rounding puts features near zero on the other side of ReLU, layer after layer, so that slopes through other features say little:
@@ -99,7 +99,7 @@ def through_features_of(window, network, images, monkeypatch):
 
     with torch.no_grad(), torch.backends.cudnn.flags(enabled=True, benchmark=False, deterministic=True, allow_tf32=False):
         monkeypatch.setattr(functional, "relu", keep)
-        window.network.compare(*torch.from_numpy(images).cuda())
+        windows.network.compare(*torch.from_numpy(images).cuda())
     features = iter([x.float().cpu() for x in kept])
 
     def replay(x):
@@ -108,7 +108,7 @@ def through_features_of(window, network, images, monkeypatch):
 
     monkeypatch.setattr(functional, "relu", replay)
     own = network.to("cpu", torch.float32)
-    own.weights = {name: w.float().cpu() for name, w in window.network.weights.items()}
+    own.weights = {name: w.float().cpu() for name, w in windows.network.weights.items()}
     image = torch.from_numpy(images[0]).requires_grad_()
     value = own.compare(image, torch.from_numpy(images[1]))
     slope, = torch.autograd.grad(value, image)
@@ -122,25 +122,25 @@ def test_value_and_slope_are_those_of_the_cpus_network_the_slope_through_the_sam
     import torch
 
     from gsac.avatar.cuda.device import Device
-    from gsac.avatar.cuda.perceptual import Window
+    from gsac.avatar.cuda.perceptual import Windows
     from gsac.benchmarks.gpu.check import relative
 
     images = np.random.default_rng(4).random((2, 128, 96, 3)).astype(np.float32)
     device = Device()
-    window = Window(device, network, 96, 128, precision)
+    windows = Windows(device, network, (1, 128, 96), precision)
     results = []
     for _ in range(2):
-        window.images.copy_(torch.from_numpy(images))
+        windows.images.copy_(torch.from_numpy(images))
         torch.cuda.synchronize()
-        window.slope.fill_(float("nan"))
+        windows.slopes.fill_(float("nan"))
         torch.cuda.synchronize()
-        window.launch()
+        windows.launch()
         device.wait()
-        results.append((float(window.value), window.slope.cpu().numpy()))
+        results.append((float(windows.values), windows.slopes[0].cpu().numpy()))
     (got, own), (again, same) = results
     assert got == again and np.array_equal(own, same), "one seed gives one avatar"
     assert got == pytest.approx(network.distance(*images, scaled=False), rel=values)
-    value, slope = through_features_of(window, network, images, monkeypatch)
+    value, slope = through_features_of(windows, network, images, monkeypatch)
     assert got == pytest.approx(value, rel=1e-4) and relative(own, slope) < slopes
 
 
