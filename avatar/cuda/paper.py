@@ -99,8 +99,8 @@ class PaperTrainer(CudaTrainer):
         return {"mu": b["mu"].read(), "quat": b["quat"].read(), "scale_logit": b["log_scale"].read(), "rgb": b["rgb"].read()}
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
-        """Since the first step that counts, or since the last `grow`: (N,) sums of the lengths of the gradients by the place in the image, -1..1
-        across the frame, and (N,) numbers of images that each gaussian was in."""
+        """Since the first step that counts, or since the last `grow`: (N,) sums of the lengths of the gradients by the place in the
+        image, -1..1 across the frame, and (N,) numbers of images that each gaussian was in."""
         return self.buffers["pulled"].read(), self.buffers["hits"].read()
 
     def grow(self, face: np.ndarray, values: dict[str, np.ndarray]) -> None:
@@ -144,7 +144,8 @@ class PaperTrainer(CudaTrainer):
         super()._make_scratch()
         tiles, n = self.batch * self.scene.max_tiles, self.count
         for name, shape, kind in (("overlap", (tiles, 4), np.float32), ("dice", 2, np.float32),
-                                  ("posed", (self.batch, n, POSED), np.float32), ("hull", (self.batch, -(-n // 128), 6), np.float32),
+                                  ("posed", (self.batch, n, POSED), np.float32),
+                                  ("hull", (self.batch, -(-n // 128), 6), np.float32),
                                   ("pull", (self.batch, n, PULL), np.int64), ("pull_value", self.batch, np.int64)):
             self.arrays.allocate(name, shape, kind)
             self.arrays.scratch.append(name)
@@ -155,7 +156,7 @@ class PaperTrainer(CudaTrainer):
             if name == "image_gradient" and self.recipe.dice:
                 grids["dice"] = ((1, 1), 256)
             if name == "gaussian_step":
-                grids |= {each: ((blocks, self.batch), 128) for each in ("pose_gaussians", "nearest", "neighbourhood")}
+                grids |= dict.fromkeys(("pose_gaussians", "nearest", "neighbourhood"), ((blocks, self.batch), 128))
                 grids["paper_step"] = ((blocks, 1), 128)
             else:
                 grids[name] = grid

@@ -27,8 +27,8 @@ def why_not() -> str | None:
 
 
 class Windows:
-    """images: (count, 2, height, width, 3), renders and targets in 0..1; values: (count,) LPIPS; slopes: (count, height, width, 3), by
-    the renders."""
+    """images: (count, 2, height, width, 3), renders and targets in 0..1; values: (count,) LPIPS; slopes, by the renders:
+    (count, height, width, 3)."""
 
     def __init__(self, device: Device, network: Lpips, size: tuple[int, int, int], precision: str = "bfloat16"):
         """size: count, height and width, px; precision: torch's name of the convolutions' type."""

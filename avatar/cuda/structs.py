@@ -56,12 +56,13 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
            "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
            "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
-           "area": FLOAT, "half_side": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT, "masked": INT,
-           "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
+           "area": FLOAT, "half_side": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT,
+           "masked": INT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
            "perceptual": FLOAT, "expression_count": INT, "expression_unit": FLOAT, "joint_unit": FLOAT,
            "fresh": DOUBLE, "tiny": DOUBLE}
-"""area: pixels that a frame's losses are a mean over, 0: its own; it and the next six are recipe `paper`'s (paper.cuh); the next five
-are LPIPS' (perceptual.cuh), the next three belong to expressions and joints at rest (shape.cuh), the last two to Adam of the body."""
+"""area: pixels that a frame's losses are a mean over, 0: its own; it and the next six are recipe `paper`'s (paper.cuh); the next
+five are LPIPS' (perceptual.cuh), the next three belong to expressions and joints at rest (shape.cuh), the last two to Adam of the
+body."""
 
 
 class Frame(ctypes.Structure):

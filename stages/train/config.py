@@ -85,7 +85,7 @@ class TrainConfig:
     """Whether to judge held-out frames by FLIP, too, at 67 pixels a degree."""
     lpips: str = AUTO
     """Where LPIPS is used, with weights that `gsac models add` brought: none; judge: metrics only; loss: also in the training loss
-    (on the CPU only recipe paper, takes hours); auto: with weights, loss for recipe paper on the CPU, otherwise judge."""
+    (on the CPU only recipe paper, takes hours); auto: with weights, loss for recipe paper, otherwise judge."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""

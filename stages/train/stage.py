@@ -117,7 +117,7 @@ def without_lpips(config: TrainConfig, device: str, camera: Camera) -> str | Non
     if min(camera.width, camera.height) < LEAST_SIDE:
         return f"frames of fewer than {LEAST_SIDE} px are too small for it"
     if device == "cuda":
-        return perceptual.why_not() if config.lpips == "loss" else "on cuda it does where train.lpips is loss"
+        return perceptual.why_not()
     return None if config.recipe == "paper" else "on the CPU recipe paper alone has it there"
 
 

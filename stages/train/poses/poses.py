@@ -20,8 +20,8 @@ TURN, SHIFT = 0.05, 0.02
 """rad and m, units of a pose's distance from its start."""
 EXPRESSION, JOINT = 0.3, 0.01
 """Coefficient and m, units of an expression's and a joint's distance from theirs."""
-KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "beta_moments", "beta_count",
-        "expression", "expression_moments", "joint_offset", "joint_moments", "joint_count")
+KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "expression",
+        "expression_moments", "joint_offset", "joint_moments", "joint_count")
 """Attributes of Poses that training changes."""
 
 
@@ -82,7 +82,7 @@ class Poses:
         self.joint_offset, self.joint_moments, self.joint_count = np.zeros((55, 3)), np.zeros((2, 55, 3)), 0
         self.joint_share = self.share.copy()
         self.joint_share[0] = 0  # the pelvis is where the translation puts it
-        self.betas, self.beta_moments, self.beta_count = np.array(params.betas, np.float64), np.zeros((2, len(params.betas))), 0
+        self.betas = np.array(params.betas, np.float64)
 
     def copy(self) -> Poses:
         """An independent copy; Adam starts anew."""
@@ -165,12 +165,6 @@ class Poses:
         """(B,) gradient of the betas from grad_rest (V, 3), of the rest vertices, and grad_joints (55, 3)."""
         on_vertices = grad_rest + self.body.J_regressor.T @ grad_joints
         return np.tensordot(on_vertices, self.body.shapedirs[:, :, :len(self.betas)], 2)
-
-    def step_betas(self, grad: np.ndarray, rate: float) -> None:
-        """One Adam step of the betas, which all frames share. grad: (B,)."""
-        self.beta_count += 1
-        self.betas -= adam_move(self.beta_moments, self.beta_count, grad, rate)
-        self.forget_rests()
 
     def expression_gradient(self, grad_rest: np.ndarray) -> np.ndarray:
         """(E,) gradient of a frame's expression from grad_rest (V, 3), of its rest vertices."""

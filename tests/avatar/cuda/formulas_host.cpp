@@ -122,28 +122,46 @@ void scale_all(int n, const double *logit, double largest, double *log_scale, do
     }
 }
 
-void spread_all(int n, int columns, const double *values, const long long *index, double weight, double *grad) {
+double spread_all(int n, int columns, const double *values, const long long *index, double weight, double *grad) {
+    double value = 0;
     for (int i = 0; i < n; ++i)
         for (int c = 0; c < columns; ++c) {
             double own[NEAREST], mean, slope;
             for (int k = 0; k < NEAREST; ++k) own[k] = values[index[NEAREST * i + k] * columns + c];
-            spread(own, weight, mean, slope);
+            value += weight * spread(own, weight, mean, slope);
             for (int k = 0; k < NEAREST; ++k) grad[index[NEAREST * i + k] * columns + c] += slope * (own[k] - mean);
         }
+    return value;
+}
+
+// Quaternions of rotations, and their gradient as one by the rotations.
+void quat_all(int n, const double *rotations, const double *grad, double *quats, double *out) {
+    for (int i = 0; i < n; ++i) {
+        V column[3];
+        for (int j = 0; j < 3; ++j) column[j] = {rotations[9 * i + j], rotations[9 * i + 3 + j], rotations[9 * i + 6 + j]};
+        quat_of(column, quats + 4 * i);
+        through_quat(quats + 4 * i, grad + 4 * i, column);
+        for (int j = 0; j < 3; ++j) {
+            out[9 * i + j] = column[j].x;
+            out[9 * i + 3 + j] = column[j].y;
+            out[9 * i + 6 + j] = column[j].z;
+        }
+    }
 }
 
 double edges_all(int height, int width, const double *image, const double *target, double weight, double *grad) {
     double loss = 0;
     auto at = [&](const double *from, int x, int y) {
         const double *p = from + 3 * (y * width + x);
-        return grey(p[0], p[1], p[2]);
+        return x < 0 || y < 0 || x >= width || y >= height ? 0.0 : grey(p[0], p[1], p[2]);
     };
     auto add = [&](int x, int y, double g) {
+        if (x < 0 || y < 0 || x >= width || y >= height) return;
         const double part[3] = {grey(1.0, 0.0, 0.0), grey(0.0, 1.0, 0.0), grey(0.0, 0.0, 1.0)};
         for (int c = 0; c < 3; ++c) grad[3 * (y * width + x) + c] += g * part[c];
     };
-    for (int y = 1; y < height - 1; ++y)
-        for (int x = 1; x < width - 1; ++x) {
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
             double across = at(image, x + 1, y) - at(image, x - 1, y), down = at(image, x, y + 1) - at(image, x, y - 1);
             double own = strength(across, down);
             double real = strength(at(target, x + 1, y) - at(target, x - 1, y), at(target, x, y + 1) - at(target, x, y - 1));
@@ -158,14 +176,15 @@ double edges_all(int height, int width, const double *image, const double *targe
 }
 
 double dice_all(int n, const double *alpha, const double *mask, double outside, double weight, double *grad) {
-    double shown = 0, masked = 0, both = 0;
+    double shown = 0, masked = 0, both = 0, squared = 0;
     for (int i = 0; i < n; ++i) {
+        squared += mask[i] * mask[i];
         shown += alpha[i];
         masked += mask[i];
         both += alpha[i] * mask[i];
     }
-    Dice found = dice_of(n + outside, shown, masked, both, weight);
-    for (int i = 0; i < n; ++i) grad[i] = found.by_clear * (1 - mask[i]) - found.everywhere;
+    Dice found = dice_of(n + outside, shown, masked, both, squared, weight);
+    for (int i = 0; i < n; ++i) grad[i] = found.by_clear * (1 - mask[i]);
     return found.value;
 }
 
@@ -176,6 +195,10 @@ void adam_pulled_all(int n, double *value, const double *grad, double *first, do
 
 void window_all(int n, const double *centre, int size, int whole, int *out) {
     for (int i = 0; i < n; ++i) out[i] = window_begin(centre[i], size, whole);
+}
+
+void square_window_all(int n, const double *centre, int size, int whole, int *out) {
+    for (int i = 0; i < n; ++i) out[i] = square_window_begin(centre[i], size, whole);
 }
 
 void adam_dense(int n, double *value, const double *grad, double *first, double *second, int steps, double rate) {

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
+from scipy.spatial.transform import Rotation
 
 from gsac.avatar import binding, light, skinning
 from gsac.avatar.camera import Camera
@@ -14,8 +16,9 @@ from gsac.avatar.draw_rule import BRIGHTEST, DARKEST, cuda_constants
 from gsac.avatar.raster import render, render_backward
 from gsac.stages.train.gaussians import kernels
 from gsac.stages.train.paper.densify import LARGEST
-from gsac.stages.train.paper.knn import K, Neighbours
-from gsac.stages.train.paper.losses import WINDOW, dice, perceptual, sobel_magnitude
+from gsac.stages.train.paper.knn import K, posed_quats, through_quats
+from gsac.stages.train.paper.losses import window_begin
+from tests.support import haha
 
 HERE = Path(__file__).parent
 SOURCES = Path(binding.__file__).parent / "cuda"
@@ -148,31 +151,54 @@ def test_scales_of_recipe_paper_and_their_slope_are_those_of_the_cpu_path(host):
     np.testing.assert_allclose(slope, 1 / (1 + np.exp(logit)), rtol=1e-12)
 
 
-def test_likeness_of_neighbours_is_that_of_the_cpu_path(host):
+def test_likeness_of_neighbours_is_the_published_one(host):
     rng = np.random.default_rng(6)
-    values, around = rng.normal(size=(40, 4)), Neighbours()
-    around.distance_gradient(rng.normal(size=(40, 3)), 1.0, 0)
-    values[around.index[7]] = values[7]  # no deviation, no slope
-    got = np.zeros_like(values)
-    host("spread_all", 40, 4, values, np.ascontiguousarray(around.index, np.int64), 0.3 / values.size, got)
-    expected = around.spread_gradient(values, 0.3)
-    assert around.index.shape == (40, K) and np.linalg.norm(expected) > 0
-    np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-15)
+    values = rng.normal(size=(40, 4))
+    index = np.stack([np.arange(40), *rng.permuted(np.tile(np.arange(40), (2, 1)), axis=1)], 1)
+    values[index[7]] = values[7]  # no deviation, no slope
+    got, leaf = np.zeros_like(values), torch.tensor(values, requires_grad=True)
+    value = host("spread_all", 40, 4, values, np.ascontiguousarray(index, np.int64), 0.3 / values.size, got)
+    expected = 0.3 * leaf[torch.tensor(index)].std(dim=1).mean()
+    expected.backward()
+    assert index.shape == (40, K) and value == pytest.approx(expected.item(), rel=1e-10)
+    np.testing.assert_allclose(got, leaf.grad, rtol=1e-9, atol=1e-15)
 
 
-def test_edges_and_dice_of_recipe_paper_are_those_of_the_cpu_path(host):
+def test_quaternions_of_posed_gaussians_and_their_gradient_are_the_published_ones(host):
+    """A turn by h about an axis changes the sum of quaternions times weights by h times the sum of gradients times moves."""
+    rng = np.random.default_rng(11)
+    rotations, grad = Rotation.random(60, random_state=1).as_matrix(), rng.normal(size=(60, 4))
+    quats, out = np.empty((60, 4)), np.empty((60, 3, 3))
+    host("quat_all", 60, rotations, grad, quats, out)
+    published = haha.multiply(haha.quaternion(torch.tensor(rotations)), torch.tensor([[1.0, 0, 0, 0]] * 60, dtype=torch.float64))
+    np.testing.assert_allclose(quats, published, atol=1e-12)
+    np.testing.assert_allclose(quats, posed_quats(rotations), atol=1e-12)
+    np.testing.assert_allclose(out, through_quats(quats, grad, rotations), atol=1e-12)
+    for axis in np.eye(3):
+        turned = [Rotation.from_rotvec(h * axis).as_matrix() @ rotations for h in (1e-5, -1e-5)]
+        measured = ((posed_quats(turned[0]) - posed_quats(turned[1])) * grad).sum(1) / 2e-5
+        moves = np.cross(axis, rotations, axisb=1, axisc=1)
+        np.testing.assert_allclose((out * moves).sum((1, 2)), measured, atol=1e-7)
+
+
+def test_edges_and_dice_of_recipe_paper_are_the_published_ones(host):
     rng = np.random.default_rng(7)
-    image, target = rng.random((12, 9, 3)), rng.random((12, 9, 3))
+    image, target = rng.random((12, 12, 3)), rng.random((12, 12, 3))
     image[:5, :4] = target[:5, :4]  # equal strengths have no slope
-    got, expected = np.zeros_like(image), np.zeros_like(image)
-    loss = host("edges_all", 12, 9, image, target, 0.7, got)
-    assert abs(loss - sobel_magnitude(image, target, 0.7, expected)) < 1e-6 * loss
-    assert np.linalg.norm(got - expected) < 1e-6 * np.linalg.norm(expected)
-    pixels = rng.integers(0, 256, (12, 9, 4), dtype=np.uint8)
-    alpha, got, expected = rng.random((12, 9)), np.empty((12, 9)), np.zeros((12, 9))
-    loss = host("dice_all", 108, alpha, pixels[..., 3] / 255, 50.0, 0.1, got)
-    assert abs(loss - dice(alpha, pixels, 50, 0.1, expected)) < 1e-7
-    assert np.linalg.norm(got - expected) < 1e-6 * np.linalg.norm(expected)
+    got, leaf = np.zeros_like(image), torch.tensor(image[None], requires_grad=True)
+    loss = host("edges_all", 12, 12, image, target, 0.7 / 144, got)
+    expected = 0.7 * torch.nn.functional.l1_loss(haha.strength(leaf), haha.strength(torch.tensor(target[None])))
+    expected.backward()
+    assert loss == pytest.approx(expected.item(), rel=1e-10)
+    np.testing.assert_allclose(got, leaf.grad[0], rtol=1e-9, atol=1e-15)
+    pixels, alpha, got = rng.integers(0, 256, (12, 9, 4), dtype=np.uint8), rng.random((12, 9)), np.empty((12, 9))
+    whole = [torch.nn.functional.pad(torch.tensor(part), (0, 5)) for part in (alpha, pixels[..., 3] / 255)]
+    whole[0].requires_grad_()
+    loss = host("dice_all", 108, alpha, pixels[..., 3] / 255, 60.0, 0.1, got)
+    expected = 0.1 * haha.dice(*whole)
+    expected.backward()
+    assert loss == pytest.approx(expected.item(), rel=1e-10)
+    np.testing.assert_allclose(got, whole[0].grad[:, :9], rtol=1e-9)
 
 
 def test_adam_of_recipe_paper_is_that_of_the_cpu_path(host):
@@ -185,24 +211,17 @@ def test_adam_of_recipe_paper_is_that_of_the_cpu_path(host):
         np.testing.assert_allclose(a, b, rtol=1e-12)
 
 
-def test_the_window_that_lpips_sees_is_that_of_the_cpu_path(host):
-    """Each pixel of the image holds its place, so that a network that returns what it is given tells where the window begins."""
-    seen = []
-
-    class Network:
-        def gradient(self, image, target, scaled):
-            seen.append(image[0, 0])
-            return 0.0, np.zeros_like(image)
-
-    width, height = 500, 411
-    places = np.stack([*np.meshgrid(np.arange(width), np.arange(height)), np.zeros((height, width))], 2).astype(np.float32)
-    centres = np.random.default_rng(3).uniform(-100, 500, (40, 2))
-    for centre in centres:
-        perceptual(Network(), places, places, np.zeros(3), np.zeros(2, int), (width, height), centre, 1.0, np.zeros_like(places))
-    for axis, whole in enumerate((width, height)):
-        got = np.full(40, -1, np.int32)
-        host("window_all", 40, np.ascontiguousarray(centres[:, axis]), WINDOW, whole, got)
-        assert len(set(got)) > 5 and got.tolist() == [int(place[axis]) for place in seen]
+def test_the_windows_that_lpips_sees_lie_inside_and_those_of_recipe_paper_are_the_published_ones(host):
+    centres = np.random.default_rng(3).uniform(-100, 700, 60)
+    for side in (257, 411, 500):
+        got, own = np.full(60, -1, np.int32), np.full(60, -1, np.int32)
+        host("square_window_all", 60, centres, 256, side, got)
+        assert got.tolist() == [haha.window(centre, side) for centre in centres] == [window_begin(c, side) for c in centres]
+        host("window_all", 60, centres, 256, side, own)
+        np.testing.assert_array_equal(own, np.floor(np.clip(centres - 128, 0, side - 256)))
+    for side in (100, 256):
+        host("square_window_all", 60, centres, side, side, got)
+        assert not got.any()
 
 
 def test_a_step_of_the_joints_at_rest_is_that_of_the_cpu_path(host):

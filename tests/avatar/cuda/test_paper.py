@@ -1,4 +1,4 @@
-"""Recipe `paper` on the GPU: every gradient of a step, the neighbours, whole trainings, against the CPU path."""
+"""Recipe `paper` on the GPU, against the published formulas and the CPU path: every gradient of a step, neighbours, trainings."""
 
 from types import SimpleNamespace
 
@@ -38,17 +38,16 @@ def task_of(figure, **values):
 
 @pytest.fixture
 def trainers(figure):
-    """trainers(batch, steps): the same start in a PaperTrainer and in the CPU's Trainer, and the CPU's views."""
+    """trainers(batch, steps): the same start in a PaperTrainer and in the CPU's Trainer, a step of the latter, and the views."""
     from gsac.avatar.cuda.paper import PaperGaussians, PaperTrainer
     from gsac.stages.train.gpu import open_trainer
     from gsac.stages.train.paper import cuda as paper_cuda
     from gsac.stages.train.paper import trainer
-    from gsac.stages.train.views import person_crop
 
     opened = []
 
-    def make(batch, steps):
-        task, other = task_of(figure, steps=steps), task_of(figure, steps=steps)
+    def make(batch, steps, **values):
+        task, other = (task_of(figure, steps=steps, **values) for _ in range(2))
         rng = np.random.default_rng(1)
         cpu = trainer.Trainer(other, rng)
         shape = {name: v.shape for name, v in cpu.values.items()}
@@ -58,32 +57,37 @@ def trainers(figure):
         v, start = cpu.values, paper_cuda.init_gaussians(len(cpu.face), rng)
         recipe = paper_cuda.make_recipe(task)
         recipe.batch = batch
-        views = {t: person_crop(view) for t, view in enumerate(task.views)}
+        for name in ("order", "background", "centre"):
+            setattr(recipe, name, np.ascontiguousarray(getattr(recipe, name)[:, :batch]))
+        recipe.counts[:] = True  # the places' gradients of the first steps too
+        views = trainer.crop_views(task)
         gaussians = PaperGaussians(cpu.face, v["mu"], v["quat"], v["scale_logit"], v["rgb"], start.opacity)
         context = open_trainer(PaperTrainer, task.poses, task.trained, [views], gaussians, recipe)
         cuda = context.__enter__()
         opened.append(context)
-        cpu.rng = SimpleNamespace(random=iter(cuda.buffers["background"].read().reshape(-1, 3)).__next__)
-        cpu.rng.random = lambda n, draw=cpu.rng.random: draw()
-        return cuda, cpu, views
+
+        def step(number, of):
+            order, background, centre = (part[number] for part in (recipe.order, recipe.background, recipe.centre))
+            return cpu.step({int(t): views[int(t)] for t in order}, of, steps, background, centre)
+
+        return cuda, cpu, step, views
 
     yield make
     for context in opened:
         context.__exit__(None, None, None)
 
 
-@pytest.mark.parametrize("batch", [1, 4])
-def test_every_gradient_of_a_step_is_that_of_the_cpu_path(trainers, batch):
+@pytest.mark.parametrize("batch, text", [(1, False), (4, False), (4, True)])
+def test_every_gradient_of_a_step_is_that_of_the_cpu_path(trainers, batch, text):
     from gsac.avatar.cuda.paper import ROWS
     from gsac.benchmarks.gpu.check import relative
 
-    cuda, cpu, views = trainers(batch, 10)
+    cuda, cpu, step, _ = trainers(batch, 10, paper_text=text)
     cuda.poison()
     cuda.train(1)
-    cpu.neighbours.index = cuda.buffers["nearest_gaussian"].read().astype(np.int64)
-    frames, moves, step = cuda.order[0].tolist(), {}, cpu.poses.step
-    cpu.poses.step = lambda t, grad, *rest: step(t, moves.setdefault(t, grad), *rest)
-    loss = cpu.step({t: views[t] for t in frames}, 1, 10)  # not step 0, which would search the neighbours again
+    moves = {}
+    cpu.body = SimpleNamespace(step=moves.update)
+    loss = step(0, 101)  # a step that counts
     assert cuda.state().step == 1 and abs(cuda.losses()[0].mean() - loss) < 1e-5 * loss
     # from empty moments the first step leaves a tenth of the gradient in them
     first, leave = cuda.buffers["first"].read(), int(SWAPS * cuda.count)
@@ -91,58 +95,129 @@ def test_every_gradient_of_a_step_is_that_of_the_cpu_path(trainers, batch):
     length, hits = cuda.pulls()
     found |= {"pulls": relative(length, cpu.densifier.length, leave),
               "vertices": relative(cuda.buffers["grad_vertices"].read().reshape(-1, 3) / batch,
-                                   np.concatenate([moves[t] for t in frames]), 3 * batch * leave)}
+                                   np.concatenate([moves[t] for t in cuda.order[0].tolist()]), 3 * batch * leave)}
     assert max(found.values()) < LIMIT, found
     assert (hits != cpu.densifier.hits).mean() < SWAPS
 
 
-@pytest.mark.parametrize("batch", [1, 4])
-def test_poses_and_betas_take_the_vertices_gradient_as_on_the_cpu(trainers, batch):
-    """From the GPU's own gradient of the vertices: the poses' sums also hold the gaussians that lie at one depth and swap."""
-    from gsac.benchmarks.gpu.check import relative
+@pytest.mark.parametrize("text", [False, True], ids=["code", "text"])
+def test_loss_and_gradient_of_the_images_are_the_published_ones(trainers, text):
+    """Of the images as this GPU drew them."""
+    import torch
 
-    cuda, cpu, _ = trainers(batch, 10)
+    from tests.support import haha
+
+    cuda, cpu, _, views = trainers(4, 4, paper_text=text)
     cuda.poison()
     cuda.train(1)
-    frames, betas = cuda.order[0].tolist(), np.zeros(len(cpu.poses.betas))
-    for t, grad in zip(frames, cuda.buffers["grad_vertices"].read(), strict=True):
-        betas += cpu.poses.shape_gradient(*cpu.poses.step(t, grad, 2e-4, 0.0)) / batch
-    cpu.poses.step_betas(betas, 2e-4)
-    got, expected = cuda.buffers["pose_first"].read()[frames], cpu.poses.moments[0][frames]
-    found = {"pose": relative(got[:, :-1], expected[:, :-1]), "transl": relative(got[:, -1], expected[:, -1]),
-             "betas": relative(cuda.buffers["beta_first"].read(), cpu.poses.beta_moments[0])}
-    assert np.linalg.norm(betas) > 0 and max(found.values()) < 1e-4, found
-    np.testing.assert_allclose(cuda.betas(), cpu.poses.betas - cpu.poses.params.betas, rtol=0.01)
-    vertices, joints = cpu.poses.body.rest(cpu.poses.betas)
+    side, order = cpu.side, cuda.order[0]
+    drawn, pixels = np.zeros((4, side, side, 4)), np.zeros((4, side, side, 4))
+    boxes, slopes = [], []
+    for b, t in enumerate(order):
+        h, w = cuda.sizes[t]
+        x, y = views[int(t)].corner
+        rows, columns, s = -(-h // 16), -(-w // 16), cuda.scene
+        reached = cuda.buffers["tile_count"].read()[b * s.max_tiles:][: rows * columns].reshape(rows, columns) > 0
+        reached = np.repeat(np.repeat(reached, 16, 0), 16, 1)[:h, :w, None]
+        image, slope = (cuda.buffers[name].read()[b * s.max_pixels:][: h * w].reshape(h, w, 4) for name in ("image", "grad_image"))
+        boxes.append(np.s_[b, y:y + h, x:x + w])
+        drawn[boxes[-1]], pixels[boxes[-1]] = np.where(reached, image, 0), views[int(t)].pixels / 255
+        slopes.append((reached, slope))
+    rgb, alpha = (torch.tensor(part, requires_grad=True) for part in (drawn[..., :3], drawn[..., 3]))
+    pixels = torch.tensor(pixels)
+    expected = haha.image_losses(rgb, alpha, pixels[..., :3], pixels[..., 3], torch.tensor(cuda.recipe.background[0]).double(), text)
+    expected.backward()
+    pulled = cuda.buffers["pull_value"].read().mean() / 2.0**60
+    assert cuda.losses()[0].mean() - pulled == pytest.approx(expected.item(), rel=1e-5)
+    for box, (reached, slope) in zip(boxes, slopes, strict=True):
+        wanted = torch.cat([rgb.grad[box], alpha.grad[box][..., None]], -1).numpy() * 4 * reached  # a frame's own, not the mean's
+        got = np.where(reached, slope, 0)
+        for part in (np.s_[..., :3], np.s_[..., 3]):
+            assert np.linalg.norm(got[part] - wanted[part]) < 1e-4 * np.linalg.norm(wanted[part])
+
+
+def test_value_and_gradient_of_the_neighbour_term_are_the_published_ones(trainers):
+    import torch
+
+    from tests.support import haha
+
+    cuda, cpu, _, _ = trainers(2, 4)
+    start = {name: value.copy() for name, value in cuda.values().items()}
+    cuda.train(1)
+    n = cuda.count
+    for b in range(2):
+        index = torch.tensor(cuda.buffers["nearest_gaussian"].read()[b]).long()
+        vertices = torch.tensor(cuda.buffers["vertices"].read()[b].astype(float))
+        posed = haha.posed(vertices, torch.tensor(cpu.faces).long(), torch.tensor(cuda.face).long(),
+                           *(torch.tensor(start[name].astype(float)) for name in ("mu", "quat", "scale_logit")))
+        parts = [part.detach().requires_grad_() for part in (*posed, torch.tensor(start["rgb"].astype(float)))]
+        squares = ((parts[0][index] - parts[0][:, None]) ** 2).sum(-1)
+        expected = haha.KNN * (sum(values[index].std(dim=1).mean() for values in parts[1:]) + squares.mean())
+        expected.backward()
+        pull = cuda.buffers["pull"].read()[b] / 2.0**60
+        assert cuda.buffers["pull_value"].read()[b] / 2.0**60 == pytest.approx(expected.item(), rel=1e-5)
+        for columns, leaf in zip((np.s_[:3], np.s_[3:7], np.s_[7:10], np.s_[10:]), parts, strict=True):
+            wanted = leaf.grad.numpy()
+            assert pull.shape == (n, 13) and np.linalg.norm(pull[:, columns] - wanted) < 1e-4 * np.linalg.norm(wanted)
+
+
+@pytest.mark.parametrize("batch", [1, 4])
+def test_what_is_learned_of_the_body_takes_the_vertices_gradient_as_on_the_cpu(trainers, batch):
+    """From the GPU's own gradient of the vertices: the sums also hold the gaussians that lie at one depth and swap."""
+    from gsac.benchmarks.gpu.check import relative
+
+    cuda, cpu, _, _ = trainers(batch, 10)
+    cuda.poison()
+    cuda.train(1)
+    frames = cuda.order[0].tolist()
+    cpu.body.step({t: grad / np.float32(batch) for t, grad in zip(frames, cuda.buffers["grad_vertices"].read(), strict=True)})
+    got, expected = cuda.buffers["pose_first"].read()[frames], cpu.body.pose[0][frames]
+    size = cpu.body.expression.shape[2]
+    expression = cuda.buffers["expression_first"].read()[frames]
+    limbs = np.arange(55) != 22  # this jaw's turn is three expressions
+    found = {"pose": relative(got[:, :-1][:, limbs], expected[:, :-1][:, limbs]), "transl": relative(got[:, -1], expected[:, -1]),
+             "betas": relative(cuda.buffers["beta_first"].read(), cpu.body.betas[0]),
+             "expression": relative(expression[:, :size], cpu.body.expression[0][frames]),
+             "jaw": relative(expression[:, size:], expected[:, 22])}
+    assert max(found.values()) < 1e-4, found
+    poses = cpu.poses
+    np.testing.assert_allclose(cuda.betas(), poses.betas - poses.params.betas, rtol=0.01)
+    learned = cuda.expressions()[frames]
+    np.testing.assert_allclose(learned[:, :size], poses.expression[frames], rtol=0.01, atol=1e-8)
+    np.testing.assert_allclose(learned[:, size:], poses.pose[frames, 22] - poses.fit_pose[frames, 22], rtol=0.01, atol=1e-8)
+    vertices, joints = poses.body.rest(poses.betas)
     np.testing.assert_allclose(cuda.body.rest[0] + cuda.buffers["offset"].read(), vertices, atol=1e-6)
     np.testing.assert_allclose(cuda.buffers["joints"].read(), joints, rtol=0, atol=5e-6)  # sums over 13,718 vertices in float32
 
 
-def test_the_neighbours_are_the_nearest(trainers):
+def test_the_neighbours_are_the_nearest_as_posed_and_stay_so_while_gaussians_move_and_grow(trainers):
     from scipy.spatial import cKDTree
 
-    cuda, _, _ = trainers(2, 4)
-    cuda.train(1)
+    def are_nearest():
+        for b in range(2):
+            places, index = cuda.buffers["posed"].read()[b, :, :3], cuda.buffers["nearest_gaussian"].read()[b]
+            expected = cKDTree(places).query(places, k=3)[0]
+            found = np.sort(np.linalg.norm(places[index] - places[:, None], axis=2), axis=1)
+            np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-6)
+            assert all(len(set(row)) == 3 for row in index[::97])
+
+    cuda, _, _, _ = trainers(2, 40)
+    for until in (1, 2, 30):
+        cuda.train(until - cuda.state().step)
+        are_nearest()
     face = np.concatenate([cuda.face, cuda.face[:1001]])
     cuda.grow(face, {name: np.concatenate([v, v[:1001] + np.float32(0.01)]) for name, v in cuda.values().items()})
-    cuda._find_neighbours()
-    places, index = cuda.buffers["place"].read(), cuda.buffers["nearest_gaussian"].read()
-    expected = cKDTree(places).query(places, k=3)[0]
-    found = np.sort(np.linalg.norm(places[index] - places[:, None], axis=2), axis=1)
-    np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-6)
-    start, back = cuda.buffers["near_of_start"].read(), cuda.buffers["near_of"].read()
-    for i in (0, 17, len(face) - 1):
-        assert sorted(back[start[i]:start[i + 1]]) == sorted(np.flatnonzero((index == i).any(1)))
     cuda.train(3)
-    assert cuda.state().step == 4 and np.isfinite(cuda.losses()).all()
+    are_nearest()
+    assert cuda.state().step == 33 and np.isfinite(cuda.losses()).all()
 
 
 def test_forty_steps_follow_the_cpu_path(trainers):
     from gsac.benchmarks.gpu.check import relative
 
-    cuda, cpu, views = trainers(3, 40)
+    cuda, cpu, step, _ = trainers(3, 40)
     cuda.train(40)
-    losses = [cpu.step({int(t): views[int(t)] for t in cuda.order[step]}, step, 40) for step in range(40)]
+    losses = [step(number, number) for number in range(40)]
     np.testing.assert_allclose(cuda.losses().mean(1), losses, rtol=0.01)
     ours, theirs = cuda.gaussians(), cpu.gaussians()
     for name in ("mu", "log_scale", "rgb"):

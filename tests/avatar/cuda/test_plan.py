@@ -98,9 +98,13 @@ def test_plans_of_the_other_trainers_hold_their_frames_and_rates():
     np.testing.assert_allclose(found.rates["offset"], np.repeat([1e-3, 1e-3 * 0.1**0.5], 3), rtol=1e-6)
     np.testing.assert_allclose(found.rates["gain"], np.repeat([2e-3, 2e-3 * 0.1**0.3], 3), rtol=1e-6)
 
-    found = plan(PaperTrainer, PaperRecipe(steps=10, batch=4, mu_rate=1e-4, mu_decay=0.01, rgb_rate=5e-3, beta_rate=2e-4), 6)
-    assert found.order.shape == (10, 4) and (found.rates["rgb"] == np.float32(5e-3)).all() and (found.rates["betas"] > 0).all()
-    np.testing.assert_allclose(found.rates["mu"], 1e-4 * 0.01 ** (np.arange(10) / 10), rtol=1e-6)
+    order, seen = np.arange(40).reshape(10, 4) % 6, np.arange(10) > 3
+    found = plan(PaperTrainer, PaperRecipe(steps=10, batch=4, order=order, background=grounds, centre=order, mu_rates=np.arange(10),
+                                           counts=seen, rgb_rate=5e-3, beta_rate=2e-4, expression_rate=2e-5), 6)
+    assert found.order is order and found.background is grounds and (found.rates["centre"] == -1).all()
+    assert (found.rates["rgb"] == np.float32(5e-3)).all() and (found.rates["betas"] == np.float32(2e-4)).all()
+    assert (found.rates["expression"] == np.float32(2e-5)).all()
+    assert found.rates["mu"].tolist() == list(range(10)) and (found.rates["counts"] == seen).all()
 
 
 def test_a_step_never_holds_a_frame_twice():

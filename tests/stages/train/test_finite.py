@@ -9,6 +9,7 @@ from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.finite import require_finite
 from gsac.stages.train.judge import heldout
 from gsac.stages.train.paper import trainer as paper
+from gsac.stages.train.paper.body_adam import BodyAdam
 from gsac.stages.train.poses import bundle_adjust
 from gsac.stages.train.poses.photometric import NormalEquations
 from gsac.stages.train.poses.poses import Poses
@@ -52,8 +53,14 @@ def bad_pose(result, poses, t, *arguments):
     return result
 
 
-def bad_betas(result, poses, *arguments):
-    nan_in(poses.betas)
+def bad_body(name):
+    def spoil(result, adam, *arguments):
+        nan_in(getattr(adam.poses, name))
+    return spoil
+
+
+def bad_adam(result, value, *arguments):
+    nan_in(value)
 
 
 @pytest.mark.parametrize("owner, name, spoil, words", [
@@ -69,10 +76,10 @@ def test_recipe_fast_stops_with_step_and_quantity(job, monkeypatch, owner, name,
 
 @pytest.mark.slow
 @pytest.mark.parametrize("owner, name, spoil, words", [
-    (paper, "render_bound_backward", bad_vertices, "gradient of vertices is not finite at step 1"),
-    (paper.Trainer, "_pull_together", bad_value("rgb"), "rgb is not finite after step 2"),
-    (Poses, "step", bad_pose, r"pose of frame \d is not finite after step 1"),
-    (Poses, "step_betas", bad_betas, "betas is not finite after step 2")])
+    (paper, "bind_backward", bad_vertices, "gradient of vertices is not finite at step 1"),
+    (paper, "adam", bad_adam, "mu is not finite after step 0"),
+    (BodyAdam, "step", bad_body("pose"), r"pose of frame \d is not finite after step 2"),
+    (BodyAdam, "step", bad_body("betas"), "betas is not finite after step 2")])
 def test_recipe_paper_stops_with_step_and_quantity(job, monkeypatch, owner, name, spoil, words):
     spoiled(monkeypatch, owner, name, spoil)
     with pytest.raises(StageError, match=words):

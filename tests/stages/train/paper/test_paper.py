@@ -163,7 +163,7 @@ def made_trainer(seed, **config):
 
 @pytest.mark.parametrize("text", [False, True], ids=["code", "text"])
 def test_a_whole_step_has_the_loss_and_every_gradient_of_the_published_one(text):
-    """From the gaussians' own values and the mesh through drawing to the loss; the places' gradients in half widths of the square."""
+    """From gaussians on a mesh through drawing to the loss; those of the places in the image in half widths of the square."""
     made, crops, views, posed, moves = made_trainer(3, paper_text=text)
     values = {name: value.copy() for name, value in made.values.items()}
     grounds = np.random.default_rng(4).random((2, 3)).astype(np.float32)
