@@ -46,7 +46,7 @@ def trainers(figure):
 
     opened = []
 
-    def make(batch, steps, **values):
+    def make(batch, steps, network=None, **values):
         task, other = (task_of(figure, steps=steps, **values) for _ in range(2))
         rng = np.random.default_rng(1)
         cpu = trainer.Trainer(other, rng)
@@ -62,7 +62,7 @@ def trainers(figure):
         recipe.counts[:] = True  # the places' gradients of the first steps too
         views = trainer.crop_views(task)
         gaussians = PaperGaussians(cpu.face, v["mu"], v["quat"], v["scale_logit"], v["rgb"], start.opacity)
-        context = open_trainer(PaperTrainer, task.poses, task.trained, [views], gaussians, recipe)
+        context = open_trainer(PaperTrainer, task.poses, task.trained, [views], gaussians, recipe, network)
         cuda = context.__enter__()
         opened.append(context)
 
@@ -100,6 +100,18 @@ def test_every_gradient_of_a_step_is_that_of_the_cpu_path(trainers, batch, text)
     assert (hits != cpu.densifier.hits).mean() < SWAPS
 
 
+def drawn_frames(cuda, views, name):
+    """(h, w, 4) each: what buffer `name`, image or grad_image, holds of the last step's frames; zero where no gaussian reaches."""
+    out = []
+    for b, t in enumerate(cuda.order[cuda.state().step - 1]):
+        h, w = views[int(t)].pixels.shape[:2]
+        rows, columns, s = -(-h // 16), -(-w // 16), cuda.scene
+        reached = cuda.buffers["tile_count"].read()[b * s.max_tiles:][: rows * columns].reshape(rows, columns) > 0
+        reached = np.repeat(np.repeat(reached, 16, 0), 16, 1)[:h, :w, None]
+        out.append(np.where(reached, cuda.buffers[name].read()[b * s.max_pixels:][: h * w].reshape(h, w, 4), 0))
+    return out
+
+
 @pytest.mark.parametrize("text", [False, True], ids=["code", "text"])
 def test_loss_and_gradient_of_the_images_are_the_published_ones(trainers, text):
     """Of the images as this GPU drew them."""
@@ -110,30 +122,66 @@ def test_loss_and_gradient_of_the_images_are_the_published_ones(trainers, text):
     cuda, cpu, _, views = trainers(4, 4, paper_text=text)
     cuda.poison()
     cuda.train(1)
-    side, order = cpu.side, cuda.order[0]
-    drawn, pixels = np.zeros((4, side, side, 4)), np.zeros((4, side, side, 4))
-    boxes, slopes = [], []
-    for b, t in enumerate(order):
-        h, w = cuda.sizes[t]
-        x, y = views[int(t)].corner
-        rows, columns, s = -(-h // 16), -(-w // 16), cuda.scene
-        reached = cuda.buffers["tile_count"].read()[b * s.max_tiles:][: rows * columns].reshape(rows, columns) > 0
-        reached = np.repeat(np.repeat(reached, 16, 0), 16, 1)[:h, :w, None]
-        image, slope = (cuda.buffers[name].read()[b * s.max_pixels:][: h * w].reshape(h, w, 4) for name in ("image", "grad_image"))
+    boxes, side = [], cpu.side
+    drawn, pixels = np.zeros((2, 4, side, side, 4))
+    for b, (t, image) in enumerate(zip(cuda.order[0], drawn_frames(cuda, views, "image"), strict=True)):
+        (x, y), (h, w) = views[int(t)].corner, image.shape[:2]
         boxes.append(np.s_[b, y:y + h, x:x + w])
-        drawn[boxes[-1]], pixels[boxes[-1]] = np.where(reached, image, 0), views[int(t)].pixels / 255
-        slopes.append((reached, slope))
+        drawn[boxes[-1]], pixels[boxes[-1]] = image, views[int(t)].pixels / 255
     rgb, alpha = (torch.tensor(part, requires_grad=True) for part in (drawn[..., :3], drawn[..., 3]))
     pixels = torch.tensor(pixels)
-    expected = haha.image_losses(rgb, alpha, pixels[..., :3], pixels[..., 3], torch.tensor(cuda.recipe.background[0]).double(), text)
+    ground = torch.tensor(cuda.recipe.background[0]).double()
+    expected = haha.image_losses(rgb, alpha, pixels[..., :3], pixels[..., 3], ground, text)
     expected.backward()
     pulled = cuda.buffers["pull_value"].read().mean() / 2.0**60
     assert cuda.losses()[0].mean() - pulled == pytest.approx(expected.item(), rel=1e-5)
-    for box, (reached, slope) in zip(boxes, slopes, strict=True):
-        wanted = torch.cat([rgb.grad[box], alpha.grad[box][..., None]], -1).numpy() * 4 * reached  # a frame's own, not the mean's
-        got = np.where(reached, slope, 0)
+    for box, slope in zip(boxes, drawn_frames(cuda, views, "grad_image"), strict=True):
+        wanted = torch.cat([rgb.grad[box], alpha.grad[box][..., None]], -1).numpy() * 4  # a frame's own, not the mean's
+        wanted = np.where((slope != 0).any(2, keepdims=True), wanted, 0)
         for part in (np.s_[..., :3], np.s_[..., 3]):
-            assert np.linalg.norm(got[part] - wanted[part]) < 1e-4 * np.linalg.norm(wanted[part])
+            assert np.linalg.norm(slope[part] - wanted[part]) < 1e-4 * np.linalg.norm(wanted[part])
+
+
+def test_lpips_of_a_window_of_every_frame_is_in_loss_and_gradient(trainers):
+    from gsac.avatar.cuda import perceptual
+    from gsac.avatar.lpips import Lpips, shapes
+    from gsac.stages.train.paper.losses import Picture
+    from gsac.stages.train.paper.losses import perceptual as on_cpu
+    from gsac.stages.train.task import LPIPS_WEIGHT
+
+    if why := perceptual.why_not():
+        pytest.skip(why)
+    rng = np.random.default_rng(0)
+    network = Lpips("lpips-vgg", {own: np.float32(rng.random(shape) if own.startswith("lin") else rng.normal(size=shape) * (
+        0.1 if len(shape) == 1 else np.sqrt(2 / np.prod(shape[1:])))) for own, shape in shapes("lpips-vgg").items()})
+    (cuda, cpu, _, views), (without, *_) = trainers(3, 4, network), trainers(3, 4)
+    for each in (cuda, without):
+        each.poison()
+        each.train(1)
+    windows, images = cuda.windows, drawn_frames(cuda, views, "image")
+    slopes, plain = drawn_frames(cuda, views, "grad_image"), drawn_frames(without, views, "grad_image")
+    for b, t in enumerate(cuda.order[0]):
+        view, ground, seen = views[int(t)], cuda.recipe.background[0, b], []
+
+        class Kept:
+            def gradient(self, *shown, scaled, b=b, seen=seen):
+                seen.extend(shown)
+                return float(windows.values[b]), windows.slopes[b].cpu().numpy()
+
+        pixels = view.pixels.astype(np.float32) / np.float32(255)
+        render, target = (part[..., :3] + (1 - part[..., 3:]) * ground for part in (images[b], pixels))
+        centre = view.camera.project(cuda.buffers["vertices"].read()[b, cuda.recipe.centre[0, b]]) + view.corner
+        picture = Picture(images[b][..., :3], images[b][..., 3], view.pixels, ground, view.corner, cpu.side)
+        expected = np.zeros_like(render)
+        value = on_cpu(Kept(), render, target, picture, centre, LPIPS_WEIGHT, expected)
+        np.testing.assert_allclose(windows.images[b].cpu().numpy(), seen, atol=2e-6)
+        assert float(windows.values[b]) == pytest.approx(network.distance(*seen, scaled=False), rel=1e-4)
+        assert cuda.losses()[0, b] - without.losses()[0, b] == pytest.approx(value, rel=1e-3) and value > 0
+        found = slopes[b][..., :3] - plain[b][..., :3]
+        expected = np.where((slopes[b] != 0).any(2, keepdims=True), expected, 0)
+        assert np.linalg.norm(found - expected) < 1e-3 * np.linalg.norm(expected) > 0
+    cuda.train(3)
+    assert cuda.state().step == 4 and np.isfinite(cuda.losses()).all()
 
 
 def test_value_and_gradient_of_the_neighbour_term_are_the_published_ones(trainers):
