@@ -18,7 +18,7 @@ from gsac.stages.train.gaussians import kernels
 from gsac.stages.train.paper.densify import LARGEST
 from gsac.stages.train.paper.knn import K, posed_quats, through_quats
 from gsac.stages.train.paper.losses import window_begin
-from tests.support import haha
+from support import haha
 
 HERE = Path(__file__).parent
 SOURCES = Path(binding.__file__).parent / "cuda"

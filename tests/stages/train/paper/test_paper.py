@@ -25,7 +25,7 @@ from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.stage import run
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
-from tests.support import haha
+from support import haha
 
 SIDE = 60
 BOXES = ((0, 13, 31, 47), (22, 0, 38, 29))
