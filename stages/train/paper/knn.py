@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from gsac.avatar.numba_kernel import own_kernel
 
@@ -46,7 +46,7 @@ def pull_together(places: np.ndarray, rotations: np.ndarray, scales: np.ndarray,
 
 def find_nearest(places: np.ndarray) -> np.ndarray:
     """(N, K) int, the nearest of each of places (N, 3), itself among them."""
-    return cKDTree(places).query(places, k=K)[1]
+    return KDTree(places).query(places, k=K)[1]
 
 
 def posed_quats(rotations: np.ndarray) -> np.ndarray:

@@ -72,7 +72,7 @@ def picture_loss(picture: Picture, share: float, text: bool, workspace: Workspac
         value += weight * losses.sobel(image, target, factor=weight, gradient=gradient, workspace=workspace).value
     else:
         value += edge_strength(image, target, p, SOBEL * share / p.side**2, gradient)
-    if network is not None:
+    if network is not None and centre is not None:
         value += perceptual(network, image, target, p, centre, LPIPS_WEIGHT * share, gradient)
     grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(p.alpha)
     through_background(gradient, p.rgb, p.alpha, p.pixels, p.background, gain, 0.0, grad_rgb, grad_alpha, grad_gain)

@@ -174,7 +174,8 @@ class Trainer:
         places, visible = screen_gradients(state)
         self.densifier.note(number, places * self.side / 2, visible)
         pull = pull_together(state.means, state.rotations, state.scales, self.values["rgb"], KNN * share)
-        bound = bind_backward(*state.bound, grads.means + pull.places, grads.rotations + pull.rotations,
-                              grads.scales + pull.scales)
+        vertices, faces, face, mu, quat, log_scale = state.bound
+        bound = bind_backward(vertices, faces, face, mu, quat, log_scale, grads.means + pull.places,
+                              grads.rotations + pull.rotations, grads.scales + pull.scales)
         return loss + pull.value, BoundGradients(bound.mu, bound.quat, bound.log_scale, grads.rgb + pull.rgb, grads.opacity,
                                                  bound.vertices)
