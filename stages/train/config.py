@@ -127,6 +127,8 @@ class TrainConfig:
             raise BadInput(f"train.lpips is {self.lpips!r}; choices: {', '.join(LPIPS)}")
         if self.recipe == "paper" and self.exposure:
             raise BadInput("train.exposure is learned by recipe fast only; set train.recipe to fast, or train.exposure to false")
+        if self.paper_text and self.recipe != "paper":
+            raise BadInput("train.paper_text is of recipe paper; set train.recipe to paper, or train.paper_text to false")
         if isinstance(self.gaussians, str) and self.gaussians != AUTO:
             raise BadInput(f"train.gaussians is {self.gaussians!r}; give a number, or {AUTO}")
         if self.gaussians != AUTO and self.gaussians < 100:

@@ -52,6 +52,12 @@ def test_cuda_without_a_gpu_says_what_is_missing_and_what_to_do():
         check_device("cuda")
 
 
+def test_the_losses_of_the_papers_text_are_refused_where_another_recipe_would_pass_them_over():
+    assert make_config(STAGE, {"recipe": "paper", "paper_text": True}).paper_text
+    with pytest.raises(BadInput, match="train.paper_text is of recipe paper"):
+        make_config(STAGE, {"paper_text": True})
+
+
 def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
     made = make_recipe(TrainConfig(mask=0.5, mu_rate=2e-3, exposure=True), 3000, batch=3)
     assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, STEPS)
