@@ -179,6 +179,7 @@ BODY_SHAPES: Shapes = {
     "center": (2,), "sigma_joints": ("T", 55), "model": (),
 }
 LIGHT_SHAPE: Shapes = {"light": (4, 3)}
+LOW_PASS_SHAPE: Shapes = {"low_pass": (2,)}
 AVATAR_SHAPES: Shapes = {
     "face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": ("N", 3), "rgb": ("N", 3), "opacity": ("N",),
 }
@@ -215,9 +216,9 @@ def check_body(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_avatar(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of avatar.npz by name: `AVATAR_SHAPES`, as mu (N, 3); light (4, 3) or not; all of `LEVEL_SHAPES` or none."""
-    arrays = check_arrays(path, AVATAR_SHAPES, LIGHT_SHAPE, LEVEL_SHAPES)
-    for name in {**AVATAR_SHAPES, **LIGHT_SHAPE, **LEVEL_SHAPES}:
+    """The arrays of avatar.npz: `AVATAR_SHAPES`, as mu (N, 3); light (4, 3), low_pass (2,), all of `LEVEL_SHAPES` or none."""
+    arrays = check_arrays(path, AVATAR_SHAPES, LIGHT_SHAPE, LOW_PASS_SHAPE, LEVEL_SHAPES)
+    for name in {**AVATAR_SHAPES, **LIGHT_SHAPE, **LOW_PASS_SHAPE, **LEVEL_SHAPES}:
         if name in arrays and not _finite(arrays[name]):
             raise ArtifactError(f"{path}: array {name} is not finite")
     if "levels" in arrays:

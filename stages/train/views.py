@@ -43,8 +43,8 @@ class View:
         return View(self.camera.scaled(w, h), cv2.resize(self.pixels, (w, h), interpolation=cv2.INTER_AREA), (0, 0))
 
 
-def read_views(frames: Path, alphas: Path, camera: Camera, height: int) -> tuple[list[View], list[int]]:
-    """All T frames, whole, at most `height` px high. camera: of the frames on disk.
+def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None) -> tuple[list[View], list[int]]:
+    """All T frames, whole, at most `height` px high, None: at their own size. camera: of the frames on disk.
 
     Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not fit the frames.
     """
@@ -58,7 +58,7 @@ def read_views(frames: Path, alphas: Path, camera: Camera, height: int) -> tuple
     return [view for view, _ in read], [t for t, (_, shown) in enumerate(read) if shown < LEAST_SHARE]
 
 
-def _read_view(path: Path, mask: Path, camera: Camera, height: int) -> tuple[View, float]:
+def _read_view(path: Path, mask: Path, camera: Camera, height: int | None) -> tuple[View, float]:
     """The frame cut out with its mask, and the share of it that the mask covers."""
     rgb, alpha = read_frame(path), read_alpha(mask)
     if alpha.shape != rgb.shape[:2]:
@@ -67,7 +67,7 @@ def _read_view(path: Path, mask: Path, camera: Camera, height: int) -> tuple[Vie
         raise StageError(f"{mask}: mask is not finite")
     alpha = np.clip(alpha, 0, 1)
     pixels = np.dstack([rgb * alpha[..., None], alpha * 255])
-    h = min(height, rgb.shape[0])
+    h = min(height or rgb.shape[0], rgb.shape[0])
     w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
     if (w, h) != (rgb.shape[1], rgb.shape[0]):
         pixels = cv2.resize(pixels, (w, h), interpolation=cv2.INTER_AREA)

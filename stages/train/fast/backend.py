@@ -51,13 +51,19 @@ class Rounds(ABC):
 class Backend(ABC):
     """The optimisations of recipe `fast` on one kind of device. Numbers that are not finite raise StageError with the step."""
 
+    device: str
+    """cpu or cuda."""
+
     @abstractmethod
     def train(self, task: Task, count: int) -> Trained:
         """Fits `count` gaussians to the trained frames; refines their poses in task.poses."""
 
     @abstractmethod
-    def refit(self, task: Task, trainer: Trainer, views: dict[int, View]) -> Trainer:
-        """Fits merged gaussians anew in `refit.refit_steps`; poses and unseen gaussians stay. views: trained frame -> view."""
+    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
+        """Fits merged gaussians anew in `refit.refit_steps`; poses and unseen gaussians stay.
+
+        views: trained frame -> view; coarse: the same at half the size for the first steps, where they shall be coarse.
+        """
 
     @abstractmethod
     def open_rounds(self, task: Task, views: dict[int, View], gaussians: Gaussians,

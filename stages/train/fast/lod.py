@@ -52,7 +52,7 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
         fewer = merge_to_size(gaussians, worth, size, task.poses.body, rest)
         if len(fewer) >= len(gaussians):
             break
-        trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True)
+        trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True, halvings=halvings)
         trainer.freeze_unseen(views)
         gaussians = backend.refit(task, trainer, views).finish(views)[0]
         out.append(gaussians)
