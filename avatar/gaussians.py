@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,13 +39,15 @@ class Gaussians:
     """(N,) in 0..1."""
     light: np.ndarray | None = None
     """(4, 3) of `avatar.light`: the room's light, a factor on rgb by the face's normal; None: factor 1."""
+    max_height_px: float | None = None
+    """Of a coarser level of detail: projected height of the person up to which it is drawn; None: not said."""
 
     def __len__(self) -> int:
         return len(self.face)
 
     def __getitem__(self, which: np.ndarray | slice) -> Gaussians:
         """Those that an index array (M,), mask (N,) or slice picks."""
-        return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in FIELDS), self.light)
+        return replace(self, **{name: np.ascontiguousarray(getattr(self, name)[which]) for name in FIELDS})
 
     def write(self, path: Path, coarser: Sequence[Gaussians] = ()) -> None:
         """To avatar.npz, float32 and face int32, with `light` and coarser levels of detail, finest first, where given."""

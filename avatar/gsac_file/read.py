@@ -14,6 +14,7 @@ from gsac.avatar.gsac_file.container import Fault, GsacError
 MAX_JOINTS = 256
 MAX_LEVELS = 16
 BLEND_RANGE = {"low_pass_px2": (0, 100), "alpha_max": (0, 1), "alpha_min": (1e-6, 1)}
+HEIGHT_RANGE = (1, 1e6)
 
 
 class Reader:
@@ -65,13 +66,20 @@ class Reader:
             raise self.bad(Fault.VALUE, f"block {name!r} is not finite")
         return array
 
+    def number(self, table: dict, key: str, span: tuple[float, float]) -> float:
+        """The number at a key, within `span`."""
+        value = self.entry(table, key, (int, float))
+        if not span[0] <= value <= span[1]:
+            raise self.bad(Fault.VALUE, f"`{key}` is out of range")
+        return value
+
     def check_drawing(self) -> None:
         """Checks the draw rule and the ground of the head, which this reader does not keep."""
         drawn = self.entry(self.head, "blend", dict) if "blend" in self.head else {}
         found = [(self.head, "ground", (-1e6, 1e6))] + [(drawn, key, span) for key, span in BLEND_RANGE.items()]
-        for table, key, (least, most) in found:
-            if key in table and not least <= self.entry(table, key, (int, float)) <= most:
-                raise self.bad(Fault.VALUE, f"`{key}` is out of range")
+        for table, key, span in found:
+            if key in table:
+                self.number(table, key, span)
 
     def check_indices(self, array: np.ndarray, limit: int, what: str) -> np.ndarray:
         """The array (...) itself, if it holds indices in 0..limit - 1 only."""
@@ -128,8 +136,9 @@ class Reader:
             N = len(face)
             if self.entry(level, "count", int) != N:
                 raise self.bad(Fault.VALUE, f"a level says it has other than {N} gaussians")
-            gaussians = Gaussians(face, light=light, **{name: self.block(f"{prefix}.{name}", (N, *shape[1:]))
-                                                        for name, shape in AVATAR_SHAPES.items() if name != "face"})
+            height = None if level.get("max_height_px") is None else float(self.number(level, "max_height_px", HEIGHT_RANGE))
+            gaussians = Gaussians(face, light=light, max_height_px=height, **{
+                name: self.block(f"{prefix}.{name}", (N, *shape[1:])) for name, shape in AVATAR_SHAPES.items() if name != "face"})
             if N and np.abs((gaussians.quat ** 2).sum(1) - 1).max() > 1e-2:
                 raise self.bad(Fault.VALUE, f"{prefix}.quat must hold unit quaternions")
             out.append(gaussians)
