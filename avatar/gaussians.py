@@ -58,6 +58,8 @@ class Gaussians:
             arrays["levels"] = np.array([len(level) for level in coarser], np.int32)
             parts = [level._arrays() for level in coarser]
             arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in FIELDS}
+            if all(level.max_height_px for level in coarser):
+                arrays["level_heights"] = np.array([level.max_height_px for level in coarser], np.float32)
         artifacts.write_arrays(path, **arrays)
 
     @classmethod
@@ -72,7 +74,9 @@ class Gaussians:
         light = arrays.get("light")
         ends = np.cumsum(arrays.get("levels", np.zeros(0, np.int32)))
         parts = [{name: arrays[f"coarser_{name}"][a:b] for name in FIELDS} for a, b in zip([0, *ends], ends, strict=False)]
-        return [cls(**part, light=light) for part in [{name: arrays[name] for name in FIELDS}, *parts]]
+        heights = [None, *arrays.get("level_heights", np.full(len(ends), None)).tolist()]
+        return [cls(**part, light=light, max_height_px=height)
+                for part, height in zip([{name: arrays[name] for name in FIELDS}, *parts], heights, strict=True)]
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in FIELDS}
