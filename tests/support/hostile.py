@@ -112,7 +112,7 @@ def files(data):
             {"blend": {"alpha_min": 0}}, {"blend": {"alpha_min": [1]}}, {"blend": {"low_pass_energy": 1}},
             {"blend": {"low_pass_energy": None}}, {"blend": {"low_pass_energy": "true"}},
             *({"levels": [*head["levels"][:1], head["levels"][1] | {"max_height_px": height}]}
-              for height in (0, -1, 0.5, 1e7, 1e400, True, "270", [270]))]):
+              for height in (0, -1, 0.5, 1e7, 10 ** 400, True, "270", [270]))]):
         out[f"head{n}"] = built(head | change, body), {"head", "value", "block"}
     for n, change in enumerate([{"blend": {"low_pass_energy": True}}, {"blend": {"low_pass_px2": 0, "low_pass_energy": True}},
                                 {"levels": [level | {"max_height_px": None} for level in head["levels"]]},
