@@ -163,7 +163,7 @@ export class Controls {
 
   showRate({ fps, p95 }) {
     const { viewer, viewer: { levels } } = this, count = levels.binding.count.toLocaleString("en");
-    const level = levels.bindings.length > 1 ? `, level ${levels.drawn + 1} of ${levels.bindings.length}` : "";
+    const level = levels.vary ? `, level ${levels.drawn + 1} of ${levels.bindings.length}` : "";
     const rate = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms`;
     find("fps").textContent = `${rate} · ${count} gaussians${level} · ${RENDERERS[viewer.renderer?.kind] ?? "…"}`;
     if (viewer.length) {

@@ -15,6 +15,8 @@ export class Levels {
   constructor(avatar, stature) {
     this.stature = stature;
     this.maxHeights = avatar.levels.map((level) => level.maxHeight);
+    // Whether the height decides: where no level says up to which it is drawn, the finest is.
+    this.vary = this.maxHeights.some((most) => most !== null);
     // The finest first.
     this.bindings = avatar.levels.map((level) => new Binding(avatar, level));
     this.sorts = avatar.levels.map((level) => new DepthSort(level.face.length));

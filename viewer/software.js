@@ -87,17 +87,18 @@ export class SoftwareRenderer {
     const across = a0 * u0 + a1 * u1 + a2 * u2, slant = b0 * u0 + b1 * u1 + b2 * u2;
     const down = b0 * (xx * b0 + xy * b1 + xz * b2) + b1 * (xy * b0 + yy * b1 + yz * b2) + b2 * (xz * b0 + yz * b1 + zz * b2);
     const bare = Math.max(0, across * down - slant * slant), det = bare + lowPass * (across + down + lowPass);
-    const seen = keepsEnergy && det > 0 ? opacity * Math.sqrt(bare / det) : opacity;
-    if (seen < alphaMin) return;
-    this.fill(i, fx * px + centre[0] + width / 2, fy * py + centre[1] + height / 2, across + lowPass, slant, down + lowPass, seen);
+    const seen = keepsEnergy ? opacity * Math.sqrt(bare / det) : opacity;
+    if (!(seen >= alphaMin)) return;
+    const cx = fx * px + centre[0] + width / 2, cy = fy * py + centre[1] + height / 2;
+    this.fill(i, cx, cy, across + lowPass, slant, down + lowPass, det, seen);
   }
 
-  // Draws the ellipse of gaussian i around (cx, cy), px, with the covariance (across, slant, down), px^2.
-  fill(i, cx, cy, across, slant, down, opacity) {
+  // Draws the ellipse of gaussian i around (cx, cy), px, with the covariance (across, slant, down), px^2, and its determinant.
+  fill(i, cx, cy, across, slant, down, det, opacity) {
     const { width, height, transmittance, colour, binding: { data, level: { rgb } } } = this;
     const { alphaMax, alphaMin } = this.avatar.blend;
     const r = rgb[i * 3] * data[i * 12 + 9], g = rgb[i * 3 + 1] * data[i * 12 + 10], b = rgb[i * 3 + 2] * data[i * 12 + 11];
-    const det = across * down - slant * slant, A = down / det, B = -slant / det, reach2 = 2 * Math.log(opacity / alphaMin);
+    const A = down / det, B = -slant / det, reach2 = 2 * Math.log(opacity / alphaMin);
     const tall = Math.sqrt(reach2 * down), first = Math.max(0, Math.ceil(cy - tall - 0.5));
     const last = Math.min(height - 1, Math.floor(cy + tall - 0.5)), bend = Math.exp(-A);
     for (let row = first; row <= last; row++) {
