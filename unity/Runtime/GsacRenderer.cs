@@ -37,8 +37,7 @@ namespace Gsac
 
         static Camera[] cameras = new Camera[8];
 
-        [SerializeField, Tooltip("m: nearer than this the finest level of detail is drawn; each doubling takes the next. Only for files that"
-                                 + " do not say at which height of the person a level is drawn.")]
+        [SerializeField, Tooltip("m: where coarser levels of detail begin, if the file does not say at which height; each doubling takes the next.")]
         float finestWithin = 8;
 
         [SerializeField, Tooltip("0..1: how far the avatar stands in the light of the room in which its clip was filmed; 0 is even light.")]
