@@ -185,6 +185,9 @@ AVATAR_SHAPES: Shapes = {
 }
 LEVEL_SHAPES: Shapes = {"levels": ("L",), **{f"coarser_{name}": ("M", *shape[1:]) for name, shape in AVATAR_SHAPES.items()}}
 """Of avatar.npz where it has coarser levels of detail: the gaussians in each, then their arrays, joined level by level."""
+LEVEL_HEIGHT_SHAPE: Shapes = {"level_heights": ("L",)}
+MORE_AVATAR_SHAPES = LIGHT_SHAPE, LOW_PASS_SHAPE, LEVEL_SHAPES, LEVEL_HEIGHT_SHAPE
+"""Groups of arrays that avatar.npz has or has not."""
 
 
 def check_keypoints(path: Path) -> dict[str, np.ndarray]:
@@ -216,11 +219,16 @@ def check_body(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_avatar(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of avatar.npz: `AVATAR_SHAPES`, as mu (N, 3); light (4, 3), low_pass (2,), all of `LEVEL_SHAPES` or none."""
-    arrays = check_arrays(path, AVATAR_SHAPES, LIGHT_SHAPE, LOW_PASS_SHAPE, LEVEL_SHAPES)
-    for name in {**AVATAR_SHAPES, **LIGHT_SHAPE, **LOW_PASS_SHAPE, **LEVEL_SHAPES}:
+    """The arrays of avatar.npz: `AVATAR_SHAPES`, as mu (N, 3); light (4, 3), low_pass (2,), all of `LEVEL_SHAPES` or none.
+
+    Where there are levels, level_heights (L,) or not.
+    """
+    arrays = check_arrays(path, AVATAR_SHAPES, *MORE_AVATAR_SHAPES)
+    for name in {name for shapes in (AVATAR_SHAPES, *MORE_AVATAR_SHAPES) for name in shapes}:
         if name in arrays and not _finite(arrays[name]):
             raise ArtifactError(f"{path}: array {name} is not finite")
+    if "level_heights" in arrays and not ("levels" in arrays and (arrays["level_heights"] > 0).all()):
+        raise ArtifactError(f"{path}: array level_heights must hold the height of the person for each of `levels`, px, above 0")
     if "levels" in arrays:
         counts = [len(arrays["face"]), *arrays["levels"].tolist()]
         if sum(counts[1:]) != len(arrays["coarser_face"]) or any(b >= a or b < 1 for a, b in zip(counts, counts[1:], strict=False)):

@@ -42,6 +42,8 @@ class Gaussians:
     """(4, 3) of `avatar.light`: the room's light, a factor on rgb by the face's normal; None: factor 1."""
     low_pass: LowPass = PIXEL
     """The filter that they were trained with, and are to be drawn with."""
+    max_height_px: float | None = None
+    """Of a coarser level of detail: projected height of the person up to which it is drawn; None: not said."""
 
     def __len__(self) -> int:
         return len(self.face)
@@ -59,6 +61,8 @@ class Gaussians:
             arrays["levels"] = np.array([len(level) for level in coarser], np.int32)
             parts = [level._arrays() for level in coarser]
             arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in FIELDS}
+            if all(level.max_height_px for level in coarser):
+                arrays["level_heights"] = np.array([level.max_height_px for level in coarser], np.float32)
         artifacts.write_arrays(path, **arrays)
 
     @classmethod
@@ -74,7 +78,9 @@ class Gaussians:
         low_pass = ADDED if given is None else LowPass(float(given[0]), bool(given[1]))
         ends = np.cumsum(arrays.get("levels", np.zeros(0, np.int32)))
         parts = [{name: arrays[f"coarser_{name}"][a:b] for name in FIELDS} for a, b in zip([0, *ends], ends, strict=False)]
-        return [cls(**part, light=light, low_pass=low_pass) for part in [{name: arrays[name] for name in FIELDS}, *parts]]
+        heights = [None, *arrays.get("level_heights", np.full(len(ends), None)).tolist()]
+        return [cls(**part, light=light, low_pass=low_pass, max_height_px=height)
+                for part, height in zip([{name: arrays[name] for name in FIELDS}, *parts], heights, strict=True)]
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in FIELDS}

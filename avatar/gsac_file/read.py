@@ -15,6 +15,7 @@ from gsac.avatar.gsac_file.container import Fault, GsacError
 MAX_JOINTS = 256
 MAX_LEVELS = 16
 BLEND_RANGE = {"low_pass_px2": (0, 100), "alpha_max": (0, 1), "alpha_min": (1e-6, 1)}
+HEIGHT_RANGE = (1, 1e6)
 
 
 class Reader:
@@ -66,13 +67,20 @@ class Reader:
             raise self.bad(Fault.VALUE, f"block {name!r} is not finite")
         return array
 
+    def number(self, table: dict, key: str, span: tuple[float, float]) -> float:
+        """The number at a key, within `span`."""
+        value = self.entry(table, key, (int, float))
+        if not span[0] <= value <= span[1]:
+            raise self.bad(Fault.VALUE, f"`{key}` is out of range")
+        return value
+
     def low_pass(self) -> LowPass:
         """The filter of the draw rule, 3DGS's where the head names none; the rest of the rule and the ground are only checked."""
         drawn = self.entry(self.head, "blend", dict) if "blend" in self.head else {}
         found = [(self.head, "ground", (-1e6, 1e6))] + [(drawn, key, span) for key, span in BLEND_RANGE.items()]
-        for table, key, (least, most) in found:
-            if key in table and not least <= self.entry(table, key, (int, float)) <= most:
-                raise self.bad(Fault.VALUE, f"`{key}` is out of range")
+        for table, key, span in found:
+            if key in table:
+                self.number(table, key, span)
         keeps_energy = self.entry(drawn, "low_pass_energy", bool) if "low_pass_energy" in drawn else ADDED.keeps_energy
         return LowPass(float(drawn.get("low_pass_px2", ADDED.px2)), keeps_energy)
 
@@ -131,8 +139,9 @@ class Reader:
             N = len(face)
             if self.entry(level, "count", int) != N:
                 raise self.bad(Fault.VALUE, f"a level says it has other than {N} gaussians")
-            gaussians = Gaussians(face, light=light, low_pass=low_pass, **{name: self.block(f"{prefix}.{name}", (N, *shape[1:]))
-                                                        for name, shape in AVATAR_SHAPES.items() if name != "face"})
+            height = None if level.get("max_height_px") is None else float(self.number(level, "max_height_px", HEIGHT_RANGE))
+            gaussians = Gaussians(face, light=light, low_pass=low_pass, max_height_px=height, **{
+                name: self.block(f"{prefix}.{name}", (N, *shape[1:])) for name, shape in AVATAR_SHAPES.items() if name != "face"})
             if N and np.abs((gaussians.quat ** 2).sum(1) - 1).max() > 1e-2:
                 raise self.bad(Fault.VALUE, f"{prefix}.quat must hold unit quaternions")
             out.append(gaussians)

@@ -43,7 +43,7 @@ def avatar_bytes(avatar: RiggedAvatar) -> bytes:
             f"{prefix}.opacity": np.rint(np.clip(g.opacity, 0, 1) * UNIT).astype(np.uint16),
         }
         scales |= {f"{prefix}.quat": QUAT_SCALE, f"{prefix}.log_scale": LOG_SCALE_SCALE, f"{prefix}.opacity": 1 / UNIT}
-        levels.append({"prefix": prefix, "count": len(g)})
+        levels.append({"prefix": prefix, "count": len(g)} | ({} if g.max_height_px is None else {"max_height_px": g.max_height_px}))
     if avatar.gaussians.light is not None:
         blocks["light"] = avatar.gaussians.light.astype(np.float32)
     for name, clip in avatar.clips.items():

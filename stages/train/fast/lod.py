@@ -12,6 +12,7 @@ import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
+from gsac.avatar.person_height import person_height
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.initial_gaussians import crop_views
 from gsac.stages.train.fast.size_search import count_pixels, viewing_weight
@@ -55,8 +56,16 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
         trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True, halvings=halvings)
         trainer.freeze_unseen(views)
         gaussians = backend.refit(task, trainer, views).finish(views)[0]
+        gaussians.max_height_px = seen_height(task.poses, views)
         out.append(gaussians)
     return out
+
+
+def seen_height(poses: Poses, views: dict[int, View]) -> float:
+    """Median height of the person in the views (frame -> view), whole px."""
+    joints = poses.to_params().joints
+    heights = [person_height(np.ptp(poses.rest(t)[0][:, 1]), joints[t], view.camera.focal[1]) for t, view in views.items()]
+    return float(round(np.median(heights)))
 
 
 def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View]) -> list[dict]:
