@@ -1,4 +1,5 @@
-"""Writes the reference pages from the code: docs/cli.md of all commands, docs/stages/<name>.md of each stage."""
+"""Writes the reference pages from the code: docs/cli.md of all commands, docs/quality.md of the presets, docs/stages/<name>.md of
+each stage."""
 
 from __future__ import annotations
 
@@ -17,6 +18,7 @@ from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.params import config_values, meanings
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.project import Project
+from gsac.pipeline.quality import QUALITIES, dial_names
 from gsac.stages.contract import BadInput, Stage
 
 WRITTEN = "<!-- Written by `make docs` from the code; edit the docstrings there. -->\n"
@@ -24,7 +26,7 @@ WRITTEN = "<!-- Written by `make docs` from the code; edit the docstrings there.
 
 def pages(project: Project) -> dict[str, str]:
     """Path below docs/ -> text, of every page."""
-    return {"cli.md": cli_page(), **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
+    return {"cli.md": cli_page(), "quality.md": quality_page(project), **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
 
 
 def cli_page() -> str:
@@ -44,6 +46,28 @@ def cli_page() -> str:
                "## Words of `--json`", "`status` of a stage:", _words(Outcome),
                "`reason`, why a stage has to run or need not:", _words(Reason)]
     return "\n\n".join(blocks) + "\n"
+
+
+def quality_page(project: Project) -> str:
+    """The presets of --quality: what each is for, and the parameters that it sets."""
+    blocks = ["# Quality", WRITTEN.strip(), "`gsac run CLIP --quality NAME`, also `gsac demo` and `gsac batch`, takes one of:",
+              _table(("preset", "what it is for"), ((f"`{quality.name}`", quality.sentence) for quality in QUALITIES.values())),
+              "A preset sets the parameters below and leaves all others as they are. What `--params` or `--set` says comes after it. "
+              "`run.json` and the report tell the preset, and which of these parameters were set otherwise.",
+              _presets(project, "cpu")]
+    if any(quality.on_gpu for quality in QUALITIES.values()):
+        blocks += ["Where training runs on a GPU:", _presets(project, "cuda")]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _presets(project: Project, device: str) -> str:
+    """Values of all parameters that a preset sets; those that it leaves at their default in plain type."""
+    rows = []
+    for stage, key in dial_names():
+        given = [quality.on(device).get(stage, {}) for quality in QUALITIES.values()]
+        default = _value(getattr(project.stage(stage).config(), key))
+        rows.append((f"`{stage}.{key}`", *(f"**{_value(values[key])}**" if key in values else default for values in given)))
+    return _table(("parameter", *QUALITIES), rows)
 
 
 def stage_page(project: Project, name: str) -> str:

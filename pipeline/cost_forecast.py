@@ -1,0 +1,166 @@
+"""How long a run will take, told before it starts: the cost model, scaled by what earlier runs took on this machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gsac.cache.record import Record, is_digest
+from gsac.cache.store import Store
+from gsac.pipeline.cost_model import stage_cost
+from gsac.pipeline.footage import Footage, expect_footage, footage_of_result
+from gsac.pipeline.keys import Keys
+from gsac.pipeline.pace import duration
+from gsac.pipeline.plan import StagePlan
+from gsac.stages.contract import BadInput, make_config
+
+EARLIER_RUNS = 5
+"""Runs of a stage, the newest, that tell how fast it is here."""
+FADING = 0.5
+"""Weight of a run over that of the next newer one."""
+SPLIT, FRAMES, CLIP_FACTS = "split", "split/frames", "split/clip.json"
+BRIEF_S = 0.5
+"""s; a stage that takes less is not named, and a run that does is not foretold."""
+THREADS = "NUMBA_NUM_THREADS"
+"""Environment variable that a batch shares the cores out by."""
+
+
+@dataclass(frozen=True)
+class Time:
+    """s, wall and of all cores."""
+
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+
+    def __add__(self, other: Time) -> Time:
+        return Time(self.seconds + other.seconds, self.cpu_seconds + other.cpu_seconds)
+
+    def times(self, factor: float, cpu_factor: float) -> Time:
+        """Scaled, each by its own factor."""
+        return Time(factor * self.seconds, cpu_factor * self.cpu_seconds)
+
+    def to_json(self) -> dict[str, float]:
+        """As run.json and --json hold it."""
+        return {"seconds": round(self.seconds, 2), "cpu_seconds": round(self.cpu_seconds, 2)}
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Times of the stages that have to run."""
+
+    stages: dict[str, Time]
+    unknown: tuple[str, ...]
+    """Stages that have to run and whose time nothing tells."""
+    cores: int
+    known_here: bool
+    """Whether some stage ran on this machine before; else the times are those of the machine of the cost model."""
+    exact: bool
+    """Whether the clip's frames are known; else as many are reckoned with as the parameters allow."""
+
+    @property
+    def whole(self) -> Time:
+        """Of the run."""
+        return sum(self.stages.values(), Time())
+
+    @property
+    def worth_saying(self) -> bool:
+        return self.whole.seconds >= BRIEF_S
+
+    def sentence(self, quality: str) -> str:
+        """`About 55 s on this machine (2 cores): split 2 s, ..., train 37 s; quality standard`"""
+        lead = "About" if self.exact else "At most about"
+        where = "on this machine" if self.known_here else "on a machine like the one that was measured"
+        parts = [f"{name} {duration(time.seconds)}" for name, time in self.stages.items() if time.seconds >= BRIEF_S]
+        missing = f", without {' and '.join(self.unknown)}, of which no time is known" if self.unknown else ""
+        cores = f"{self.cores} core{'s' if self.cores > 1 else ''}"
+        return f"{lead} {duration(self.whole.seconds)} {where} ({cores}): {', '.join(parts)}{missing}; quality {quality}"
+
+    def to_json(self) -> dict[str, Any]:
+        """As --json holds it."""
+        return self.whole.to_json() | {
+            "stages": {name: time.to_json() for name, time in self.stages.items()}, "unknown": list(self.unknown),
+            "cores": self.cores, "known_here": self.known_here, "exact": self.exact,
+        }
+
+    def judged(self, took: dict[str, Time]) -> dict[str, Any]:
+        """The same with what its stages took instead, and the ratio of that to what was told. took: of the stages that ran."""
+        both = [(took[name], told) for name, told in self.stages.items() if name in took]
+        real, told = sum((real for real, _ in both), Time()), sum((told for _, told in both), Time())
+        ratio = real.seconds / told.seconds if told.seconds else None
+        return self.to_json() | {"took": real.to_json(), "ratio": None if ratio is None else round(ratio, 3)}
+
+
+def foretell(plans: Iterable[StagePlan], keys: Keys, store: Store, clip: Path) -> Forecast:
+    """Forecast of the stages that are not up to date, as the plans say."""
+    plans = list(plans)
+    due = [plan.stage for plan in plans if plan.cached is None]
+    footage = _footage_of(next((plan.cached for plan in plans if plan.stage == SPLIT and plan.cached is not None), None), store)
+    footage = footage or expect_footage(clip, keys.configs.get(SPLIT))
+    cores = count_cores()
+    models = {name: _model_time(name, keys.configs[name], footage, keys.device_of(name), cores) for name in due}
+    pace = {name: _pace(name, keys, store, cores) for name in due}
+    overall = sum((real for real, _ in pace.values()), Time()), sum((model for _, model in pace.values()), Time())
+    stages, unknown = {}, []
+    for name in due:
+        real, model = pace[name] if pace[name][1].cpu_seconds else overall
+        if (expected := models[name]) is not None:
+            stages[name] = expected.times(_ratio(real.seconds, model.seconds), _ratio(real.cpu_seconds, model.cpu_seconds))
+        elif (usual := _last_time(name, store)) is not None:
+            stages[name] = usual
+        else:
+            unknown.append(name)
+    return Forecast(stages, tuple(unknown), cores, bool(overall[1].cpu_seconds), footage.read)
+
+
+def count_cores() -> int:
+    """Number of cores that a stage may use."""
+    here = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    shared = os.environ.get(THREADS, "")
+    return min(here, int(shared)) if shared.isdecimal() and int(shared) else here
+
+
+def _model_time(name: str, config: Any, footage: Footage, device: str, cores: int) -> Time | None:
+    cost = stage_cost(name, config, footage, device or "cpu")
+    return None if cost is None else Time(cost.seconds(cores), cost.cpu_seconds)
+
+
+def _pace(name: str, keys: Keys, store: Store, cores: int) -> tuple[Time, Time]:
+    """What earlier runs of a stage on this device took, and what the model says of them: sums in which older runs fade."""
+    took = modelled = Time()
+    for age, record in enumerate(store.recent(name, EARLIER_RUNS)):
+        footage = _footage_of(record, store)
+        if footage is None or record.parts.device != keys.device_of(name) or record.info.timings.get("resumed_at_step") is not None:
+            continue
+        try:
+            config = make_config(keys.project.stage(name), record.parts.params)
+        except BadInput:  # of another version of the stage
+            continue
+        time = _model_time(name, config, footage, record.parts.device, cores)
+        if time is not None:
+            weight = FADING ** age
+            took += Time(record.info.seconds, record.info.cpu_seconds).times(weight, weight)
+            modelled += time.times(weight, weight)
+    return took, modelled
+
+
+def _last_time(name: str, store: Store) -> Time | None:
+    """Of a stage that the model does not know, what its last run took."""
+    return next((Time(record.info.seconds, record.info.cpu_seconds) for record in store.recent(name, 1)), None)
+
+
+def _ratio(real: float, model: float) -> float:
+    """How much longer than modelled; 1 where that is not told, or by no number that can be."""
+    ratio = real / model if model else 0.0
+    return ratio if 0 < ratio < float("inf") else 1.0
+
+
+def _footage_of(record: Record | None, store: Store) -> Footage | None:
+    """The frames that a run read, or that split made; None where they are no longer in the store."""
+    if record is None:
+        return None
+    ports = record.parts.inputs | {f"{record.parts.stage}/{output}": digest for output, digest in record.outputs.items()}
+    paths = {port: store.where(ports[port], port) for port in (FRAMES, CLIP_FACTS) if is_digest(ports.get(port))}
+    return footage_of_result(paths.get(FRAMES), paths.get(CLIP_FACTS))
