@@ -86,11 +86,11 @@ class Forecast:
         }
 
     def judged(self, took: dict[str, Time]) -> dict[str, Any]:
-        """The same with what its stages took instead, and the ratio of that to what was told. took: of the stages that ran."""
+        """The same with what its stages took instead, and the ratios of that to what was told. took: of the stages that ran."""
         both = [(took[name], told) for name, told in self.stages.items() if name in took]
         real, told = sum((real for real, _ in both), Time()), sum((told for _, told in both), Time())
-        ratio = real.seconds / told.seconds if told.seconds else None
-        return self.to_json() | {"took": real.to_json(), "ratio": None if ratio is None else round(ratio, 3)}
+        return self.to_json() | {"took": real.to_json(), "ratio": _share(real.seconds, told.seconds),
+                                 "cpu_ratio": _share(real.cpu_seconds, told.cpu_seconds)}
 
 
 def foretell(plans: Iterable[StagePlan], keys: Keys, store: Store, clip: Path) -> Forecast:
@@ -103,16 +103,16 @@ def foretell(plans: Iterable[StagePlan], keys: Keys, store: Store, clip: Path) -
     models = {name: _model_time(name, keys.configs[name], footage, keys.device_of(name), cores) for name in due}
     pace = {name: _pace(name, keys, store, cores) for name in due}
     overall = sum((real for real, _ in pace.values()), Time()), sum((model for _, model in pace.values()), Time())
-    stages, unknown = {}, []
+    stages, unknown, known_here = {}, [], bool(overall[1].cpu_seconds)
     for name in due:
         real, model = pace[name] if pace[name][1].cpu_seconds else overall
         if (expected := models[name]) is not None:
             stages[name] = expected.times(_ratio(real.seconds, model.seconds), _ratio(real.cpu_seconds, model.cpu_seconds))
         elif (usual := _last_time(name, store)) is not None:
-            stages[name] = usual
+            stages[name], known_here = usual, True
         else:
             unknown.append(name)
-    return Forecast(stages, tuple(unknown), cores, bool(overall[1].cpu_seconds), footage.read)
+    return Forecast(stages, tuple(unknown), cores, known_here, footage.read or not any(models.values()))
 
 
 def count_cores() -> int:
@@ -149,6 +149,10 @@ def _pace(name: str, keys: Keys, store: Store, cores: int) -> tuple[Time, Time]:
 def _last_time(name: str, store: Store) -> Time | None:
     """Of a stage that the model does not know, what its last run took."""
     return next((Time(record.info.seconds, record.info.cpu_seconds) for record in store.recent(name, 1)), None)
+
+
+def _share(real: float, told: float) -> float | None:
+    return round(real / told, 3) if told else None
 
 
 def _ratio(real: float, model: float) -> float:

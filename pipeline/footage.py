@@ -43,7 +43,7 @@ class Footage:
 
 def footage_of_result(frames: Path | None, clip: Path | None) -> Footage | None:
     """Of what split has made: its folder `frames` and its `clip.json`, of which one may be missing. None where they do not tell."""
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, struct.error):
+    with contextlib.suppress(OSError, ValueError, LookupError, TypeError, struct.error):
         told = json.loads(clip.read_text()) if clip is not None else {}
         names = sorted(path.name for path in frames.glob("[0-9]*.png")) if frames is not None else []
         count = len(names) if frames is not None else len(told["timestamps_s"])

@@ -52,8 +52,8 @@ def quality_page(project: Project) -> str:
     """The presets of --quality: what each is for, and the parameters that it sets."""
     blocks = ["# Quality", WRITTEN.strip(), "`gsac run CLIP --quality NAME`, also `gsac demo` and `gsac batch`, takes one of:",
               _table(("preset", "what it is for"), ((f"`{quality.name}`", quality.sentence) for quality in QUALITIES.values())),
-              "A preset sets the parameters below and leaves all others as they are. What `--params` or `--set` says comes after it. "
-              "`run.json` and the report tell the preset, and which of these parameters were set otherwise.",
+              "A preset sets the parameters in bold and leaves all others as they are. What `--params` or `--set` says comes after "
+              "it. `run.json` and the report tell the preset, and which of these parameters were set otherwise.",
               _presets(project, "cpu")]
     if any(quality.on_gpu for quality in QUALITIES.values()):
         blocks += ["Where training runs on a GPU:", _presets(project, "cuda")]

@@ -50,7 +50,8 @@ def test_what_was_set_otherwise_is_named():
     entry = quality_entry("draft", resolve_quality("draft", PROJECT, None, ["train.steps=300", "train.seed=3"]))
     assert entry == {"name": "draft", "otherwise": ["train.steps"]} and describe_quality(entry) == "draft, but for train.steps"
     assert quality_entry(STANDARD, resolve(PROJECT, None, ["train.steps=60"]))["otherwise"] == ["train.steps"]
-    assert describe_quality(None) == describe_quality({"name": ""}) == "" and describe_quality({"name": "fine", "otherwise": 3}) == "fine"
+    assert describe_quality(None) == describe_quality({"name": ""}) == ""
+    assert describe_quality({"name": "fine", "otherwise": 3}) == "fine", "whatever stands in a run.json"
 
 
 def test_a_gpu_gets_more_and_training_that_is_kept_from_it_does_not(monkeypatch):
