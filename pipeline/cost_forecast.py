@@ -23,7 +23,7 @@ FADING = 0.5
 """Weight of a run over that of the next newer one."""
 SPLIT, FRAMES, CLIP_FACTS = "split", "split/frames", "split/clip.json"
 BRIEF_S = 0.5
-"""s; a stage that takes less is not named, and a run that does is not foretold."""
+"""s; a stage that takes less is not named, and of a run that does nothing is said."""
 THREADS = "NUMBA_NUM_THREADS"
 """Environment variable that a batch shares the cores out by."""
 
@@ -38,13 +38,29 @@ class Time:
     def __add__(self, other: Time) -> Time:
         return Time(self.seconds + other.seconds, self.cpu_seconds + other.cpu_seconds)
 
-    def times(self, factor: float, cpu_factor: float) -> Time:
-        """Scaled, each by its own factor."""
-        return Time(factor * self.seconds, cpu_factor * self.cpu_seconds)
-
     def to_json(self) -> dict[str, float]:
         """As run.json and --json hold it."""
         return {"seconds": round(self.seconds, 2), "cpu_seconds": round(self.cpu_seconds, 2)}
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast this machine is beside the one of the cost model."""
+
+    took: float = 0.0
+    """CPU s of earlier runs, in which older ones fade."""
+    modelled: float = 0.0
+    """The same by the model."""
+    waiting: float = 1.0
+    """Wall over CPU time, relative to the model's, of the run that waited least: others may have had the machine in the rest."""
+
+    def __add__(self, other: Pace) -> Pace:
+        return Pace(self.took + other.took, self.modelled + other.modelled)
+
+    def scale(self, time: Time) -> Time:
+        """What the model says, as it would take here."""
+        slower = _ratio(self.took, self.modelled)
+        return Time(slower * _ratio(self.waiting, 1.0) * time.seconds, slower * time.cpu_seconds)
 
 
 @dataclass(frozen=True)
@@ -59,6 +75,8 @@ class Forecast:
     """Whether some stage ran on this machine before; else the times are those of the machine of the cost model."""
     exact: bool
     """Whether the clip's frames are known; else as many are reckoned with as the parameters allow."""
+    load: float = 0.0
+    """Processes that wanted a core when this was told, the mean of a minute."""
 
     @property
     def whole(self) -> Time:
@@ -76,13 +94,14 @@ class Forecast:
         parts = [f"{name} {duration(time.seconds)}" for name, time in self.stages.items() if time.seconds >= BRIEF_S]
         missing = f", without {' and '.join(self.unknown)}, of which no time is known" if self.unknown else ""
         cores = f"{self.cores} core{'s' if self.cores > 1 else ''}"
-        return f"{lead} {duration(self.whole.seconds)} {where} ({cores}): {', '.join(parts)}{missing}; quality {quality}"
+        busy = ", longer while others keep it as busy as now" if self.load > self.cores else ""
+        return f"{lead} {duration(self.whole.seconds)} {where} ({cores}){busy}: {', '.join(parts)}{missing}; quality {quality}"
 
     def to_json(self) -> dict[str, Any]:
         """As --json holds it."""
         return self.whole.to_json() | {
             "stages": {name: time.to_json() for name, time in self.stages.items()}, "unknown": list(self.unknown),
-            "cores": self.cores, "known_here": self.known_here, "exact": self.exact,
+            "cores": self.cores, "known_here": self.known_here, "exact": self.exact, "load": round(self.load, 2),
         }
 
     def judged(self, took: dict[str, Time]) -> dict[str, Any]:
@@ -102,17 +121,17 @@ def foretell(plans: Iterable[StagePlan], keys: Keys, store: Store, clip: Path) -
     cores = count_cores()
     models = {name: _model_time(name, keys.configs[name], footage, keys.device_of(name), cores) for name in due}
     pace = {name: _pace(name, keys, store, cores) for name in due}
-    overall = sum((real for real, _ in pace.values()), Time()), sum((model for _, model in pace.values()), Time())
-    stages, unknown, known_here = {}, [], bool(overall[1].cpu_seconds)
+    overall = sum(pace.values(), Pace())
+    stages, unknown, known_here = {}, [], bool(overall.modelled)
     for name in due:
-        real, model = pace[name] if pace[name][1].cpu_seconds else overall
         if (expected := models[name]) is not None:
-            stages[name] = expected.times(_ratio(real.seconds, model.seconds), _ratio(real.cpu_seconds, model.cpu_seconds))
+            stages[name] = (pace[name] if pace[name].modelled else overall).scale(expected)
         elif (usual := _last_time(name, store)) is not None:
             stages[name], known_here = usual, True
         else:
             unknown.append(name)
-    return Forecast(stages, tuple(unknown), cores, known_here, footage.read or not any(models.values()))
+    return Forecast(stages, tuple(unknown), cores, known_here, footage.read or not any(models.values()),
+                    os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0)
 
 
 def count_cores() -> int:
@@ -127,9 +146,9 @@ def _model_time(name: str, config: Any, footage: Footage, device: str, cores: in
     return None if cost is None else Time(cost.seconds(cores), cost.cpu_seconds)
 
 
-def _pace(name: str, keys: Keys, store: Store, cores: int) -> tuple[Time, Time]:
-    """What earlier runs of a stage on this device took, and what the model says of them: sums in which older runs fade."""
-    took = modelled = Time()
+def _pace(name: str, keys: Keys, store: Store, cores: int) -> Pace:
+    """Of the stage's earlier runs on its device class."""
+    took, modelled, waiting = 0.0, 0.0, []
     for age, record in enumerate(store.recent(name, EARLIER_RUNS)):
         footage = _footage_of(record, store)
         if footage is None or record.parts.device != keys.device_of(name) or record.info.timings.get("resumed_at_step") is not None:
@@ -138,12 +157,11 @@ def _pace(name: str, keys: Keys, store: Store, cores: int) -> tuple[Time, Time]:
             config = make_config(keys.project.stage(name), record.parts.params)
         except BadInput:  # of another version of the stage
             continue
-        time = _model_time(name, config, footage, record.parts.device, cores)
-        if time is not None:
-            weight = FADING ** age
-            took += Time(record.info.seconds, record.info.cpu_seconds).times(weight, weight)
-            modelled += time.times(weight, weight)
-    return took, modelled
+        model, cpu_seconds = _model_time(name, config, footage, record.parts.device, cores), record.info.cpu_seconds
+        if model is not None and 0 < cpu_seconds < float("inf"):
+            took, modelled = took + FADING ** age * cpu_seconds, modelled + FADING ** age * model.cpu_seconds
+            waiting.append(record.info.seconds / cpu_seconds * model.cpu_seconds / model.seconds)
+    return Pace(took, modelled, min(waiting, default=1.0))
 
 
 def _last_time(name: str, store: Store) -> Time | None:

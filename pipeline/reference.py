@@ -26,7 +26,8 @@ WRITTEN = "<!-- Written by `make docs` from the code; edit the docstrings there.
 
 def pages(project: Project) -> dict[str, str]:
     """Path below docs/ -> text, of every page."""
-    return {"cli.md": cli_page(), "quality.md": quality_page(project), **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
+    return {"cli.md": cli_page(), "quality.md": quality_page(project),
+            **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
 
 
 def cli_page() -> str:

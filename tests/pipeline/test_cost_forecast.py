@@ -24,7 +24,8 @@ PROJECT = Project.at_hand()
 STAGES = list(PROJECT.graph.steps)
 DEMO = Footage(60, 720, 1280)
 SMALL = replace(DEMO, frames=4)
-DEMO_TOOK = {"split": 3.8, "keypoints": 6.6, "handgap": 0.4, "segment": 11.3, "face": 0.95, "smplx": 4.1, "train": 53.0, "export": 1.7}
+DEMO_TOOK = {"split": 3.8, "keypoints": 6.6, "handgap": 0.4, "segment": 11.3, "face": 0.95, "smplx": 4.1, "train": 53.0,
+             "export": 1.7}
 """CPU s of the demo's clip on the machine that the coefficients were measured on."""
 FORECAST = Forecast({"split": Time(2, 4), "face": Time(0.3, 1), "train": Time(36.6, 53)}, (), 2, known_here=True, exact=True)
 
@@ -70,8 +71,8 @@ def test_cores_help_what_is_shared_out_only():
     assert cost.seconds(1) == 10 and cost.seconds(2) == pytest.approx(7) and cost.seconds(600) == pytest.approx(4, rel=0.01)
 
 
-def put(store: Store, name: str, times: float, sets: tuple[str, ...] = (), timings: dict | None = None) -> None:
-    """A made-up run of a stage on a few frames, which took so many times what the model says."""
+def put(store: Store, name: str, times: float, sets: tuple[str, ...] = (), timings: dict | None = None, waiting: float = 1) -> None:
+    """A made-up run of a stage on a few frames, which took so many times what the model says, and waited for others."""
     keys = Keys(PROJECT, resolve(PROJECT, None, sets), store)
     with store.private("split") as folder:
         (folder / "frames").mkdir()
@@ -83,7 +84,8 @@ def put(store: Store, name: str, times: float, sets: tuple[str, ...] = (), timin
         inputs = {port: split.outputs.get(port.removeprefix("split/"), "b" * 64) for port in PROJECT.graph.step(name).deps}
         with store.private(name) as folder:
             (folder / "result").write_text(name)
-            told = replace(info(name, times, sets), timings=timings or {})
+            told = info(name, times, sets)
+            told.timings, told.seconds = timings or {}, waiting * told.seconds
             publish(store, keys.parts(name, inputs), folder, ("result",), told)
 
 
@@ -122,6 +124,14 @@ def test_the_newest_run_counts_most(tmp_path):
     assert 1.0 < tell(store, tmp_path).stages["train"].cpu_seconds / costs(SMALL)["train"] < 2.0
 
 
+def test_of_wall_time_the_run_counts_that_waited_least_for_others(tmp_path):
+    store = Store(tmp_path / "store")
+    free = tell(store, tmp_path).stages["train"].seconds
+    put(store, "train", 1.0, ("train.seed=1",), waiting=1.1)
+    put(store, "train", 1.0, ("train.seed=2",), waiting=5.0)
+    assert tell(store, tmp_path).stages["train"].seconds == pytest.approx(1.1 * free)
+
+
 def test_runs_that_went_on_from_a_checkpoint_ran_elsewhere_or_tell_no_time_do_not_count(tmp_path, monkeypatch):
     store = Store(tmp_path / "store")
     put(store, "train", 3.0, ("train.seed=1",), {"resumed_at_step": 900})
@@ -149,6 +159,11 @@ def test_the_sentence_names_what_takes_time():
     guessed = replace(FORECAST, unknown=("smplx",), cores=1, known_here=False, exact=False)
     assert guessed.sentence("draft") == ("At most about 39 s on a machine like the one that was measured (1 core): split 2 s, "
                                          "train 37 s, without smplx, of which no time is known; quality draft")
+
+
+def test_a_busy_machine_is_said_to_be_busy():
+    said = replace(FORECAST, load=6).sentence("fine")
+    assert said.startswith("About 39 s on this machine (2 cores), longer while others keep it as busy as now: split 2 s")
 
 
 def test_what_ran_is_held_against_what_was_told_of_it():
