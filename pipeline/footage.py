@@ -6,7 +6,7 @@ import contextlib
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,17 +55,22 @@ def footage_of_result(frames: Path | None, clip: Path | None) -> Footage | None:
 def expect_footage(clip: Path, split: Any) -> Footage:
     """What split will keep of a clip, a video or a folder of photos. split: its config, or None."""
     fps, count, most = (getattr(split, name, None) for name in ("fps", "count", "max_height"))
+    height = most or LIKELY_HEIGHT
     if clip.is_dir():
         photos = sum(path.suffix.lower() in PHOTOS and path.stem != "plate" for path in clip.iterdir())
-        height = most or LIKELY_HEIGHT
-        return Footage(max(1, min(photos, count or photos)), round(height * PHOTO_ASPECT), height, read=False)
+        return keep(Footage(max(1, photos), round(height * PHOTO_ASPECT), height, read=False), count, most)
     header = read_header(clip)
     if header is None:
-        height = most or LIKELY_HEIGHT
         return Footage(count or LIKELY_FRAMES, round(height * VIDEO_ASPECT), height, read=False)
     frames = header.frames if fps is None else min(header.frames, int(header.seconds * fps) + 1)
-    height = min(header.height, most or header.height)
-    return Footage(max(1, min(frames, count or frames)), max(1, round(header.width * height / header.height)), height)
+    return keep(Footage(frames, header.width, header.height), count, most)
+
+
+def keep(footage: Footage, count: int | None, max_height: int | None) -> Footage:
+    """What is left of frames by split's parameters of these names."""
+    height = min(footage.height, max_height or footage.height)
+    width = max(1, round(footage.width * height / footage.height))
+    return replace(footage, frames=min(footage.frames, count or footage.frames), width=width, height=height)
 
 
 @dataclass(frozen=True)
