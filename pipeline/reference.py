@@ -64,9 +64,9 @@ def quality_page(project: Project) -> str:
               "it. `run.json` and the report tell the preset, and which of these parameters were set otherwise.",
               _presets(project, "cpu"), "Where training runs on a GPU:", _presets(project, "cuda"),
               "The times are what the cost model (`pipeline/cost_model.py`) says of the machine that it was measured on. Before it "
-              "starts, a run tells its own: scaled by the clip, by the stages that have to run, and by what earlier runs took on the "
-              "machine at hand, as far as the cache holds them. `--dry-run` tells it alone. `run.json` keeps the last forecast "
-              "beside what its stages took (`forecast`, with `ratio`)."]
+              "starts, a run tells its own: scaled by the clip, by the stages that have to run, and by what earlier runs took on "
+              "the machine at hand, as far as the cache holds them. `--dry-run` tells it alone. `run.json` keeps the last forecast "
+              "beside what its stages took (`forecast`, with `ratio` and `cpu_ratio`)."]
     return "\n\n".join(blocks) + "\n"
 
 
