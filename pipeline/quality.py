@@ -82,13 +82,17 @@ def quality_entry(name: str, configs: Mapping[str, Any]) -> dict[str, Any]:
     return {"name": name, "otherwise": otherwise}
 
 
+def name_of(entry: Any) -> str:
+    """The preset's name; empty of what is no entry of `quality_entry`, or of a preset that is gone."""
+    name = entry.get("name") if isinstance(entry, dict) else None
+    return name if isinstance(name, str) and name in QUALITIES else ""
+
+
 def describe_quality(entry: Any) -> str:
-    """`draft`, or `draft, but for train.steps`; empty of what is no entry of `quality_entry`."""
-    if not isinstance(entry, dict) or not entry.get("name"):
-        return ""
-    otherwise = entry.get("otherwise")
+    """`draft`, or `draft, but for train.steps`; empty where there is no name."""
+    name, otherwise = name_of(entry), entry.get("otherwise") if isinstance(entry, dict) else None
     names = ", ".join(map(str, otherwise)) if isinstance(otherwise, list) else ""
-    return f"{entry['name']}, but for {names}" if names else str(entry["name"])
+    return f"{name}, but for {names}" if name and names else name
 
 
 def dial_names() -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ import pytest
 from gsac.pipeline import quality
 from gsac.pipeline.cli import execute, make_parser
 from gsac.pipeline.commands.batch import forwarded_arguments
+from gsac.pipeline.lost_files import recovery
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
@@ -84,6 +85,13 @@ def test_run_json_the_object_of_json_and_the_report_tell_the_preset(toy):
     assert "Quality: standard." in (toy.out / "report.html").read_text(), "drawn anew, though no result changed"
     assert toy.gsac("stage", "left", toy.out, "--set", "left.word=last").code == 0
     assert json.loads((toy.out / "run.json").read_text())["quality"]["name"] == "standard", "another command keeps it"
+
+
+def test_the_command_that_brings_lost_files_back_asks_for_the_same_preset(tmp_path):
+    (tmp_path / "dvc.yaml").touch()
+    for entry, words in ((None, ""), ({"name": STANDARD}, ""), ({"name": "draft"}, " --quality draft"), ({"name": ["draft"]}, "")):
+        (tmp_path / "run.json").write_text(json.dumps({"quality": entry}))
+        assert recovery(tmp_path / "train" / "avatar.npz") == f"gsac run CLIP --out {tmp_path}{words}"
 
 
 def test_the_page_writes_every_preset_out():
