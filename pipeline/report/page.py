@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from gsac.pipeline.quality import describe_quality
 from gsac.pipeline.report.frame_links import FrameLinks
 from gsac.pipeline.report.origin import drawn_from, read_origin, shown_stages
 from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
@@ -79,7 +80,7 @@ def render(results: Results, drawn: dict[str, Section]) -> str:
         failed=results.failed, reached=explain_partial_run(results), stages=stage_rows(results),
         totals=totals(results), parameters=parameters(results), files=list_exports(results), foot=provenance(results),
         viewer="export/viewer.html" if has_viewer(results) else "", caveat=results.caveat,
-        drawn_from=drawn_from(results), shows=" ".join(shown_stages(results)),
+        drawn_from=drawn_from(results), shows=" ".join(shown_stages(results)), quality=describe_quality(results.run.get("quality")),
     )
 
 
