@@ -12,7 +12,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Fit, Task
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, Views
 
 
 class Trained(NamedTuple):
@@ -71,10 +71,10 @@ class Backend(ABC):
         """A context in which the gaussians learn by the plan while someone else moves task.poses. views: trained frame -> view."""
 
     @abstractmethod
-    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:
+    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """Test-time pose optimisation: moves the poses of `frames`, (n,) indices, to their images; the avatar stays.
 
-        views: of all T frames; steps: for each frame.
+        views: frame -> view; steps: for each frame.
         """
 
     def fit(self, task: Task, count: int) -> Fit:

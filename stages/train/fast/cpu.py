@@ -19,7 +19,7 @@ from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import correct_midway
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, Views
 
 
 class Cpu(Backend):
@@ -82,7 +82,7 @@ class Cpu(Backend):
         """As `Backend.open_rounds`."""
         yield CpuRounds(task, views, gaussians, plan)
 
-    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:
+    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""
         for t in map(int, frames):
             align_pose(gaussians, poses, t, views[t], steps)

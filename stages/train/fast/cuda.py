@@ -31,7 +31,7 @@ from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.poses import bundle_adjust
 from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, TURN, Poses
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
-from gsac.stages.train.views import View, person_crop
+from gsac.stages.train.views import View, Views, person_crop
 
 STEPS = 3200
 """Steps where none are configured, more than twice the CPU's: 0.4 s more for 0.15 dB, 0.3 with poses moved to their images."""
@@ -96,7 +96,7 @@ class Cuda(Backend):
             yield CudaRounds(trainer, task, gaussians)
             task.gpu_seconds += trainer.seconds
 
-    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:
+    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""
         if not len(frames):
             return
@@ -145,7 +145,7 @@ def make_recipe(config: TrainConfig, count: int, kind: type[SomeRecipe] = Recipe
 
 def lpips_options(task: Task) -> dict[str, Any]:
     """Fields of a recipe for LPIPS of windows, for `make_recipe`."""
-    camera = task.views[0].camera
+    camera = task.views[0].frame
     return {"perceptual": LPIPS_WEIGHT, "perceptual_steps": LPIPS_STEPS, "frame_size": (camera.width, camera.height)}
 
 

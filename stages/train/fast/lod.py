@@ -6,6 +6,7 @@ at its own size draws better there.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -68,16 +69,16 @@ def seen_height(poses: Poses, views: dict[int, View]) -> float:
     return float(round(np.median(heights)))
 
 
-def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View]) -> list[dict]:
+def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views: Mapping[int, View], height: int) -> list[dict]:
     """Held-out psnr_fg and ssim of each level at its own image height, with its size and the same figures of the finest level.
 
-    held: (n,) indices of the frames; views: of all T.
+    views: held-out frame -> its whole view, `height` px high as the trained ones.
     """
     rows, candidates = [], []
     for (_, halvings), level in zip(LEVELS, levels, strict=False):
-        small = {int(t): halve(views[t], halvings) for t in held}
-        rows.append({"n_gaussians": len(level), "image_height": halve(views[0], halvings).camera.height})
-        candidates += [Candidate(gaussians, poses, held, small) for gaussians in (level, finest)]
+        small = {t: halve(view, halvings) for t, view in views.items()}
+        rows.append({"n_gaussians": len(level), "image_height": height // 2**halvings or 1})
+        candidates += [Candidate(gaussians, poses, list(small), small) for gaussians in (level, finest)]
     for k, judged_rows in enumerate(judge_all(candidates)):
         figures, name = summary(judged_rows), "_finest" if k % 2 else ""
         rows[k // 2] |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}

@@ -1,8 +1,8 @@
 """`train.gaussians: auto`: searches for the smallest number of gaussians at no visible loss on held-out frames.
 
 The largest size is trained as always; each smaller size merges neighbours of the one before and refits the result. Sizes are
-judged on held-out frames whose poses are first moved to their images, once, with the largest avatar: a pose that is off would
-reward blur. The search ends at the first size that scores worse than the best, and takes the one before.
+judged on held-out frames, as filmed, whose poses are first moved to their images, once, with the largest avatar: a pose that is
+off would reward blur. The search ends at the first size that scores worse than the best, and takes the one before.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from gsac.stages.train.fast.size_rule import MOST_LOST, SizeScore, choose, optim
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gaussians.merge import merge_to_size, skin_weights
 from gsac.stages.train.gaussians.unseen import level_heights
-from gsac.stages.train.judge.heldout import judge
+from gsac.stages.train.judge.heldout import Candidate, judge_person
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import carry_to_untrained
 from gsac.stages.train.task import Fit, Task
@@ -58,7 +58,7 @@ def search(task: Task, backend: Backend) -> Fit:
             trainer.freeze_unseen(coarse)
             trainer = backend.refit(task, trainer, fine, coarse)
         fits.append(Fit(*trainer.finish(coarse), dict(trainer.gains)))
-        rows = judge(fits[-1].gaussians, poses, task.choosing, task.views)
+        rows, = judge_person([Candidate(fits[-1].gaussians, poses, task.choosing, task.filmed)])
         scores.append(SizeScore(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
         if choose(scores) is not scores[-1] and not task.config.every_size:
             break

@@ -34,7 +34,7 @@ def fit(task: Task) -> Fit:
 
 def make_recipe(task: Task) -> PaperRecipe:
     """The published rates and weights for the task's frames."""
-    camera = task.views[0].camera
+    camera = task.views[0].frame
     return PaperRecipe(
         steps=task.config.steps or paper.STEPS, batch=min(paper.BATCH, len(task.trained)), seed=task.config.seed,
         mu_rate=paper.MU_RATE, mu_decay=paper.MU_DECAY, rgb_rate=paper.RATES["rgb"], quat_rate=paper.RATES["quat"],

@@ -79,7 +79,7 @@ class Trainer:
         self.values = {name: value.astype(np.float32) for name, value in self.values.items()}
         self.first = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.second = {name: np.zeros_like(v) for name, v in self.values.items()}
-        self.frame_size = task.views[0].camera.width, task.views[0].camera.height
+        self.frame_size = task.views[0].frame.width, task.views[0].frame.height
         self.lpips = task.lpips
         self.densifier = Densifier(count)
         self.neighbours = Neighbours()

@@ -70,19 +70,20 @@ def test_a_size_is_the_mean_of_its_last_steps(monkeypatch):
 
 @pytest.mark.slow
 def test_sizes_are_judged_as_they_are_handed_out(job_anywhere, monkeypatch):
-    level_heights, judge, judged = trainer.level_heights, size_search.judge, []
+    level_heights, judge, judged = trainer.level_heights, size_search.judge_person, []
 
     def marked(gaussians, rest, faces):
         return replace(level_heights(gaussians, rest, faces), rgb=np.full_like(gaussians.rgb, 0.25))
 
-    def watched(gaussians, *rest):
-        judged.append(gaussians)
-        return judge(gaussians, *rest)
+    def watched(candidates):
+        judged.append(candidates[0].gaussians)
+        assert {view.camera.height for view in candidates[0].views.values()} == {128}, "as filmed, whatever is trained on"
+        return judge(candidates)
 
     monkeypatch.setattr(size_search, "list_sizes", lambda largest: (400, 40))
     monkeypatch.setattr(trainer, "level_heights", marked)
-    monkeypatch.setattr(size_search, "judge", watched)
-    run(job_anywhere(gaussians="auto", frames=6, steps=12, pose_rounds=0, pose_test_steps=0))
+    monkeypatch.setattr(size_search, "judge_person", watched)
+    run(job_anywhere(gaussians="auto", height=64, frames=6, steps=12, pose_rounds=0, pose_test_steps=0))
     assert len(judged) == 2 and all((gaussians.rgb == 0.25).all() for gaussians in judged)
 
 
