@@ -8,10 +8,11 @@ import numpy as np
 
 from gsac.avatar.artifacts import Crop
 
-MARGIN, LEAST_MARGIN = 0.13, 0.05
-"""Free space about the person's points, as a share of the person's height: in a crop as planned, and in one that is accepted."""
-CROWN = 0.08
-"""From the topmost point, of the face, to the top of the head and hair, as a share of the person's height."""
+MARGIN, LEAST_MARGIN = 0.1, 0.03
+"""Free space about the person, as a share of the person's height: in a crop as planned, and in one that is accepted."""
+CROWN, REACH = 0.08, 0.05
+"""From the topmost point, of the face, to the end of the hair, and from the outermost ones to that of fingers, toes and clothes, as
+shares of the person's height."""
 POINTS_SPAN = 0.91
 """Of a standing person's height, from the eyes' points to the feet's."""
 LEAST_GAIN = 1.2
@@ -20,8 +21,8 @@ LEAST_HEIGHT = 0.1
 """Share of the footage's height below which a person is not believed."""
 LEAST_ASPECT = 9 / 16
 """Least width of a crop as a share of its height: masks and the search for a moving camera need some of the scene."""
-WIDER = 0.35
-"""By how much a crop that turns out too narrow grows on that side, as a share of the person's height."""
+WIDER = 0.25
+"""By how much a crop grows on a side where it hides some of the person, as a share of the person's height."""
 SIDES = np.array([-1, -1, 1, 1])
 """Outward direction of left, top, right and bottom."""
 
@@ -31,7 +32,7 @@ class Extent:
     """Where a clip's person is in the footage, over all frames that were looked at."""
 
     box: np.ndarray
-    """(4,) px, left, top, right, bottom of the points and the crown."""
+    """(4,) px, left, top, right, bottom of the person."""
     tall: float
     """px, the person's height."""
 
@@ -40,7 +41,7 @@ class Extent:
         """points: (n, 2) px of one person in one frame."""
         low, high = points.min(0), points.max(0)
         tall = float((high - low).max()) / POINTS_SPAN
-        return cls(np.array([low[0], low[1] - CROWN * tall, *high]), tall)
+        return cls(np.array([*low, *high]) + tall * np.array([-REACH, -CROWN, REACH, REACH]), tall)
 
     def joined(self, other: Extent | None) -> Extent:
         """Of both."""
@@ -76,12 +77,12 @@ def plan_crop(extent: Extent, width: int, height: int, max_height: int) -> Crop 
     return Crop(left, top, right - left, bottom - top, kept / (bottom - top))
 
 
-def sides_cut(extent: Extent, crop: Crop, width: int, height: int) -> np.ndarray:
-    """(4,) bool, sides of the crop that the extent, px of the footage of width x height px, comes too near to; the footage's own
-    ends are none."""
+def sides_near(extent: Extent, crop: Crop, width: int, height: int, margin: float) -> np.ndarray:
+    """(4,) bool, sides of the crop from which the extent, px of the footage of width x height px, is less than a share `margin` of
+    the person's height away; the footage's own ends are none."""
     edge = np.array([crop.x, crop.y, crop.x + crop.width, crop.y + crop.height])
     inside = edge != np.array([0, 0, width, height])
-    return inside & (SIDES * extent.box + LEAST_MARGIN * extent.tall > SIDES * edge)
+    return inside & (SIDES * extent.box + margin * extent.tall > SIDES * edge)
 
 
 def principal_point(crop: Crop, size: tuple[int, int], width: int, height: int) -> tuple[float, float]:

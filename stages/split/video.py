@@ -16,7 +16,7 @@ from gsac.avatar.files import told_no_room
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
-from gsac.stages.split.crop import Extent, plan_crop, principal_point, sides_cut
+from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_point, sides_near
 from gsac.stages.split.keyframes import read_key_frames
 from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
@@ -113,10 +113,9 @@ def write_about_person(path: Path, video: Video, frames: Path, config: SplitConf
             break
         written = write(crop)
         found = see_frames(people, frames, crop)
-        cut = sides_cut(found, crop, *whole[:2]) if found is not None else None
-        if cut is not None and not cut.any():
+        if found is not None and not sides_near(found, crop, *whole[:2], LEAST_MARGIN).any():
             return crop, written
-        extent = found.joined(extent).grown(cut) if found is not None else None
+        extent = found.joined(extent).grown(sides_near(found, crop, *whole[:2], 0)) if found is not None else None
         for frame in frame_paths(frames):
             frame.unlink()
     return None, write(None)
