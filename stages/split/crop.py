@@ -21,7 +21,7 @@ LEAST_HEIGHT = 0.1
 """Share of the footage's height below which a person is not believed."""
 LEAST_ASPECT = 9 / 16
 """Least width of a crop as a share of its height: masks and the search for a moving camera need some of the scene."""
-WIDER = 0.25
+WIDER = 0.4
 """By how much a crop grows on a side where it hides some of the person, as a share of the person's height."""
 SIDES = np.array([-1, -1, 1, 1])
 """Outward direction of left, top, right and bottom."""

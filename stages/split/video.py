@@ -27,7 +27,7 @@ SHOWN = re.compile(r"\bn:\s*\d+ pts:\s*(-?\d+)")
 TIME_BASE = re.compile(r"config in time_base: (\d+)/(\d+)")
 LONGEST_S = 24 * 3600
 SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
-LOOKS, CHECKS, TRIES = 12, 30, 2
+LOOKS, CHECKS, TRIES = 12, 30, 3
 """Most key frames by which a crop is planned, most frames in which it is checked, and crops tried before the frames stay whole."""
 
 
