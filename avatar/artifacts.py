@@ -23,6 +23,19 @@ class ArtifactError(Exception):
     """A file is not what its port promises. The message names the file, the array and what was expected."""
 
 
+@dataclass(frozen=True)
+class Crop:
+    """The part of the footage that the frames show."""
+
+    x: int
+    """px of the upright footage, as y, width and height."""
+    y: int
+    width: int
+    height: int
+    scale: float
+    """Frames' px per px of the footage."""
+
+
 @dataclass
 class Clip:
     """clip.json of `split`."""
@@ -39,9 +52,28 @@ class Clip:
     """Of the video file, or of the photos in order."""
     notes: list[str] = field(default_factory=list)
     """What was changed on the way, for people: `transparency composited over black`."""
+    crop: Crop | None = None
+    """None: the frames show the whole footage."""
+    center: tuple[float, float] | None = None
+    """Principal point, px; None: the frame's middle."""
+
+    @property
+    def principal_point(self) -> tuple[float, float]:
+        """px."""
+        return self.center or (self.width / 2, self.height / 2)
+
+    @property
+    def longer_side(self) -> float:
+        """Of the footage, cut or not, in px of the frames: what a focal length is guessed from."""
+        if self.crop is None:
+            return max(self.width, self.height)
+        middle = self.principal_point
+        return 2 * max(middle[0] + self.crop.x * self.crop.scale, middle[1] + self.crop.y * self.crop.scale)
 
     def write(self, path: Path) -> None:
-        write_file(path, (json.dumps(asdict(self), indent=1, sort_keys=True) + "\n").encode())
+        cut = {"crop", "center"} if self.crop is None and self.center is None else set()
+        values = {name: value for name, value in asdict(self).items() if name not in cut}
+        write_file(path, (json.dumps(values, indent=1, sort_keys=True) + "\n").encode())
 
     @classmethod
     def read(cls, path: Path) -> Clip:
@@ -50,9 +82,16 @@ class Clip:
         if not isinstance(values, dict):
             raise ArtifactError(f"{path}: expected a JSON object, not a {type(values).__name__}")
         for each in fields(cls):
-            if each.name not in values and each.default_factory is MISSING:
+            if each.name not in values and each.default_factory is MISSING and each.default is MISSING:
                 raise ArtifactError(f"{path}: field {each.name} is missing (has {', '.join(sorted(values))})")
-        return cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
+        clip = cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
+        try:
+            clip.crop = Crop(**values["crop"]) if values.get("crop") else None
+            clip.center = tuple(map(float, values["center"])) if values.get("center") else None
+        except (TypeError, ValueError) as e:
+            raise ArtifactError(f"{path}: crop and center must be an object of {', '.join(f.name for f in fields(Crop))}, "
+                                f"and two numbers ({e})") from e
+        return clip
 
 
 def frame_paths(frames: Path) -> list[Path]:

@@ -141,7 +141,7 @@ def _value(value: Any) -> str:
 def _dependencies(stage: Stage) -> str:
     config = stage.config()
     rows = {"model files, with the defaults": stage.models(config),
-            "model files, where the user has added them": stage.wishes(config),
+            "model files, where they are here": stage.wishes(config),
             "versions of packages": stage.packages, "programs": tuple(stage.programs()),
             "device class": ("cpu or cuda",) if stage.uses_device else ()}
     return "\n".join(["- its code, and the version of Python",
