@@ -20,7 +20,7 @@ NAMES = {"mse_white": "psnr_full", "mse_black": "psnr_full_black", "mse_fg": "ps
          "mse_inside": "psnr_inside", **{f"mse_{name}": f"psnr_{name}" for name in BOXES}}
 """Name of a mean squared error -> name of its PSNR."""
 EDGE, RIM, EDGE_HEIGHT = 4.0, 2.0, 1280
-"""px to each side of the silhouette that `mse_edge` is of, and outside that `stray_edge_alpha` allows; in a frame of EDGE_HEIGHT."""
+"""px to each side of the silhouette that `mse_edge` is of, and outside that `stray_edge_alpha` allows, at EDGE_HEIGHT."""
 TAPS = 11
 """px, window of SSIM."""
 REACH = 10
