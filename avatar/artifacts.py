@@ -23,6 +23,19 @@ class ArtifactError(Exception):
     """A file is not what its port promises. The message names the file, the array and what was expected."""
 
 
+@dataclass(frozen=True)
+class Crop:
+    """The part of the footage that the frames show."""
+
+    x: int
+    """px of the upright footage, as y, width and height."""
+    y: int
+    width: int
+    height: int
+    scale: float
+    """Frames' px per px of the footage."""
+
+
 @dataclass
 class Clip:
     """clip.json of `split`."""
@@ -39,9 +52,28 @@ class Clip:
     """Of the video file, or of the photos in order."""
     notes: list[str] = field(default_factory=list)
     """What was changed on the way, for people: `transparency composited over black`."""
+    crop: Crop | None = None
+    """None: the frames show the whole footage."""
+    center: tuple[float, float] | None = None
+    """Principal point, px; None: the frame's middle."""
+
+    @property
+    def principal_point(self) -> tuple[float, float]:
+        """px."""
+        return self.center or (self.width / 2, self.height / 2)
+
+    @property
+    def longer_side(self) -> float:
+        """Of the footage, cut or not, in px of the frames: what a focal length is guessed from."""
+        if self.crop is None:
+            return max(self.width, self.height)
+        middle = self.principal_point
+        return 2 * max(middle[0] + self.crop.x * self.crop.scale, middle[1] + self.crop.y * self.crop.scale)
 
     def write(self, path: Path) -> None:
-        write_file(path, (json.dumps(asdict(self), indent=1, sort_keys=True) + "\n").encode())
+        cut = {"crop", "center"} if self.crop is None and self.center is None else set()
+        values = {name: value for name, value in asdict(self).items() if name not in cut}
+        write_file(path, (json.dumps(values, indent=1, sort_keys=True) + "\n").encode())
 
     @classmethod
     def read(cls, path: Path) -> Clip:
@@ -50,9 +82,16 @@ class Clip:
         if not isinstance(values, dict):
             raise ArtifactError(f"{path}: expected a JSON object, not a {type(values).__name__}")
         for each in fields(cls):
-            if each.name not in values and each.default_factory is MISSING:
+            if each.name not in values and each.default_factory is MISSING and each.default is MISSING:
                 raise ArtifactError(f"{path}: field {each.name} is missing (has {', '.join(sorted(values))})")
-        return cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
+        clip = cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
+        try:
+            clip.crop = Crop(**values["crop"]) if values.get("crop") else None
+            clip.center = tuple(map(float, values["center"])) if values.get("center") else None
+        except (TypeError, ValueError) as e:
+            raise ArtifactError(f"{path}: crop and center must be an object of {', '.join(f.name for f in fields(Crop))}, "
+                                f"and two numbers ({e})") from e
+        return clip
 
 
 def frame_paths(frames: Path) -> list[Path]:
@@ -179,11 +218,15 @@ BODY_SHAPES: Shapes = {
     "center": (2,), "sigma_joints": ("T", 55), "model": (),
 }
 LIGHT_SHAPE: Shapes = {"light": (4, 3)}
+LOW_PASS_SHAPE: Shapes = {"low_pass": (2,)}
 AVATAR_SHAPES: Shapes = {
     "face": ("N",), "mu": ("N", 3), "quat": ("N", 4), "log_scale": ("N", 3), "rgb": ("N", 3), "opacity": ("N",),
 }
 LEVEL_SHAPES: Shapes = {"levels": ("L",), **{f"coarser_{name}": ("M", *shape[1:]) for name, shape in AVATAR_SHAPES.items()}}
 """Of avatar.npz where it has coarser levels of detail: the gaussians in each, then their arrays, joined level by level."""
+LEVEL_HEIGHT_SHAPE: Shapes = {"level_heights": ("L",)}
+MORE_AVATAR_SHAPES = LIGHT_SHAPE, LOW_PASS_SHAPE, LEVEL_SHAPES, LEVEL_HEIGHT_SHAPE
+"""Groups of arrays that avatar.npz has or has not."""
 
 
 def check_keypoints(path: Path) -> dict[str, np.ndarray]:
@@ -215,11 +258,16 @@ def check_body(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_avatar(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of avatar.npz by name: `AVATAR_SHAPES`, as mu (N, 3); light (4, 3) or not; all of `LEVEL_SHAPES` or none."""
-    arrays = check_arrays(path, AVATAR_SHAPES, LIGHT_SHAPE, LEVEL_SHAPES)
-    for name in {**AVATAR_SHAPES, **LIGHT_SHAPE, **LEVEL_SHAPES}:
+    """The arrays of avatar.npz: `AVATAR_SHAPES`, as mu (N, 3); light (4, 3), low_pass (2,), all of `LEVEL_SHAPES` or none.
+
+    Where there are levels, level_heights (L,) or not.
+    """
+    arrays = check_arrays(path, AVATAR_SHAPES, *MORE_AVATAR_SHAPES)
+    for name in {name for shapes in (AVATAR_SHAPES, *MORE_AVATAR_SHAPES) for name in shapes}:
         if name in arrays and not _finite(arrays[name]):
             raise ArtifactError(f"{path}: array {name} is not finite")
+    if "level_heights" in arrays and not ("levels" in arrays and (arrays["level_heights"] > 0).all()):
+        raise ArtifactError(f"{path}: array level_heights must hold the height of the person for each of `levels`, px, above 0")
     if "levels" in arrays:
         counts = [len(arrays["face"]), *arrays["levels"].tolist()]
         if sum(counts[1:]) != len(arrays["coarser_face"]) or any(b >= a or b < 1 for a, b in zip(counts, counts[1:], strict=False)):

@@ -6,8 +6,22 @@ defaults (tests/avatar/test_draw_rule.py compares). A splat is `alpha = min(MAX_
 
 from __future__ import annotations
 
-BLUR = 0.3
-"""Low-pass: px^2 added to both variances of every splat."""
+from typing import NamedTuple
+
+
+class LowPass(NamedTuple):
+    """The filter of every splat on the screen."""
+
+    px2: float
+    """Added to both variances, px^2."""
+    keeps_energy: bool
+    """Whether the opacity falls as the splat grows by it: by sqrt(det of the covariance before / after)."""
+
+
+ADDED = LowPass(0.3, keeps_energy=False)
+"""3DGS (Kerbl et al. 2023): what is small on the screen becomes fat."""
+PIXEL = LowPass(0.1, keeps_energy=True)
+"""Mip-Splatting (Yu et al. 2024): about a pixel's area, so that an avatar looks alike from every distance."""
 MAX_ALPHA = 0.999
 ALPHA_LEVELS = 255
 MIN_ALPHA = 1 / ALPHA_LEVELS
@@ -23,6 +37,6 @@ DARKEST, BRIGHTEST = 0.25, 2.5
 
 def cuda_constants() -> str:
     """The same numbers as CUDA text, each the exact double."""
-    numbers = {"BLUR": BLUR, "MAX_ALPHA": MAX_ALPHA, "ALPHA_LEVELS": ALPHA_LEVELS, "MIN_ALPHA": MIN_ALPHA, "STOP": STOP,
+    numbers = {"MAX_ALPHA": MAX_ALPHA, "ALPHA_LEVELS": ALPHA_LEVELS, "MIN_ALPHA": MIN_ALPHA, "STOP": STOP,
                "NEAR_PLANE": NEAR, "FRUSTUM": FRUSTUM, "DARKEST": DARKEST, "BRIGHTEST": BRIGHTEST}
     return "".join(f"constexpr double {name} = {value!r};\n" for name, value in numbers.items())

@@ -22,7 +22,7 @@ WHITE_POINT = TO_XYZ.sum(1)
 
 def flip(reference: np.ndarray, test: np.ndarray, pixels_per_degree: float = PIXELS_PER_DEGREE) -> np.ndarray:
     """Difference (H, W) in 0..1, 0 where equal. reference, test: (H, W, 3) sRGB in 0..1."""
-    opponents = [_to_opponent(_to_linear(np.asarray(image, np.float64))) for image in (reference, test)]
+    opponents = [_to_opponent(_to_linear(np.asarray(image, np.float32))) for image in (reference, test)]
     filtered = [_adjust_hunt(_to_lab(_filter_contrast(o, pixels_per_degree))) for o in opponents]
     corners = _adjust_hunt(_to_lab(np.array([[[0.0, 1, 0], [0, 0, 1]]])))
     largest = float(_hyab(corners[:, :1], corners[:, 1:])[0, 0]) ** QC
@@ -40,7 +40,7 @@ def _to_linear(srgb: np.ndarray) -> np.ndarray:
 
 def _to_opponent(linear: np.ndarray) -> np.ndarray:
     """YCxCz of linear RGB."""
-    x, y, z = np.moveaxis(linear @ TO_XYZ.T / WHITE_POINT, -1, 0)
+    x, y, z = np.moveaxis(_mix(linear, TO_XYZ / WHITE_POINT[:, None]), -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], -1)
 
 
@@ -55,12 +55,12 @@ def _filter_contrast(opponent: np.ndarray, ppd: float) -> np.ndarray:
         total = sum(weight * line.sum() ** 2 for weight, line in parts)
         out[..., c] = sum(weight / total * _convolve(opponent[..., c], line, line) for weight, line in parts)
     y = (out[..., 0] + 16) / 116
-    xyz = np.stack([y + out[..., 1] / 500, y, y - out[..., 2] / 200], -1) * WHITE_POINT
-    return np.clip(xyz @ np.linalg.inv(TO_XYZ).T, 0, 1)
+    xyz = np.stack([y + out[..., 1] / 500, y, y - out[..., 2] / 200], -1)
+    return np.clip(_mix(xyz, np.linalg.inv(TO_XYZ) * WHITE_POINT), 0, 1)
 
 
 def _to_lab(linear: np.ndarray) -> np.ndarray:
-    ratio = linear @ TO_XYZ.T / WHITE_POINT
+    ratio = _mix(linear, TO_XYZ / WHITE_POINT[:, None])
     limit = 6 / 29
     f = np.where(ratio > limit**3, np.cbrt(ratio), ratio / (3 * limit**2) + 4 / 29)
     return np.stack([116 * f[..., 1] - 16, 500 * (f[..., 0] - f[..., 1]), 200 * (f[..., 1] - f[..., 2])], -1)
@@ -88,7 +88,14 @@ def _features(lightness: np.ndarray, ppd: float) -> tuple[np.ndarray, np.ndarray
     return tuple(found)
 
 
+def _mix(image: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """(H, W, 3): the matrix (3, 3) applied to each pixel."""
+    import cv2
+
+    return cv2.transform(image, matrix)
+
+
 def _convolve(image: np.ndarray, down: np.ndarray, across: np.ndarray) -> np.ndarray:
     import cv2
 
-    return cv2.sepFilter2D(image, cv2.CV_64F, across, down, borderType=cv2.BORDER_REPLICATE)
+    return cv2.sepFilter2D(image, -1, across, down, borderType=cv2.BORDER_REPLICATE)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from gsac.avatar import artifacts
+from gsac.avatar.draw_rule import ADDED, PIXEL, LowPass
 
 FLATNESS = 0.15
 """Thickness of a fresh gaussian along the face's normal, as a share of its width."""
@@ -39,23 +40,29 @@ class Gaussians:
     """(N,) in 0..1."""
     light: np.ndarray | None = None
     """(4, 3) of `avatar.light`: the room's light, a factor on rgb by the face's normal; None: factor 1."""
+    low_pass: LowPass = PIXEL
+    """The filter that they were trained with, and are to be drawn with."""
+    max_height_px: float | None = None
+    """Of a coarser level of detail: projected height of the person up to which it is drawn; None: not said."""
 
     def __len__(self) -> int:
         return len(self.face)
 
     def __getitem__(self, which: np.ndarray | slice) -> Gaussians:
         """Those that an index array (M,), mask (N,) or slice picks."""
-        return Gaussians(*(np.ascontiguousarray(getattr(self, name)[which]) for name in FIELDS), self.light)
+        return replace(self, **{name: np.ascontiguousarray(getattr(self, name)[which]) for name in FIELDS})
 
     def write(self, path: Path, coarser: Sequence[Gaussians] = ()) -> None:
-        """To avatar.npz, float32 and face int32, with `light` and coarser levels of detail, finest first, where given."""
-        arrays = self._arrays()
+        """To avatar.npz, float32 and face int32, `low_pass`, and where given `light` and coarser levels of detail, finest first."""
+        arrays = self._arrays() | {"low_pass": np.array(self.low_pass, np.float32)}
         if self.light is not None:
             arrays["light"] = np.asarray(self.light, np.float32)
         if coarser:
             arrays["levels"] = np.array([len(level) for level in coarser], np.int32)
             parts = [level._arrays() for level in coarser]
             arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in FIELDS}
+            if all(level.max_height_px for level in coarser):
+                arrays["level_heights"] = np.array([level.max_height_px for level in coarser], np.float32)
         artifacts.write_arrays(path, **arrays)
 
     @classmethod
@@ -67,26 +74,30 @@ class Gaussians:
     def read_levels(cls, path: Path) -> list[Gaussians]:
         """The avatar and its coarser levels of detail, finest first; as `read`."""
         arrays = artifacts.check_avatar(path)
-        light = arrays.get("light")
+        light, given = arrays.get("light"), arrays.get("low_pass")
+        low_pass = ADDED if given is None else LowPass(float(given[0]), bool(given[1]))
         ends = np.cumsum(arrays.get("levels", np.zeros(0, np.int32)))
         parts = [{name: arrays[f"coarser_{name}"][a:b] for name in FIELDS} for a, b in zip([0, *ends], ends, strict=False)]
-        return [cls(**part, light=light) for part in [{name: arrays[name] for name in FIELDS}, *parts]]
+        heights = [None, *arrays.get("level_heights", np.full(len(ends), None)).tolist()]
+        return [cls(**part, light=light, low_pass=low_pass, max_height_px=height)
+                for part, height in zip([{name: arrays[name] for name in FIELDS}, *parts], heights, strict=True)]
 
     def _arrays(self) -> dict[str, np.ndarray]:
         return {name: np.asarray(getattr(self, name), np.int32 if name == "face" else np.float32) for name in FIELDS}
 
     @classmethod
     def area(cls, vertices: np.ndarray, faces: np.ndarray, count: int, seed: int = 0,
-             rgb: tuple[float, float, float] = (0.5, 0.5, 0.5), opacity: float = 0.9, power: float = 0.85) -> Gaussians:
-        """`count` gaussians spread over the faces of a mesh, a face drawn with probability area ** power.
+             rgb: tuple[float, float, float] = (0.5, 0.5, 0.5), opacity: float = 0.9, power: float = 0.85,
+             density: np.ndarray | None = None) -> Gaussians:
+        """`count` gaussians spread over the faces of a mesh, a face drawn with probability area ** power * density.
 
-        vertices: (V, 3) m; faces: (F, 3) int. A gaussian is as large as the area that the density leaves it, so small faces (eyes,
-        mouth) do not collect sub-pixel gaussians. Systematic draws in the mesh's own order and low-discrepancy points inside a
-        face leave few gaps and few clumps.
+        vertices: (V, 3) m; faces: (F, 3) int; density: (F,), 1 where not given. A gaussian is as large as the area
+        that the density leaves it, so small faces (eyes, mouth) do not collect sub-pixel gaussians. Systematic draws in the mesh's
+        own order and low-discrepancy points inside a face leave few gaps and few clumps.
         """
         random = np.random.default_rng(seed)
         areas = _areas(vertices, faces)
-        chance = areas ** power
+        chance = areas ** power if density is None else areas ** power * density
         up_to = np.cumsum(chance)
         expected = count * chance / up_to[-1]
         whole = np.diff(np.floor(count * (up_to / up_to[-1]) + random.random()).astype(np.int64), prepend=0)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import cv2
 import numpy as np
 
-from gsac.avatar.metrics import WHITE, composite, psnr
+from gsac.avatar.metrics import WHITE, composite, find_shown, psnr
 
 SIZES = {"body": 320, "face": 40, "hands": 28}
 """px that the person's height and the side of a face's and a hand's box are judged at."""
@@ -30,7 +30,9 @@ def compare_parts(rgb: np.ndarray, alpha: np.ndarray, true_rgb: np.ndarray, mask
 
     rgb, true_rgb: (H, W, 3) premultiplied; alpha, mask: (H, W); boxes: name -> x0, y0, x1, y1 px of face, left_hand and right_hand.
     """
-    render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
+    render, real = np.ones(rgb.shape, np.float32), np.ones(rgb.shape, np.float32)
+    shown = find_shown(alpha, mask)
+    render[shown], real[shown] = composite(rgb[shown], alpha[shown], WHITE), composite(true_rgb[shown], mask[shown], WHITE)
     rows = np.flatnonzero((mask >= 0.5).any(1))
     areas = [("body", (0, 0, mask.shape[1], mask.shape[0]), rows[-1] + 1 - rows[0])] if len(rows) else []
     areas += [("face" if name == "face" else "hands", box, max(box[2] - box[0], box[3] - box[1])) for name, box in boxes.items()]

@@ -7,6 +7,7 @@ and alpha, a frame is cut out by its mask; both are scored on the same backgroun
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,17 +16,42 @@ from gsac.avatar.lpips import Lpips
 
 WHITE, BLACK = 1.0, 0.0
 BOXES = ("face", "left_hand", "right_hand")
-NAMES = {"mse_white": "psnr_full", "mse_black": "psnr_full_black", "mse_fg": "psnr_fg",
-         **{f"mse_{name}": f"psnr_{name}" for name in BOXES}}
+NAMES = {"mse_white": "psnr_full", "mse_black": "psnr_full_black", "mse_fg": "psnr_fg", "mse_edge": "psnr_edge",
+         "mse_inside": "psnr_inside", **{f"mse_{name}": f"psnr_{name}" for name in BOXES}}
 """Name of a mean squared error -> name of its PSNR."""
-LPIPS = {"lpips_alex": ("lpips-alex", True), "lpips_alex_unscaled": ("lpips-alex", False), "lpips_vgg": ("lpips-vgg", True)}
-"""Metric -> network, and whether its images are in -1..1, as in its training, or in 0..1, as in many papers' scorers."""
+EDGE, RIM, EDGE_HEIGHT = 4.0, 2.0, 1280
+"""px to each side of the silhouette that `mse_edge` is of, and outside that `stray_edge_alpha` allows, at EDGE_HEIGHT."""
+TAPS = 11
+"""px, window of SSIM."""
+REACH = 10
+"""px from a difference within which a window of SSIM or FLIP may see it."""
+
+
+class Perceptual(NamedTuple):
+    """How an LPIPS is measured."""
+
+    network: str
+    scaled: bool
+    """Whether its images are in -1..1, as in the network's training, or in 0..1, as in many papers' scorers."""
+    background: float
+
+
+LPIPS = {"lpips_alex": Perceptual("lpips-alex", True, WHITE), "lpips_alex_unscaled": Perceptual("lpips-alex", False, WHITE),
+         "lpips_vgg": Perceptual("lpips-vgg", True, WHITE), "lpips_alex_black": Perceptual("lpips-alex", False, BLACK),
+         "lpips_vgg_black": Perceptual("lpips-vgg", False, BLACK)}
+"""By metric; `*_black` is the paper's."""
 
 
 def composite(premultiplied: np.ndarray, alpha: np.ndarray, background: float) -> np.ndarray:
     """An image (H, W, 3) on a grey background, float64 in 0..1, rounded to 8 bit. premultiplied: (H, W, 3); alpha: (H, W)."""
-    image = premultiplied.astype(np.float64) + (1 - alpha.astype(np.float64))[..., None] * background
-    return np.round(np.clip(image, 0, 1) * 255) / 255
+    image = premultiplied.astype(np.float64)
+    if background:
+        image += ((1 - alpha.astype(np.float64)) * background)[..., None]
+    np.clip(image, 0, 1, out=image)
+    image *= 255
+    np.rint(image, out=image)
+    image /= 255
+    return image
 
 
 def psnr(mse: float) -> float | None:
@@ -33,21 +59,31 @@ def psnr(mse: float) -> float | None:
     return None if mse is None or not np.isfinite(mse) else float(-10 * np.log10(max(mse, 1 / 12 / 255**2)))
 
 
-def ssim(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean SSIM of images a and b, (H, W, 3): Gaussian window of 11 taps, sigma 1.5, k1 .01, k2 .03, whole windows only."""
+def ssim(a: np.ndarray, b: np.ndarray, frame: tuple[int, int] | None = None) -> float:
+    """Mean SSIM of images a and b, (H, W, 3): Gaussian window of 11 taps, sigma 1.5, k1 .01, k2 .03, whole windows only.
+
+    frame: height and width of the images that a and b are cut from, which are equal in every window that lies elsewhere.
+    """
     import cv2
 
-    if min(a.shape[:2]) < 11:
+    total = float(np.prod([side + 1 - TAPS for side in frame or a.shape[:2]]))
+    if min(frame or a.shape[:2]) < TAPS:
         return float("nan")
+    if not a.size:
+        return 1.0
 
     def blur(x):
-        return cv2.GaussianBlur(x, (11, 11), 1.5)[5:-5, 5:-5]
+        return cv2.GaussianBlur(x, (TAPS, TAPS), 1.5)[TAPS // 2:-(TAPS // 2), TAPS // 2:-(TAPS // 2)]
 
-    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    # Variances of numbers about zero lose no digits in float32.
+    level_a, level_b = np.float32(a.mean()), np.float32(b.mean())
+    a, b = np.asarray(a, np.float32) - level_a, np.asarray(b, np.float32) - level_b
     ma, mb = blur(a), blur(b)
-    va, vb, cov = blur(a * a) - ma * ma, blur(b * b) - mb * mb, blur(a * b) - ma * mb
-    c1, c2 = 0.01**2, 0.03**2
-    return float(np.mean((2 * ma * mb + c1) * (2 * cov + c2) / ((ma**2 + mb**2 + c1) * (va + vb + c2))))
+    variances, covariance = blur(a * a + b * b) - (ma * ma + mb * mb), blur(a * b) - ma * mb
+    ma, mb = ma + level_a, mb + level_b
+    c1, c2 = np.float32(0.01**2), np.float32(0.03**2)
+    alike = (2 * ma * mb + c1) * (2 * covariance + c2) / ((ma * ma + mb * mb + c1) * (variances + c2))
+    return float((alike.sum(dtype=np.float64) / 3 + total - alike.size / 3) / total)
 
 
 def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
@@ -55,41 +91,105 @@ def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
 
     image, truth: (H, W, 3); region: (H, W) bool. Central differences; NaN where the truth is flat.
     """
-    own, true = (sum((np.gradient(x, axis=axis)[region] ** 2).sum() for axis in (0, 1)) for x in (image, truth))
-    return float(own / true) if true > 0 else float("nan")
+    import cv2
+
+    def energy(values):
+        slopes = (cv2.Sobel(np.float32(values), cv2.CV_32F, across, 1 - across, ksize=1)[region] for across in (0, 1))
+        return sum(float(np.vdot(slope, slope)) for slope in slopes)
+
+    own, true = energy(image), energy(truth)
+    return own / true if true > 0 else float("nan")
 
 
 def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray, boxes: dict | None = None,
           with_flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> dict[str, float]:
     """Scores one image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1; boxes: name -> x0, y0, x1, y1 px.
 
-    `mse_white`, `mse_black`: the whole frame on that background. `mse_fg`: the person only, that is pixels where mask
-    or alpha is at least 0.5, on white, so that both a missing and an added limb count. `ssim`: whole frame on white.
-    `alpha_iou`: of alpha and mask at 0.5. `detail`: gradient energy over the truth's, where both show the person.
-    `mse_<name>`: all of a box on white, NaN without one. `flip`: mean over the person, NaN unless asked for. The names of LPIPS:
-    whole frame on white, NaN for a network that is not in `lpips` (name -> network).
+    `mse_white`, `mse_black`: the whole frame on that background. `ssim`, `ssim_black`: likewise. `alpha_iou`: of alpha and mask
+    at 0.5. `mse_edge`, `mse_inside`, `stray_edge_alpha`: see `find_edge`, and alpha farther outside than RIM over the mask's
+    area. `mse_<name>`: all of a box on white, NaN without one. `flip`: mean over the person, NaN unless asked for. The names of
+    LPIPS: whole frame, NaN for a network that is not in `lpips` (name -> network). The others: see `score_person`.
     """
-    white, white_truth = composite(rgb, alpha, WHITE), composite(truth, mask, WHITE)
-    error = ((white - white_truth) ** 2).mean(2)
-    black = ((composite(rgb, alpha, BLACK) - composite(truth, mask, BLACK)) ** 2).mean()
-    both = (alpha >= 0.5) & (mask >= 0.5)
-    either = (alpha >= 0.5) | (mask >= 0.5)
-    return {
-        "mse_white": float(error.mean()), "mse_black": float(black),
-        "mse_fg": float(error[either].mean()) if either.any() else float("nan"),
-        "fg_pixels": int(either.sum()), "ssim": ssim(white, white_truth),
+    area = find_shown(alpha, mask)
+    # Outside of the area both images are their background: the rest of the frame has no error, and a likeness of one.
+    cut_alpha, cut_mask = alpha[area], mask[area]
+    white, white_truth = composite(rgb[area], cut_alpha, WHITE), composite(truth[area], cut_mask, WHITE)
+    black, black_truth = composite(rgb[area], cut_alpha, BLACK), composite(truth[area], cut_mask, BLACK)
+    error = np.zeros(mask.shape)
+    error[area] = squared_error(white, white_truth)
+    person = _score_person(white, white_truth, error[area], cut_alpha, cut_mask)
+    band, inside, away = find_edge(cut_mask >= 0.5, mask.shape[0])
+    either, both = (f(cut_alpha >= 0.5, cut_mask >= 0.5) for f in (np.logical_or, np.logical_and))
+    backgrounds = {} if not lpips else {ground: (composite(rgb, alpha, ground), composite(truth, mask, ground))
+                                        for ground in (WHITE, BLACK)}
+    return person | {
+        "mse_white": float(error.mean()), "mse_black": float(squared_error(black, black_truth).sum() / mask.size),
+        "ssim": ssim(white, white_truth, mask.shape), "ssim_black": ssim(black, black_truth, mask.shape),
         "alpha_iou": float(both.sum() / either.sum()) if either.any() else float("nan"),
-        "detail": detail(white, white_truth, both) if both.any() else float("nan"),
+        "mse_edge": _mean(error[area][band]), "mse_inside": _mean(error[area][inside]),
+        "stray_edge_alpha": float(cut_alpha[away].sum() / (cut_mask >= 0.5).sum()) if (cut_mask >= 0.5).any() else float("nan"),
         **{f"mse_{name}": _in_box(error, (boxes or {}).get(name)) for name in BOXES},
-        "flip": float(flip(white_truth, white)[either].mean()) if with_flip and either.any() else float("nan"),
-        **{figure: lpips[net].distance(white, white_truth, scaled) if lpips and net in lpips else float("nan")
-           for figure, (net, scaled) in LPIPS.items()},
+        "flip": _mean(flip(white_truth, white)[either]) if with_flip and either.any() else float("nan"),
+        **{figure: lpips[how.network].distance(*backgrounds[how.background], how.scaled)
+           if lpips and how.network in lpips else float("nan") for figure, how in LPIPS.items()},
     }
+
+
+def score_person(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> dict[str, float]:
+    """The part of `score` that tells avatars of one clip apart, for a fraction of its time.
+
+    rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1. `mse_fg`: the person only, that is `fg_pixels` pixels where
+    mask or alpha is at least 0.5, on white, so that both a missing and an added limb count. `detail`: gradient energy over the
+    truth's, where both show the person.
+    """
+    area = find_shown(alpha, mask)
+    white, white_truth = composite(rgb[area], alpha[area], WHITE), composite(truth[area], mask[area], WHITE)
+    return _score_person(white, white_truth, squared_error(white, white_truth), alpha[area], mask[area])
+
+
+def squared_error(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """(H, W), mean over the channels. image, truth: (H, W, 3)."""
+    difference = image - truth
+    return np.einsum("ijk,ijk->ij", difference, difference) / 3
+
+
+def _score_person(white: np.ndarray, white_truth: np.ndarray, error: np.ndarray, alpha: np.ndarray,
+                  mask: np.ndarray) -> dict[str, float]:
+    both, either = (alpha >= 0.5) & (mask >= 0.5), (alpha >= 0.5) | (mask >= 0.5)
+    return {"mse_fg": _mean(error[either]), "fg_pixels": int(either.sum()),
+            "detail": detail(white, white_truth, both) if both.any() else float("nan")}
+
+
+def find_shown(alpha: np.ndarray, mask: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of all that either shows, and of what a window or a band sees of it. alpha, mask: (H, W)."""
+    room = max(REACH, int(np.ceil(EDGE * mask.shape[0] / EDGE_HEIGHT)) + 1)
+    shown = (alpha > 0) | (mask > 0)
+    hits = [np.flatnonzero(shown.any(axis)) for axis in (1, 0)]
+    rows, columns = (slice(max(at[0] - room, 0), at[-1] + 1 + room) if len(at) else slice(0, 0) for at in hits)
+    return rows, columns
+
+
+def find_edge(person: np.ndarray, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Three (H, W) bool: the band of EDGE px to each side of the silhouette's pixels, the person inside of it, and all that is
+    farther than RIM px outside. person: (H, W) bool; height: px of the frame that it is cut from, which both scale with.
+    """
+    import cv2
+
+    if not person.any():
+        return np.zeros_like(person), np.zeros_like(person), ~person
+    deep, far = (cv2.distanceTransform(np.uint8(area), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for area in (person, ~person))
+    edge, rim = EDGE * height / EDGE_HEIGHT, max(1.0, RIM * height / EDGE_HEIGHT)
+    inside = deep > edge + 1
+    return ~inside & (far <= edge), inside, far > rim
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if values.size else float("nan")
 
 
 def _in_box(error: np.ndarray, box: tuple[int, int, int, int] | None) -> float:
     x0, y0, x1, y1 = box or (0, 0, 0, 0)
-    return float(error[y0:y1, x0:x1].mean()) if x1 > x0 and y1 > y0 else float("nan")
+    return _mean(error[y0:max(y1, y0), x0:max(x1, x0)])
 
 
 def figures(scores: dict[str, float]) -> dict[str, float | None]:
@@ -98,17 +198,20 @@ def figures(scores: dict[str, float]) -> dict[str, float | None]:
     return {NAMES.get(name, name): psnr(value) if name in NAMES else value for name, value in known.items()}
 
 
-def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
-    """Metrics of many images: `psnr_*` is the mean of the images' PSNR, `psnr_*_pooled` the PSNR of all their pixels together.
+def mean_psnr(scores: list[dict[str, float]], *names: str) -> float | None:
+    """dB, the mean of the images' PSNR of one or more mean squared errors; None where none was measured."""
+    values = [psnr(s[name]) for s in scores for name in names if np.isfinite(s[name])]
+    return float(np.mean(values)) if values else None
 
-    `lpips` is that of `lpips_net`, the first available network of `LPIPS`; None without one.
+
+def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
+    """Metrics of many images by `score`: `psnr_*` is the mean of the images' PSNR, `psnr_*_pooled` that of all pixels together.
+
+    `lpips` is that of `lpips_net`, the first available network of `LPIPS`, and `lpips_black` the first one on black; None without
+    one.
     """
     def mean(name):
         values = [s[name] for s in scores if np.isfinite(s[name])]
-        return float(np.mean(values)) if values else None
-
-    def mean_psnr(*names):
-        values = [psnr(s[name]) for s in scores for name in names if np.isfinite(s[name])]
         return float(np.mean(values)) if values else None
 
     def pooled(name, weight):
@@ -117,13 +220,20 @@ def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
             return None
         return psnr(float(np.average([s[name] for s in kept], weights=[s[weight] for s in kept] if weight else None)))
 
+    def first(background):
+        return next((name for name, how in LPIPS.items() if how.background == background and perceptual[name] is not None), None)
+
     perceptual = {name: mean(name) for name in LPIPS}
-    first = next((name for name, value in perceptual.items() if value is not None), None)
+    white, black = first(WHITE), first(BLACK)
     return {
-        "psnr_full": mean_psnr("mse_white"), "psnr_full_pooled": pooled("mse_white", None),
-        "psnr_full_black": mean_psnr("mse_black"), "psnr_full_black_pooled": pooled("mse_black", None),
-        "psnr_fg": mean_psnr("mse_fg"), "psnr_fg_pooled": pooled("mse_fg", "fg_pixels"), "ssim": mean("ssim"),
-        "lpips": first and perceptual[first], "lpips_net": first and LPIPS[first][0], **perceptual,
-        "flip": mean("flip"), "psnr_face": mean_psnr("mse_face"), "psnr_hands": mean_psnr("mse_left_hand", "mse_right_hand"),
+        "psnr_full": mean_psnr(scores, "mse_white"), "psnr_full_pooled": pooled("mse_white", None),
+        "psnr_full_black": mean_psnr(scores, "mse_black"), "psnr_full_black_pooled": pooled("mse_black", None),
+        "psnr_fg": mean_psnr(scores, "mse_fg"), "psnr_fg_pooled": pooled("mse_fg", "fg_pixels"),
+        "psnr_edge": mean_psnr(scores, "mse_edge"), "psnr_inside": mean_psnr(scores, "mse_inside"),
+        "stray_edge_alpha": mean("stray_edge_alpha"), "ssim": mean("ssim"), "ssim_black": mean("ssim_black"),
+        "lpips": white and perceptual[white], "lpips_net": white and LPIPS[white].network,
+        "lpips_black": black and perceptual[black], **perceptual,
+        "flip": mean("flip"), "psnr_face": mean_psnr(scores, "mse_face"),
+        "psnr_hands": mean_psnr(scores, "mse_left_hand", "mse_right_hand"),
         "alpha_iou": mean("alpha_iou"), "detail": mean("detail"),
     }

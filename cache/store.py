@@ -13,6 +13,7 @@ memo.sqlite lock                 stat memo; lock held by publishers together, by
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import stat as modes
 import time
@@ -81,8 +82,12 @@ class Store:
 
     def path(self, record: Record, output: str) -> Path:
         """The output's file or folder in the store; read-only."""
-        path = objects.object_path(self.root, record.outputs[output], output)
-        return self.below.path(record, output) if self.below is not None and not path.exists() else path
+        return self.where(record.outputs[output], output)
+
+    def where(self, digest: str, output: str) -> Path:
+        """Where the object of a digest lies; output: its relative path, or its port."""
+        path = objects.object_path(self.root, digest, output)
+        return self.below.where(digest, output) if self.below is not None and not path.exists() else path
 
     def lookup(self, key: str, outputs: Collection[str] | None = None, deep: bool = False) -> Record | None:
         """The record of a finished run, if it is whole and all its outputs are there and unchanged.
@@ -177,11 +182,12 @@ class Store:
             records += filter(None, [self.below.previous(stage, like)])
         return min(records, key=lambda record: len(record.parts.diff(like)), default=None)
 
-    def usual_seconds(self, stage: str) -> float | None:
-        """s, of the stage's run that was used last; None without one."""
-        newest = max(self.record_files(stage), key=_mtime, default=None)
-        record = self.read(newest) if newest is not None else None
-        return record.info.seconds if record is not None else self.below.usual_seconds(stage) if self.below is not None else None
+    def recent(self, stage: str, most: int) -> list[Record]:
+        """Records of the stage's runs, those that were used last first."""
+        newest = sorted(self.record_files(stage), key=_mtime, reverse=True)
+        found = list(itertools.islice((record for record in map(self.read, newest) if record is not None), most))
+        more = most - len(found)
+        return found + (self.below.recent(stage, more) if self.below is not None and more else [])
 
     def quarantine(self, path: Path, digest: str) -> None:
         """Moves a damaged object to quarantine/, unless another process has put a sound one in its place."""

@@ -99,8 +99,8 @@ class Keys:
             raise BadInput(f"{told}; give all the same, for short by `--body NAME`")
 
     def _models(self, stage: Stage, config: Any) -> list[str]:
-        """Model files that the stage needs, and optional ones that the user has added."""
-        return [*stage.models(config), *(name for name in stage.wishes(config) if name in self.models.brought)]
+        """Model files that the stage needs, and optional ones that can be had without a pull."""
+        return [*stage.models(config), *(name for name in stage.wishes(config) if self.models.has(name))]
 
     def _versions(self, stage: Stage, device: str) -> dict[str, str]:
         """Of Python, and of the packages and programs that the stage computes with."""

@@ -7,7 +7,9 @@ import shlex
 from pathlib import Path
 
 from gsac.cache.roots import find_links, object_of
-from gsac.pipeline.run_folder import DAG, RunFolder
+from gsac.pipeline.quality import STANDARD, name_of
+from gsac.pipeline.rows import read_json
+from gsac.pipeline.run_folder import DAG, RUN, RunFolder
 from gsac.stages.contract import BadInput
 
 
@@ -31,5 +33,7 @@ def recovery(path: Path) -> str:
     root = next((folder for folder in path.absolute().parents if (folder / DAG).is_file()), None)
     if root is None:
         return "gsac run CLIP"
-    clip = RunFolder(root).clip
-    return shlex.join(["gsac", "run", str(clip.resolve()) if clip.exists() else "CLIP", "--out", str(root)])
+    clip, run = RunFolder(root).clip, read_json(root / RUN)
+    quality = name_of(run.get("quality")) if isinstance(run, dict) else ""
+    return shlex.join(["gsac", "run", str(clip.resolve()) if clip.exists() else "CLIP", "--out", str(root),
+                       *(["--quality", quality] if quality not in ("", STANDARD) else [])])

@@ -69,6 +69,12 @@ class ModelStore:
         places = [root / self.sha256(name) / name for root in self._roots]
         return next((place for place in places if self._counts(place)), places[0])
 
+    def has(self, name: str) -> bool:
+        """Whether a wish for it counts: the user brought it, or it is a network of gsac's own that was pulled."""
+        from gsac.avatar.network_files import MODELS
+
+        return name in self.brought or (name in MODELS and self.is_here(name))
+
     def is_here(self, name: str) -> bool:
         return self._counts(self.path(name))
 

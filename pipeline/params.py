@@ -1,4 +1,5 @@
-"""Parameters: defaults of the stages' dataclasses, overridden by --params FILE, then by --set; and params.yaml, made from them."""
+"""Parameters: defaults of the stages' dataclasses, overridden by --quality, --params FILE, then --set; and params.yaml, made from
+them."""
 
 from __future__ import annotations
 
@@ -21,11 +22,11 @@ Values = dict[str, dict[str, Any]]
 
 
 def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = (), only: str = "",
-            options: Mapping[str, Values] | None = None) -> dict[str, Any]:
+            options: Mapping[str, Values] | None = None, below: Mapping[str, Values] | None = None) -> dict[str, Any]:
     """Config instance of every stage, or of `only` one. options: values by the option that gave them, which come after the file and
-    before `sets`. BadInput names the parameter and its source."""
+    before `sets`; below: the same, which come before the file. BadInput names the parameter and its source."""
     wanted = [only] if only else list(project.graph.steps)
-    sources: list[tuple[str, Values]] = []
+    sources: list[tuple[str, Values]] = list((below or {}).items())
     if file is not None:
         sources.append((str(file), _sections(read_yaml(file), str(file))))
     sources.extend((options or {}).items())

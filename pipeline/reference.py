@@ -1,4 +1,5 @@
-"""Writes the reference pages from the code: docs/cli.md of all commands, docs/stages/<name>.md of each stage."""
+"""Writes the reference pages from the code: docs/cli.md of all commands, docs/quality.md of the presets, docs/stages/<name>.md of
+each stage."""
 
 from __future__ import annotations
 
@@ -12,19 +13,28 @@ from typing import Any
 
 from gsac.pipeline import commands
 from gsac.pipeline.cli import make_parser
+from gsac.pipeline.cost_model import stage_cost
+from gsac.pipeline.footage import Footage, keep
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.params import config_values, meanings
+from gsac.pipeline.pace import duration
+from gsac.pipeline.params import Values, config_values, meanings, resolve
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.project import Project
+from gsac.pipeline.quality import QUALITIES, dial_names
 from gsac.stages.contract import BadInput, Stage
 
 WRITTEN = "<!-- Written by `make docs` from the code; edit the docstrings there. -->\n"
 
 
+EXAMPLE, EXAMPLE_CORES = Footage(60, 720, 1280), 2
+"""Frames and cores that the times of the presets are given for."""
+
+
 def pages(project: Project) -> dict[str, str]:
     """Path below docs/ -> text, of every page."""
-    return {"cli.md": cli_page(), **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
+    return {"cli.md": cli_page(), "quality.md": quality_page(project),
+            **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
 
 
 def cli_page() -> str:
@@ -44,6 +54,40 @@ def cli_page() -> str:
                "## Words of `--json`", "`status` of a stage:", _words(Outcome),
                "`reason`, why a stage has to run or need not:", _words(Reason)]
     return "\n\n".join(blocks) + "\n"
+
+
+def quality_page(project: Project) -> str:
+    """The presets of --quality: what each is for, and the parameters that it sets."""
+    blocks = ["# Quality", WRITTEN.strip(), "`gsac run CLIP --quality NAME`, also `gsac demo` and `gsac batch`, takes one of:",
+              _table(("preset", "what it is for"), ((f"`{quality.name}`", quality.sentence) for quality in QUALITIES.values())),
+              "A preset sets the parameters in bold and leaves all others as they are. What `--params` or `--set` says comes after "
+              "it. `run.json` and the report tell the preset, and which of these parameters were set otherwise.",
+              _presets(project, "cpu"), "Where training runs on a GPU:", _presets(project, "cuda"),
+              "The times are what the cost model (`pipeline/cost_model.py`) says of the machine that it was measured on. Before it "
+              "starts, a run tells its own: scaled by the clip, by the stages that have to run, and by what earlier runs took on "
+              "the machine at hand, as far as the cache holds them. `--dry-run` tells it alone. `run.json` keeps the last forecast "
+              "beside what its stages took (`forecast`, with `ratio` and `cpu_ratio`)."]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _presets(project: Project, device: str) -> str:
+    """Values of all parameters that a preset sets, in bold, the defaults of those that it leaves, and the time of a run."""
+    rows: list[tuple[str, ...]] = []
+    for stage, key in dial_names():
+        given = [quality.on(device).get(stage, {}) for quality in QUALITIES.values()]
+        default = _value(getattr(project.stage(stage).config(), key))
+        rows.append((f"`{stage}.{key}`", *(f"**{_value(values[key])}**" if key in values else default for values in given)))
+    times = (duration(_whole_run(project, quality.on(device), device)) for quality in QUALITIES.values())
+    frames = f"{EXAMPLE.frames} frames of {EXAMPLE.width} x {EXAMPLE.height} px, {EXAMPLE_CORES} cores"
+    return _table(("parameter", *QUALITIES), [*rows, (f"whole run, about ({frames})", *times)])
+
+
+def _whole_run(project: Project, values: Values, device: str) -> float:
+    """s, of the example with these parameters."""
+    configs = resolve(project, below={"": values})
+    kept = keep(EXAMPLE, configs["split"].count, configs["split"].max_height)
+    costs = [stage_cost(name, config, kept, device) for name, config in configs.items()]
+    return sum(cost.seconds(EXAMPLE_CORES) for cost in costs if cost is not None)
 
 
 def stage_page(project: Project, name: str) -> str:
@@ -97,7 +141,7 @@ def _value(value: Any) -> str:
 def _dependencies(stage: Stage) -> str:
     config = stage.config()
     rows = {"model files, with the defaults": stage.models(config),
-            "model files, where the user has added them": stage.wishes(config),
+            "model files, where they are here": stage.wishes(config),
             "versions of packages": stage.packages, "programs": tuple(stage.programs()),
             "device class": ("cpu or cuda",) if stage.uses_device else ()}
     return "\n".join(["- its code, and the version of Python",

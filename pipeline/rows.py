@@ -22,6 +22,9 @@ from gsac.pipeline.timings import add_timings
 
 Row = dict[str, Any]
 
+LASTING = ("quality", "forecast")
+"""Entries of run.json that stay until a command gives others: the preset of the last run, and the last forecast beside what its
+stages took."""
 DONE = (Outcome.RAN.value, Outcome.CACHED.value)
 
 
@@ -45,13 +48,15 @@ def result_row(row: Row | None) -> Row | None:
     return next((row for row in found if isinstance(row, dict) and row.get("status") in DONE), None)
 
 
-def write_rows(folder: RunFolder, graph: Graph, store: Store, fresh: list[Row], clip: Row) -> None:
-    """Writes run.json and metrics.json of what lies in the folder. fresh: rows of this command; clip: the entries `clip` and
-    `clip_digest` of run.json."""
-    rows = merge_rows(folder, graph, store, fresh)
+def write_rows(folder: RunFolder, graph: Graph, store: Store, fresh: list[Row], entries: Row) -> None:
+    """Writes run.json and metrics.json of what lies in the folder. fresh: rows of this command; entries: `clip` and `clip_digest`
+    of run.json, and those of `LASTING` that this command gives."""
+    before = read_json(folder.root / RUN)
+    lasting = {name: before[name] for name in LASTING if name in before} if isinstance(before, dict) else {}
+    rows = merge_rows(folder, graph, store, fresh, rows_of(before))
     ports = [port for row in rows if result_row(row) is not None for port in graph.step(row["name"]).outs]
     metrics = folder_metrics(folder, ports, {row["name"]: timings_of(row) for row in rows})
-    folder.write_json(RUN, {**clip, "stages": rows, "outputs": folder.outputs(ports), "metrics": metrics})
+    folder.write_json(RUN, {**lasting, **entries, "stages": rows, "outputs": folder.outputs(ports), "metrics": metrics})
     folder.write_json(METRICS, metrics)
 
 
@@ -82,10 +87,9 @@ def timings_of(row: Row | None) -> Row:
     return timings if isinstance(timings, dict) else {}
 
 
-def merge_rows(folder: RunFolder, graph: Graph, store: Store, fresh: list[Row]) -> list[Row]:
-    """Rows of the folder after a command, in running order. fresh: those of the stages that it judged."""
+def merge_rows(folder: RunFolder, graph: Graph, store: Store, fresh: list[Row], before: dict[str, Row]) -> list[Row]:
+    """Rows of the folder after a command, in running order. fresh: those of the stages that it judged; before: stage -> row."""
     judged = {row["name"]: row for row in fresh}
-    before = read_rows(folder)
     known = {port: digest for row in fresh for port, digest in row["outputs"].items()}
     lying = functools.cache(lambda port: known.get(port) or port_digest(folder, port, store))
     rows: list[Row] = []

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.key import KeyParts
@@ -25,13 +25,17 @@ from gsac.pipeline.pace import Course
 from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
 from gsac.pipeline.project import Project
+from gsac.pipeline.quality import STANDARD, describe_quality, quality_entry
 from gsac.pipeline.reporter import PlainReporter
-from gsac.pipeline.rows import read_rows, result_row, write_rows
+from gsac.pipeline.rows import Row, read_rows, result_row, write_rows
 from gsac.pipeline.run_folder import LOGS, RunFolder
 from gsac.pipeline.sources import Source, source_digest
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, StageError
+
+if TYPE_CHECKING:
+    from gsac.pipeline.cost_forecast import Forecast
 
 AHEAD = 2
 """Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
@@ -93,6 +97,8 @@ class Options:
     """First stage that may run; everything it needs must be in the cache (`--from`)."""
     force: tuple[str, ...] = ()
     """Stages that run whether their result is there or not."""
+    quality: str = STANDARD
+    """Preset that the parameters were made with."""
 
 
 class ClipRun:
@@ -107,6 +113,10 @@ class ClipRun:
         self.keys = Keys(project, configs, store)
         self.results: list[StageResult] = []
         self.metrics: dict[str, Any] = {}
+        self.forecast: Forecast | None = None
+        """Of the stages that have to run; None before it is known that one has to."""
+        self.entries: Row = {}
+        """Entries `quality` and `forecast` of run.json and --json, once the run has ended."""
         self._told: dict[str, Outcome] = {}
         """Key -> outcome, of the stages that this run has judged."""
         self._damaged: set[str] = set()
@@ -125,11 +135,14 @@ class ClipRun:
                 raise BadInput(f"stage {name} does not run with --until {options.until}")
         return [name for name in self.graph.steps if name in wanted]
 
-    def forecast(self, clip: Path, options: Options) -> list[StagePlan]:
+    def plan(self, clip: Path, options: Options) -> list[StagePlan]:
         """What would run and why, as far as it is known before anything runs."""
-        digests = {CLIP: source_digest(clip, self.store)}
+        return self._plan_all(self.select(options), {CLIP: source_digest(clip, self.store)}, options)
+
+    def _plan_all(self, steps: list[str], digests: dict[str, str], options: Options) -> list[StagePlan]:
+        """Plans of stages in running order. digests: of the ports that are known; those of cached stages join them."""
         plans = []
-        for name in self.select(options):
+        for name in steps:
             unknown = [p for p in self.graph.step(name).deps if p not in digests]
             if unknown:
                 makers = {self.graph.producer[p] for p in unknown}
@@ -145,7 +158,7 @@ class ClipRun:
     def pull_models(self, clip: Path, options: Options) -> None:
         """Pulls the networks that are not here and that stages to be run need. BadInput where they cannot be had."""
         if self.keys.missing_models(self.select(options)):
-            due = [plan.stage for plan in self.forecast(clip, options) if plan.cached is None]
+            due = [plan.stage for plan in self.plan(clip, options) if plan.cached is None]
             self.keys.pull_models(due, self.reporter.note)
 
     def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
@@ -161,16 +174,16 @@ class ClipRun:
         digests = {CLIP: source.digest}
         paths = {CLIP: clip}
         runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
-        self.reporter.follows(Course(steps, self.graph.above, self.store.usual_seconds))
-        with in_use(self.store) as lease, self._writing_results(clip, source.digest), runner:
-            at = 0
+        self.reporter.follows(Course(steps, self.graph.above, self._expected_seconds))
+        with in_use(self.store) as lease, self._writing_results(clip, source.digest, options), runner:
+            at, plans = 0, {}
             while at < len(steps):
                 name, following = steps[at], steps[at + 1:at + 1 + AHEAD]
                 runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
                 inputs = self.graph.step(name).deps
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
                 lease.add(parts.key)
-                plan = self._plan(parts, options)
+                plan = plans[name] = self._plan(parts, options)
                 outcome, record = Outcome.CACHED, plan.cached
                 if record is None:
                     if name in required:
@@ -181,6 +194,9 @@ class ClipRun:
                         at = steps.index(maker)
                         del self._told[self.results[at].key], self.results[at:]
                         continue
+                    if self.forecast is None:
+                        later = self._plan_all(steps[at + 1:], dict(digests), options)
+                        self.foretell(clip, [*plans.values(), *later], options)
                     with self._recording_failure(plan, parts.key, runner):
                         outcome, record = runner.run(
                             parts, plan.reason, {port: paths[port] for port in inputs}, forced=name in options.force,
@@ -196,6 +212,28 @@ class ClipRun:
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
                 at += 1
+
+    def foretell(self, clip: Path, plans: list[StagePlan], options: Options) -> Forecast:
+        """How long the stages that are not up to date will take; says it, too."""
+        from gsac.pipeline.cost_forecast import foretell  # a run with nothing to do needs none
+
+        self.forecast = foretell(plans, self.keys, self.store, clip)
+        if self.forecast.worth_saying:
+            self.reporter.note(self.forecast.sentence(describe_quality(quality_entry(options.quality, self.configs))))
+        return self.forecast
+
+    def _judged_forecast(self) -> Row:
+        """Entry `forecast` of run.json, with what its stages took; {} where nothing had to run."""
+        if self.forecast is None:
+            return {}
+        from gsac.pipeline.cost_forecast import Time
+
+        took = {result.name: Time(result.seconds, result.cpu_seconds) for result in self.results if result.outcome is Outcome.RAN}
+        return {"forecast": self.forecast.judged(took)}
+
+    def _expected_seconds(self, stage: str) -> float | None:
+        expected = self.forecast.stages.get(stage) if self.forecast is not None else None
+        return expected.seconds if expected is not None else None
 
     def _maker_of_damaged(self, name: str, paths: dict[str, Path]) -> str | None:
         """The stage whose result has to be made again before a stage can read it; None where all inputs are whole.
@@ -238,13 +276,14 @@ class ClipRun:
             raise StageFailedError(plan.stage, error, runner.logs / f"{plan.stage}.log") from error
 
     @contextlib.contextmanager
-    def _writing_results(self, clip: Path, digest: str) -> Iterator[None]:
+    def _writing_results(self, clip: Path, digest: str, options: Options) -> Iterator[None]:
         """run.json, metrics.json and dvc.lock are written however the run ends."""
         try:
             yield
         finally:
+            self.entries = {"quality": quality_entry(options.quality, self.configs)} | self._judged_forecast()
             write_rows(self.folder, self.graph, self.store, [result.to_json() for result in self.results],
-                       {"clip": str(clip), "clip_digest": digest})
+                       {"clip": str(clip), "clip_digest": digest} | self.entries)
             dvc_sync.write_lock(self.folder, self.graph, self.finished, self.configs, self.store)
 
     @property
@@ -259,6 +298,7 @@ class ClipRun:
             "stages": [result.to_json() for result in self.results],
             "outputs": self.folder.outputs(ports),
             "metrics": self.metrics,
+            **self.entries,
         }
 
 

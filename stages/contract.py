@@ -47,7 +47,7 @@ class Stage:
     models: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
     wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()
-    """Names of model files that are used if the user has brought them; then their digests are part of the key too."""
+    """Names of model files that are used if they are here, brought or pulled; then their digests are part of the key too."""
     any_of: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names among the wishes of which this configuration needs at least one."""
     check_on: Callable[[Any, str], None] = lambda config, device: None
@@ -69,7 +69,7 @@ class Job:
     config: Any
     """Instance of the stage's config dataclass."""
     models: dict[str, Path] = field(default_factory=dict)
-    """Model name -> file; a wish that the user has not brought is not among them."""
+    """Model name -> file; a wish that is not here is not among them."""
     scratch: Path | None = None
     """Folder that is kept when a run is killed or stopped, for the next run of the same key; the stage makes it when it has
     something to keep. None: nothing is kept."""

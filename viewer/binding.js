@@ -14,19 +14,21 @@ export class Binding {
   // Gaussians in a row of `data`, as WebGL has it in a texture.
   static PER_ROW = 512;
 
-  /** @param {import("./reader.js").Avatar} avatar */
-  constructor(avatar) {
+  /**
+   * @param {import("./reader.js").Avatar} avatar
+   * @param {import("./reader.js").Level} level whose gaussians it places
+   */
+  constructor(avatar, level) {
     this.avatar = avatar;
-    // Whether the light of the clip shines on the colours, where the file has it.
-    this.lit = true;
-    this.count = avatar.face.length;
+    this.level = level;
+    this.count = level.face.length;
     this.axes = new Float32Array(this.count * 9);
     // Twelve numbers a gaussian: mean x, y, z, covariance xx, xy, xz, yy, yz, zz, and a factor for each colour.
     this.rows = Math.max(1, Math.ceil(this.count / Binding.PER_ROW));
     this.data = new Float32Array(this.rows * Binding.PER_ROW * 12);
     const q = new Float32Array(4), r = new Float32Array(9);
     for (let i = 0; i < this.count; i++) {
-      const { quat, logScale } = avatar;
+      const { quat, logScale } = level;
       q[0] = quat[i * 4 + 1]; q[1] = quat[i * 4 + 2]; q[2] = quat[i * 4 + 3]; q[3] = quat[i * 4];
       quatMix(q, 0, q, 0, q, 0, 0);
       quatToMatrix(r, 0, q, 0);
@@ -34,9 +36,9 @@ export class Binding {
     }
   }
 
-  // Fills this.data; vertices: (V, 3) posed.
-  update(vertices) {
-    const { faces, face, mu } = this.avatar, M = this.axes, D = this.data, light = (this.lit && this.avatar.light) || EVEN_LIGHT;
+  // Fills this.data; vertices: (V, 3) posed; lit: whether in the light of the clip, where the file has it.
+  update(vertices, lit) {
+    const { avatar: { faces }, level: { face, mu }, axes: M, data: D } = this, light = (lit && this.avatar.light) || EVEN_LIGHT;
     const shade = (c, x, y, z) => {
       const factor = light[c] + x * light[3 + c] + y * light[6 + c] + Math.abs(z) * light[9 + c];
       return Math.min(BRIGHTEST, Math.max(DARKEST, factor));

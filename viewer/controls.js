@@ -31,7 +31,7 @@ export class Controls {
     for (const pose of Object.keys(viewer.avatar.poses).sort()) this.addButton(`${pose}-pose`, { pose });
     for (const clip of Object.keys(viewer.avatar.clips)) this.addButton(clip[0].toUpperCase() + clip.slice(1), { clip });
     this.onClick("turntable", () => { viewer.turntable = !viewer.turntable; });
-    this.onClick("light", () => { viewer.binding.lit = !viewer.binding.lit; });
+    this.onClick("light", () => { viewer.levels.lit = !viewer.levels.lit; });
     find("light").hidden = viewer.avatar.light === null;
     this.onClick("pause", () => this.pause());
     this.onClick("reset", () => this.reset());
@@ -162,9 +162,10 @@ export class Controls {
   }
 
   showRate({ fps, p95 }) {
-    const { viewer } = this, count = viewer.binding.count.toLocaleString("en");
+    const { viewer, viewer: { levels } } = this, count = levels.binding.count.toLocaleString("en");
+    const level = levels.vary ? `, level ${levels.drawn + 1} of ${levels.bindings.length}` : "";
     const rate = `${fps.toFixed(fps < 10 ? 1 : 0)} fps · p95 ${p95.toFixed(p95 < 100 ? 1 : 0)} ms`;
-    find("fps").textContent = `${rate} · ${count} gaussians · ${RENDERERS[viewer.renderer?.kind] ?? "…"}`;
+    find("fps").textContent = `${rate} · ${count} gaussians${level} · ${RENDERERS[viewer.renderer?.kind] ?? "…"}`;
     if (viewer.length) {
       if (document.activeElement !== find("time") || !viewer.paused) find("time").value = viewer.clock / viewer.length;
       find("clock").textContent = `${viewer.clock.toFixed(1)} / ${viewer.length.toFixed(1)} s`;
@@ -178,7 +179,7 @@ export class Controls {
       button.setAttribute("aria-pressed", String(button.dataset.pose === playing.pose && button.dataset.clip === playing.clip));
     }
     find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
-    find("light").setAttribute("aria-pressed", String(viewer.binding.lit));
+    find("light").setAttribute("aria-pressed", String(viewer.levels.lit));
     find("timeline").hidden = find("pause").disabled = find("time").disabled = !viewer.length;
     if (!viewer.length) find("clock").textContent = "";
     find("fullscreen").setAttribute("aria-pressed", String(document.fullscreenElement !== null));

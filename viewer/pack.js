@@ -1,14 +1,12 @@
-// Packs an avatar into the arrays that the graphics card reads.
+// Packs an avatar into the arrays that Gsac.compute and the splats' shader read; Unity's GsacPacking.cs makes the same.
 
 /**
- * For Gsac.compute; Unity's GsacPacking.cs makes the same.
+ * The body.
  * @param {import("./reader.js").Avatar} avatar
  * @returns {Object<string, Float32Array | Uint32Array>} by the buffer's name in the shader
  */
-export function packForGpu(avatar) {
-  const { vertices, expressions, start, moved, delta, skinIndex, skinWeight } = avatar;
-  const { faces, face, mu, quat, logScale, rgb, opacity } = avatar;
-  const V = vertices.length / 3, N = face.length;
+export function packBody(avatar) {
+  const { vertices, expressions, start, moved, delta, skinIndex, skinWeight } = avatar, V = vertices.length / 3;
   // The expressions' moves sorted by vertex: a counting sort.
   const first = new Uint32Array(V + 1), moves = new Float32Array(Math.max(moved.length, 1) * 4);
   for (const v of moved) first[v + 1]++;
@@ -25,7 +23,17 @@ export function packForGpu(avatar) {
     skin.set([j[0] | j[1] << 8 | j[2] << 16 | j[3] << 24, w[0] | w[1] << 16, w[2] | w[3] << 16], v * 4);
   }
   for (let v = 0; v <= V; v++) skin[v * 4 + 3] = first[v];
-  const corners = new Uint32Array(N * 4), local = new Float32Array(N * 12), colours = new Float32Array(N * 4);
+  return { GsacRest: rest, GsacSkin: skin, GsacMoves: moves };
+}
+
+/**
+ * A level's gaussians.
+ * @param {import("./reader.js").Avatar} avatar
+ * @param {import("./reader.js").Level} level
+ * @returns {Object<string, Float32Array | Uint32Array>} by the buffer's name in the shader
+ */
+export function packLevel({ faces }, { face, mu, quat, logScale, rgb, opacity }) {
+  const N = face.length, corners = new Uint32Array(N * 4), local = new Float32Array(N * 12), colours = new Float32Array(N * 4);
   for (let i = 0; i < N; i++) {
     const q = quat.subarray(i * 4, i * 4 + 4), n = 1 / Math.hypot(...q);
     corners.set(faces.subarray(face[i] * 3, face[i] * 3 + 3), i * 4);
@@ -35,7 +43,7 @@ export function packForGpu(avatar) {
     colours.set(rgb.subarray(i * 3, i * 3 + 3), i * 4);
     colours[i * 4 + 3] = opacity[i];
   }
-  return { GsacRest: rest, GsacSkin: skin, GsacMoves: moves, GsacCorners: corners, GsacLocal: local, GsacColours: colours };
+  return { GsacCorners: corners, GsacLocal: local, GsacColours: colours };
 }
 
 /**

@@ -7,8 +7,8 @@ const GSAC_MAX_JOINTS = 256;
 const GSAC_MAX_LEVELS = 16;
 
 /**
- * What the viewer plays. Arrays are flat, row by row; V vertices, F faces, J joints, E expressions, M moved vertices,
- * N gaussians of the finest level; canonical axes, m, rad.
+ * What the viewer plays. Arrays are flat, row by row; V vertices, F faces, J joints, E expressions, M moved vertices;
+ * canonical axes, m, rad.
  * @typedef {ReturnType<typeof readAvatar>} Avatar
  */
 
@@ -19,11 +19,13 @@ export function readAvatar(buffer) {
   const skeleton = readSkeleton(head, arrays), mesh = readMesh(arrays, skeleton.names.length);
   const expressions = readExpressions(head, arrays, mesh.vertices.length / 3);
   if (mesh.vertices.length === 0) throw new GsacError("value", "the mesh has no vertices");
-  const [finest] = readLevels(head, arrays, mesh.faces.length / 3);
+  const levels = readLevels(head, arrays, mesh.faces.length / 3);
   checkPoses(head.poses, skeleton.names);
   checkNumber(head, "ground", -1e6, 1e6);
   return {
-    ...skeleton, ...mesh, ...expressions, ...finest,
+    ...skeleton, ...mesh, ...expressions,
+    // Of detail, the finest first.
+    levels,
     // Name -> joint -> axis-angle.
     poses: head.poses,
     clips: readClips(head, arrays, skeleton.names),
@@ -117,7 +119,14 @@ function readExpressions(head, arrays, vertexCount) {
   return { expressions, start, moved, delta: arrays.real("expression.delta", M, 3) };
 }
 
-// Returns the levels of detail, the finest first: face and opacity (N,), mu, logScale and rgb (N, 3), quat (N, 4) wxyz.
+/**
+ * N gaussians: face and opacity (N,), mu, logScale and rgb (N, 3), quat (N, 4) wxyz; maxHeight: px, of the person up to which the
+ * level is drawn, or null.
+ * @typedef {{face: Uint8Array | Uint16Array | Uint32Array, mu: Float32Array, quat: Float32Array, logScale: Float32Array,
+ *   rgb: Float32Array, opacity: Float32Array, maxHeight: number | null}} Level
+ */
+
+/** @returns {Level[]} the finest first */
 function readLevels(head, arrays, faceCount) {
   const given = checkList(head.levels, "levels"), prefixes = new Set(given.map((level) => level?.prefix));
   if (given.length === 0 || given.length > GSAC_MAX_LEVELS) throw new GsacError("head", "levels is empty or too long");
@@ -131,7 +140,9 @@ function readLevels(head, arrays, faceCount) {
       const length = Math.hypot(...quat.subarray(q, q + 4));
       if (Math.abs(length ** 2 - 1) > 1e-2) throw new GsacError("value", "quat must hold unit quaternions");
     }
-    return { face, mu: real("mu", 3), quat, logScale: real("log_scale", 3), rgb: real("rgb", 3), opacity: real("opacity") };
+    const { max_height_px: maxHeight = null } = level, shape = { face, mu: real("mu", 3), quat, logScale: real("log_scale", 3) };
+    if (maxHeight !== null) checkNumber(level, "max_height_px", 1, 1e6);
+    return { ...shape, rgb: real("rgb", 3), opacity: real("opacity"), maxHeight };
   });
 }
 
@@ -170,16 +181,19 @@ function readClips(head, arrays, names) {
   return clips;
 }
 
-// How gaussians become pixels, with the format's defaults: lowPass is added to a projected covariance, px^2; the alpha of a
-// gaussian in a pixel is at most alphaMax, and below alphaMin nothing is drawn.
+// How gaussians become pixels, with the format's defaults: lowPass is added to a projected covariance, px^2, and if keepsEnergy the
+// opacity falls as much as the area grows; the alpha of a gaussian in a pixel is at most alphaMax, and below alphaMin nothing is
+// drawn.
 function readBlend(head) {
   const { blend = {} } = head;
   if (!isTable(blend)) throw new GsacError("head", "blend is of the wrong kind");
   checkNumber(blend, "low_pass_px2", 0, 100);
   checkNumber(blend, "alpha_max", 0, 1);
   checkNumber(blend, "alpha_min", 1e-6, 1);
+  const { low_pass_energy: keepsEnergy = false } = blend;
+  if (typeof keepsEnergy !== "boolean") throw new GsacError("head", "low_pass_energy is of the wrong kind");
   const { low_pass_px2: lowPass = 0.3, alpha_max: alphaMax = 0.999, alpha_min: alphaMin = 1 / 255 } = blend;
-  return { lowPass, alphaMax, alphaMin };
+  return { lowPass, keepsEnergy, alphaMax, alphaMin };
 }
 
 function checkList(value, what) {

@@ -16,13 +16,12 @@ import { WebgpuRenderer } from "./webgpu.js";
  * @param {string | null} asked "webgpu", "webgl" or "software"; anything else: what suits the device. What cannot be had makes
  *   room for the next of them.
  * @param {HTMLCanvasElement} canvas may be replaced in the page by a fresh one
- * @param {{avatar: import("./reader.js").Avatar, skin: import("./skin.js").Skin, binding: import("./binding.js").Binding,
- *   sort: import("./sort.js").DepthSort}} scene
+ * @param {{avatar: import("./reader.js").Avatar, skin: import("./skin.js").Skin, levels: import("./levels.js").Levels}} scene
  * @returns {Promise<Renderer>}
  */
-export async function makeRenderer(asked, canvas, { avatar, skin, binding, sort }) {
+export async function makeRenderer(asked, canvas, { avatar, skin, levels }) {
   if (asked !== "webgl" && asked !== "software") {
-    const renderer = await WebgpuRenderer.open(canvas, avatar, skin, binding, asked === "webgpu").catch((error) => {
+    const renderer = await WebgpuRenderer.open(canvas, avatar, skin, levels, asked === "webgpu").catch((error) => {
       console.info(`no WebGPU: ${error.message}`);
       return null;
     });
@@ -30,12 +29,12 @@ export async function makeRenderer(asked, canvas, { avatar, skin, binding, sort 
   }
   if (asked !== "software" && (asked === "webgl" || !hasNoGraphicsCard())) {
     try {
-      return new WebglRenderer(replaceCanvas(canvas), avatar, binding, sort);
+      return new WebglRenderer(replaceCanvas(canvas), avatar, levels);
     } catch (error) {
       console.info(`no WebGL2: ${error.message}`);
     }
   }
-  return new SoftwareRenderer(replaceCanvas(canvas), avatar, binding, sort);
+  return new SoftwareRenderer(replaceCanvas(canvas), avatar, levels);
 }
 
 /**

@@ -1,5 +1,5 @@
 // Written by `python -m gsac.viewer.wgsl` from the HLSL of the Unity package and page.hlsl. Do not edit.
-// glslang 11, naga-wasm@30.1.0, HLSL fe8fb44bae0a20a8acb056df176c0196a81a0656fbecedbf2deb895b45030cba
+// glslang 11, naga-wasm@30.1.0, HLSL 6e52f82ffb994cacd13f4e1c9f08ef731ddc38cd852d3cca234202137a6a7f3d
 
 export const SHADERS = {
   Skin: { bindings: {"parameters": 0, "GsacSkin": 2, "GsacRest": 1, "GsacMoves": 3, "GsacWeights": 4, "GsacBones": 5, "GsacPosed": 6}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
@@ -1138,7 +1138,7 @@ id_1 = id;
 SortMerge_1();
 }
 ` },
-  SplatVertex: { bindings: {"GsacKeys": 3, "parameters": 0, "GsacColours": 2, "GsacSplats": 1}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacIndexBits": 64, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
+  SplatVertex: { bindings: {"GsacKeys": 3, "parameters": 0, "GsacColours": 2, "GsacSplats": 1}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacKeepsEnergy": 64, "GsacIndexBits": 68, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
 struct GsacKeys {
 data: array<u32>,
 }
@@ -1148,6 +1148,7 @@ GsacModel0_: vec4<f32>,
 GsacModel1_: vec4<f32>,
 GsacModel2_: vec4<f32>,
 GsacBlend: vec4<f32>,
+GsacKeepsEnergy: u32,
 GsacIndexBits: u32,
 PageView0_: vec4<f32>,
 PageView1_: vec4<f32>,
@@ -1181,110 +1182,121 @@ var<private> entryPointOutput_u002e_sigmas: vec2<f32>;
 var<private> entryPointOutput_u002e_colour: vec4<f32>;
 
 fn SplatVertex_1() {
-var phi_1667_: vec2<f32>;
-var phi_1669_: vec4<f32>;
-var phi_1674_: vec4<f32>;
-var phi_1673_: vec2<f32>;
-var phi_1672_: vec4<f32>;
+var phi_1745_: vec2<f32>;
+var phi_1747_: vec4<f32>;
+var phi_1748_: vec4<f32>;
+var phi_1753_: vec4<f32>;
+var phi_1752_: vec2<f32>;
+var phi_1751_: vec4<f32>;
 
-let _e49 = vertex_1;
-let _e51 = unnamed.PageView0_;
-let _e53 = unnamed.PageView1_;
-let _e55 = unnamed.PageView2_;
-let _e56 = mat4x4<f32>(_e51, _e53, _e55, vec4<f32>(0f, 0f, 0f, 1f));
-let _e59 = unnamed.PageLens[0u];
-let _e62 = unnamed.PageLens[2u];
-let _e65 = unnamed.PageLens[1u];
-let _e66 = -(_e65);
-let _e69 = unnamed.PageLens[3u];
-let _e70 = -(_e69);
-let _e75 = unnamed.PageInk;
-let _e76 = _e75.xy;
+let _e51 = vertex_1;
+let _e53 = unnamed.PageView0_;
+let _e55 = unnamed.PageView1_;
+let _e57 = unnamed.PageView2_;
+let _e58 = mat4x4<f32>(_e53, _e55, _e57, vec4<f32>(0f, 0f, 0f, 1f));
+let _e61 = unnamed.PageLens[0u];
+let _e64 = unnamed.PageLens[2u];
+let _e67 = unnamed.PageLens[1u];
+let _e68 = -(_e67);
+let _e71 = unnamed.PageLens[3u];
+let _e72 = -(_e71);
+let _e77 = unnamed.PageInk;
+let _e78 = _e77.xy;
 switch bitcast<i32>(0u) {
 default: {
-let _e82 = GsacKeys_1.data[(_e49 >> bitcast<u32>(2i))];
-let _e84 = unnamed.GsacIndexBits;
-let _e88 = (_e82 & ((1u << bitcast<u32>(_e84)) - 1u));
-let _e91 = GsacColours_1.data[_e88];
-let _e95 = GsacSplats.data[(_e88 * 3u)];
-let _e100 = GsacSplats.data[((_e88 * 3u) + 1u)];
-let _e105 = GsacSplats.data[((_e88 * 3u) + 2u)];
-let _e108 = (_e91.xyz * _e105.yzw);
-let _e114 = vec4<f32>(_e108.x, _e91.y, _e91.z, _e91.w);
-let _e120 = vec4<f32>(_e114.x, _e108.y, _e114.z, _e114.w);
-let _e126 = vec4<f32>(_e120.x, _e120.y, _e108.z, _e120.w);
-let _e129 = unnamed.GsacModel0_[0u];
-let _e132 = unnamed.GsacModel1_[0u];
-let _e135 = unnamed.GsacModel2_[0u];
-let _e139 = unnamed.GsacModel0_[1u];
-let _e142 = unnamed.GsacModel1_[1u];
-let _e145 = unnamed.GsacModel2_[1u];
-let _e149 = unnamed.GsacModel0_[2u];
-let _e152 = unnamed.GsacModel1_[2u];
-let _e155 = unnamed.GsacModel2_[2u];
-let _e167 = unnamed.GsacModel0_[3u];
-let _e170 = unnamed.GsacModel1_[3u];
-let _e173 = unnamed.GsacModel2_[3u];
-let _e175 = ((((vec3<f32>(_e129, _e132, _e135) * _e95.x) + (vec3<f32>(_e139, _e142, _e145) * _e95.y)) + (vec3<f32>(_e149, _e152, _e155) * _e95.z)) + vec3<f32>(_e167, _e170, _e173));
-let _e180 = (vec4<f32>(_e175.x, _e175.y, _e175.z, 1f) * _e56);
-let _e182 = -(_e180.z);
-let _e188 = unnamed.GsacBlend[2u];
-if (!((_e182 > 0.01f)) || (_e91.w < _e188)) {
-phi_1674_ = vec4<f32>(2f, 2f, 2f, 1f);
-phi_1673_ = vec2<f32>(0f, 0f);
-phi_1672_ = _e126;
+let _e84 = GsacKeys_1.data[(_e51 >> bitcast<u32>(2i))];
+let _e86 = unnamed.GsacIndexBits;
+let _e90 = (_e84 & ((1u << bitcast<u32>(_e86)) - 1u));
+let _e93 = GsacColours_1.data[_e90];
+let _e97 = GsacSplats.data[(_e90 * 3u)];
+let _e102 = GsacSplats.data[((_e90 * 3u) + 1u)];
+let _e107 = GsacSplats.data[((_e90 * 3u) + 2u)];
+let _e110 = (_e93.xyz * _e107.yzw);
+let _e116 = vec4<f32>(_e110.x, _e93.y, _e93.z, _e93.w);
+let _e122 = vec4<f32>(_e116.x, _e110.y, _e116.z, _e116.w);
+let _e128 = vec4<f32>(_e122.x, _e122.y, _e110.z, _e122.w);
+let _e131 = unnamed.GsacModel0_[0u];
+let _e134 = unnamed.GsacModel1_[0u];
+let _e137 = unnamed.GsacModel2_[0u];
+let _e141 = unnamed.GsacModel0_[1u];
+let _e144 = unnamed.GsacModel1_[1u];
+let _e147 = unnamed.GsacModel2_[1u];
+let _e151 = unnamed.GsacModel0_[2u];
+let _e154 = unnamed.GsacModel1_[2u];
+let _e157 = unnamed.GsacModel2_[2u];
+let _e169 = unnamed.GsacModel0_[3u];
+let _e172 = unnamed.GsacModel1_[3u];
+let _e175 = unnamed.GsacModel2_[3u];
+let _e177 = ((((vec3<f32>(_e131, _e134, _e137) * _e97.x) + (vec3<f32>(_e141, _e144, _e147) * _e97.y)) + (vec3<f32>(_e151, _e154, _e157) * _e97.z)) + vec3<f32>(_e169, _e172, _e175));
+let _e182 = (vec4<f32>(_e177.x, _e177.y, _e177.z, 1f) * _e58);
+let _e184 = -(_e182.z);
+let _e190 = unnamed.GsacBlend[2u];
+if (!((_e184 > 0.01f)) || (_e93.w < _e190)) {
+phi_1753_ = vec4<f32>(2f, 2f, 2f, 1f);
+phi_1752_ = vec2<f32>(0f, 0f);
+phi_1751_ = _e128;
 break;
 }
-let _e192 = (vec4<f32>(_e129, _e132, _e135, 0f) * _e56);
-let _e194 = (vec4<f32>(_e139, _e142, _e145, 0f) * _e56);
-let _e196 = (vec4<f32>(_e149, _e152, _e155, 0f) * _e56);
-let _e197 = vec2<f32>(_e59, _e66);
-let _e200 = (vec2<f32>(1f, 1f) / abs(_e197));
-let _e213 = -(vec3<f32>(_e192.z, _e194.z, _e196.z));
-let _e225 = ((_e76 * 0.5f) * abs(_e197));
-let _e226 = (vec2<f32>(_e62, _e70) / _e197);
-let _e229 = unnamed.GsacBlend[0u];
-let _e237 = clamp((vec3<f32>(_e180.x, _e180.y, _e182).xy / vec2(_e182)), (_e226 - (_e200 * 1.3f)), (_e226 + (_e200 * 1.3f)));
-let _e243 = ((vec3<f32>(_e192.x, _e194.x, _e196.x) - (_e213 * _e237.x)) * (_e225.x / _e182));
-let _e249 = ((vec3<f32>(_e192.y, _e194.y, _e196.y) - (_e213 * _e237.y)) * (_e225.y / _e182));
-let _e268 = vec3<f32>(fma(_e100.w, _e243.z, fma(_e95.w, _e243.x, (_e100.z * _e243.y))), fma(_e105.x, _e243.z, fma(_e100.z, _e243.x, (_e100.x * _e243.y))), fma(_e100.y, _e243.z, fma(_e100.w, _e243.x, (_e105.x * _e243.y))));
-let _e289 = (dot(_e243, _e268) + _e229);
-let _e290 = dot(_e249, _e268);
-let _e292 = (dot(_e249, vec3<f32>(fma(_e100.w, _e249.z, fma(_e95.w, _e249.x, (_e100.z * _e249.y))), fma(_e105.x, _e249.z, fma(_e100.z, _e249.x, (_e100.x * _e249.y))), fma(_e100.y, _e249.z, fma(_e100.w, _e249.x, (_e105.x * _e249.y))))) + _e229);
-let _e293 = (_e289 + _e292);
-let _e297 = length(vec2<f32>((0.5f * (_e289 - _e292)), _e290));
-let _e298 = fma(0.5f, _e293, _e297);
-phi_1667_ = vec2<f32>(1f, 0f);
-if (_e297 > (_e293 * 0.0000005f)) {
-phi_1667_ = normalize(select(vec2<f32>(_e290, (_e298 - _e289)), vec2<f32>((_e298 - _e292), _e290), vec2((_e289 > _e292))));
+let _e194 = (vec4<f32>(_e131, _e134, _e137, 0f) * _e58);
+let _e196 = (vec4<f32>(_e141, _e144, _e147, 0f) * _e58);
+let _e198 = (vec4<f32>(_e151, _e154, _e157, 0f) * _e58);
+let _e199 = vec2<f32>(_e61, _e68);
+let _e202 = (vec2<f32>(1f, 1f) / abs(_e199));
+let _e215 = -(vec3<f32>(_e194.z, _e196.z, _e198.z));
+let _e227 = ((_e78 * 0.5f) * abs(_e199));
+let _e228 = (vec2<f32>(_e64, _e72) / _e199);
+let _e231 = unnamed.GsacBlend[0u];
+let _e239 = clamp((vec3<f32>(_e182.x, _e182.y, _e184).xy / vec2(_e184)), (_e228 - (_e202 * 1.3f)), (_e228 + (_e202 * 1.3f)));
+let _e245 = ((vec3<f32>(_e194.x, _e196.x, _e198.x) - (_e215 * _e239.x)) * (_e227.x / _e184));
+let _e251 = ((vec3<f32>(_e194.y, _e196.y, _e198.y) - (_e215 * _e239.y)) * (_e227.y / _e184));
+let _e270 = vec3<f32>(fma(_e102.w, _e245.z, fma(_e97.w, _e245.x, (_e102.z * _e245.y))), fma(_e107.x, _e245.z, fma(_e102.z, _e245.x, (_e102.x * _e245.y))), fma(_e102.y, _e245.z, fma(_e102.w, _e245.x, (_e107.x * _e245.y))));
+let _e290 = dot(_e245, _e270);
+let _e291 = dot(_e251, _e270);
+let _e292 = dot(_e251, vec3<f32>(fma(_e102.w, _e251.z, fma(_e97.w, _e251.x, (_e102.z * _e251.y))), fma(_e107.x, _e251.z, fma(_e102.z, _e251.x, (_e102.x * _e251.y))), fma(_e102.y, _e251.z, fma(_e102.w, _e251.x, (_e107.x * _e251.y)))));
+let _e296 = max(fma(_e290, _e292, -((_e291 * _e291))), 0f);
+let _e299 = fma(_e231, ((_e290 + _e292) + _e231), _e296);
+let _e300 = (_e290 + _e231);
+let _e301 = (_e292 + _e231);
+let _e302 = (_e300 + _e301);
+let _e306 = length(vec2<f32>((0.5f * (_e300 - _e301)), _e291));
+let _e307 = fma(0.5f, _e302, _e306);
+phi_1745_ = vec2<f32>(1f, 0f);
+if (_e306 > (_e302 * 0.0000005f)) {
+phi_1745_ = normalize(select(vec2<f32>(_e291, (_e307 - _e300)), vec2<f32>((_e307 - _e301), _e291), vec2((_e300 > _e301))));
 }
-let _e315 = phi_1667_;
-let _e327 = unnamed.GsacBlend[2u];
-let _e341 = (vec2<f32>(select(-1f, 1f, ((_e49 & 1u) != 0u)), select(-1f, 1f, ((_e49 & 2u) != 0u))) * (sqrt((2f * log(max((_e91.w / _e327), 1f)))) + 0.001f));
-let _e351 = (vec4<f32>(_e180.x, _e180.y, _e180.z, 1f) * mat4x4<f32>(vec4<f32>(_e59, 0f, _e62, 0f), vec4<f32>(0f, _e66, _e70, 0f), vec4<f32>(0f, 0f, -1f, -0.02f), vec4<f32>(0f, 0f, -1f, 0f)));
-let _e359 = (_e351.xy + (((((((_e315 * sqrt(_e298)) * _e341.x) + ((vec2<f32>(-(_e315.y), _e315.x) * sqrt(max((fma(_e289, _e292, -((_e290 * _e290))) / _e298), 0.000001f))) * _e341.y)) * 2f) / _e76) * sign(_e197)) * _e351.w));
-let _e365 = vec4<f32>(_e359.x, _e351.y, _e351.z, _e351.w);
-let _e374 = unnamed.GsacBlend[3u];
-phi_1669_ = _e126;
-if (_e374 > 0.5f) {
-let _e380 = pow(max(((_e126.xyz + vec3<f32>(0.055f, 0.055f, 0.055f)) * vec3<f32>(0.94786733f, 0.94786733f, 0.94786733f)), vec3<f32>(0f, 0f, 0f)), vec3<f32>(2.4f, 2.4f, 2.4f));
-let _e397 = vec4<f32>(select((_e108.x * 0.07739938f), _e380.x, (_e108.x > 0.04045f)), _e126.y, _e126.z, _e126.w);
-let _e402 = vec4<f32>(_e397.x, select((_e108.y * 0.07739938f), _e380.y, (_e108.y > 0.04045f)), _e397.z, _e397.w);
-phi_1669_ = vec4<f32>(_e402.x, _e402.y, select((_e108.z * 0.07739938f), _e380.z, (_e108.z > 0.04045f)), _e402.w);
+let _e321 = phi_1745_;
+let _e334 = unnamed.GsacKeepsEnergy;
+phi_1747_ = _e128;
+if (_e334 != 0u) {
+phi_1747_ = vec4<f32>(_e110.x, _e110.y, _e110.z, (_e93.w * sqrt((_e296 / max(_e299, 0.000000000001f)))));
 }
-let _e409 = phi_1669_;
-phi_1674_ = vec4<f32>(_e365.x, _e359.y, _e365.z, _e365.w);
-phi_1673_ = _e341;
-phi_1672_ = _e409;
+let _e340 = phi_1747_;
+let _e344 = unnamed.GsacBlend[2u];
+let _e358 = (vec2<f32>(select(-1f, 1f, ((_e51 & 1u) != 0u)), select(-1f, 1f, ((_e51 & 2u) != 0u))) * (sqrt((2f * log(max((_e340.w / _e344), 1f)))) + 0.001f));
+let _e368 = (vec4<f32>(_e182.x, _e182.y, _e182.z, 1f) * mat4x4<f32>(vec4<f32>(_e61, 0f, _e64, 0f), vec4<f32>(0f, _e68, _e72, 0f), vec4<f32>(0f, 0f, -1f, -0.02f), vec4<f32>(0f, 0f, -1f, 0f)));
+let _e376 = (_e368.xy + (((((((_e321 * sqrt(_e307)) * _e358.x) + ((vec2<f32>(-(_e321.y), _e321.x) * sqrt(max((_e299 / _e307), 0.000001f))) * _e358.y)) * 2f) / _e78) * sign(_e199)) * _e368.w));
+let _e382 = vec4<f32>(_e376.x, _e368.y, _e368.z, _e368.w);
+let _e391 = unnamed.GsacBlend[3u];
+phi_1748_ = _e340;
+if (_e391 > 0.5f) {
+let _e397 = pow(max(((_e340.xyz + vec3<f32>(0.055f, 0.055f, 0.055f)) * vec3<f32>(0.94786733f, 0.94786733f, 0.94786733f)), vec3<f32>(0f, 0f, 0f)), vec3<f32>(2.4f, 2.4f, 2.4f));
+let _e420 = vec4<f32>(select((_e340.x * 0.07739938f), _e397.x, (_e340.x > 0.04045f)), _e340.y, _e340.z, _e340.w);
+let _e425 = vec4<f32>(_e420.x, select((_e340.y * 0.07739938f), _e397.y, (_e340.y > 0.04045f)), _e420.z, _e420.w);
+phi_1748_ = vec4<f32>(_e425.x, _e425.y, select((_e340.z * 0.07739938f), _e397.z, (_e340.z > 0.04045f)), _e425.w);
+}
+let _e432 = phi_1748_;
+phi_1753_ = vec4<f32>(_e382.x, _e376.y, _e382.z, _e382.w);
+phi_1752_ = _e358;
+phi_1751_ = _e432;
 break;
 }
 }
-let _e411 = phi_1674_;
-let _e413 = phi_1673_;
-let _e415 = phi_1672_;
-entryPointOutput_u002e_clip = _e411;
-entryPointOutput_u002e_sigmas = _e413;
-entryPointOutput_u002e_colour = _e415;
+let _e434 = phi_1753_;
+let _e436 = phi_1752_;
+let _e438 = phi_1751_;
+entryPointOutput_u002e_clip = _e434;
+entryPointOutput_u002e_sigmas = _e436;
+entryPointOutput_u002e_colour = _e438;
 return;
 }
 
@@ -1300,12 +1312,13 @@ let _e10 = entryPointOutput_u002e_colour;
 return VertexOutput(_e8, _e9, _e10);
 }
 ` },
-  SplatFragment: { bindings: {"parameters": 0}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacIndexBits": 64, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
+  SplatFragment: { bindings: {"parameters": 0}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacKeepsEnergy": 64, "GsacIndexBits": 68, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
 struct u0024_Global {
 GsacModel0_: vec4<f32>,
 GsacModel1_: vec4<f32>,
 GsacModel2_: vec4<f32>,
 GsacBlend: vec4<f32>,
+GsacKeepsEnergy: u32,
 GsacIndexBits: u32,
 PageView0_: vec4<f32>,
 PageView1_: vec4<f32>,
@@ -1343,12 +1356,13 @@ let _e5 = entryPointOutput;
 return _e5;
 }
 ` },
-  FloorVertex: { bindings: {"parameters": 0}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacIndexBits": 64, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
+  FloorVertex: { bindings: {"parameters": 0}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacKeepsEnergy": 64, "GsacIndexBits": 68, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
 struct u0024_Global {
 GsacModel0_: vec4<f32>,
 GsacModel1_: vec4<f32>,
 GsacModel2_: vec4<f32>,
 GsacBlend: vec4<f32>,
+GsacKeepsEnergy: u32,
 GsacIndexBits: u32,
 PageView0_: vec4<f32>,
 PageView1_: vec4<f32>,
@@ -1401,12 +1415,13 @@ let _e8 = entryPointOutput_u002e_place;
 return VertexOutput(_e7, _e8);
 }
 ` },
-  FloorFragment: { bindings: {"parameters": 0}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacIndexBits": 64, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
+  FloorFragment: { bindings: {"parameters": 0}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacKeepsEnergy": 64, "GsacIndexBits": 68, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `
 struct u0024_Global {
 GsacModel0_: vec4<f32>,
 GsacModel1_: vec4<f32>,
 GsacModel2_: vec4<f32>,
 GsacBlend: vec4<f32>,
+GsacKeepsEnergy: u32,
 GsacIndexBits: u32,
 PageView0_: vec4<f32>,
 PageView1_: vec4<f32>,

@@ -5,7 +5,7 @@
  * @param {import("./viewer.js").Viewer} viewer
  */
 export function describeView(viewer) {
-  const { camera, playing, binding } = viewer, words = [], round = (x) => String(Math.round(x * 1000) / 1000);
+  const { camera, playing, levels } = viewer, words = [], round = (x) => String(Math.round(x * 1000) / 1000);
   words.push(playing.clip ? `clip=${encodeURIComponent(playing.clip)}` : `pose=${encodeURIComponent(playing.pose)}`);
   if (playing.clip && viewer.paused) words.push(`t=${round(viewer.clock)}`);
   if (viewer.turntable) words.push("turntable");
@@ -18,7 +18,7 @@ export function describeView(viewer) {
   const turned = Object.entries(viewer.turned).filter(([, by]) => by.some(Boolean)).map(([name, by]) => `${name}:${by.join(",")}`);
   if (face.length) words.push(`expression=${face.join(",")}`);
   if (turned.length) words.push(`joints=${turned.join(";")}`);
-  if (!binding.lit) words.push("light=off");
+  if (!levels.lit) words.push("light=off");
   return `${location.href.split("#")[0]}#${words.join("&")}`;
 }
 

@@ -1,6 +1,7 @@
 // The skeleton's pose, and linear blend skinning (LBS) of the mesh by it.
 
 import { quatFromAxisAngle, quatMix, quatToMatrix } from "./flat_quat.js";
+import { transformPoint } from "./projection.js";
 
 export class Pose {
   /** @param {import("./reader.js").Avatar} avatar */
@@ -71,6 +72,8 @@ export class Skin {
   /** @param {import("./reader.js").Avatar} avatar */
   constructor(avatar) {
     this.avatar = avatar;
+    // Of joints.
+    this.count = avatar.names.length;
     // (J, 3, 4) [R | t], from the rest place to the posed one.
     this.bones = new Float32Array(avatar.names.length * 12);
     this.local = new Float32Array(9);
@@ -118,6 +121,11 @@ export class Skin {
         B[o + r * 4 + 3] = place - (B[o + r * 4] * jx + B[o + r * 4 + 1] * jy + B[o + r * 4 + 2] * jz);
       }
     }
+  }
+
+  // Where this.bones put a joint, m.
+  place(joint) {
+    return transformPoint(this.bones.subarray(joint * 12, joint * 12 + 12), this.avatar.joints.subarray(joint * 3, joint * 3 + 3));
   }
 
   // Fills this.vertices from this.rest and this.bones.

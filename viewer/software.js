@@ -10,15 +10,16 @@ export class SoftwareRenderer {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {import("./reader.js").Avatar} avatar
-   * @param {import("./binding.js").Binding} binding
-   * @param {import("./sort.js").DepthSort} sort
+   * @param {import("./levels.js").Levels} levels
    */
-  constructor(canvas, avatar, binding, sort) {
+  constructor(canvas, avatar, levels) {
     this.kind = "software";
     this.context = canvas.getContext("2d", { alpha: false });
     this.avatar = avatar;
-    this.binding = binding;
-    this.sort = sort;
+    this.levels = levels;
+    // Of the level that is drawn.
+    this.binding = levels.binding;
+    this.order = levels.sort.order;
     this.background = [0, 0, 0, 1];
     // Size of the picture, px; of each pixel the share of light from farther away that still comes through, and the colour so far.
     this.width = 0;
@@ -34,7 +35,10 @@ export class SoftwareRenderer {
   }
 
   prepare(view) {
-    this.sort.update(this.binding.data, view);
+    const { binding, sort } = this.levels;
+    sort.update(binding.data, view);
+    this.binding = binding;
+    this.order = sort.order;
   }
 
   clear(background) {
@@ -50,7 +54,7 @@ export class SoftwareRenderer {
     this.resize(width, height);
     this.transmittance.fill(1);
     this.colour.fill(0);
-    const { order } = this.sort;
+    const { order } = this;
     for (let rank = this.binding.count - 1; rank >= 0; rank--) this.splat(order[rank], eye);
     if (shadow) this.darken(eye, shadow);
     this.show();
@@ -69,7 +73,7 @@ export class SoftwareRenderer {
   // Projects gaussian i and draws its ellipse.
   splat(i, { view, focal: [fx, fy], centre }) {
     const D = this.binding.data, o = i * 12, x = D[o], y = D[o + 1], z = D[o + 2];
-    const { blend: { lowPass, alphaMin } } = this.avatar, opacity = this.avatar.opacity[i];
+    const { blend: { lowPass, keepsEnergy, alphaMin } } = this.avatar, opacity = this.binding.level.opacity[i];
     const cz = view[8] * x + view[9] * y + view[10] * z + view[11];
     if (cz < NEAR || opacity < alphaMin) return;
     const { width, height } = this, px = (view[0] * x + view[1] * y + view[2] * z + view[3]) / cz;
@@ -80,17 +84,21 @@ export class SoftwareRenderer {
     const b0 = (view[4] - ty * view[8]) * sy, b1 = (view[5] - ty * view[9]) * sy, b2 = (view[6] - ty * view[10]) * sy;
     const xx = D[o + 3], xy = D[o + 4], xz = D[o + 5], yy = D[o + 6], yz = D[o + 7], zz = D[o + 8];
     const u0 = xx * a0 + xy * a1 + xz * a2, u1 = xy * a0 + yy * a1 + yz * a2, u2 = xz * a0 + yz * a1 + zz * a2;
-    const across = a0 * u0 + a1 * u1 + a2 * u2 + lowPass, slant = b0 * u0 + b1 * u1 + b2 * u2;
-    const down = b0 * (xx * b0 + xy * b1 + xz * b2) + b1 * (xy * b0 + yy * b1 + yz * b2) + b2 * (xz * b0 + yz * b1 + zz * b2)
-      + lowPass;
-    this.fill(i, fx * px + centre[0] + width / 2, fy * py + centre[1] + height / 2, across, slant, down, opacity);
+    const across = a0 * u0 + a1 * u1 + a2 * u2, slant = b0 * u0 + b1 * u1 + b2 * u2;
+    const down = b0 * (xx * b0 + xy * b1 + xz * b2) + b1 * (xy * b0 + yy * b1 + yz * b2) + b2 * (xz * b0 + yz * b1 + zz * b2);
+    const bare = Math.max(0, across * down - slant * slant), det = bare + lowPass * (across + down + lowPass);
+    const seen = keepsEnergy ? opacity * Math.sqrt(bare / det) : opacity;
+    if (!(seen >= alphaMin)) return;
+    const cx = fx * px + centre[0] + width / 2, cy = fy * py + centre[1] + height / 2;
+    this.fill(i, cx, cy, across + lowPass, slant, down + lowPass, det, seen);
   }
 
-  // Draws the ellipse of gaussian i around (cx, cy), px, with the covariance (across, slant, down), px^2.
-  fill(i, cx, cy, across, slant, down, opacity) {
-    const { width, height, transmittance, colour, avatar: { rgb, blend: { alphaMax, alphaMin } }, binding: { data } } = this;
+  // Draws the ellipse of gaussian i around (cx, cy), px, with the covariance (across, slant, down), px^2, and its determinant.
+  fill(i, cx, cy, across, slant, down, det, opacity) {
+    const { width, height, transmittance, colour, binding: { data, level: { rgb } } } = this;
+    const { alphaMax, alphaMin } = this.avatar.blend;
     const r = rgb[i * 3] * data[i * 12 + 9], g = rgb[i * 3 + 1] * data[i * 12 + 10], b = rgb[i * 3 + 2] * data[i * 12 + 11];
-    const det = across * down - slant * slant, A = down / det, B = -slant / det, reach2 = 2 * Math.log(opacity / alphaMin);
+    const A = down / det, B = -slant / det, reach2 = 2 * Math.log(opacity / alphaMin);
     const tall = Math.sqrt(reach2 * down), first = Math.max(0, Math.ceil(cy - tall - 0.5));
     const last = Math.min(height - 1, Math.floor(cy + tall - 0.5)), bend = Math.exp(-A);
     for (let row = first; row <= last; row++) {

@@ -6,8 +6,9 @@ export class DepthSort {
 
   // count: of gaussians.
   constructor(count) {
+    this.rows = Math.max(1, Math.ceil(count / DepthSort.PER_ROW));
     // Indices of gaussians, the farthest first.
-    this.order = new Uint32Array(Math.max(1, Math.ceil(count / DepthSort.PER_ROW)) * DepthSort.PER_ROW);
+    this.order = new Uint32Array(this.rows * DepthSort.PER_ROW);
     this.count = count;
     this.depth = new Float32Array(count);
     this.key = new Uint16Array(count);

@@ -1,11 +1,10 @@
 // The avatar on the canvas: what it plays, how its joints and face are set by hand, the camera, and the picture of it all.
 
-import { Binding } from "./binding.js";
 import { OrbitCamera } from "./camera.js";
+import { Levels } from "./levels.js";
 import { FrameRate } from "./rate.js";
 import { makeRenderer, replaceCanvas } from "./renderer.js";
 import { Pose, Skin } from "./skin.js";
-import { DepthSort } from "./sort.js";
 
 // From one motion to the next.
 const FADE_S = 0.35;
@@ -54,8 +53,6 @@ export class Viewer {
     this.before = new Pose(avatar);
     this.fade = 1;
     this.skin = new Skin(avatar);
-    this.binding = new Binding(avatar);
-    this.sort = new DepthSort(this.binding.count);
     this.stage = document.getElementById("stage");
     /** @type {import("./renderer.js").Renderer | null} */
     this.renderer = null;
@@ -64,6 +61,7 @@ export class Viewer {
     // Box around the figure at rest, m.
     this.low = low;
     this.high = high;
+    this.levels = new Levels(avatar, high[1] - low[1]);
     this.rate = new FrameRate();
     /** @type {Object<string, number>} weights by name */
     this.expression = {};
@@ -174,11 +172,11 @@ export class Viewer {
   // Everything the picture depends on, as text: equal texts need no new picture.
   get state() {
     this.camera.update();
-    const { pose, camera, stage, binding, renderer, background, expression } = this;
+    const { pose, camera, stage, levels, renderer, background, expression } = this;
     const panel = document.getElementById("panel").offsetTop;
     const view = Array.from(camera.view, (x) => x.toFixed(5));
     return [pose.quats, pose.transl, view, camera.fov, stage.clientWidth, stage.clientHeight, window.devicePixelRatio, panel,
-      binding.lit, renderer?.kind, background, JSON.stringify(expression)].join(" ");
+      levels.lit, renderer?.kind, background, JSON.stringify(expression)].join(" ");
   }
 
   // Sets a pose to what plays at a place in the clip, s.
@@ -202,8 +200,13 @@ export class Viewer {
       this.renderer.move(this.expression);
     } else {
       this.skin.update(this.pose, this.expression);
-      this.binding.update(this.skin.vertices);
+      this.levels.update(this.skin.vertices);
     }
+  }
+
+  // Takes the level of detail for the person's height in the picture of the eye that sees it largest.
+  chooseLevel(eyes) {
+    if (this.levels.choose(Math.max(...eyes.map((eye) => this.levels.height(eye, this.skin))))) this.move();
   }
 
   /** @returns {Shadow} below the figure where it is now */
@@ -222,6 +225,7 @@ export class Viewer {
     if (!this.renderer) return;
     if (this.resize() && !this.camera.moved) this.frame();
     const eye = this.camera.eye(this.canvas.width, this.canvas.height);
+    this.chooseLevel([eye]);
     this.renderer.prepare(eye.view);
     this.renderer.clear([...this.rgb, 1]);
     this.renderer.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
@@ -281,7 +285,8 @@ export class Viewer {
     this.background = options.background ?? this.background;
     this.opening = options.turntable === null && !options.picked && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.turntable = options.turntable ?? this.opening;
-    this.binding.lit = options.lit;
+    this.levels.lit = options.lit;
+    this.levels.drawn = 0;
     this.expression = options.expression;
     this.turned = Object.fromEntries(Object.entries(options.turned).filter(([joint]) => avatar.names.includes(joint)));
     if (Object.hasOwn(avatar.clips, clip)) this.play({ clip });

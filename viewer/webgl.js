@@ -1,5 +1,6 @@
 // Draws the gaussians with WebGL2: four corners each in one indexed draw, blended from the farthest to the nearest.
-// The trainer's rule: covariance + lowPass, alpha = min(alphaMax, opacity exp(-s)), nothing below alphaMin.
+// The trainer's rule: covariance + lowPass (the opacity falls as much as the area grows by it, if it keeps energy),
+// alpha = min(alphaMax, opacity exp(-s)), nothing below alphaMin.
 
 import { Binding } from "./binding.js";
 import { indexQuads } from "./pack.js";
@@ -18,7 +19,7 @@ uniform vec4 view[3];
 uniform vec2 size;
 uniform vec2 focal;
 uniform vec2 centre;
-uniform vec3 blend; // lowPass, alphaMax, alphaMin
+uniform vec4 blend; // lowPass, alphaMax, alphaMin, 1 if the low-pass keeps energy
 out vec4 colour;
 out vec2 sigmas;
 
@@ -35,14 +36,18 @@ void main() {
   gl_Position = vec4(0, 0, 2, 1);
   vec4 p = vec4(d0.xyz, 1);
   vec3 c = vec3(dot(view[0], p), dot(view[1], p), dot(view[2], p));
-  if (c.z < NEAR || colour.a < blend.z) return;
+  if (c.z < NEAR) return;
 
   mat3 world = mat3(d0.w, d1.x, d1.y, d1.x, d1.z, d1.w, d1.y, d1.w, d2.x);
   vec2 tangent = clamp(c.xy / c.z, -WIDE * size / (2.0 * focal), WIDE * size / (2.0 * focal));
   vec3 row0 = (view[0].xyz - tangent.x * view[2].xyz) * (focal.x / c.z);
   vec3 row1 = (view[1].xyz - tangent.y * view[2].xyz) * (focal.y / c.z);
   vec3 side0 = world * row0;
-  float xx = dot(row0, side0) + blend.x, xy = dot(row1, side0), yy = dot(row1, world * row1) + blend.x;
+  float xx = dot(row0, side0), xy = dot(row1, side0), yy = dot(row1, world * row1), bare = max(xx * yy - xy * xy, 0.0);
+  if (blend.w > 0.5) colour.a *= sqrt(bare / max(bare + blend.x * (xx + yy + blend.x), 1e-12));
+  if (colour.a < blend.z) return;
+  xx += blend.x;
+  yy += blend.x;
 
   float middle = 0.5 * (xx + yy), spread = length(vec2(0.5 * (xx - yy), xy));
   float large = middle + spread, small = max(middle - spread, 1e-6);
@@ -56,7 +61,7 @@ void main() {
 
 const SPLAT_FRAGMENT = `#version 300 es
 precision highp float;
-uniform vec3 blend;
+uniform vec4 blend;
 in vec4 colour;
 in vec2 sigmas;
 out vec4 pixel;
@@ -98,38 +103,34 @@ export class WebglRenderer {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {import("./reader.js").Avatar} avatar
-   * @param {Binding} binding
-   * @param {DepthSort} sort
+   * @param {import("./levels.js").Levels} levels
    */
-  constructor(canvas, avatar, binding, sort) {
+  constructor(canvas, avatar, levels) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: false,
       powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser offers no WebGL2, which the viewer draws with");
     this.kind = "webgl";
     this.gl = gl;
-    this.binding = binding;
-    this.sort = sort;
+    this.levels = levels;
+    // Whose colours the card has.
+    /** @type {Binding | null} */
+    this.coloured = null;
     /** @type {(why: string) => void} */
     this.onLost = () => {};
     canvas.addEventListener("webglcontextlost", () => this.onLost("the graphics driver stopped"));
-    const { lowPass, alphaMax, alphaMin } = avatar.blend;
-    this.blend = [lowPass, alphaMax, alphaMin];
+    const { lowPass, alphaMax, alphaMin, keepsEnergy } = avatar.blend;
+    this.blend = [lowPass, alphaMax, alphaMin, Number(keepsEnergy)];
     const constants = { ORDER_ROW: DepthSort.PER_ROW, DATA_ROW: Binding.PER_ROW, NEAR: NEAR.toFixed(3), WIDE: WIDE.toFixed(3) };
     const vertex = Object.entries(constants).reduce((text, [name, value]) => text.replaceAll(name, String(value)), SPLAT_VERTEX);
     this.splats = this.program(vertex, SPLAT_FRAGMENT);
     this.floor = this.program(FLOOR_VERTEX, FLOOR_FRAGMENT);
-    this.gaussians = this.texture(gl.RGBA32F, Binding.PER_ROW * 3, binding.rows);
-    this.order = this.texture(gl.R32UI, DepthSort.PER_ROW, sort.order.length / DepthSort.PER_ROW);
-    this.colours = this.texture(gl.RGBA32F, Binding.PER_ROW, binding.rows);
-    const colours = new Float32Array(binding.rows * Binding.PER_ROW * 4);
-    for (let i = 0; i < binding.count; i++) {
-      colours.set(avatar.rgb.subarray(i * 3, i * 3 + 3), i * 4);
-      colours[i * 4 + 3] = avatar.opacity[i];
-    }
-    this.fill(this.colours, Binding.PER_ROW, binding.rows, gl.RGBA, gl.FLOAT, colours);
+    const rows = Math.max(...levels.bindings.map((binding) => binding.rows));
+    this.gaussians = this.texture(gl.RGBA32F, Binding.PER_ROW * 3, rows);
+    this.order = this.texture(gl.R32UI, DepthSort.PER_ROW, Math.max(...levels.sorts.map((sort) => sort.rows)));
+    this.colours = this.texture(gl.RGBA32F, Binding.PER_ROW, rows);
     gl.bindVertexArray(gl.createVertexArray());
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indexQuads(binding.count), gl.STATIC_DRAW);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indexQuads(Math.max(...levels.bindings.map((binding) => binding.count))), gl.STATIC_DRAW);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
@@ -174,10 +175,23 @@ export class WebglRenderer {
 
   // Sorts and uploads the gaussians; view: as Eye's.
   prepare(view) {
-    const { gl, binding, sort } = this;
+    const { gl, levels: { binding, sort } } = this;
     sort.update(binding.data, view);
+    if (this.coloured !== binding) this.fillColours(binding);
     this.fill(this.gaussians, Binding.PER_ROW * 3, binding.rows, gl.RGBA, gl.FLOAT, binding.data);
-    this.fill(this.order, DepthSort.PER_ROW, sort.order.length / DepthSort.PER_ROW, gl.RED_INTEGER, gl.UNSIGNED_INT, sort.order);
+    this.fill(this.order, DepthSort.PER_ROW, sort.rows, gl.RED_INTEGER, gl.UNSIGNED_INT, sort.order);
+  }
+
+  // Uploads the colours and opacities of a level.
+  fillColours(binding) {
+    const { gl } = this, { count, rows, level: { rgb, opacity } } = binding;
+    const colours = new Float32Array(rows * Binding.PER_ROW * 4);
+    for (let i = 0; i < count; i++) {
+      colours.set(rgb.subarray(i * 3, i * 3 + 3), i * 4);
+      colours[i * 4 + 3] = opacity[i];
+    }
+    this.fill(this.colours, Binding.PER_ROW, rows, gl.RGBA, gl.FLOAT, colours);
+    this.coloured = binding;
   }
 
   clear(background) {
@@ -191,7 +205,7 @@ export class WebglRenderer {
    * @param {import("./viewer.js").Shadow | null} shadow
    */
   paint(eye, shadow) {
-    const { gl, binding } = this;
+    const { gl } = this;
     gl.viewport(...eye.box);
     if (shadow) {
       this.use(this.floor, eye);
@@ -201,14 +215,14 @@ export class WebglRenderer {
     }
     this.use(this.splats, eye);
     const places = this.splats.places;
-    gl.uniform3fv(places.blend, this.blend);
+    gl.uniform4fv(places.blend, this.blend);
     [this.gaussians, this.colours, this.order].forEach((texture, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.uniform1i([places.gaussians, places.colours, places.order][unit], unit);
     });
     gl.activeTexture(gl.TEXTURE0);
-    gl.drawElements(gl.TRIANGLES, binding.count * 6, gl.UNSIGNED_INT, 0);
+    gl.drawElements(gl.TRIANGLES, this.levels.binding.count * 6, gl.UNSIGNED_INT, 0);
   }
 
   use(program, eye) {

@@ -3,7 +3,8 @@
 
 import { EVEN_LIGHT } from "./binding.js";
 import { reachDevice } from "./device.js";
-import { indexQuads, packForGpu } from "./pack.js";
+import { indexQuads, packBody, packLevel } from "./pack.js";
+import { transformPoint } from "./projection.js";
 import { SHADERS } from "./shaders.js";
 
 // As in Gsac.compute: a group sorts 2^SORT_BLOCK_BITS keys at once, a thread of SortAcross SORT_HAND.
@@ -28,15 +29,15 @@ export class WebgpuRenderer {
    * @param {HTMLCanvasElement} canvas
    * @param {import("./reader.js").Avatar} avatar
    * @param {import("./skin.js").Skin} skin
-   * @param {import("./binding.js").Binding} binding
+   * @param {import("./levels.js").Levels} levels
    * @param {boolean} asked
    */
-  static async open(canvas, avatar, skin, binding, asked) {
+  static async open(canvas, avatar, skin, levels, asked) {
     const late = /** @type {Promise<null>} */ (new Promise((done) => setTimeout(done, ANSWER_MS, null)));
     const device = await Promise.race([reachDevice(asked), late]);
     if (!device) return null;
     device.pushErrorScope("validation");
-    const renderer = new WebgpuRenderer(device, canvas, avatar, skin, binding);
+    const renderer = new WebgpuRenderer(device, canvas, avatar, skin, levels);
     await renderer.build();
     const wrong = await device.popErrorScope();
     if (wrong) throw new Error(wrong.message);
@@ -46,35 +47,46 @@ export class WebgpuRenderer {
   }
 
   // Use `open`.
-  constructor(device, canvas, avatar, skin, binding) {
+  constructor(device, canvas, avatar, skin, levels) {
     this.kind = "webgpu";
     /** @type {GPUDevice} */
     this.device = device;
     /** @type {import("./reader.js").Avatar} */
     this.avatar = avatar;
     this.skin = skin;
-    this.binding = binding;
-    this.sort = planSort(binding.count);
+    /** @type {import("./levels.js").Levels} */
+    this.levels = levels;
     /** @type {(why: string) => void} */
     this.onLost = () => {};
-    this.reach = jointReach(avatar, binding);
+    this.reach = jointReach(avatar, levels.bindings);
     this.background = [0, 0, 0, 1];
     this.context = canvas.getContext("webgpu");
     this.format = navigator.gpu.getPreferredCanvasFormat();
     this.context.configure({ device, format: this.format, alphaMode: "opaque" });
     const { names, vertices, expressions } = avatar, size = (bytes) => new Uint8Array(Math.max(bytes, 16));
     this.weights = new Float32Array(Math.max(expressions.length, 4));
-    const arrays = { ...packForGpu(avatar), GsacWeights: this.weights, GsacBones: size(names.length * 48),
-      GsacPosed: size(vertices.length / 3 * 16), GsacSplats: size(binding.count * 48), GsacKeys: size(this.sort.keys * 4) };
-    this.buffers = Object.fromEntries(Object.entries(arrays).map(([name, data]) => [name, this.buffer(data)]));
-    this.corners = this.buffer(indexQuads(binding.count), GPUBufferUsage.INDEX);
-    /** @type {Dispatch[]} */
-    this.dispatches = [{ entry: "Skin", groups: Math.ceil(vertices.length / 3 / SKIN_THREADS) },
-      { entry: "Bind", groups: Math.ceil(binding.count / SKIN_THREADS) }, ...this.sort.steps];
-    this.dispatchParameters = new ArrayBuffer(this.dispatches.length * PARAMETER_BYTES);
+    const counts = avatar.levels.map((level) => level.face.length), sorts = counts.map(planSort), most = Math.max(...counts);
+    this.buffers = this.upload({ ...packBody(avatar), GsacWeights: this.weights, GsacBones: size(names.length * 48),
+      GsacPosed: size(vertices.length / 3 * 16), GsacSplats: size(most * 48),
+      GsacKeys: size(Math.max(...sorts.map((sort) => sort.keys)) * 4) });
+    this.corners = this.buffer(indexQuads(most), GPUBufferUsage.INDEX);
+    // What draws each level of detail.
+    this.plans = avatar.levels.map((level, i) => {
+      /** @type {Dispatch[]} */
+      const dispatches = [{ entry: "Skin", groups: Math.ceil(vertices.length / 3 / SKIN_THREADS) },
+        { entry: "Bind", groups: Math.ceil(counts[i] / SKIN_THREADS) }, ...sorts[i].steps];
+      return { count: counts[i], indexBits: sorts[i].indexBits, dispatches,
+        buffers: { ...this.buffers, ...this.upload(packLevel(avatar, level)) } };
+    });
+    this.dispatchParameters = new ArrayBuffer(Math.max(...this.plans.map((plan) => plan.dispatches.length)) * PARAMETER_BYTES);
     this.dispatchBuffer = this.buffer(new Uint8Array(this.dispatchParameters), GPUBufferUsage.UNIFORM);
     this.eyeParameters = new ArrayBuffer(PARAMETER_BYTES);
     this.eyeBuffer = this.buffer(new Uint8Array(this.eyeParameters), GPUBufferUsage.UNIFORM);
+  }
+
+  // Buffers by name, from arrays by name.
+  upload(arrays) {
+    return Object.fromEntries(Object.entries(arrays).map(([name, data]) => [name, this.buffer(data)]));
   }
 
   // A buffer on the graphics card that begins as `data`.
@@ -90,7 +102,7 @@ export class WebgpuRenderer {
     const { device } = this, module = (entry) => device.createShaderModule({ code: SHADERS[entry].code });
     const kernel = (entry) => device.createComputePipelineAsync({ layout: "auto",
       compute: { module: module(entry), entryPoint: entry } });
-    const entries = [...new Set(this.dispatches.map(({ entry }) => entry))];
+    const entries = [...new Set(this.plans.flatMap((plan) => plan.dispatches.map(({ entry }) => entry)))];
     const draw = (name, topology) => device.createRenderPipelineAsync({ layout: "auto",
       vertex: { module: module(`${name}Vertex`), entryPoint: `${name}Vertex` },
       fragment: { module: module(`${name}Fragment`), entryPoint: `${name}Fragment`,
@@ -98,18 +110,22 @@ export class WebgpuRenderer {
       primitive: { topology } });
     const [splats, floor, kernels] = await Promise.all(
       [draw("Splat", "triangle-list"), draw("Floor", "triangle-strip"), Promise.all(entries.map(kernel))]);
-    this.kernels = this.dispatches.map(({ entry }, i) => {
-      const pipeline = kernels[entries.indexOf(entry)], offset = i * PARAMETER_BYTES;
-      return { pipeline, group: this.group(pipeline, entry, { buffer: this.dispatchBuffer, offset, size: PARAMETER_BYTES }) };
-    });
-    this.splats = { pipeline: splats, group: this.group(splats, "SplatVertex", { buffer: this.eyeBuffer }) };
-    this.floor = { pipeline: floor, group: this.group(floor, "FloorVertex", { buffer: this.eyeBuffer }) };
+    // Each dispatch of each level, and what draws the level.
+    this.kernels = this.plans.map(({ dispatches, buffers }) => dispatches.map(({ entry }, i) => {
+      const pipeline = kernels[entries.indexOf(entry)], parameters = { buffer: this.dispatchBuffer, offset: i * PARAMETER_BYTES,
+        size: PARAMETER_BYTES };
+      return { pipeline, group: this.group(pipeline, entry, { ...buffers, parameters }) };
+    }));
+    const parameters = { buffer: this.eyeBuffer };
+    this.splats = this.plans.map(({ buffers }) => ({ pipeline: splats,
+      group: this.group(splats, "SplatVertex", { ...buffers, parameters }) }));
+    this.floor = { pipeline: floor, group: this.group(floor, "FloorVertex", { parameters }) };
   }
 
-  // The buffers that a shader's entry point reads; parameters: what its uniform block is bound to.
-  group(pipeline, entry, parameters) {
+  // Binds what a shader's entry point reads. resources: buffers by name; parameters: what its uniform block is bound to.
+  group(pipeline, entry, resources) {
     const entries = Object.entries(SHADERS[entry].bindings).map(([name, binding]) =>
-      ({ binding, resource: name === "parameters" ? parameters : { buffer: this.buffers[name] } }));
+      ({ binding, resource: name === "parameters" ? resources.parameters : { buffer: resources[name] } }));
     return this.device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries });
   }
 
@@ -122,21 +138,22 @@ export class WebgpuRenderer {
 
   // Poses and sorts the gaussians; view: as Eye's.
   prepare(view) {
-    const { avatar, binding, device } = this, [near, far] = this.depths(view);
-    const light = (binding.lit && avatar.light) || EVEN_LIGHT;
+    const { avatar, levels, device } = this, [near, far] = this.depths(view), plan = this.plans[levels.drawn];
+    const light = (levels.lit && avatar.light) || EVEN_LIGHT;
     const along = (c) => [light[3 + c], light[6 + c], light[9 + c], light[c]];
-    this.dispatches.forEach(({ entry, stage = 0, shift = 0, strides = 0 }, i) => {
+    plan.dispatches.forEach(({ entry, stage = 0, shift = 0, strides = 0 }, i) => {
       setParameters(this.dispatchParameters, i * PARAMETER_BYTES, SHADERS[entry].parameters, {
-        GsacVertexCount: avatar.vertices.length / 3, GsacSplatCount: binding.count, GsacIndexBits: this.sort.indexBits,
+        GsacVertexCount: avatar.vertices.length / 3, GsacSplatCount: plan.count, GsacIndexBits: plan.indexBits,
         GsacSortStage: stage, GsacSortShift: shift, GsacSortStrides: strides, GsacDepthRange: [near, 1 / (far - near)],
         GsacDepthRow: view.subarray(8, 12), GsacLightRed: along(0), GsacLightGreen: along(1), GsacLightBlue: along(2) });
     });
     device.queue.writeBuffer(this.dispatchBuffer, 0, this.dispatchParameters);
     this.encoder = device.createCommandEncoder();
     const pass = this.encoder.beginComputePass();
-    this.dispatches.forEach(({ groups }, i) => {
-      pass.setPipeline(this.kernels[i].pipeline);
-      pass.setBindGroup(0, this.kernels[i].group);
+    plan.dispatches.forEach(({ groups }, i) => {
+      const { pipeline, group } = this.kernels[levels.drawn][i];
+      pass.setPipeline(pipeline);
+      pass.setBindGroup(0, group);
       pass.dispatchWorkgroups(groups);
     });
     pass.end();
@@ -144,12 +161,10 @@ export class WebgpuRenderer {
 
   // The least and greatest depth that the gaussians can have.
   depths(view) {
-    const { bones } = this.skin, { joints } = this.avatar, range = [Infinity, -Infinity];
+    const range = [Infinity, -Infinity];
     this.reach.forEach((reach, j) => {
       if (reach === 0) return;
-      const at = [0, 4, 8].map((r) => bones[j * 12 + r] * joints[j * 3] + bones[j * 12 + r + 1] * joints[j * 3 + 1]
-        + bones[j * 12 + r + 2] * joints[j * 3 + 2] + bones[j * 12 + r + 3]);
-      const depth = view[8] * at[0] + view[9] * at[1] + view[10] * at[2] + view[11];
+      const [, , depth] = transformPoint(view, this.skin.place(j));
       range[0] = Math.min(range[0], depth - reach);
       range[1] = Math.max(range[1], depth + reach);
     });
@@ -166,11 +181,12 @@ export class WebgpuRenderer {
    * @param {import("./viewer.js").Shadow | null} shadow
    */
   paint({ view, focal, centre, box: [, , width, height] }, shadow) {
-    const { device, avatar: { blend: { lowPass, alphaMax, alphaMin } } } = this;
+    const { device, avatar: { blend: { lowPass, alphaMax, alphaMin, keepsEnergy } } } = this;
+    const { count, indexBits } = this.plans[this.levels.drawn], splats = this.splats[this.levels.drawn];
     setParameters(this.eyeParameters, 0, SHADERS.SplatVertex.parameters, {
       GsacModel0: [1, 0, 0, 0], GsacModel1: [0, 1, 0, 0], GsacModel2: [0, 0, 1, 0], GsacBlend: [lowPass, alphaMax, alphaMin, 0],
-      GsacIndexBits: this.sort.indexBits, PageView0: view.subarray(0, 4), PageView1: view.subarray(4, 8).map((x) => -x),
-      PageView2: view.subarray(8, 12).map((x) => -x),
+      GsacKeepsEnergy: Number(keepsEnergy), GsacIndexBits: indexBits,
+      PageView0: view.subarray(0, 4), PageView1: view.subarray(4, 8).map((x) => -x), PageView2: view.subarray(8, 12).map((x) => -x),
       PageLens: [2 * focal[0] / width, 2 * focal[1] / height, -2 * centre[0] / width, 2 * centre[1] / height],
       PageDisc: shadow ? [shadow.x, shadow.y, shadow.z, shadow.radius] : [0, 0, 0, 0],
       PageInk: [width, height, shadow ? shadow.strength : 0, 0] });
@@ -182,10 +198,10 @@ export class WebgpuRenderer {
       pass.setBindGroup(0, this.floor.group);
       pass.draw(4);
     }
-    pass.setPipeline(this.splats.pipeline);
-    pass.setBindGroup(0, this.splats.group);
+    pass.setPipeline(splats.pipeline);
+    pass.setBindGroup(0, splats.group);
     pass.setIndexBuffer(this.corners, "uint32");
-    pass.drawIndexed(this.binding.count * 6);
+    pass.drawIndexed(count * 6);
     pass.end();
     device.queue.submit([this.encoder.finish()]);
   }
@@ -220,8 +236,8 @@ function planSort(count) {
 
 // The greatest distance of gaussians from a joint that moves them, m, by joint: however the joints turn, a skinned vertex stays
 // in the hull of balls around its joints; gaussians are let stand half as far again off the mesh as at rest.
-function jointReach(avatar, binding) {
-  const { vertices, faces, face, joints, names, skinIndex, skinWeight, moved, delta } = avatar;
+function jointReach(avatar, bindings) {
+  const { vertices, faces, joints, names, skinIndex, skinWeight, moved, delta } = avatar;
   const reach = new Float64Array(names.length), far = new Float64Array(vertices.length / 3);
   const length = (x, y, z) => Math.hypot(x, y, z);
   for (let i = 0; i < moved.length; i++) far[moved[i]] += length(...delta.subarray(i * 3, i * 3 + 3));
@@ -230,11 +246,14 @@ function jointReach(avatar, binding) {
     const v = k >> 2, j = skinIndex[k];
     reach[j] = Math.max(reach[j], far[v] + length(...[0, 1, 2].map((c) => vertices[v * 3 + c] - joints[j * 3 + c])));
   }
-  binding.update(vertices);
   let beyond = 0;
-  for (let i = 0; i < face.length; i++) {
-    const corner = faces[face[i] * 3] * 3, { data } = binding;
-    beyond = Math.max(beyond, length(...[0, 1, 2].map((c) => data[i * 12 + c] - vertices[corner + c])));
+  for (const binding of bindings) {
+    binding.update(vertices, false);
+    const { data, level: { face } } = binding;
+    for (let i = 0; i < face.length; i++) {
+      const corner = faces[face[i] * 3] * 3;
+      beyond = Math.max(beyond, length(...[0, 1, 2].map((c) => data[i * 12 + c] - vertices[corner + c])));
+    }
   }
   return reach.map((r) => (r > 0 ? r + 1.5 * beyond : 0));
 }

@@ -61,9 +61,11 @@ async function enter(viewer, mode, button) {
       const seen = xrFrame.getViewerPose(space);
       if (!seen) return;
       gl.bindFramebuffer(gl.FRAMEBUFFER, layer.framebuffer);
+      const eyes = seen.views.map((view) => eyeOf(view, layer.getViewport(view), stand));
+      viewer.chooseLevel(eyes);
       renderer.prepare(viewRows(seen.transform.inverse.matrix, stand));
       renderer.clear(background);
-      for (const view of seen.views) renderer.paint(eyeOf(view, layer.getViewport(view), stand), viewer.shadow);
+      for (const eye of eyes) renderer.paint(eye, viewer.shadow);
     };
     session.requestAnimationFrame(frame);
   } catch (error) {
@@ -75,7 +77,7 @@ async function enter(viewer, mode, button) {
 // A headset is drawn by WebGL2: by the page's renderer, or by one of its own where the page draws in another way.
 function headsetRenderer(viewer) {
   if (viewer.renderer instanceof WebglRenderer) return viewer.renderer;
-  return viewer.headset ??= new WebglRenderer(document.createElement("canvas"), viewer.avatar, viewer.binding, viewer.sort);
+  return viewer.headset ??= new WebglRenderer(document.createElement("canvas"), viewer.avatar, viewer.levels);
 }
 
 // Eye's view from a column-major OpenGL view matrix; stand: the avatar's place in the room, m.

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, DTypeLike
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda.device import Buffer, Shape
 from gsac.avatar.cuda.structs import POINTERS, Scene
+from gsac.avatar.draw_rule import LowPass
 from gsac.avatar.joints import J
 
 TILE, SEGMENT, JOINTS = 16, 128, J
@@ -54,6 +55,7 @@ class OnFaces(Protocol):
     """(N,) index of the face that carries it."""
     light: np.ndarray | None
     """(4, 3) of the clip."""
+    low_pass: LowPass
 
     def __len__(self) -> int:
         """N."""

@@ -153,7 +153,8 @@ template <class real> FORMULA int window_begin(real centre, int size, int whole)
     return int(floor(fmin(fmax(centre - size * real(0.5), real(0)), real(whole - size))));
 }
 
-template <class real> struct Lens { real fx, fy, cx, cy, width, height; };
+// px2, keeps_energy: of the low-pass (avatar/draw_rule.py).
+template <class real> struct Lens { real fx, fy, cx, cy, width, height, px2; bool keeps_energy; };
 
 // Factor of the clip's light on a colour channel of a face (avatar/light.py); light: 4 rows of 3; n: normal, camera frame.
 template <class real> FORMULA real shade_of(const real *light, Vec<real> n, int channel) {
@@ -183,8 +184,8 @@ template <class real> FORMULA Rows<real> rows_of(const Lens<real> &lens, const B
     return r;
 }
 
-// Centre (px), exponent s = ha dx^2 + b dx dy + hc dy^2, its largest value, half extents (px).
-template <class real> struct Splat { real x, y, ha, b, hc, s_max, wide, high; bool seen; };
+// Centre (px), exponent s = ha dx^2 + b dx dy + hc dy^2, its largest value, half extents (px), opacity after the low-pass.
+template <class real> struct Splat { real x, y, ha, b, hc, s_max, wide, high, opacity; bool seen; };
 
 template <class real> FORMULA Splat<real> project(const Lens<real> &lens, const Bound<real> &g, real opacity) {
     Splat<real> s;
@@ -199,18 +200,18 @@ template <class real> FORMULA Splat<real> project(const Lens<real> &lens, const 
     }
     // the determinant as a sum of squares: thin splats lose no digits
     real m0 = r.a[1] * r.b[2] - r.a[2] * r.b[1], m1 = r.a[2] * r.b[0] - r.a[0] * r.b[2], m2 = r.a[0] * r.b[1] - r.a[1] * r.b[0];
-    const real blur = real(BLUR);
-    real determinant = m0 * m0 + m1 * m1 + m2 * m2 + blur * (aa + bb) + blur * blur;
-    real xx = aa + blur, yy = bb + blur;
+    real bare = m0 * m0 + m1 * m1 + m2 * m2, determinant = bare + lens.px2 * (aa + bb) + lens.px2 * lens.px2;
+    real xx = aa + lens.px2, yy = bb + lens.px2;
+    s.opacity = lens.keeps_energy ? opacity * sqrt(bare / determinant) : opacity;
     s.x = g.mean.x / g.mean.z * lens.fx + lens.cx;
     s.y = g.mean.y / g.mean.z * lens.fy + lens.cy;
     s.ha = yy / (2 * determinant);
     s.b = -ab / determinant;
     s.hc = xx / (2 * determinant);
-    s.s_max = log(real(ALPHA_LEVELS) * opacity);
+    s.s_max = log(real(ALPHA_LEVELS) * s.opacity);
     s.wide = sqrt(2 * s.s_max * xx);
     s.high = sqrt(2 * s.s_max * yy);
-    s.seen = determinant < real(1e30) && xx < real(1e15) && yy < real(1e15) && s.x < real(1e7) && s.x > real(-1e7) &&
+    s.seen = s.opacity > real(MIN_ALPHA) && determinant < real(1e30) && xx < real(1e15) && yy < real(1e15) && s.x < real(1e7) && s.x > real(-1e7) &&
              s.y < real(1e7) && s.y > real(-1e7);
     return s;
 }
@@ -225,6 +226,20 @@ FORMULA Bound<real> project_backward(const Lens<real> &lens, const Bound<real> &
     real m00 = a * k00 + b * k01, m01 = a * k01 + b * k11, m10 = b * k00 + c * k01, m11 = b * k01 + c * k11;
     real h00 = m00 * a + m01 * b, h01 = m00 * b + m01 * c, h11 = m10 * b + m11 * c;
     Rows<real> r = rows_of(lens, g);
+    if (lens.keeps_energy) {
+        // the opacity's factor sqrt(bare / determinant) has the slope (C^-1 - Q) / 2 in its logarithm, C without the low-pass
+        real aa = 0, ab = 0, bb = 0;
+        for (int j = 0; j < 3; ++j) {
+            aa += r.a[j] * r.a[j];
+            ab += r.a[j] * r.b[j];
+            bb += r.b[j] * r.b[j];
+        }
+        real n0 = r.a[1] * r.b[2] - r.a[2] * r.b[1], n1 = r.a[2] * r.b[0] - r.a[0] * r.b[2], n2 = r.a[0] * r.b[1] - r.a[1] * r.b[0];
+        real bare = n0 * n0 + n1 * n1 + n2 * n2, half = moments[0] / 2;
+        h00 += half * (bb / bare - a);
+        h01 -= half * (ab / bare + b);
+        h11 += half * (aa / bare - c);
+    }
     real gjx = 0, gjy = 0, t2x = 0, t2y = 0;
     for (int j = 0; j < 3; ++j) {
         real A = 2 * (h00 * r.a[j] + h01 * r.b[j]), B = 2 * (h01 * r.a[j] + h11 * r.b[j]);
@@ -347,7 +362,7 @@ FORMULA void adam_pulled(real &value, real grad, real &first, real &second, int 
 }
 
 // Bounds of stages/train/gaussians/kernels.py `limit`, for one gaussian.
-template <class real> struct Bounds { real needle, largest, reach; };
+template <class real> struct Bounds { real needle, least, largest, reach; };
 
 template <class real>
 FORMULA void limit(real *mu, real *quat, real *log_scale, real *rgb, real &logit, const real *start, real face_scale,
@@ -360,7 +375,8 @@ FORMULA void limit(real *mu, real *quat, real *log_scale, real *rgb, real &logit
     real high = fmax(a, fmax(b, d)), low = fmin(a, fmin(b, d)), middle = a + b + d - high - low;
     real size = fmax(face_scale, real(1e-6));
     real top = fmin(high, fmin(middle + log(bounds.needle), log(bounds.largest / size)));
-    for (int c = 0; c < 3; ++c) log_scale[c] = fmax(fmin(log_scale[c], top), top - log(real(10)));
+    real bottom = fmax(top - log(real(10)), log(bounds.least / size));
+    for (int c = 0; c < 3; ++c) log_scale[c] = fmax(fmin(log_scale[c], top), bottom);
     real away = 0;
     for (int c = 0; c < 3; ++c) {
         mu[c] -= pull * (mu[c] - start[c]);

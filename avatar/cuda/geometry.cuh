@@ -129,7 +129,7 @@ struct Posed {
 FORMULA Posed posed(const Scene &s, int b, int i) {
     Posed g;
     const Frame &f = s.now[b].frame;
-    g.lens = {f.fx, f.fy, f.cx, f.cy, float(f.width), float(f.height)};
+    g.lens = {f.fx, f.fy, f.cx, f.cy, float(f.width), float(f.height), s.low_pass_px2, s.low_pass_energy != 0};
     const float *vertices = s.vertices + 3 * b * s.vertex_count;
     const int *corner = s.corner + 3 * i;
     g.face = face_frame(vec(vertices + 3 * corner[0]), vec(vertices + 3 * corner[1]), vec(vertices + 3 * corner[2]));
@@ -165,7 +165,7 @@ extern "C" __global__ void __launch_bounds__(128) project(Scene s) {
                 tiles = (x1 - x0) * (y1 - y0);
                 float4 *splat = (float4 *)s.splat + 3 * at;
                 splat[0] = {p.x, p.y, p.ha, p.b};
-                splat[1] = {p.hc, p.s_max, g.opacity, p.wide};
+                splat[1] = {p.hc, p.s_max, p.opacity, p.wide};
                 splat[2] = {g.shade[0] * s.rgb[3 * i], g.shade[1] * s.rgb[3 * i + 1], g.shade[2] * s.rgb[3 * i + 2], p.high};
                 s.depth[at] = g.bound.mean.z;
             }

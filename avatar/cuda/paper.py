@@ -9,6 +9,7 @@ import numpy as np
 from gsac.avatar.cuda.arrays import Shot
 from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, rates_of
 from gsac.avatar.cuda.trainer import CudaTrainer, opacity_logit
+from gsac.avatar.draw_rule import ADDED, LowPass
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import sigmoid
 from gsac.avatar.lpips import Lpips
@@ -39,6 +40,7 @@ class PaperGaussians:
     """(N,) in 0..1, not learned."""
     light: np.ndarray | None = None
     """(4, 3) as `Gaussians.light`; the recipe has none."""
+    low_pass: LowPass = ADDED
 
     def __len__(self) -> int:
         return len(self.face)
@@ -91,7 +93,8 @@ class PaperTrainer(CudaTrainer):
         v, limit = self.values(), self.recipe.scale_limit
         opacity = sigmoid(self.buffers["logit"].read())
         return Gaussians(self.face.copy(), v["mu"], v["quat"] / np.linalg.norm(v["quat"], axis=1, keepdims=True),
-                         np.log(limit) - np.log1p(np.exp(-v["scale_logit"])), np.clip(v["rgb"], 0, 1), opacity)
+                         np.log(limit) - np.log1p(np.exp(-v["scale_logit"])), np.clip(v["rgb"], 0, 1), opacity,
+                         low_pass=self.low_pass)
 
     def values(self) -> dict[str, np.ndarray]:
         """mu (N, 3), quat (N, 4), scale_logit (N, 3) and rgb (N, 3), as they are learned."""

@@ -32,12 +32,18 @@ class Recipe:
     quat_rate: float = 0.0
     scale_rate: float = 0.0
     opacity_rate: float = 0.0
+    mu_end: float = 0.01
+    """Factor that the rate of the places falls to."""
+    end: float = 0.1
+    """Factor that all other rates of the gaussians fall to."""
     pose_rate: float = 0.0
     pose_pull: float = 0.0
     ssim: float = 0.0
     sobel: float = 0.0
     mask: float = 0.0
     needle: float = math.inf
+    least: float = 0.0
+    """Shortest axis of a gaussian, m at rest."""
     largest: float = math.inf
     """Longest axis of a gaussian, m at rest."""
     reach: float = math.inf
@@ -125,11 +131,13 @@ def rates_of(recipe: Recipe, done: np.ndarray, levels: int = 1) -> np.ndarray:
     """(steps,) as `DrawnPlan.rates`. done: (steps,) shares of the training that each step has behind it."""
     rates = zero_rates(len(done))
     rates["level"] = np.where(done < recipe.coarse_share, 0, levels - 1)
-    for name, rate, end in (("mu", recipe.mu_rate, 0.01), ("quat", recipe.quat_rate, 0.1), ("log_scale", recipe.scale_rate, 0.1),
+    for name, rate, end in (("mu", recipe.mu_rate, recipe.mu_end), ("quat", recipe.quat_rate, recipe.end),
+                            ("log_scale", recipe.scale_rate, recipe.end),
                             ("expression", recipe.expression_rate, 0.01),
                             ("joints", recipe.joint_rate, 0.01),
-                            ("rgb", recipe.rgb_rate, 0.1), ("opacity", recipe.opacity_rate, 0.1), ("pose", recipe.pose_rate, 0.01),
-                            ("place_pull", recipe.place_pull if recipe.mu_rate else 0.0, 0.01)):
+                            ("rgb", recipe.rgb_rate, recipe.end), ("opacity", recipe.opacity_rate, recipe.end),
+                            ("pose", recipe.pose_rate, 0.01),
+                            ("place_pull", recipe.place_pull if recipe.mu_rate else 0.0, recipe.mu_end)):
         rates[name] = rate * end**done
     rates["offset"] = np.where(done < recipe.offset_share, recipe.offset_rate * 0.1 ** (done / max(recipe.offset_share, 1e-9)), 0)
     rates["betas"], rates["gain"] = recipe.beta_rate, recipe.gain_rate * 0.1**done

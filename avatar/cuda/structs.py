@@ -54,7 +54,8 @@ POINTERS = {
 }
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
-           "shift_unit": FLOAT, "needle": FLOAT, "largest": FLOAT, "reach": FLOAT, "smoothness": FLOAT,
+           "shift_unit": FLOAT, "low_pass_px2": FLOAT, "low_pass_energy": INT, "needle": FLOAT, "least": FLOAT, "largest": FLOAT,
+           "reach": FLOAT, "smoothness": FLOAT,
            "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
            "area": FLOAT, "half_side": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT,
            "masked": INT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,

@@ -35,7 +35,7 @@ class CudaTrainer:
         """
         self.device = device or Device()
         self.recipe, self.body, self.face = recipe, body, np.asarray(gaussians.face, np.int32)
-        self.frames, self.count, self.light = len(levels[0]), len(gaussians), gaussians.light
+        self.frames, self.count, self.light, self.low_pass = len(levels[0]), len(gaussians), gaussians.light, gaussians.low_pass
         self.arrays = Arrays()
         self.buffers, self.scene = self.arrays.buffers, self.arrays.scene
         self._graph = None
@@ -61,7 +61,7 @@ class CudaTrainer:
         b = self.buffers
         opacity = sigmoid(b["logit"].read().astype(np.float64))
         return Gaussians(self.face.copy(), b["mu"].read(), b["quat"].read(), b["log_scale"].read(), b["rgb"].read(),
-                         opacity.astype(np.float32), self.light)
+                         opacity.astype(np.float32), self.light, self.low_pass)
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Pose (T, 55, 3) rad and translation (T, 3) m, float64."""
@@ -229,10 +229,11 @@ class CudaTrainer:
         self.sizes = sizes = [shot.pixels.shape[:2] for level in levels for shot in level]
         scene.frame_count, scene.batch, scene.count = self.frames, self.batch, self.count
         scene.vertex_count = self.body.rest.shape[1]
+        scene.low_pass_px2, scene.low_pass_energy = self.low_pass.px2, self.low_pass.keeps_energy
         scene.max_pixels = max(h * w for h, w in sizes)
         scene.max_tiles = max(-(-h // TILE) * -(-w // TILE) for h, w in sizes)
-        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "largest", "reach", "offset_every",
-                     "expression_unit", "joint_unit", "fresh", "tiny"):
+        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "least", "largest", "reach",
+                     "offset_every", "expression_unit", "joint_unit", "fresh", "tiny"):
             setattr(scene, name, getattr(recipe, name))
 
     def _open_window(self, network: Lpips, windows: int = 1, precision: str = "bfloat16") -> None:

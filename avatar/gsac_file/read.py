@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gsac.avatar.artifacts import AVATAR_SHAPES, LIGHT_SHAPE
+from gsac.avatar.draw_rule import ADDED, LowPass
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.container import Fault, GsacError
@@ -14,6 +15,7 @@ from gsac.avatar.gsac_file.container import Fault, GsacError
 MAX_JOINTS = 256
 MAX_LEVELS = 16
 BLEND_RANGE = {"low_pass_px2": (0, 100), "alpha_max": (0, 1), "alpha_min": (1e-6, 1)}
+HEIGHT_RANGE = (1, 1e6)
 
 
 class Reader:
@@ -65,13 +67,22 @@ class Reader:
             raise self.bad(Fault.VALUE, f"block {name!r} is not finite")
         return array
 
-    def check_drawing(self) -> None:
-        """Checks the draw rule and the ground of the head, which this reader does not keep."""
+    def number(self, table: dict, key: str, span: tuple[float, float]) -> float:
+        """The number at a key, within `span`."""
+        value = self.entry(table, key, (int, float))
+        if not span[0] <= value <= span[1]:
+            raise self.bad(Fault.VALUE, f"`{key}` is out of range")
+        return value
+
+    def low_pass(self) -> LowPass:
+        """The filter of the draw rule, 3DGS's where the head names none; the rest of the rule and the ground are only checked."""
         drawn = self.entry(self.head, "blend", dict) if "blend" in self.head else {}
         found = [(self.head, "ground", (-1e6, 1e6))] + [(drawn, key, span) for key, span in BLEND_RANGE.items()]
-        for table, key, (least, most) in found:
-            if key in table and not least <= self.entry(table, key, (int, float)) <= most:
-                raise self.bad(Fault.VALUE, f"`{key}` is out of range")
+        for table, key, span in found:
+            if key in table:
+                self.number(table, key, span)
+        keeps_energy = self.entry(drawn, "low_pass_energy", bool) if "low_pass_energy" in drawn else ADDED.keeps_energy
+        return LowPass(float(drawn.get("low_pass_px2", ADDED.px2)), keeps_energy)
 
     def check_indices(self, array: np.ndarray, limit: int, what: str) -> np.ndarray:
         """The array (...) itself, if it holds indices in 0..limit - 1 only."""
@@ -102,7 +113,6 @@ class Reader:
         if start[0] != 0 or start[-1] != len(moved) or (np.diff(start) < 0).any():
             raise self.bad(Fault.VALUE, "expression.start must rise from 0 to the number of moved vertices")
         gaussians, *coarser = self.levels(len(faces))
-        self.check_drawing()
         return dict(
             vertices=vertices, faces=faces, joints=self.block("rest.joints", (J, 3)),
             parents=np.asarray(parents, np.int32), joint_names=joint_names,
@@ -122,14 +132,16 @@ class Reader:
         if len(set(prefixes)) != len(prefixes):
             raise self.bad(Fault.HEAD, "two levels have the same gaussians")
         light = self.block("light", LIGHT_SHAPE["light"]) if "light" in self.blocks else None
+        low_pass = self.low_pass()
         out = []
         for level, prefix in zip(levels, prefixes, strict=True):
             face = self.check_indices(self.block(f"{prefix}.face", (None,), True), faces, f"{prefix}.face")
             N = len(face)
             if self.entry(level, "count", int) != N:
                 raise self.bad(Fault.VALUE, f"a level says it has other than {N} gaussians")
-            gaussians = Gaussians(face, light=light, **{name: self.block(f"{prefix}.{name}", (N, *shape[1:]))
-                                                        for name, shape in AVATAR_SHAPES.items() if name != "face"})
+            height = None if level.get("max_height_px") is None else float(self.number(level, "max_height_px", HEIGHT_RANGE))
+            gaussians = Gaussians(face, light=light, low_pass=low_pass, max_height_px=height, **{
+                name: self.block(f"{prefix}.{name}", (N, *shape[1:])) for name, shape in AVATAR_SHAPES.items() if name != "face"})
             if N and np.abs((gaussians.quat ** 2).sum(1) - 1).max() > 1e-2:
                 raise self.bad(Fault.VALUE, f"{prefix}.quat must hold unit quaternions")
             out.append(gaussians)

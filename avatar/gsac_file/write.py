@@ -12,8 +12,8 @@ UNIT = 65535
 SKIN_SCALE = 1 / UNIT
 QUAT_SCALE = 1 / 32767
 LOG_SCALE_SCALE = 1 / 2048
-BLEND = {"low_pass_px2": draw_rule.BLUR, "alpha_max": draw_rule.MAX_ALPHA, "alpha_min": draw_rule.MIN_ALPHA}
-"""The draw rule under the file's names."""
+ALPHAS = {"alpha_max": draw_rule.MAX_ALPHA, "alpha_min": draw_rule.MIN_ALPHA}
+"""The draw rule's bounds of alpha under the file's names."""
 
 
 def avatar_bytes(avatar: RiggedAvatar) -> bytes:
@@ -43,7 +43,7 @@ def avatar_bytes(avatar: RiggedAvatar) -> bytes:
             f"{prefix}.opacity": np.rint(np.clip(g.opacity, 0, 1) * UNIT).astype(np.uint16),
         }
         scales |= {f"{prefix}.quat": QUAT_SCALE, f"{prefix}.log_scale": LOG_SCALE_SCALE, f"{prefix}.opacity": 1 / UNIT}
-        levels.append({"prefix": prefix, "count": len(g)})
+        levels.append({"prefix": prefix, "count": len(g)} | ({} if g.max_height_px is None else {"max_height_px": g.max_height_px}))
     if avatar.gaussians.light is not None:
         blocks["light"] = avatar.gaussians.light.astype(np.float32)
     for name, clip in avatar.clips.items():
@@ -53,10 +53,15 @@ def avatar_bytes(avatar: RiggedAvatar) -> bytes:
     head = {
         "format": "gsac", "axes": "right-handed, metres, y up, facing +z, left +x", "ground": avatar.ground,
         "joints": {"names": avatar.joint_names, "parents": avatar.parents.tolist()},
-        "expressions": avatar.expression_names, "poses": avatar.poses, "clips": clips, "blend": BLEND,
+        "expressions": avatar.expression_names, "poses": avatar.poses, "clips": clips, "blend": blend_of(avatar.gaussians.low_pass),
         "levels": levels, "licence": avatar.licence, "provenance": avatar.provenance,
     }
     return pack(head, blocks, scales)
+
+
+def blend_of(low_pass: draw_rule.LowPass) -> dict[str, float | bool]:
+    """The draw rule under the file's names."""
+    return {"low_pass_px2": low_pass.px2, "low_pass_energy": low_pass.keeps_energy, **ALPHAS}
 
 
 def _unit(quat: np.ndarray) -> np.ndarray:

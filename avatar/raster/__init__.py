@@ -14,6 +14,7 @@ import numpy as np
 
 from gsac.avatar import binding, light
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import PIXEL, LowPass
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import backward, forward, project, tiles
 from gsac.avatar.threads import Workspace
@@ -28,6 +29,8 @@ class State:
     means: np.ndarray  # (N, 3) m, camera frame
     rotations: np.ndarray  # (N, 3, 3)
     scales: np.ndarray  # (N, 3) m
+    opacity: np.ndarray  # (N,)
+    low_pass: tuple[np.floating, bool]  # px^2, keeps energy
     lens: np.ndarray  # (4,) focal lengths and principal point, px
     lattice: np.ndarray  # (32,) x, then y of the pixel centres of a block
     splats: np.ndarray  # (N, 16), columns as in project.py
@@ -90,7 +93,7 @@ class BoundGradients(NamedTuple):
 
 
 def render(means: np.ndarray, rotations: np.ndarray, scales: np.ndarray, rgb: np.ndarray, opacity: np.ndarray, camera: Camera,
-           workspace: Workspace | None = None) -> Rendering:
+           workspace: Workspace | None = None, low_pass: LowPass = PIXEL) -> Rendering:
     """Renders free gaussians.
 
     means: (N, 3) m, camera frame; rotations: (N, 3, 3); scales: (N, 3) m; rgb: (N, 3); opacity: (N,) in 0..1.
@@ -101,9 +104,10 @@ def render(means: np.ndarray, rotations: np.ndarray, scales: np.ndarray, rgb: np
     workspace = workspace or Workspace()
     share, take, count = workspace.share, workspace.take, len(means)
     lens = np.array([*camera.focal, *camera.center], real)
+    splat_filter = real.type(low_pass.px2), low_pass.keeps_energy
     splats, depths = take("splats", (count, project.SPLAT), real), take("depths", (count,), real)
     boxes = take("boxes", (count, 4), np.int32)
-    share(project.project, means, rotations, scales, rgb, opacity, lens, camera.width, camera.height,
+    share(project.project, means, rotations, scales, rgb, opacity, lens, camera.width, camera.height, *splat_filter,
           splats, depths, boxes)
 
     columns, rows = -(-camera.width // project.TILE), -(-camera.height // project.TILE)
@@ -127,8 +131,8 @@ def render(means: np.ndarray, rotations: np.ndarray, scales: np.ndarray, rgb: np
     scratch = take("forward", (workspace.workers, forward.PLANES * project.TILE ** 2), real)
     share(forward.composite, tile_order, tile_start, pair_gaussian, pair_mask, splats, lattice, columns,
           scratch, image, alpha)
-    state = State(camera, workspace, means, rotations, scales, lens, lattice, splats, slot_start, tile_order, tile_start,
-                  pair_gaussian, pair_slot, pair_mask, columns, image, alpha)
+    state = State(camera, workspace, means, rotations, scales, opacity, splat_filter, lens, lattice, splats, slot_start, tile_order,
+                  tile_start, pair_gaussian, pair_slot, pair_mask, columns, image, alpha)
     return Rendering(image, alpha, state)
 
 
@@ -144,8 +148,8 @@ def render_backward(state: State, grad_rgb: np.ndarray, grad_alpha: np.ndarray) 
     gradients = Gradients(take("grad_means", (count, 3), real), take("grad_rotations", (count, 3, 3), real),
                           take("grad_scales", (count, 3), real), take("grad_rgb", (count, 3), real),
                           take("grad_opacity", (count,), real))
-    share(project.project_backward, state.means, state.rotations, state.scales, state.lens,
-          state.camera.width, state.camera.height, state.splats, state.slot_start, moments, *gradients)
+    share(project.project_backward, state.means, state.rotations, state.scales, state.opacity, state.lens,
+          state.camera.width, state.camera.height, *state.low_pass, state.splats, state.slot_start, moments, *gradients)
     return gradients
 
 
@@ -176,7 +180,7 @@ def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, 
     binding.forward(workspace.share, vertices, faces, take("used", (f,), np.bool_), frames, face, mu, quat, log_scale, bound)
     shade = None if gaussians.light is None else light.shade(gaussians.light, frames.R[face, :, 1] * light.FROM_CAMERA.astype(real))
     rgb = gaussians.rgb if shade is None else gaussians.rgb * shade
-    rendering = render(*bound, rgb, gaussians.opacity, camera, workspace)
+    rendering = render(*bound, rgb, gaussians.opacity, camera, workspace, gaussians.low_pass)
     rendering.state.bound, rendering.state.shade = (vertices, faces, face, mu, quat, log_scale), shade
     return rendering
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.draw_rule import ALPHA_LEVELS, BLUR, FRUSTUM, MIN_ALPHA, NEAR
+from gsac.avatar.draw_rule import ALPHA_LEVELS, FRUSTUM, MIN_ALPHA, NEAR
 from gsac.avatar.numba_kernel import kernel
 
 X, Y, HA, B, HC, S_MAX, OPACITY, RED, GREEN, BLUE, HALF_WIDTH, HALF_HEIGHT, RIGHTMOST, CHORD, SLOPE, RIM = range(16)
@@ -38,7 +38,7 @@ def _jacobian(lens, width, height, x, y, z):
 
 @kernel
 def _rows(rotations, scales, i, jx, jy, u, v):
-    """The 2x3 matrix A = J R diag(s): the splat's covariance is A A^T plus the blur."""
+    """The 2x3 matrix A = J R diag(s): the splat's covariance is A A^T plus the low-pass."""
     s0, s1, s2 = scales[i, 0], scales[i, 1], scales[i, 2]
     a0 = jx * (rotations[i, 0, 0] - u * rotations[i, 2, 0]) * s0
     a1 = jx * (rotations[i, 0, 1] - u * rotations[i, 2, 1]) * s1
@@ -50,19 +50,19 @@ def _rows(rotations, scales, i, jx, jy, u, v):
 
 
 @kernel
-def _covariance(a0, a1, a2, b0, b1, b2, blur):
-    """xx, xy, yy and the determinant, the last as a sum of squares so that thin splats lose no digits."""
+def _covariance(a0, a1, a2, b0, b1, b2, px2):
+    """xx, xy, yy with the low-pass, the determinants without and with it, as sums of squares so that thin splats lose no digits."""
     aa, bb = a0 * a0 + a1 * a1 + a2 * a2, b0 * b0 + b1 * b1 + b2 * b2
     m0, m1, m2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
-    determinant = m0 * m0 + m1 * m1 + m2 * m2 + blur * (aa + bb) + blur * blur
-    return aa + blur, a0 * b0 + a1 * b1 + a2 * b2, bb + blur, determinant
+    bare = m0 * m0 + m1 * m1 + m2 * m2
+    return aa + px2, a0 * b0 + a1 * b1 + a2 * b2, bb + px2, bare, bare + px2 * (aa + bb) + px2 * px2
 
 
 @kernel
-def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width, height, splats, depths, boxes):
+def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width, height, px2, keeps_energy, splats, depths, boxes):
     """Fills splats (N, 16), depths (N,) and boxes (N, 4): first and end tile column, first and end tile row.
 
-    A box is empty where the gaussian is not seen; its splat is then left as it was.
+    px2, keeps_energy: of the low-pass. A box is empty where the gaussian is not seen; its splat is then left as it was.
     """
     count = len(means)
     real = lens.dtype.type
@@ -74,7 +74,11 @@ def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width
             continue
         jx, jy, u, v, _, _ = _jacobian(lens, real(width), real(height), x, y, z)
         a0, a1, a2, b0, b1, b2 = _rows(rotations, scales, i, jx, jy, u, v)
-        xx, xy, yy, determinant = _covariance(a0, a1, a2, b0, b1, b2, real(BLUR))
+        xx, xy, yy, bare, determinant = _covariance(a0, a1, a2, b0, b1, b2, px2)
+        if keeps_energy:
+            o *= np.sqrt(bare / determinant)
+            if not o > real(MIN_ALPHA):
+                continue
         px, py = x / z * lens[0] + lens[2], y / z * lens[1] + lens[3]
         if not (determinant < real(1e30) and xx < real(1e15) and yy < real(1e15) and abs(px) < real(1e7) and abs(py) < real(1e7)):
             continue
@@ -98,8 +102,8 @@ def project(worker, workers, means, rotations, scales, rgb, opacity, lens, width
 
 
 @kernel
-def project_backward(worker, workers, means, rotations, scales, lens, width, height, splats, slot_start, moments,
-                     grad_means, grad_rotations, grad_scales, grad_rgb, grad_opacity):
+def project_backward(worker, workers, means, rotations, scales, opacity, lens, width, height, px2, keeps_energy, splats, slot_start,
+                     moments, grad_means, grad_rotations, grad_scales, grad_rgb, grad_opacity):
     """Sums a gaussian's moments over its tiles and takes them through the projection; zero for gaussians not seen."""
     count = len(means)
     real = lens.dtype.type
@@ -121,7 +125,7 @@ def project_backward(worker, workers, means, rotations, scales, lens, width, hei
                 for j in range(3):
                     grad_rotations[i, axis, j] = real(0)
             continue
-        grad_opacity[i] = g / splats[i, OPACITY]
+        grad_opacity[i] = g / opacity[i]
         a, b, c = two * splats[i, HA], splats[i, B], two * splats[i, HC]
         # dL/ds = -g: pixel centre, then the covariance H = -Q G Q of the inverse covariance Q
         ux, uy = a * gx + b * gy, b * gx + c * gy
@@ -132,6 +136,13 @@ def project_backward(worker, workers, means, rotations, scales, lens, width, hei
         x, y, z = means[i, 0], means[i, 1], means[i, 2]
         jx, jy, u, v, inside_u, inside_v = _jacobian(lens, real(width), real(height), x, y, z)
         a0, a1, a2, b0, b1, b2 = _rows(rotations, scales, i, jx, jy, u, v)
+        if keeps_energy:
+            # the opacity's factor sqrt(bare / determinant) has the slope (C^-1 - Q) / 2 in its logarithm, C without the low-pass
+            xx, xy, yy, bare, _ = _covariance(a0, a1, a2, b0, b1, b2, px2)
+            half_g = real(0.5) * g
+            h00 += half_g * ((yy - px2) / bare - a)
+            h01 -= half_g * (xy / bare + b)
+            h11 += half_g * ((xx - px2) / bare - c)
         s0, s1, s2 = scales[i, 0], scales[i, 1], scales[i, 2]
         A0, A1, A2 = two * (h00 * a0 + h01 * b0), two * (h00 * a1 + h01 * b1), two * (h00 * a2 + h01 * b2)
         B0, B1, B2 = two * (h01 * a0 + h11 * b0), two * (h01 * a1 + h11 * b1), two * (h01 * a2 + h11 * b2)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import torch
 
 from gsac.avatar.camera import Camera
-from gsac.avatar.draw_rule import BLUR, FRUSTUM, MAX_ALPHA, MIN_ALPHA, NEAR, STOP
+from gsac.avatar.draw_rule import FRUSTUM, MAX_ALPHA, MIN_ALPHA, NEAR, PIXEL, STOP, LowPass
 
 
 def render(means: torch.Tensor, rotations: torch.Tensor, scales: torch.Tensor, rgb: torch.Tensor, opacity: torch.Tensor,
-           camera: Camera) -> tuple[torch.Tensor, torch.Tensor]:
+           camera: Camera, low_pass: LowPass = PIXEL) -> tuple[torch.Tensor, torch.Tensor]:
     """The rgb (H, W, 3) and alpha (H, W) of free gaussians.
 
     means: (N, 3) m, camera frame; rotations: (N, 3, 3); scales: (N, 3) m; rgb: (N, 3); opacity: (N,) in 0..1.
@@ -31,7 +31,10 @@ def render(means: torch.Tensor, rotations: torch.Tensor, scales: torch.Tensor, r
         rows.append(torch.stack(row, 1))
     jacobian = torch.stack(rows, 1)
     half = jacobian @ rotations * scales[:, None, :]
-    covariance = half @ half.transpose(1, 2) + BLUR * torch.eye(2, dtype=means.dtype)
+    bare = half @ half.transpose(1, 2)
+    covariance = bare + low_pass.px2 * torch.eye(2, dtype=means.dtype)
+    if low_pass.keeps_energy:
+        opacity = opacity * torch.sqrt(torch.linalg.det(bare) / torch.linalg.det(covariance))
     inverse = torch.linalg.inv(covariance)
 
     y, x = torch.meshgrid(torch.arange(camera.height, dtype=means.dtype) + 0.5,

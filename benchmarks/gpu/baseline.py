@@ -24,6 +24,7 @@ from gsac.benchmarks.gpu.synthetic_clip import Figure
 from gsac.stages.train.fast import prealign
 from gsac.stages.train.fast.cuda import Cuda, make_recipe
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
+from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gpu import body_arrays
 from gsac.stages.train.poses.poses import HAND_SHARE
@@ -61,7 +62,7 @@ def fit(task: Task) -> Fit:
     """Recipe fast for the stage, eager, with the frames, sizes, backgrounds and rates of the CUDA trainer."""
     prealign.adjust(task, Cuda())
     fine, coarse = crop_views(task)
-    gaussians = init_gaussians(task, coarse, task.config.budget())
+    gaussians = init_gaussians(task, coarse, budget(task, "cuda"))
     recipe = make_recipe(task.config, len(gaussians))
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]
     poses = task.poses

@@ -35,7 +35,7 @@ def main() -> None:
     def one(case: training.Case, recipe: str, cores: list[int] | None) -> dict:
         folder = options.out / "trainings" / f"{case.name}_{recipe}"
         metrics = training.train(case, folder, cores, recipe=recipe, device="cuda", height=options.height, flip=True)
-        return metrics | (judge_poses(folder, case.novel, options.height, folder / "novel") if case.novel else {})
+        return metrics | (judge_poses(folder, case.novel, folder / "novel") if case.novel else {})
 
     cases = training.prepare_cases(options, PlainReporter(sys.stderr), options.novel)
     calls = [(case, recipe) for case in cases for recipe in RECIPES]

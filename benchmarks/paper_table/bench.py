@@ -1,8 +1,8 @@
 """gsac bench paper-table: training time, number of gaussians, PSNR, SSIM and LPIPS, with three ways to fill a hidden hand.
 
 In the truth clips a hand moves behind the back or in front of the belly; each row is the mean of trainings with several seeds.
-PSNR and SSIM are of whole held-out frames on black, as published; the hands' PSNR is a column of its own. LPIPS is a dash without
-its weights (`gsac models add`).
+PSNR, SSIM and LPIPS are of whole held-out frames on black, LPIPS of images in 0..1, as published; the hands' PSNR is a column of
+its own. LPIPS is a dash without its weights (`gsac models add`).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 COLUMNS = {"time, s": ("seconds", ".0f"), "gaussians": ("n_gaussians", ".0f"), "PSNR": ("psnr_full_black", ".3f"),
-           "SSIM": ("ssim", ".4f"), "LPIPS": ("lpips", ".4f"), "PSNR person": ("psnr_fg", ".2f"),
+           "SSIM": ("ssim_black", ".4f"), "LPIPS": ("lpips_black", ".4f"), "PSNR person": ("psnr_fg", ".2f"),
            "PSNR hands": ("psnr_hands", ".2f"), "pose aligned": ("psnr_fg_ttpo", ".2f")}
 """Heading -> name in metrics.json, and format."""
 

@@ -62,7 +62,7 @@ def measure(cases: list[training.Case], options: argparse.Namespace, say: PlainR
         metrics = training.train(case, folder, cores, recipe=recipe, steps=steps, seed=seed, height=options.height, curve=CURVE,
                                  flip=True)
         if case.novel:
-            metrics |= novel_poses.judge_poses(folder, case.novel, options.height, folder / "novel")
+            metrics |= novel_poses.judge_poses(folder, case.novel, folder / "novel")
         say.note(f"{folder.name}: {metrics['psnr_fg']:.2f} dB after {metrics['cpu_seconds']:.1f} CPU s")
         return make_trial(case.name, metrics)
 

@@ -32,10 +32,11 @@ def read_true_params(truth: Path, model: str) -> BodyParams:
     return BodyParams(**fields, sigma_joints=np.full((len(arrays["transl"]), J), 1e-3, np.float32), model=model)
 
 
-def judge_poses(trained: Path, clip: Path, height: int, folder: Path) -> dict[str, float | None]:
+def judge_poses(trained: Path, clip: Path, folder: Path, height: int | None = None) -> dict[str, float | None]:
     """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first aligned to its image.
 
-    trained: output folder of `train`; clip: a turntable's folder of novel poses; folder: for truth, render and error images.
+    trained: output folder of `train`; clip: a turntable's folder of novel poses; folder: for truth, render and error images;
+    height: px to judge at, None for the clip's own.
     """
     body, gaussians = Body.load(), Gaussians.read(trained / "avatar.npz")
     truth = read_true_params(clip / "truth.npz", body.digest)
@@ -53,16 +54,15 @@ def rename_metrics(metrics: dict[str, float | None], ending: str) -> dict[str, f
     return {f"{name.removesuffix('_fg')}_{ending}": metrics[name] for name in ("psnr_fg", "ssim", "flip", "detail")}
 
 
-def read_views(clip: Path, truth: BodyParams, height: int) -> list[View]:
-    """The clip's frames with their masks as alpha, `height` px high."""
+def read_views(clip: Path, truth: BodyParams, height: int | None) -> list[View]:
+    """The clip's frames with their masks as alpha, `height` px high, or as they are."""
     views = []
     for path in frame_paths(clip / "frames"):
         rgb, mask = read_frame(path), cv2.imread(str(clip / "mask" / path.name), cv2.IMREAD_GRAYSCALE)
         camera = truth.camera(mask.shape[1], mask.shape[0])
         pixels = np.dstack([rgb * (mask[..., None] / 255), mask])
-        width = max(1, round(mask.shape[1] * height / mask.shape[0]))
-        pixels = cv2.resize(pixels, (width, height), interpolation=cv2.INTER_AREA)
-        views.append(View(camera.scaled(width, height), np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0)))
+        view = View(camera, np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0))
+        views.append(view.reduced(height) if height else view)
     return views
 
 

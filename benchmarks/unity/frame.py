@@ -115,5 +115,6 @@ class Frame:
             views.append(view.T)
         rule = [BLUR, MAX_ALPHA, MIN_ALPHA, 0]
         return {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(camera).T] * 2,
-                "_ScreenParams": [size, size, 0, 0], "GsacBlend": rule, "GsacIndexBits": index_bits(self.count),
+                "_ScreenParams": [size, size, 0, 0], "GsacBlend": rule, "GsacKeepsEnergy": 0,
+                "GsacIndexBits": index_bits(self.count),
                 **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}

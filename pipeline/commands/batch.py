@@ -12,6 +12,7 @@ from gsac.pipeline.commands.options import (
     add_json,
     add_params,
     add_person,
+    add_quality,
     open_store,
     progress_reporter,
     values_of_person,
@@ -22,8 +23,8 @@ from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.pace import duration
-from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
+from gsac.pipeline.quality import STANDARD, resolve_quality
 from gsac.pipeline.report.batch import PAGE, BatchPage
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
@@ -38,6 +39,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
     command.add_argument("--replace", action="store_true", help="put a clip's avatar in place of another clip's in its folder")
+    add_quality(command)
     add_person(command)
     add_params(command)
     add_json(command)
@@ -51,7 +53,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
     check_executor(arguments.executor)
     project = Project.at_hand()
-    configs = resolve(project, arguments.params, arguments.set, options=values_of_person(arguments, project))
+    configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
     stages = set(project.graph.steps)
     if arguments.until:
         project.graph.step(arguments.until)
@@ -81,6 +83,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
     """Arguments of every clip's `gsac run`."""
     told = ["--params", str(arguments.params.absolute())] if arguments.params else []
+    told += [] if arguments.quality == STANDARD else ["--quality", arguments.quality]
     told += [] if arguments.height is None else ["--height", str(arguments.height)]
     told += [] if arguments.body is None else ["--body", arguments.body]
     told += [word for text in arguments.set for word in ("--set", text)]

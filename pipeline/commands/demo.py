@@ -8,13 +8,13 @@ import time
 from pathlib import Path
 
 from gsac.cache.half_made import half_made
-from gsac.pipeline.commands.options import open_store, progress_reporter
+from gsac.pipeline.commands.options import add_quality, open_store, progress_reporter
 from gsac.pipeline.commands.run import run_clip
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.params import resolve
 from gsac.pipeline.placing import keep_aside
 from gsac.pipeline.project import Project
+from gsac.pipeline.quality import resolve_quality
 from gsac.pipeline.reporter import PlainReporter
 
 CLIP_FILE = "clip.mp4"
@@ -22,6 +22,7 @@ CLIP_FILE = "clip.mp4"
 
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="default: ./demo")
+    add_quality(command)
     command.set_defaults(do=do)
 
 
@@ -29,9 +30,10 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     root = arguments.out.absolute()
     with progress_reporter(arguments) as reporter:
         store, project = open_store(reporter), Project.at_hand()
+        configs = resolve_quality(arguments.quality, project)
         if not (root / "clip" / CLIP_FILE).is_file():
-            Keys(project, resolve(project), store).pull_models(project.graph.steps, reporter.note)
-        run_clip(make_truth_clip(root / "clip", reporter), root / "avatar", store, reporter)
+            Keys(project, configs, store).pull_models(project.graph.steps, reporter.note)
+        run_clip(make_truth_clip(root / "clip", reporter), root / "avatar", store, reporter, arguments.quality)
     return ExitCode.OK
 
 

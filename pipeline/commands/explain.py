@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from gsac.cache.key import KeyParts
-from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, forecast
+from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, plan_run
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 
@@ -21,7 +21,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     with answer_reporter(arguments) as reporter:
-        plan = forecast(arguments, reporter, until=arguments.stage)[1][-1]
+        plan = plan_run(arguments, reporter, until=arguments.stage)[1][-1]
         reporter.note(f"{plan.stage}: {plan.reason.value}")
         if not plan.changes:
             reporter.note(f"  {plan.sentence}")

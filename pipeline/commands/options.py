@@ -16,6 +16,7 @@ from gsac.pipeline.keys import BODY
 from gsac.pipeline.params import Values, resolve
 from gsac.pipeline.plan import StagePlan
 from gsac.pipeline.project import Project
+from gsac.pipeline.quality import QUALITIES, STANDARD
 from gsac.pipeline.reporter import PlainReporter, open_reporter
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
@@ -26,6 +27,11 @@ def add_params(command: argparse.ArgumentParser) -> None:
     command.add_argument("--params", type=Path, metavar="FILE", help="YAML file with sections of parameters")
     command.add_argument("--set", action="append", default=[], metavar="stage.key=value",
                          help="one parameter; may be repeated")
+
+
+def add_quality(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--quality", default=STANDARD, metavar="NAME",
+                         help=f"{', '.join(QUALITIES)}: how good, and how long it takes (default: {STANDARD})")
 
 
 def add_person(command: argparse.ArgumentParser) -> None:
@@ -123,10 +129,10 @@ def open_run_folder(
     return run_folder, project, resolve(project, file, arguments.set, only)
 
 
-def forecast(arguments: argparse.Namespace, reporter: PlainReporter, until: str | None = None) -> tuple[ClipRun, list[StagePlan]]:
+def plan_run(arguments: argparse.Namespace, reporter: PlainReporter, until: str | None = None) -> tuple[ClipRun, list[StagePlan]]:
     """The run in `arguments.folder` as it would go now, up to one stage; nothing runs."""
     folder, project, configs = open_run_folder(arguments, arguments.folder)
     if until is not None:
         project.graph.step(until)
     clip_run = ClipRun(project, configs, open_store_of(folder, reporter), folder, reporter)
-    return clip_run, clip_run.forecast(folder.require_clip(), Options(until=until))
+    return clip_run, clip_run.plan(folder.require_clip(), Options(until=until))

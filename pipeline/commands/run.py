@@ -11,6 +11,7 @@ from gsac.pipeline.commands.options import (
     add_json,
     add_params,
     add_person,
+    add_quality,
     open_store,
     progress_reporter,
     values_of_person,
@@ -20,8 +21,8 @@ from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.other_clip import find_other_clip, forget_results
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
+from gsac.pipeline.quality import quality_entry, resolve_quality
 from gsac.pipeline.report.refresh import EarlySections, refresh_report
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import ClipRun, Options
@@ -41,19 +42,20 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--force", action="append", default=[], metavar="STAGE",
                          help="run this stage again; may be repeated")
     command.add_argument("--replace", action="store_true", help="put this clip's avatar in place of another clip's in DIR")
+    add_quality(command)
     add_person(command)
     add_params(command)
-    command.add_argument("--dry-run", action="store_true", help="say what would run and why")
+    command.add_argument("--dry-run", action="store_true", help="say what would run and why, and how long it would take")
     add_json(command)
     command.set_defaults(do=do)
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     project = Project.at_hand()
-    configs = resolve(project, arguments.params, arguments.set, options=values_of_person(arguments, project))
+    configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
     clip = find_clip(arguments.clip)
     run_folder = RunFolder(arguments.out or default_out(clip))
-    options = Options(arguments.until, arguments.start, tuple(arguments.force))
+    options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality)
     with progress_reporter(arguments) as reporter:
         store = open_store(reporter)
         clip_run = ClipRun(project, configs, store, run_folder, reporter)
@@ -107,8 +109,8 @@ def write_report(clip_run: ClipRun, reporter: PlainReporter, early: EarlySection
 
 
 def dry_run(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
-    """Reports what would run and why."""
-    plans = clip_run.forecast(clip, options)
+    """Reports what would run and why, and how long it would take."""
+    plans = clip_run.plan(clip, options)
     rows = []
     for plan in plans:
         outcome = Outcome.CACHED if plan.up_to_date else Outcome.PLANNED
@@ -116,8 +118,10 @@ def dry_run(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRepo
         reporter.foresees(plan.stage, outcome, info.seconds if info else 0.0, f"{plan.reason.value}: {plan.sentence}")
         rows.append({"name": plan.stage, "status": outcome.value, "seconds": info.seconds if info else None,
                      "key": plan.parts.key if plan.parts else None, "reason": plan.reason.value})
+    forecast = clip_run.foretell(clip, plans, options)
     if json:
-        emit({"stages": rows, "outputs": {}, "metrics": {}})
+        emit({"stages": rows, "outputs": {}, "metrics": {}, "quality": quality_entry(options.quality, clip_run.configs),
+              "forecast": forecast.to_json()})
     return ExitCode.OK
 
 
@@ -133,14 +137,15 @@ def default_out(clip: Path) -> Path:
     return Path.cwd() / avatar_name(clip)
 
 
-def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter) -> None:
-    """All stages with their defaults."""
+def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter, quality: str) -> None:
+    """All stages as a preset has them."""
     project = Project.at_hand()
-    configs = resolve(project)
+    configs = resolve_quality(quality, project)
     run_folder = RunFolder(out)
     run_folder.say = reporter.note
     run_folder.refuse_foreign(find_clip(clip), project)
     with run_folder.hold():
         run_folder.prepare(find_clip(clip), project, configs)
         store = writable_store(store, out / OWN_STORE, reporter)
-        carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(), reporter, json=False)
+        carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(quality=quality), reporter,
+                  json=False)

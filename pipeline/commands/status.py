@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 
-from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, forecast
+from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, plan_run
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.plan import Reason
@@ -20,7 +20,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     with answer_reporter(arguments) as reporter:
-        clip_run, plans = forecast(arguments, reporter)
+        clip_run, plans = plan_run(arguments, reporter)
         plans = [
             dataclasses.replace(plan, reason=Reason.OUTPUT)
             if plan.cached is not None and not clip_run.folder.shows(clip_run.store, plan.cached) else plan for plan in plans

@@ -36,7 +36,7 @@ def drawn_from(results: Results) -> str:
     """Digest of all that a page shows of a folder: the results and what is said of them, the clip's name, the report's own code."""
     rows = [[row.get(part) for part in ROW_PARTS]
             for name, row in results.rows.items() for row in filter(None, (row, results.result(name)))]
-    told = json.dumps([rows, results.clip_name, results.has_run, _own_code()], sort_keys=True)
+    told = json.dumps([rows, results.clip_name, results.has_run, results.run.get("quality"), _own_code()], sort_keys=True)
     return typed_digest("report 1", told.encode())
 
 

@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from gsac.pipeline.quality import describe_quality
 from gsac.pipeline.report.frame_links import FrameLinks
 from gsac.pipeline.report.origin import drawn_from, read_origin, shown_stages
 from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
@@ -79,7 +80,7 @@ def render(results: Results, drawn: dict[str, Section]) -> str:
         failed=results.failed, reached=explain_partial_run(results), stages=stage_rows(results),
         totals=totals(results), parameters=parameters(results), files=list_exports(results), foot=provenance(results),
         viewer="export/viewer.html" if has_viewer(results) else "", caveat=results.caveat,
-        drawn_from=drawn_from(results), shows=" ".join(shown_stages(results)),
+        drawn_from=drawn_from(results), shows=" ".join(shown_stages(results)), quality=describe_quality(results.run.get("quality")),
     )
 
 
@@ -183,13 +184,18 @@ def list_figures(results: Results, metrics: dict[str, Any]) -> list[tuple[str, s
     names = (("psnr_fg", "{:.2f} dB", "Held-out PSNR, person only", f"poses carried from neighbouring frames{at}"),
              ("psnr_fg_ttpo", "{:.2f} dB", "Held-out PSNR, pose aligned", f"on the held-out frame, avatar frozen{at}"),
              ("psnr_fg_fit", "{:.2f} dB", "Held-out PSNR, pose of the fit", f"as stage smplx left it{at}"),
+             ("psnr_fg_ttpo_540", "{:.2f} dB", "Held-out PSNR at 540 px", "pose aligned, drawn small, as older versions judged"),
+             ("psnr_edge_ttpo", "{:.2f} dB", "PSNR at the outline", f"in a narrow band along the cut-out, pose aligned{at}"),
+             ("psnr_inside_ttpo", "{:.2f} dB", "PSNR inside of it", f"pose aligned{at}"),
              ("psnr_face_ttpo", "{:.2f} dB", "PSNR of the face", f"pose aligned{at}"),
              ("psnr_hands_ttpo", "{:.2f} dB", "PSNR of the hands", f"pose aligned{at}"),
              ("ssim", "{:.3f}", "SSIM", f"whole frame, on white{at}"),
              ("alpha_iou_ttpo", "{:.3f}", "IoU of the outline", "pose aligned"),
              ("n_gaussians", "{:,.0f}", "Gaussians", "bound to faces of the body"))
+    small = metrics.get("at_540")
+    known = metrics | {f"{key}_540": value for key, value in (small if isinstance(small, dict) else {}).items()}
     figures = [(name, form.format(value), meaning) for key, form, name, meaning in names
-               if (value := number(metrics.get(key))) is not None]
+               if (value := number(known.get(key))) is not None]
     total = totals(results)
     if total["seconds"]:
         figures.append(("Total time", seconds(total["seconds"]),
@@ -312,6 +318,8 @@ SECTIONS = (
      lambda paint: paint.sheets.body_sheet(paint.footage)),
     ("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of "
      "frames that training never saw.", "train/heldout", lambda paint: paint.sheets.heldout_sheet(paint.results)),
+    ("faces", "Faces", "Truth on the left, render on the right, of held-out frames, a pixel of the picture for each pixel of the "
+     "frame.", "train/heldout", lambda paint: paint.sheets.face_sheet(paint.results)),
     ("views", "From all sides", "The avatar in its T-pose, from directions that the camera may never have "
      "had.", "train/heldout/views.png", lambda paint: paint.sheets.views_sheet(paint.results)),
     (TRAINING, "Training", "How training went, over its seconds, without the time for judging.", "train/metrics.json", None,

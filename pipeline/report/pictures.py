@@ -24,6 +24,8 @@ from gsac.avatar.wholebody import BODY, FEET
 from gsac.pipeline.report.results import AbsentError, Results
 
 QUALITIES = (82, 68, 52, 36, 20)
+EXACT = 101
+"""The quality above all others: every pixel as it is."""
 MOST_BYTES = 42_000
 """Of one picture; about 60 of them make a page."""
 SEEN = 0.2
@@ -45,11 +47,12 @@ class Picture:
     """The frame of the clip that it shows."""
 
 
-def make_picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTES, frame: int | None = None) -> Picture:
+def make_picture(rgb: np.ndarray, caption: str, alt: str, most_bytes: int = MOST_BYTES, frame: int | None = None,
+                 qualities: tuple[int, ...] = QUALITIES) -> Picture:
     """rgb: (H, W, 3) uint8; frame: that it shows. Quality falls, then size, until the file is at most `most_bytes`."""
     shown = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
     while True:
-        for quality in QUALITIES:
+        for quality in qualities:
             ok, data = cv2.imencode(".webp", shown, [cv2.IMWRITE_WEBP_QUALITY, quality])
             if ok and len(data) <= most_bytes:
                 uri = "data:image/webp;base64," + base64.b64encode(data.tobytes()).decode()

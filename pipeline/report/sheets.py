@@ -14,15 +14,19 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
 from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
-from gsac.pipeline.report.pictures import SEEN, Footage, Picture, make_picture, shrink_to_fit, spread_evenly
+from gsac.pipeline.report.pictures import EXACT, QUALITIES, SEEN, Footage, Picture, make_picture, shrink_to_fit, spread_evenly
 from gsac.pipeline.report.results import AbsentError, Results, number
 from gsac.stages.segment.camera_motion import find_moved, make_view, measure_sway
 
-CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT = 12, 8, 8, 8, 8
+CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT, FACES = 12, 8, 8, 8, 8, 3
 """How many frames each sheet shows at most."""
 WIDE, HIGH = 520, 640
 """Largest picture of a sheet, px."""
-VIEWS_BYTES = 160_000
+VIEWS_BYTES, FACE_BYTES = 160_000, 120_000
+FACE_ROOM = 0.4
+"""Room round a face's box for hair and chin, in units of its side."""
+GAP = 4
+"""px of white beside truth and render of a face."""
 LEAST_MASK = 1e-4
 """A mask that covers less of the frame is empty."""
 RIM = 2
@@ -43,7 +47,9 @@ class Sheet:
     facts: dict[str, float] = field(default_factory=dict)
     """The same for `quality`."""
     columns: str = "large"
-    """How the page lays the pictures out: small, large, wide, or one."""
+    """How the page lays the pictures out: small, large, wide, one, or native, which no screen enlarges."""
+    parts: int = 1
+    """Pictures side by side in each, of which the first is the truth and the second its render."""
 
 
 def contact_sheet(footage: Footage) -> Sheet:
@@ -263,7 +269,33 @@ def heldout_sheet(results: Results) -> Sheet:
         shown = np.hstack([shrink_to_fit(image[y, x], 420, 540) for image in triple])
         pictures.append(make_picture(shown, heldout_caption(stem, rows.get(stem, {}), stem == worst),
                                 f"Held-out frame {int(stem)}: truth, render, error", 70_000, int(stem)))
-    return Sheet(pictures, heldout_figures(results), columns="wide")
+    return Sheet(pictures, heldout_figures(results), columns="wide", parts=3)
+
+
+def face_sheet(results: Results) -> Sheet:
+    """Faces of the best, the middle and the worst held-out frame that shows one, truth beside render, a pixel for a pixel."""
+    folder, rows = results.path("train/heldout"), heldout_rows(results)
+    shown = sorted((psnr, stem) for stem, row in rows.items()
+                   if row.get("face_box") and (psnr := number(row.get("psnr_face"))) is not None)
+    if not shown:
+        raise AbsentError("No held-out frame shows the face, or an older version judged them.")
+    pictures = []
+    for psnr, stem in (shown[i] for i in reversed(spread_evenly(len(shown), FACES))):
+        pair = [read_frame(folder / f"{stem}_{kind}.png") for kind in ("truth", "render")]
+        y, x = face_area(rows[stem]["face_box"], *pair[0].shape[:2])
+        beside = np.hstack([np.pad(image[y, x], ((0, 0), (0, GAP), (0, 0)), constant_values=255) for image in pair])
+        words = f"frame {int(stem)}: truth and render, {psnr:.2f} dB in the face's box"
+        pictures.append(make_picture(beside, words + (" (the worst of them)" if (psnr, stem) == shown[0] else ""),
+                                     f"The face in held-out frame {int(stem)}, as filmed on the left, as drawn on the right",
+                                     FACE_BYTES, int(stem), (EXACT, *QUALITIES)))
+    return Sheet(pictures, columns="native", parts=2)
+
+
+def face_area(box: list[int], height: int, width: int) -> tuple[slice, slice]:
+    """Rows and columns of a face's box, x0 y0 x1 y1 px, with room round it, in a picture of that size."""
+    x0, y0, x1, y1 = box
+    room = round(FACE_ROOM * max(x1 - x0, y1 - y0))
+    return slice(max(y0 - room, 0), min(y1 + room, height)), slice(max(x0 - room, 0), min(x1 + room, width))
 
 
 def heldout_figures(results: Results) -> dict[str, str]:

@@ -68,7 +68,7 @@ def merge_level(avatar: RiggedAvatar, members: int) -> Gaussians:
         log_scale=np.log(scales / k[:, None]).astype(np.float32),
         rgb=mean(g.rgb, weight * hidden).astype(np.float32),
         opacity=np.clip(total / scales[:, 1:].prod(1), 0, 1).astype(np.float32),
-        light=g.light,
+        light=g.light, low_pass=g.low_pass,
     )
 
 

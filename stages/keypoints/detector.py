@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face, FaceMesh, head_yaw, region_of_head
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
-from gsac.stages.keypoints.pose import Pose
 from gsac.stages.keypoints.tracking import Tracker
 
 POSE33 = {

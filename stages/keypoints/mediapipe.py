@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import EYE_POINTS, IBUG68, NOSE_TIP, Face
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
 from gsac.stages.keypoints.hands import Arm, Hand, HandNetworks
-from gsac.stages.keypoints.pose import Pose
 
 ARM33 = {"left": (13, 15, 17, 19), "right": (14, 16, 18, 20)}
 """Elbow, wrist, pinky knuckle, index knuckle."""

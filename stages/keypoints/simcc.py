@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
-from gsac.stages.keypoints.pose import Pose
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)
 DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.blazepose import Person, Pose, PoseNetworks
 from gsac.avatar.region import Region
 from gsac.avatar.threads import available_cores
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
-from gsac.stages.keypoints.pose import Person, Pose, PoseNetworks
 
 SECOND_SCORE = 0.7
 """Least score, of detector and landmark network alike, for a second person to be reported."""

@@ -14,7 +14,7 @@ HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17
 BODY_POINTS = np.array([*range(23), *HAND_ROOTS])
 HIPS = (INDEX["left_hip"], INDEX["right_hip"])
 FOCAL_GUESS = 0.95
-"""Focal length when nothing is known, as a share of the image's longer side: between a phone's main lens and a tele."""
+"""Focal length when nothing is known, as a share of the footage's longer side: between a phone's main lens and a tele."""
 FOCAL_SPREAD, GIVEN_FOCAL_SPREAD = 0.15, 0.002
 """Relative sigma of a guessed and of a given focal length."""
 
@@ -34,6 +34,15 @@ class Sightings:
     detector: str = ""
     face: dict[str, np.ndarray] | None = None
     """Arrays of face.npz: `valid` (T,), `expression` (T, E), `jaw` (T, 3) and, where a head was fitted, its mesh."""
+    principal_point: tuple[float, float] | None = None
+    """px; None: the frame's middle."""
+    longer_side: float | None = None
+    """Of the footage before it was cut, in px of the frames; None: the frame's."""
+
+    @property
+    def center(self) -> np.ndarray:
+        """(2,) px, principal point."""
+        return np.array(self.principal_point or (self.width / 2, self.height / 2))
 
     @property
     def seen(self) -> np.ndarray:
@@ -52,4 +61,4 @@ def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float
     given = config.focal_px or sightings.focal_px
     if given:
         return given, GIVEN_FOCAL_SPREAD
-    return FOCAL_GUESS * max(sightings.width, sightings.height), FOCAL_SPREAD
+    return FOCAL_GUESS * (sightings.longer_side or max(sightings.width, sightings.height)), FOCAL_SPREAD

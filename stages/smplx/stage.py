@@ -41,7 +41,7 @@ def run(job: Job) -> None:
     body = load_body(job, "smplx")
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px, str(points["detector"]), face)
+                          clip.focal_px, str(points["detector"]), face, clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
@@ -53,7 +53,7 @@ def run(job: Job) -> None:
     expression, jaw, silent = translate_expression(body, face)
     if silent:
         job.warn(silent)
-    params = to_params(body, fit.state, np.array([clip.width / 2, clip.height / 2]), expression, fit.joint_offset)
+    params = to_params(body, fit.state, sightings.center, expression, fit.joint_offset)
     params.jaw_pose = jaw
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)

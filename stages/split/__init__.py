@@ -4,7 +4,8 @@ takes  clip: a video file, or a folder of photos, HEIC among them (optional plat
 gives  frames/%06d.png (8-bit RGB), frames/plate.png where there is a plate, clip.json (artifacts.Clip)
 
 The rotation tag is applied, HDR is tone-mapped to SDR BT.709, transparency is composited over black and pixels are made square;
-the aspect is kept. The same input gives the same bytes.
+the aspect is kept. Footage taller than split.max_height is cut to the person where
+that shows more of them, if the networks that find people are there (split.crop). The same input gives the same bytes.
 """
 
 from gsac.avatar.artifacts import check_image_folder
@@ -18,6 +19,7 @@ STAGE = Stage(
     inputs=("clip",),
     outputs=(Output("frames", check_image_folder), Output("clip.json", check_clip)),
     config=SplitConfig,
-    packages=("av", "imageio-ffmpeg", "numpy", "opencv-contrib-python-headless", "pillow", "pillow-heif"),
+    packages=("ai-edge-litert", "av", "imageio-ffmpeg", "numpy", "opencv-contrib-python-headless", "pillow", "pillow-heif"),
+    wishes=lambda config: config.wishes(),
     programs=lambda: {"ffmpeg": ffmpeg_program()},
 )

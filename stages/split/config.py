@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from gsac.stages.contract import BadInput
 
+NETWORKS = ("pose_detection", "pose_landmark_full")
+
 
 @dataclass
 class SplitConfig:
@@ -15,6 +17,13 @@ class SplitConfig:
     """Most frames kept in all, spread evenly over the clip; null: no limit."""
     max_height: int | None = 1280
     """Largest height of a frame, px; taller ones are scaled down with their aspect; null keeps the size."""
+    crop: bool = True
+    """Whether footage taller than max_height is cut to the person before it is scaled, where that makes the person larger by a
+    fifth or more; the frames are whole where it is not sure where the person is."""
+
+    def wishes(self) -> tuple[str, ...]:
+        """Names of the network files that find the person."""
+        return NETWORKS if self.crop and self.max_height is not None else ()
 
     def check(self) -> None:
         if self.fps is not None and not 0 < self.fps < float("inf"):

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
-from gsac.avatar.artifacts import write_frame
+from gsac.avatar.artifacts import Crop, write_frame
 from gsac.stages.contract import BadInput
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
+from gsac.stages.split.crop import plan_crop, principal_point
+from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_evenly
 
 HEIC = {".heic", ".heif"}
@@ -53,14 +56,24 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
     return photos, plates[0] if plates else None
 
 
-def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: SplitConfig, warn: Callable[[str], None],
-                 progress: Callable[[int, int, str], None]) -> dict:
-    """Writes frames/%06d.png and frames/plate.png. Returns the Clip fields width, height, focal_px, notes."""
+def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: SplitConfig, people: People | None,
+                 warn: Callable[[str], None], progress: Callable[[int, int, str], None]) -> dict:
+    """Writes frames/%06d.png and frames/plate.png. people: who finds the person, None: the frames stay whole. Returns the Clip
+    fields width, height, focal_px, notes, crop, center."""
     picks = [photos[i] for i in pick_evenly(len(photos), config.count)]
     if len(picks) < len(photos):
         warn(f"{len(photos)} photos given, {len(picks)} kept evenly (split.count is {config.count}).")
     usual = usual_size(picks)
-    width, height = fit_size(*usual, config.max_height)
+    crop = find_crop(picks, usual, config, people)
+    width, height = fit_size(*usual if crop is None else (crop.width, crop.height), config.max_height)
+
+    def fit(rgb: np.ndarray, exif: Image.Exif) -> tuple[np.ndarray, float | None]:
+        if crop is None:
+            return fit_photo(rgb, exif, width, height)
+        shown, focal_px = fit_photo(rgb, exif, *usual)
+        part = shown[crop.y: crop.y + crop.height, crop.x: crop.x + crop.width]
+        return _resize(part, width, height), None if focal_px is None else focal_px * crop.scale
+
     focals, notes, other, unread = [], set(), [], []
     for done, path in enumerate(picks):
         try:
@@ -72,7 +85,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
             notes.add(COMPOSITED)
         if (rgb.shape[1], rgb.shape[0]) != usual:
             other.append(path.name)
-        shown, focal_px = fit_photo(rgb, exif, width, height)
+        shown, focal_px = fit(rgb, exif)
         del rgb  # before the next one is read
         write_frame(frames / f"{len(focals):06d}.png", shown)
         focals.append(focal_px)
@@ -88,13 +101,30 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         rgb, _, had_alpha = read_photo(plate)
         if had_alpha:
             notes.add(COMPOSITED)
-        write_frame(frames / "plate.png", fit_photo(rgb, Image.Exif(), width, height)[0])
+        write_frame(frames / "plate.png", fit(rgb, Image.Exif())[0])
     known = [f for f in focals if f is not None]
     if known and max(known) > 1.02 * min(known):
         warn(f"the photos' focal lengths differ ({min(known):.0f} to {max(known):.0f} px): was the zoom moved? "
              "Their median is used.")
     return {"width": width, "height": height, "focal_px": float(np.median(known)) if known else None,
-            "notes": sorted(notes)}
+            "notes": sorted(notes), "crop": crop,
+            "center": None if crop is None else principal_point(crop, (width, height), *usual)}
+
+
+def find_crop(photos: list[Path], usual: tuple[int, int], config: SplitConfig, people: People | None) -> Crop | None:
+    """About the person in all photos; None where they stay whole. usual: width and height, px, that most of them have."""
+    if people is None or config.max_height is None or usual[1] <= config.max_height:
+        return None
+    size = fit_size(*usual, config.max_height)
+
+    def small() -> Iterator[np.ndarray]:
+        for path in photos:
+            with contextlib.suppress(BadInput):  # it is left out, and read_photo says why
+                rgb, exif, _ = read_photo(path, size)
+                yield fit_photo(rgb, exif, *size)[0]
+
+    extent = find_extent(people, small(), *usual, config.max_height)
+    return plan_crop(extent, *usual, config.max_height) if extent is not None else None
 
 
 def usual_size(photos: list[Path]) -> tuple[int, int]:
@@ -147,11 +177,16 @@ def open_image(path: Path) -> Image.Image:
     return image
 
 
-def read_photo(path: Path) -> tuple[np.ndarray, Image.Exif, bool]:
-    """(H, W, 3) uint8 sRGB turned upright, its EXIF, and whether it had transparency (composited over black)."""
+def read_photo(path: Path, least: tuple[int, int] | None = None) -> tuple[np.ndarray, Image.Exif, bool]:
+    """(H, W, 3) uint8 sRGB turned upright, its EXIF, and whether it had transparency (composited over black).
+
+    least: width and height, px; a JPEG may then come smaller, though not smaller than that, in a fraction of the time.
+    """
     try:
         with open_image(path) as image:
             exif, profile = image.getexif(), image.info.get("icc_profile")
+            if least is not None:
+                image.draft(None, (min(least), min(least)))
             image.load()
         ImageOps.exif_transpose(image, in_place=True)
         has_alpha = image.has_transparency_data

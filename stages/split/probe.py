@@ -32,6 +32,8 @@ class Video:
     """Index of the video stream in the file."""
     ticks: np.ndarray
     """(N,) int64 presentation times, rising, in time_base; empty where the container has none."""
+    key_ticks: np.ndarray
+    """(K,) int64, those of them whose frame needs no other one."""
     time_base: Fraction
     declared_frames: int
     """Number of frames by the header; 0 where it has none."""
@@ -53,7 +55,7 @@ class Video:
 def probe(path: Path) -> Video:
     """Raises BadInput where no picture of the file can be decoded."""
     try:
-        with _open(path) as container:
+        with open_video(path) as container:
             return _probe(container, path)
     except BadInput:
         raise
@@ -70,7 +72,8 @@ def file_url(path: Path) -> str:
     return f"file:{path.absolute()}"
 
 
-def _open(path: Path) -> InputContainer:
+def open_video(path: Path) -> InputContainer:
+    """Under `LIMITS`."""
     return av.open(file_url(path), options=LIMITS, metadata_errors="ignore")
 
 
@@ -90,7 +93,7 @@ def _probe(container: InputContainer, path: Path) -> Video:
     _check_size(path, stream.width, stream.height)
     stream.codec_context.options = {"max_pixels": LIMITS["max_pixels"]}
     picture = _first_picture(container, stream, path)
-    ticks = _packet_times(path, stream.index)
+    ticks, key_ticks = _packet_times(path, stream.index)
 
     width, height = picture.width, picture.height
     aspect = stream.sample_aspect_ratio or Fraction(1)
@@ -109,9 +112,10 @@ def _probe(container: InputContainer, path: Path) -> Video:
     hidden_alpha = codec in ("vp8", "vp9") and tags.get("alpha_mode") == "1"
     rate = stream.average_rate or stream.guessed_rate
     return Video(
-        stream=stream.index, ticks=ticks, time_base=stream.time_base or Fraction(1, 1_000_000), declared_frames=stream.frames,
-        width=width, height=height, transfer=int(picture.color_trc), primaries=int(picture.color_primaries),
-        matrix=int(picture.colorspace), has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
+        stream=stream.index, ticks=ticks, key_ticks=key_ticks, time_base=stream.time_base or Fraction(1, 1_000_000),
+        declared_frames=stream.frames, width=width, height=height,
+        transfer=int(picture.color_trc), primaries=int(picture.color_primaries), matrix=int(picture.colorspace),
+        has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
         decoder={"vp8": "libvpx", "vp9": "libvpx-vp9"}[codec] if hidden_alpha else None,
         rate=float(rate) if rate else None, tags=tags)
 
@@ -134,20 +138,21 @@ def _first_picture(container: InputContainer, stream: av.VideoStream, path: Path
                    "copy it from the phone again.")
 
 
-def _packet_times(path: Path, index: int) -> np.ndarray:
-    """(N,) rising ticks of the intact packets of one stream; empty if any has no time."""
-    ticks = []
-    with _open(path) as container:
+def _packet_times(path: Path, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) rising ticks of the intact packets of one stream, and (K,) of its key frames; empty if any has no time."""
+    ticks, keys = [], []
+    with open_video(path) as container:
         try:
             for packet in container.demux(container.streams[index]):
                 if packet.size == 0 or packet.is_discard or packet.is_corrupt:
                     continue
                 if packet.pts is None:
-                    return np.zeros(0, np.int64)
+                    return np.zeros(0, np.int64), np.zeros(0, np.int64)
                 ticks.append(packet.pts)
+                keys += [packet.pts] * packet.is_keyframe
         except av.FFmpegError:
             pass  # a truncated file: what was read so far is what there is
-    return np.unique(np.array(ticks, np.int64))
+    return np.unique(np.array(ticks, np.int64)), np.unique(np.array(keys, np.int64))
 
 
 def _reason(error: Exception) -> str:

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from gsac.avatar.artifacts import Clip, frame_paths
 from gsac.stages.contract import BadInput, Job, StageError
+from gsac.stages.split.config import NETWORKS
+from gsac.stages.split.crop import describe_crop
+from gsac.stages.split.people import People
 from gsac.stages.split.photos import SUFFIXES, list_photos, split_photos
 from gsac.stages.split.video import split_video
 
@@ -23,11 +26,12 @@ def run(job: Job) -> None:
         raise BadInput(f"{source.name}: the file is empty; expected a video or a folder of photos.")
     else:
         photos, plate = ([source], None) if source.suffix.lower() in SUFFIXES else ([], None)
+    people = People(job.models) if job.config.crop and all(name in job.models for name in NETWORKS) else None
     if photos:
         fields = {"fps": None, "timestamps_s": None}
-        fields |= split_photos(photos, plate, frames, job.config, job.warn, job.progress)
+        fields |= split_photos(photos, plate, frames, job.config, people, job.warn, job.progress)
     else:
-        fields = split_video(source, frames, job.config, job.warn, job.progress)
+        fields = split_video(source, frames, job.config, people, job.warn, job.progress)
 
     # clip.json holds no file name: equal content must give equal bytes.
     clip = Clip(source_sha256=_digest(photos + [plate] * (plate is not None) if photos else [source]), **fields)
@@ -36,6 +40,8 @@ def run(job: Job) -> None:
         raise StageError(f"{source.name}: {kept} frames and {len(clip.timestamps_s)} timestamps")
     if kept == 1:
         job.warn(f"{source.name} gives one frame: the avatar will be right from one side only. Record a full turn.")
+    if clip.crop is not None:
+        job.note(describe_crop(clip.crop))
     clip.write(job.out / "clip.json")
 
 

@@ -10,12 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.artifacts import Crop, frame_paths, read_frame
 from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.avatar.files import told_no_room
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
-from gsac.stages.split.pick import fit_size, pick_by_time
+from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_point, sides_near
+from gsac.stages.split.keyframes import read_key_frames
+from gsac.stages.split.people import People, find_extent
+from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
 from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, LIMITS, PQ, UNSPECIFIED, Video, file_url, probe
 
 TRANSFER_NAMES = {HLG: "arib-std-b67", PQ: "smpte2084"}
@@ -23,11 +27,14 @@ SHOWN = re.compile(r"\bn:\s*\d+ pts:\s*(-?\d+)")
 TIME_BASE = re.compile(r"config in time_base: (\d+)/(\d+)")
 LONGEST_S = 24 * 3600
 SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
+LOOKS, CHECKS, TRIES = 12, 30, 3
+"""Most key frames by which a crop is planned, most frames in which it is checked, and crops tried before the frames stay whole."""
 
 
-def split_video(path: Path, frames: Path, config: SplitConfig, warn: Callable[[str], None],
+def split_video(path: Path, frames: Path, config: SplitConfig, people: People | None, warn: Callable[[str], None],
                 progress: Callable[[int, int, str], None]) -> dict:
-    """Writes frames/%06d.png. Returns the Clip fields fps, timestamps_s, width, height, focal_px, notes."""
+    """Writes frames/%06d.png. people: who finds the person, None: the frames stay whole. Returns the Clip fields fps, timestamps_s,
+    width, height, focal_px, notes, crop, center."""
     video = probe(path)
     base = video.time_base
     if not len(video.ticks):
@@ -39,16 +46,20 @@ def split_video(path: Path, frames: Path, config: SplitConfig, warn: Callable[[s
         warn(f"{path.name} is truncated: its header promises {video.declared_frames} frames and {len(video.ticks)} are "
              "there. Those are used.")
 
-    width, height = fit_size(video.width, video.height, config.max_height)
     times = (video.ticks - video.ticks[0]) * float(base)
     if not 0 <= times[-1] <= LONGEST_S:
         raise BadInput(f"{path.name}: its frames lie {times[-1]:g} s apart from first to last; at most {LONGEST_S} s are read. "
                        "Copy the file from the phone again, or cut the clip.")
     picks = pick_by_time(times, config.fps, config.count)
-    graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, width, height))
-    output = ["-vf", graph, "-pix_fmt", "rgb24", "-compression_level", "4", "-pred", "up", "-flags", "+bitexact",
-              "-start_number", "0", "-f", "image2", "%06d.png"]
-    shown, base, errors = _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"))
+
+    def write(crop: Crop | None) -> tuple[list[int], Fraction, list[str]]:
+        width, height = frame_size(video, config, crop)
+        graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, crop, width, height))
+        output = ["-vf", graph, "-pix_fmt", "rgb24", "-compression_level", "4", "-pred", "up", "-flags", "+bitexact",
+                  "-start_number", "0", "-f", "image2", "%06d.png"]
+        return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"))
+
+    crop, (shown, base, errors) = write_about_person(path, video, frames, config, people, write)
 
     written = len(list(frames.glob("*.png")))
     if written == 0:
@@ -68,12 +79,56 @@ def split_video(path: Path, frames: Path, config: SplitConfig, warn: Callable[[s
     if video.has_alpha:
         notes.append("transparency composited over black")
     span = float(times[-1])
+    width, height = frame_size(video, config, crop)
+    whole_width, whole_height = (width, height) if crop is None else (video.width * crop.scale, video.height * crop.scale)
     return {
         "fps": (len(times) - 1) / span if span > 0 else video.rate,
         "timestamps_s": [float((tick - int(video.ticks[0])) * base) for tick in shown],
-        "width": width, "height": height, "focal_px": focal.from_video_tags(video.tags, width, height),
-        "notes": notes,
+        "width": width, "height": height, "focal_px": focal.from_video_tags(video.tags, whole_width, whole_height),
+        "notes": notes, "crop": crop,
+        "center": None if crop is None else principal_point(crop, (width, height), video.width, video.height),
     }
+
+
+def frame_size(video: Video, config: SplitConfig, crop: Crop | None) -> tuple[int, int]:
+    """Width and height of the frames, px."""
+    return fit_size(*(video.width, video.height) if crop is None else (crop.width, crop.height), config.max_height)
+
+
+Written = tuple[list[int], Fraction, list[str]]
+
+
+def write_about_person(path: Path, video: Video, frames: Path, config: SplitConfig, people: People | None,
+                       write: Callable[[Crop | None], Written]) -> tuple[Crop | None, Written]:
+    """Writes the frames, cut where the key frames say that it is worth while; and again, wider or whole, where the frames show that
+    it cuts the person."""
+    if people is None or config.max_height is None or video.height <= config.max_height:
+        return None, write(None)
+    whole = video.width, video.height, config.max_height
+    looks = read_key_frames(path, video, LOOKS, *frame_size(video, config, None))
+    extent = find_extent(people, looks, *whole)
+    for _ in range(TRIES):
+        crop = plan_crop(extent, *whole) if extent is not None else None
+        if crop is None:
+            break
+        written = write(crop)
+        found = see_frames(people, frames, crop)
+        if found is not None and not sides_near(found, crop, *whole[:2], LEAST_MARGIN).any():
+            return crop, written
+        extent = found.joined(extent).grown(sides_near(found, crop, *whole[:2], 0)) if found is not None else None
+        for frame in frame_paths(frames):
+            frame.unlink()
+    return None, write(None)
+
+
+def see_frames(people: People, frames: Path, crop: Crop) -> Extent | None:
+    """Where the person is in the frames, px of the footage; None where that is not known."""
+    people.start_anew()
+    paths, found = frame_paths(frames), None
+    for i in pick_evenly(len(paths), CHECKS):
+        seen = people.follow(read_frame(paths[i]))
+        found = seen.mapped(1 / crop.scale, crop.x, crop.y).joined(found) if seen is not None else found
+    return found if people.known else None
 
 
 def _select(ticks: np.ndarray, picks: np.ndarray) -> list[str]:
@@ -90,7 +145,13 @@ def _select(ticks: np.ndarray, picks: np.ndarray) -> list[str]:
     return [f"select='{any_of([int(t) for t in ticks[picks]])}'"]
 
 
-def _picture_filters(video: Video, width: int, height: int) -> list[str]:
+def _picture_filters(video: Video, crop: Crop | None, width: int, height: int) -> list[str]:
+    if crop is not None:
+        # In shares: where pixels are not square, the stored width or height is another one.
+        share = {name: f"{value}/{whole}" for name, value, whole in zip(
+            ("iw", "ih", "x", "y"), (crop.width, crop.height, crop.x, crop.y), (video.width, video.height) * 2, strict=True)}
+        cut = f"crop=w=iw*{share['iw']}:h=ih*{share['ih']}:x=iw*{share['x']}:y=ih*{share['y']}:exact=1"
+        return [cut, *_picture_filters(video, None, width, height)]
     scale = f"scale={width}:{height}:flags={SCALING}"
     if video.transfer in TRANSFER_NAMES:
         source = f"tin={TRANSFER_NAMES[video.transfer]}"

@@ -11,7 +11,7 @@ RECIPES = ("fast", "paper")
 AUTO = "auto"
 """`gaussians` that the size search chooses; `device` that the engine chooses; `lpips` as the recipe has it."""
 FULL_SIZE = 12000
-"""Gaussians that `auto` starts from, and that `largest` is meant for."""
+"""Gaussians that `largest` is meant for."""
 DEVICES = (AUTO, "cpu", "cuda")
 LPIPS = (AUTO, "none", "judge", "loss")
 NETWORKS = ("lpips-vgg", "lpips-alex")
@@ -28,13 +28,14 @@ class TrainConfig:
     device: str = AUTO
     """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
     gaussians: int | str = AUTO
-    """How many; auto: the smallest size whose held-out frames score as well as with 12,000. Recipe paper has one a face."""
+    """How many; auto: the smallest size whose held-out frames score as well as with as many as the person's pixels ask for, 12,000
+    for a person of 1,000 px. Recipe paper has one a face."""
     every_size: bool = False
     """Whether auto tries all its sizes instead of stopping at the first that scores worse: for `gsac bench size`."""
     steps: int | None = None
     """Optimisation steps; null: the recipe's own: fast 1400 of one frame, 3200 on cuda; paper 3000 of four frames."""
-    height: int = 540
-    """Height of the images for training and judging, px; smaller frames are not enlarged."""
+    height: int | None = None
+    """Height of the images to train on, px; null: the frames' own. Smaller frames are not enlarged."""
     seed: int = 0
     """Seed of the placement, the order of the frames and the backgrounds."""
     holdout: int = 8
@@ -106,10 +107,6 @@ class TrainConfig:
     def searches_size(self) -> bool:
         """Whether held-out frames choose the number of gaussians."""
         return self.recipe == "fast" and self.gaussians == AUTO
-
-    def budget(self) -> int:
-        """Gaussians of recipe `fast`: as many as asked for, or those that the size search starts from."""
-        return self.gaussians if isinstance(self.gaussians, int) else FULL_SIZE
 
     def check_on(self, device: str) -> None:
         """Raises BadInput where LPIPS is asked for in a loss that the device (cpu, cuda) has none of."""

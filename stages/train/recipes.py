@@ -9,6 +9,7 @@ from gsac.stages.train.fast import lod, prealign, size_search
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.cuda import Cuda
+from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
@@ -20,7 +21,7 @@ def fit_fast(backend: Backend, task: Task) -> Fit:
     """Aligns the poses, fits the given number of gaussians or searches for it, adds coarser levels, removes bone drift."""
     if task.resumed is None:
         prealign.adjust(task, backend)
-    fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, task.config.budget())
+    fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, budget(task, backend.device))
     require_finite("after the last step", named_values(fit.gaussians))
     levels = [fit.gaussians, *lod.fit_levels(task, backend, fit)]
     fit.gaussians, *fit.coarser = bone_drift.remove_drift(levels, task.poses, task.trained)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -19,7 +21,7 @@ from gsac.avatar.cuda.device import Device
 from gsac.avatar.files import write_file
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import LEAST_SIDE, Lpips
-from gsac.avatar.metrics import figures, summary
+from gsac.avatar.metrics import figures, mean_psnr, summary
 from gsac.avatar.yaw import turn_seen
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
@@ -30,14 +32,14 @@ from gsac.stages.train.config import NETWORKS, TrainConfig
 from gsac.stages.train.fast.lod import judge_levels
 from gsac.stages.train.finite import named_result, named_values, require_finite
 from gsac.stages.train.judge.coverage import unseen_parts
-from gsac.stages.train.judge.heldout import Candidate, draw_all_round, judge, judge_all
+from gsac.stages.train.judge.heldout import Candidate, draw_all_round, find_boxes, judge, judge_person
 from gsac.stages.train.judge.likeness import judge_likeness
 from gsac.stages.train.judge.novel_poses import judge_novel
 from gsac.stages.train.judge.surface import seen_area
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View, read_views
+from gsac.stages.train.views import View, read_views, read_whole
 from gsac.stages.train.warmup import warm_up
 
 LOSS_ROWS = 20
@@ -50,6 +52,10 @@ LEAST_SEEN = 0.8
 """Share of the body's surface in view below which the user is warned."""
 TRAIN_SAMPLE = 8
 """Trained frames, at most, that `psnr_fg_train` is the mean of."""
+SMALL = 540
+"""Height, px, that held-out frames are also judged at, to compare with older figures, and at most that poses are aligned at."""
+ALSO_SMALL = ("psnr_fg", "psnr_face", "psnr_hands", "detail", "ssim")
+"""Figures that are told at that size, too."""
 JUDGING = 4, "parts of judging"
 """What the progress of judging is counted in."""
 
@@ -91,12 +97,12 @@ def run(job: Job) -> None:
     if turn < LEAST_TURN:
         job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
 
-    if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].camera)):
+    if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].frame)):
         if config.lpips == "loss":
             raise BadInput(f"train.lpips is loss, but {why}; set train.lpips to judge")
         job.warn(f"LPIPS takes no part in the loss: {why}.")
 
-    run = Run(job, Poses(body, params), views, trained, held, choosing)
+    run = Run(job, Poses(body, params), camera, views, trained, held, choosing)
     run.fit()
     if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
         job.warn(f"No frame shows the {', '.join(parts)}; the avatar has there the colours of what lies around.")
@@ -137,12 +143,26 @@ def due(step: int, steps: int, times: int) -> bool:
     return step * times // steps > (step - 1) * times // steps
 
 
+def at_test(metrics: dict[str, Any]) -> dict[str, Any]:
+    """The figures under their names for poses that are aligned at test time."""
+    return {f"{name}_ttpo": value for name, value in metrics.items() if name != "lpips_net"}
+
+
+def pick_small(rows: list[dict]) -> dict[str, float | None]:
+    """The figures of `ALSO_SMALL` of scores at that size."""
+    found = summary(rows)
+    return {name: found[name] for name in ALSO_SMALL}
+
+
 class Run:
     """One training: the recipe under a clock with its curve and checkpoints, and the files and figures of its result."""
 
-    def __init__(self, job: Job, poses: Poses, views: list[View], trained: np.ndarray, held: np.ndarray, choosing: np.ndarray):
-        """Indices of frames: trained (n,); held (m,), which are judged; choosing (c,), which the recipe chooses by."""
-        self.job, self.poses, self.views, self.trained, self.held = job, poses, views, trained, held
+    def __init__(self, job: Job, poses: Poses, camera: Camera, views: list[View], trained: np.ndarray, held: np.ndarray,
+                 choosing: np.ndarray):
+        """camera: of the frames on disk; views: (T,), to train on. Indices of frames: trained (n,); held (m,), which are judged;
+        choosing (c,), which the recipe chooses by.
+        """
+        self.job, self.poses, self.camera, self.views, self.trained, self.held = job, poses, camera, views, trained, held
         self.choosing = choosing
         self.curve: list[dict] = []
         self.losses: list[float] = []
@@ -150,19 +170,31 @@ class Run:
         self.checkpoints = Checkpoints(job.scratch, job.warn)
         self.resumed_at: int | None = None
         self.lpips = {name: Lpips.read(name, job.models[name]) for name in job.config.wishes() if name in job.models}
-        in_loss = job.config.in_loss() and not without_lpips(job.config, job.device, views[0].camera)
+        in_loss = job.config.in_loss() and not without_lpips(job.config, job.device, views[0].frame)
         self.in_loss = self.lpips.get(NETWORKS[0]) if in_loss else None
+
+    @cached_property
+    def filmed(self) -> dict[int, View]:
+        """Held-out frame -> its view, whole and as large as it was filmed."""
+        return self.read(self.held)
+
+    def read(self, frames: np.ndarray) -> dict[int, View]:
+        """`read_whole` of frames, (n,) indices."""
+        return read_whole(self.job.inputs["split/frames"], self.job.inputs["segment/alpha"], self.camera, frames)
 
     def fit(self) -> None:
         """Runs the recipe, from a checkpoint where there is one."""
+        config, chosen_by = self.job.config, {}
+        if config.searches_size():
+            chosen_by = self.filmed if self.choosing is self.held else self.read(self.choosing)
         self.began = read_clocks()
-        task = Task(self.views, self.trained, self.choosing, self.poses, self.job.config, self.job.progress, self.checkpoint,
-                    self.marks, self.keep, lpips=self.in_loss)
+        task = Task(self.views, self.trained, self.choosing, self.poses, config, self.job.progress, self.checkpoint,
+                    self.marks, self.keep, filmed=chosen_by, lpips=self.in_loss)
         state = self.checkpoints.read()
         if state is not None:
             self.restore(state)
             task.resumed = state["recipe"]
-        self.result = RECIPES[self.job.config.recipe, self.job.device](task)
+        self.result = RECIPES[config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
         require_finite("after the last step", named_result(self.result.gaussians, self.poses))
         self.seen_area = seen_area(self.poses, self.trained, self.views)
@@ -205,7 +237,7 @@ class Run:
         self.losses.clear()
         if len(self.held) and due(step, steps, self.job.config.curve):
             shown = gaussians()
-            row |= {"psnr_fg": self.psnr_fg(shown, self.poses_of_all(), self.held), "n_gaussians": len(shown)}
+            row |= {"psnr_fg": self.psnr_fg(shown, self.poses_of_all(), self.filmed), "n_gaussians": len(shown)}
         self.curve.append(row)
         self.aside += self.clock() - before
 
@@ -213,9 +245,15 @@ class Run:
         """The poses, those of frames that were not trained on interpolated between their neighbours."""
         return carry_to_untrained(self.poses, self.trained)
 
-    def psnr_fg(self, gaussians: Gaussians, poses: Poses, frames: Iterable[int]) -> float | None:
+    def psnr_fg(self, gaussians: Gaussians, poses: Poses, views: dict[int, View]) -> float | None:
         """dB on the person, mean over some frames; None of no frame."""
-        return summary(judge(gaussians, poses, frames, self.views))["psnr_fg"]
+        return mean_psnr(judge_person([Candidate(gaussians, poses, list(views), views)])[0], "mse_fg")
+
+    def judge_both(self, gaussians: Gaussians, poses: Poses, small: dict[int, View],
+                   folder: Path | None = None) -> tuple[list[dict], list[dict]]:
+        """Scores of the held-out frames as filmed and in their small views. folder: for the images as filmed."""
+        rows = judge(gaussians, poses, self.held, self.filmed, folder, self.job.config.flip, self.lpips)
+        return rows, rows if self.camera.height <= SMALL else judge(gaussians, poses, self.held, small)
 
     def write(self) -> None:
         """Writes the stage's outputs."""
@@ -241,25 +279,24 @@ class Run:
     def metrics(self, gaussians: Gaussians, poses: Poses, folder: Path) -> dict:
         """The content of metrics.json. folder: where the images of the held-out frames go."""
         config, held = self.job.config, self.held
-        rows = judge(gaussians, poses, held, self.views, folder, config.flip, self.lpips)
+        small = {t: view.reduced(SMALL) for t, view in self.filmed.items()}
+        rows, small_rows = self.judge_both(gaussians, poses, small, folder)
         self.job.progress(1, *JUDGING)
+        aligned, ttpo, small_ttpo = poses.copy(), [], []
+        if config.pose_test_steps:
+            BACKENDS[self.job.device].align_poses(gaussians, aligned, held, small, config.pose_test_steps)
+            ttpo, small_ttpo = self.judge_both(gaussians, aligned, small)
+        self.job.progress(2, *JUDGING)
         fitted = poses.copy()
         fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
-        aligned = poses.copy()
-        if config.pose_test_steps:
-            BACKENDS[self.job.device].align_poses(gaussians, aligned, held, self.views, config.pose_test_steps)
-            ttpo = judge(gaussians, aligned, held, self.views, None, config.flip, self.lpips)
-        else:
-            ttpo = []
-        self.job.progress(2, *JUDGING)
-        sample = self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]
-        of_fit, of_trained = judge_all([Candidate(gaussians, fitted, held, self.views),
-                                        Candidate(gaussians, poses, sample, self.views)])
+        of_fit = self.psnr_fg(gaussians, fitted, self.filmed)
+        of_trained = self.psnr_fg(gaussians, poses, self.read(self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]))
         self.job.progress(3, *JUDGING)
-        return summary(rows) | {
-            **{f"{name}_ttpo": value for name, value in summary(ttpo).items() if name != "lpips_net"},
-            "psnr_fg_fit": summary(of_fit)["psnr_fg"],
-            "psnr_fg_train": summary(of_trained)["psnr_fg"],
+        trained = self.views[0].frame
+        return summary(rows) | at_test(summary(ttpo)) | {
+            f"at_{SMALL}": pick_small(small_rows) | at_test(pick_small(small_ttpo)),
+            "psnr_fg_fit": of_fit,
+            "psnr_fg_train": of_trained,
             "pose_at_test": {
                 "psnr_fg": "between the refined poses of the neighbouring trained frames, plus what the body fit has beside its "
                            "own there, as far as that proved right in trained frames; at the clip's ends and between far views the "
@@ -270,14 +307,16 @@ class Run:
             "light": None if gaussians.light is None else gaussians.light.tolist(),
             "n_gaussians": len(gaussians), "steps": self.curve[-1]["step"], "recipe": config.recipe,
             "device": self.job.device, "seed": config.seed,
-            "image_size": [self.views[0].camera.width, self.views[0].camera.height],
+            "image_size": [self.camera.width, self.camera.height], "trained_size": [trained.width, trained.height],
             "trained_frames": len(self.trained), "heldout_frames": [int(t) for t in held],
-            "heldout": [{"frame": t, **figures(row), **{f"{name}_ttpo": value for name, value in figures(other).items()}}
+            "heldout": [{"frame": t, "face_box": find_boxes(poses, t, self.camera).get("face"), **figures(row),
+                         **at_test(figures(other))}
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
             "lpips_in_loss": self.in_loss is not None,
-            "levels": judge_levels(gaussians, self.result.coarser, poses, held, self.views),
-            "likeness": judge_likeness(gaussians, aligned, held, self.views),
+            "levels": judge_levels(gaussians, self.result.coarser, poses,
+                                   {t: view.reduced(trained.height) for t, view in self.filmed.items()}, trained.height),
+            "likeness": judge_likeness(gaussians, aligned, held, self.filmed),
             "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),

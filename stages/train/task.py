@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,7 +22,7 @@ LPIPS_WEIGHT = 0.01
 @dataclass
 class Task:
     views: list[View]
-    """(T,) whole frames at the height that is trained on."""
+    """(T,) frames at the height that is trained on, each cropped to its person."""
     trained: np.ndarray
     """(n,) indices of the frames to train on."""
     choosing: np.ndarray
@@ -41,6 +41,8 @@ class Task:
     process die. The caller keeps the poses. Not called on the GPU, where a training takes seconds."""
     resumed: State | None = None
     """The state that a stopped run gave to `keep`; poses are as they were then."""
+    filmed: Mapping[int, View] = field(default_factory=dict)
+    """Frame of `choosing` -> its view, whole and as large as it was filmed, to judge by."""
     lpips: Lpips | None = None
     """The network (VGG) in the loss, where LPIPS is wanted there and the user has brought the weights."""
     gpu_seconds: float = 0.0

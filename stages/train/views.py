@@ -1,7 +1,8 @@
-"""Frames as the trainer uses them: scaled, cut out with the mask, cropped to the person's box, 8 bit."""
+"""Frames as training and judging use them, cut out with the mask, 8 bit: scaled and cropped to the person, or whole as filmed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,8 @@ from gsac.stages.contract import StageError
 
 MARGIN = 0.06
 """Margin round the mask's box, in units of its height: limbs may move there while poses are refined."""
+FAINT = 25
+"""Value of the mask, 0..255, up to which a pixel shows nobody."""
 LEAST_SHARE = 2e-4
 """A mask that covers less of the frame counts as empty."""
 
@@ -30,36 +33,80 @@ class View:
     """(h, w, 4) uint8, premultiplied RGB and mask."""
     corner: tuple[int, int]
     """x, y of the crop in the frame, px."""
+    whole: Camera | None = None
+    """The frame's camera, at this size, where this is a crop of it."""
+
+    @property
+    def frame(self) -> Camera:
+        """The camera of the whole frame at this size."""
+        return self.whole or self.camera
 
     def crop(self, x0: int, y0: int, x1: int, y1: int) -> View:
         """Columns x0 to x1 and rows y0 to y1, px, the last ones excluded."""
         c = self.camera
         return View(Camera(c.focal, (c.center[0] - x0, c.center[1] - y0), x1 - x0, y1 - y0),
-                    np.ascontiguousarray(self.pixels[y0:y1, x0:x1]), (self.corner[0] + x0, self.corner[1] + y0))
+                    np.ascontiguousarray(self.pixels[y0:y1, x0:x1]), (self.corner[0] + x0, self.corner[1] + y0), self.frame)
 
     def halved(self) -> View:
         """The view at half its size, with corner (0, 0)."""
-        w, h = max(1, self.camera.width // 2), max(1, self.camera.height // 2)
-        return View(self.camera.scaled(w, h), cv2.resize(self.pixels, (w, h), interpolation=cv2.INTER_AREA), (0, 0))
+        return self.resized(max(1, self.camera.width // 2), max(1, self.camera.height // 2))
+
+    def reduced(self, height: int) -> View:
+        """The view at a height, px, with corner (0, 0); as it is where it is not higher."""
+        w, h = self.camera.width, self.camera.height
+        return self if h <= height else self.resized(max(1, round(w * height / h)), height)
+
+    def resized(self, width: int, height: int) -> View:
+        """The view at a smaller size, px, by area, with corner (0, 0)."""
+        pixels = cv2.resize(self.pixels, (width, height), interpolation=cv2.INTER_AREA)
+        return View(self.camera.scaled(width, height), pixels, (0, 0))
 
 
-def read_views(frames: Path, alphas: Path, camera: Camera, height: int) -> tuple[list[View], list[int]]:
-    """All T frames, whole, at most `height` px high. camera: of the frames on disk.
+Views = Mapping[int, View] | list[View]
+"""Views by frame."""
+
+
+def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None) -> tuple[list[View], list[int]]:
+    """All T frames, at most `height` px high (None: as they are), each cropped to its person. camera: of the frames on disk.
 
     Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not fit the frames.
     """
+    paths = pair_masks(frames, alphas)
+
+    def read(pair: tuple[Path, Path]) -> tuple[View, bool]:
+        view, share = _read_view(*pair, camera, height)
+        if share < LEAST_SHARE or not (view.pixels[..., 3] > FAINT).any():
+            return view.crop(0, 0, 1, 1), False
+        return person_crop(view), True
+
+    with ThreadPoolExecutor(available_cores()) as pool:
+        found = list(pool.map(read, paths))
+    return [view for view, _ in found], [t for t, (_, shown) in enumerate(found) if not shown]
+
+
+def read_whole(frames: Path, alphas: Path, camera: Camera, chosen: Iterable[int]) -> dict[int, View]:
+    """Frame -> its view, whole and as large as its file, of the chosen frames. camera: of the frames on disk.
+
+    Raises StageError for masks that do not fit the frames.
+    """
+    paths = pair_masks(frames, alphas)
+    chosen = [int(t) for t in chosen]
+    with ThreadPoolExecutor(available_cores()) as pool:
+        return dict(zip(chosen, pool.map(lambda t: _read_view(*paths[t], camera)[0], chosen), strict=True))
+
+
+def pair_masks(frames: Path, alphas: Path) -> list[tuple[Path, Path]]:
+    """(T,) the files of each frame and its mask, from the folders. Raises StageError for a frame without a mask."""
     masks = {p.stem: p for p in frame_paths(alphas)}
     paths = frame_paths(frames)
     for path in paths:
         if path.stem not in masks:
             raise StageError(f"{alphas}: no mask for frame {path.name}; run segment again")
-    with ThreadPoolExecutor(available_cores()) as pool:
-        read = list(pool.map(lambda path: _read_view(path, masks[path.stem], camera, height), paths))
-    return [view for view, _ in read], [t for t, (_, shown) in enumerate(read) if shown < LEAST_SHARE]
+    return [(path, masks[path.stem]) for path in paths]
 
 
-def _read_view(path: Path, mask: Path, camera: Camera, height: int) -> tuple[View, float]:
-    """The frame cut out with its mask, and the share of it that the mask covers."""
+def _read_view(path: Path, mask: Path, camera: Camera, height: int | None = None) -> tuple[View, float]:
+    """The frame cut out with its mask, at most `height` px high, and the share of it that the mask covers."""
     rgb, alpha = read_frame(path), read_alpha(mask)
     if alpha.shape != rgb.shape[:2]:
         raise StageError(f"{mask}: mask is {alpha.shape[1]}x{alpha.shape[0]} px, its frame {rgb.shape[1]}x{rgb.shape[0]}")
@@ -67,7 +114,7 @@ def _read_view(path: Path, mask: Path, camera: Camera, height: int) -> tuple[Vie
         raise StageError(f"{mask}: mask is not finite")
     alpha = np.clip(alpha, 0, 1)
     pixels = np.dstack([rgb * alpha[..., None], alpha * 255])
-    h = min(height, rgb.shape[0])
+    h = min(height or rgb.shape[0], rgb.shape[0])
     w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
     if (w, h) != (rgb.shape[1], rgb.shape[0]):
         pixels = cv2.resize(pixels, (w, h), interpolation=cv2.INTER_AREA)
@@ -76,7 +123,7 @@ def _read_view(path: Path, mask: Path, camera: Camera, height: int) -> tuple[Vie
 
 def person_crop(view: View) -> View:
     """The view cut to the box of its mask and a margin."""
-    rows, columns = (np.flatnonzero((view.pixels[..., 3] > 25).any(axis)) for axis in (1, 0))
+    rows, columns = (np.flatnonzero((view.pixels[..., 3] > FAINT).any(axis)) for axis in (1, 0))
     margin = int(np.ceil(MARGIN * (rows[-1] - rows[0]))) + 4
     return view.crop(max(columns[0] - margin, 0), max(rows[0] - margin, 0),
                      min(columns[-1] + 1 + margin, view.camera.width), min(rows[-1] + 1 + margin, view.camera.height))

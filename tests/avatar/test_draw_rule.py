@@ -10,7 +10,7 @@ from gsac.avatar import draw_rule
 from gsac.avatar.cuda.kernels import source
 
 ROOT = Path(__file__).resolve().parents[2]
-FILE_NAMES = {"low_pass_px2": draw_rule.BLUR, "alpha_max": draw_rule.MAX_ALPHA, "alpha_min": draw_rule.MIN_ALPHA}
+FILE_NAMES = {"low_pass_px2": draw_rule.ADDED.px2, "alpha_max": draw_rule.MAX_ALPHA, "alpha_min": draw_rule.MIN_ALPHA}
 NUMBER = r"([\d.]+f?(?: ?/ ?[\d.]+f?)?)"
 
 

@@ -82,9 +82,10 @@ def levels_of(mesh):
 def test_coarser_levels_come_back_in_order_and_readers_that_know_none_read_the_finest(mesh, tmp_path):
     finest, *coarser = levels_of(mesh)
     finest.light = np.ones((4, 3), np.float32)
+    coarser[0].max_height_px, coarser[1].max_height_px = 270, 135
     finest.write(tmp_path / "avatar.npz", coarser)
     again = Gaussians.read_levels(tmp_path / "avatar.npz")
-    assert [len(level) for level in again] == [30, 10, 4]
+    assert [len(level) for level in again] == [30, 10, 4] and [level.max_height_px for level in again] == [None, 270, 135]
     for level, wanted in zip(again, (finest, *coarser), strict=True):
         for name in artifacts.AVATAR_SHAPES:
             np.testing.assert_array_equal(getattr(level, name), getattr(wanted, name))
@@ -98,6 +99,7 @@ def test_coarser_levels_come_back_in_order_and_readers_that_know_none_read_the_f
 
 @pytest.mark.parametrize(("name", "value", "words"), [
     ("levels", np.int32([10, 5]), "levels"), ("levels", np.int32([4, 10]), "levels"), ("levels", np.int32([14, 0]), "levels"),
+    ("level_heights", np.float32([270]), "level_heights"), ("level_heights", np.float32([270, 0]), "level_heights"),
     ("coarser_mu", np.zeros((3, 3), np.float32), "coarser_mu"), ("coarser_rgb", np.full((14, 3), np.nan, np.float32), "finite")])
 def test_levels_that_do_not_belong_together_are_refused_by_name(mesh, tmp_path, name, value, words):
     finest, *coarser = levels_of(mesh)

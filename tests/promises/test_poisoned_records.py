@@ -59,7 +59,7 @@ def test_poisoned_records_touch_nothing_outside_and_pass_no_wrong_result(tmp_pat
     for trial in range(TRIALS):
         poison(random.Random(trial), file, home, other_file)
         if trial % 3 == 1:
-            ls(store), store.previous("train", other.parts), store.usual_seconds("train")
+            ls(store), store.previous("train", other.parts), store.recent("train", 5)
         if trial % 3 == 2:
             verify(store)
         if trial % 20 == 3:

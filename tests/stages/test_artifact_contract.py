@@ -1,7 +1,8 @@
 """Every array of an artifact is declared, documented and checked: by the stage that writes it and by each that reads it."""
 
 import importlib
-from dataclasses import fields
+import json
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from gsac.avatar.artifacts import (
     LIGHT_SHAPE,
     ArtifactError,
     Clip,
+    Crop,
     write_arrays,
 )
 from gsac.avatar.body import Body
@@ -86,7 +88,8 @@ def test_what_only_some_clips_have_may_be_absent_altogether(tmp_path, port, few)
     next(output.check for output in STAGES[name].outputs if output.path == path)(tmp_path / path)
 
 
-@pytest.mark.parametrize("field", [field.name for field in fields(Clip) if field.name != "notes"])
+@pytest.mark.parametrize("field", [field.name for field in fields(Clip)
+                                   if field.default_factory is MISSING and field.default is MISSING])
 def test_clip_json_names_the_field_that_it_lacks(tmp_path, field):
     path = write_whole(tmp_path)["split/clip.json"]
     path.write_text(path.read_text().replace(f'"{field}"', '"other"'))
@@ -99,3 +102,15 @@ def test_every_array_stands_in_the_contract(port):
     sections = {heading: text for part in PAGE.read_text().split("\n## ")[1:] for heading, _, text in [part.partition("\n")]}
     text = "".join(body for heading, body in sections.items() if port.split("/")[0] in heading.split(", "))
     assert [array for array in PORTS[port] if f"`{array}`" not in text] == []
+
+
+def test_clip_json_has_crop_and_principal_point_only_where_the_footage_was_cut_and_gives_them_back(tmp_path):
+    whole = Clip.read(write_whole(tmp_path)["split/clip.json"])
+    assert whole.principal_point == (32, 32) and whole.longer_side == 64
+    assert not {"crop", "center"} & json.loads((tmp_path / "split/clip.json").read_text()).keys()
+    cut = replace(whole, crop=Crop(10, 20, 128, 128, 0.5), center=(40.5, 70.25))
+    cut.write(tmp_path / "clip.json")
+    assert Clip.read(tmp_path / "clip.json") == cut and cut.principal_point == (40.5, 70.25) and cut.longer_side == 160.5
+    (tmp_path / "clip.json").write_text((tmp_path / "clip.json").read_text().replace('"scale"', '"skale"'))
+    with pytest.raises(ArtifactError, match="clip.json: crop and center must be"):
+        Clip.read(tmp_path / "clip.json")

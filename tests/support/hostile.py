@@ -109,9 +109,15 @@ def files(data):
             {"licence": {"x": 1}}, {"licence": []}, {"provenance": None}, {"format": "other"}, {"format": None},
             {"ground": "0"}, {"ground": None}, {"ground": True}, {"ground": 1e7}, {"blend": None}, {"blend": []},
             {"blend": {"low_pass_px2": ""}}, {"blend": {"low_pass_px2": -1}}, {"blend": {"alpha_max": 1.5}},
-            {"blend": {"alpha_min": 0}}, {"blend": {"alpha_min": [1]}}]):
+            {"blend": {"alpha_min": 0}}, {"blend": {"alpha_min": [1]}}, {"blend": {"low_pass_energy": 1}},
+            {"blend": {"low_pass_energy": None}}, {"blend": {"low_pass_energy": "true"}},
+            *({"levels": [*head["levels"][:1], head["levels"][1] | {"max_height_px": height}]}
+              for height in (0, -1, 0.5, 1e7, 10 ** 400, True, "270", [270]))]):
         out[f"head{n}"] = built(head | change, body), {"head", "value", "block"}
-    for n, change in enumerate([{"blend": {}}, {"blend": {"alpha_min": 1, "other": None}}, {"ground": 10 ** 6}, {"x": 10 ** 400},
+    for n, change in enumerate([{"blend": {"low_pass_energy": True}}, {"blend": {"low_pass_px2": 0, "low_pass_energy": True}},
+                                {"levels": [level | {"max_height_px": None} for level in head["levels"]]},
+                                {"levels": [level | {"max_height_px": 270 + n} for n, level in enumerate(head["levels"])]},
+                                {"blend": {}}, {"blend": {"alpha_min": 1, "other": None}}, {"ground": 10 ** 6}, {"x": 10 ** 400},
                                 {"x": {"__proto__": [1e308, -10 ** 400]}}]):
         out[f"odd{n}"] = built(head | change, body), {"ok"}
     out["no_drawing"] = built({k: v for k, v in head.items() if k not in ("ground", "blend")}, body), {"ok"}

@@ -36,7 +36,7 @@ def test_mesh_skeleton_skin_expressions_and_gaussians_are_those_of_the_python_re
     for name in FIELDS:
         np.testing.assert_array_equal(got[0][name], np.ravel(getattr(avatar.gaussians, name)), name)
     np.testing.assert_array_equal(got[0]["light"], LIGHT.ravel())
-    np.testing.assert_allclose(got[0]["blend"], [.3, .999, 1 / 255, avatar.ground], rtol=1e-6)
+    np.testing.assert_allclose(got[0]["blend"], [.3, .999, 1 / 255, avatar.ground, 0], rtol=1e-6)
 
 
 def test_names_poses_and_clips_are_those_of_the_python_reader(got, avatar):

@@ -61,7 +61,8 @@ def picture(gpu, passes, scene, pipeline, flipped=False, linear=0):
     screen = np.array([SIZE, SIZE, 0, 0])
     parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(scene["camera"], flipped).T,
                   "_ScreenParams": screen, "_ScaledScreenParams": screen, "_ScreenSize": screen,
-                  "_WorldSpaceCameraPos": [*eye, 0], "GsacBlend": np.array([.3, .999, 1 / 255, linear]), "GsacIndexBits": 13,
+                  "_WorldSpaceCameraPos": [*eye, 0], "GsacBlend": np.array([.3, .999, 1 / 255, linear]),
+                  "GsacKeepsEnergy": 0, "GsacIndexBits": 13,
                   **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
     return Painting(gpu, *passes[pipeline], SIZE, SIZE, N).draw(parameters)
 

@@ -258,7 +258,7 @@ def test_a_link_shows_what_is_seen_and_the_avatar_is_saved_as_its_own_file(page,
     link = page.run("describeView(gsac)")
     for words in ("clip=walk", "t=0.", "yaw=35", "bg=203040", "joints=head:0,20,0", "expression=jawOpen:0.5", "light=off"):
         assert words in link
-    state = "JSON.stringify([gsac.playing, gsac.camera.yaw, gsac.background, gsac.turned, gsac.expression, gsac.binding.lit])"
+    state = "JSON.stringify([gsac.playing, gsac.camera.yaw, gsac.background, gsac.turned, gsac.expression, gsac.levels.lit])"
     before = page.run(state)
     page.open(link)
     assert page.run(state) == before
@@ -336,7 +336,7 @@ def test_a_figure_at_rest_is_drawn_once_and_again_after_each_change(page):
     soon = "new Promise((done) => setTimeout(done, 250))"
     page.run(soon)
     for change in ("expression = { jawOpen: 1 }", "turned = { left_elbow: [0, -40, 0] }", "background = '#102030'",
-                   "camera.yaw += 10", "camera.zoom(0.9)", "binding.lit = !gsac.binding.lit", "choose({ pose: 'T' })"):
+                   "camera.yaw += 10", "camera.zoom(0.9)", "levels.lit = !gsac.levels.lit", "choose({ pose: 'T' })"):
         page.until("(() => { const now = gsac.state, still = window.before === now; window.before = now; return still; })()")
         page.run("window.drawn = 0")
         page.run(soon)

@@ -87,10 +87,10 @@ def test_its_button_switches_it_and_is_there_only_where_a_light_is(browser, addr
     for pressed in ("true", "false", "true"):
         assert browser.run(f"{button}.getAttribute('aria-pressed')") == pressed and browser.run(f"{button}.offsetParent !== null")
         browser.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        factors.append(np.array(browser.run("Array.from(gsac.binding.data)")).reshape(-1, 12)[:100, 9:])
+        factors.append(np.array(browser.run("Array.from(gsac.levels.binding.data)")).reshape(-1, 12)[:100, 9:])
         browser.run(f"{button}.click()")
     assert np.ptp(factors[0]) > 0.5 and (factors[1] == 1).all()
     np.testing.assert_array_equal(factors[0], factors[2])
     browser.open((exported / "viewer.html").as_uri())
-    assert browser.run(f"{button}.offsetParent === null && gsac.binding.data[9] === 1")
+    assert browser.run(f"{button}.offsetParent === null && gsac.levels.binding.data[9] === 1")
     assert browser.errors == []

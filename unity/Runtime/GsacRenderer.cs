@@ -37,7 +37,7 @@ namespace Gsac
 
         static Camera[] cameras = new Camera[8];
 
-        [SerializeField, Tooltip("m: nearer than this the finest level of detail is drawn; each doubling takes the next, where the file has more.")]
+        [SerializeField, Tooltip("m: where coarser levels of detail begin, if the file does not say at which height; each doubling takes the next.")]
         float finestWithin = 8;
 
         [SerializeField, Tooltip("0..1: how far the avatar stands in the light of the room in which its clip was filmed; 0 is even light.")]
@@ -54,7 +54,7 @@ namespace Gsac
         int drawn;
         string trouble;
 
-        /// <summary>m: where an avatar with several levels of detail begins to use coarser ones.</summary>
+        /// <summary>m: where an avatar begins to use coarser levels of detail, if its file does not say at which height in px.</summary>
         public float FinestWithin
         {
             get { return finestWithin; }
@@ -106,13 +106,14 @@ namespace Gsac
             }
             int count = Cameras();
             if (count == 0) return;
+            GsacSkeleton.Bones(model.Data, transform, avatar.Joints, boneRows);
             GsacModel.Level level = model.Levels[Level(count)];
             if (level.Count == 0) return;
             Bind(level);
             float low, high;
             for (int i = 0; i < count; i++)
             {
-                if ((cameras[i].cullingMask & (1 << gameObject.layer)) == 0) continue;
+                if (!IsSeenBy(cameras[i])) continue;
                 GsacView view = View(cameras[i]);
                 if (view.Depths(transform, boneRows, model, out low, out high)) view.Draw(kernels, splats, level, model, transform, low, high);
             }
@@ -157,7 +158,6 @@ namespace Gsac
 
         void Bind(GsacModel.Level level)
         {
-            GsacSkeleton.Bones(model.Data, transform, avatar.Joints, boneRows);
             avatar.CollectWeights();
             bones.SetData(boneRows);
             if (avatar.DrawnWeights.Length > 0) weights.SetData(avatar.DrawnWeights);
@@ -210,13 +210,31 @@ namespace Gsac
             cameras = new Camera[most];
         }
 
-        /// <summary>Level of detail for the nearest camera; the one of before while the distance is about where they change.</summary>
+        bool IsSeenBy(Camera camera)
+        {
+            return (camera.cullingMask & (1 << gameObject.layer)) != 0;
+        }
+
+        /// <summary>
+        /// Level of detail for the camera that sees the person largest; the one of before while that is about where they change.
+        /// </summary>
         int Level(int count)
+        {
+            if (!model.Data.HasHeights) return LevelByDistance(count);
+            float height = 0;
+            for (int i = 0; i < count; i++)
+            {
+                if (IsSeenBy(cameras[i])) height = Math.Max(height, View(cameras[i]).Height(transform, boneRows, model));
+            }
+            return drawn = Math.Min(Math.Max(drawn, model.Data.LevelAt(height / Slack)), model.Data.LevelAt(height));
+        }
+
+        /// <summary>As Level, of files that say no heights: for the nearest camera.</summary>
+        int LevelByDistance(int count)
         {
             float nearest = float.MaxValue;
             for (int i = 0; i < count; i++) nearest = Math.Min(nearest, Vector3.Distance(cameras[i].transform.position, transform.position));
-            drawn = Math.Min(Math.Max(drawn, LevelAt(nearest * Slack)), LevelAt(nearest));
-            return drawn;
+            return drawn = Math.Min(Math.Max(drawn, LevelAt(nearest * Slack)), LevelAt(nearest));
         }
 
         int LevelAt(float distance)

@@ -77,6 +77,15 @@ namespace Gsac
             pose.Transl[2] = moved.z;
         }
 
+        /// <summary>Where the rows of `Bones` put a joint, in the space of their root.</summary>
+        public static Vector3 Posed(GsacData data, Vector4[] rows, int joint)
+        {
+            float x = data.Joints[joint * 3], y = data.Joints[joint * 3 + 1], z = data.Joints[joint * 3 + 2];
+            Vector4 r0 = rows[joint * 3], r1 = rows[joint * 3 + 1], r2 = rows[joint * 3 + 2];
+            return new Vector3(r0.x * x + r0.y * y + r0.z * z + r0.w, r1.x * x + r1.y * y + r1.z * z + r1.w,
+                               r2.x * x + r2.y * y + r2.z * z + r2.w);
+        }
+
         /// <summary>Rows of rest -> posed, J x 3, in the space of `root`.</summary>
         public static void Bones(GsacData data, Transform root, Transform[] joints, Vector4[] rows)
         {

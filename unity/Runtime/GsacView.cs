@@ -18,6 +18,7 @@ namespace Gsac
         static readonly int KeysId = Shader.PropertyToID("GsacKeys");
         static readonly int ColoursId = Shader.PropertyToID("GsacColours");
         static readonly int BlendId = Shader.PropertyToID("GsacBlend");
+        static readonly int KeepsEnergyId = Shader.PropertyToID("GsacKeepsEnergy");
         static readonly int[] ModelIds =
         {
             Shader.PropertyToID("GsacModel0"), Shader.PropertyToID("GsacModel1"), Shader.PropertyToID("GsacModel2"),
@@ -61,15 +62,12 @@ namespace Gsac
             low = float.MaxValue;
             high = float.MinValue;
             Vector3 least = new Vector3(float.MaxValue, float.MaxValue, float.MaxValue), most = -least;
-            float[] rest = model.Data.Joints;
             for (int j = 0; j < model.Data.JointCount; j++)
             {
-                float x = rest[j * 3], y = rest[j * 3 + 1], z = rest[j * 3 + 2], radius = model.Extent.Radius[j];
+                float radius = model.Extent.Radius[j];
                 if (radius == 0) continue;
                 radius += model.Extent.Pad;
-                Vector4 b0 = bones[j * 3], b1 = bones[j * 3 + 1], b2 = bones[j * 3 + 2];
-                var place = new Vector3(b0.x * x + b0.y * y + b0.z * z + b0.w, b1.x * x + b1.y * y + b1.z * z + b1.w,
-                                        b2.x * x + b2.y * y + b2.z * z + b2.w);
+                Vector3 place = GsacSkeleton.Posed(model.Data, bones, j);
                 float depth = depthRow.x * place.x + depthRow.y * place.y + depthRow.z * place.z + depthRow.w;
                 low = Math.Min(low, depth - radius * size);
                 high = Math.Max(high, depth + radius * size);
@@ -81,6 +79,35 @@ namespace Gsac
             // keys are spent on what lies before the eye
             low = Math.Max(low, 0);
             return high > low;
+        }
+
+        /// <summary>
+        /// Height of the person in the camera's picture, px: of the rest mesh, where the joint nearest to the eye is. Of the
+        /// two eyes of a headset the larger.
+        /// </summary>
+        public float Height(Transform root, Vector4[] bones, GsacModel model)
+        {
+            Matrix4x4 m = root.localToWorldMatrix;
+            if (!Camera.stereoEnabled) return Height(Camera.projectionMatrix, Camera.worldToCameraMatrix * m, bones, model);
+            return Math.Max(Height(Camera.StereoscopicEye.Left, m, bones, model), Height(Camera.StereoscopicEye.Right, m, bones, model));
+        }
+
+        float Height(Camera.StereoscopicEye eye, Matrix4x4 m, Vector4[] bones, GsacModel model)
+        {
+            return Height(Camera.GetStereoProjectionMatrix(eye), Camera.GetStereoViewMatrix(eye) * m, bones, model);
+        }
+
+        float Height(Matrix4x4 projection, Matrix4x4 toEye, Vector4[] bones, GsacModel model)
+        {
+            float size = Mathf.Sqrt(toEye.m01 * toEye.m01 + toEye.m11 * toEye.m11 + toEye.m21 * toEye.m21);
+            float height = Math.Abs(projection.m11) * Camera.pixelHeight / 2 * size * model.Extent.Stature;
+            if (Camera.orthographic) return height;
+            float nearest = float.MaxValue;
+            for (int j = 0; j < model.Data.JointCount; j++)
+            {
+                nearest = Math.Min(nearest, toEye.MultiplyPoint3x4(GsacSkeleton.Posed(model.Data, bones, j)).magnitude);
+            }
+            return height / nearest;
         }
 
         static Bounds WorldBounds(Matrix4x4 m, Vector3 least, Vector3 most)
@@ -101,6 +128,7 @@ namespace Gsac
             for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], m.GetRow(r));
             bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
             properties.SetVector(BlendId, new Vector4(model.Data.LowPass, model.Data.AlphaMax, model.Data.AlphaMin, linear ? 1 : 0));
+            properties.SetInteger(KeepsEnergyId, model.Data.KeepsEnergy ? 1 : 0);
             properties.SetInteger(IndexBitsId, level.Sort.IndexBits);
             properties.SetBuffer(SplatsId, splats);
             properties.SetBuffer(ColoursId, level.Colours);

@@ -70,7 +70,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
 def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
            config: SmplxConfig) -> tuple[Problem, State]:
     """The problem of the body's joints, and the state from which it is solved."""
-    center, focal = np.array([sightings.width / 2, sightings.height / 2]), focal_prior(sightings, config)
+    center, focal = sightings.center, focal_prior(sightings, config)
     person_offsets = PersonOffsets.of(body, detector.own, config.joint_offsets)
     moves = np.concatenate([detector.slopes(body), person_offsets.points], 2)
     pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS], moves[BODY_POINTS])

@@ -66,7 +66,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
 
 def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
          progress: Callable[[int, int, str], None], passes: tuple[Pass, ...]) -> Fit:
-    center = np.array([sightings.width / 2, sightings.height / 2])
+    center = sightings.center
     start = estimate_start(body, sightings, focal_prior(sightings, config)[0], center)
     objective = Objective(body, sightings, start, center)
     unknowns = Unknowns(objective.start, torch.tensor(start.transl, dtype=torch.float32), body.num_betas)

@@ -12,7 +12,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Fit, Task
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, Views
 
 
 class Trained(NamedTuple):
@@ -51,13 +51,19 @@ class Rounds(ABC):
 class Backend(ABC):
     """The optimisations of recipe `fast` on one kind of device. Numbers that are not finite raise StageError with the step."""
 
+    device: str
+    """cpu or cuda."""
+
     @abstractmethod
     def train(self, task: Task, count: int) -> Trained:
         """Fits `count` gaussians to the trained frames; refines their poses in task.poses."""
 
     @abstractmethod
-    def refit(self, task: Task, trainer: Trainer, views: dict[int, View]) -> Trainer:
-        """Fits merged gaussians anew in `refit.refit_steps`; poses and unseen gaussians stay. views: trained frame -> view."""
+    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
+        """Fits merged gaussians anew in `refit.refit_steps`; poses and unseen gaussians stay.
+
+        views: trained frame -> view; coarse: the same at half the size for the first steps, where they shall be coarse.
+        """
 
     @abstractmethod
     def open_rounds(self, task: Task, views: dict[int, View], gaussians: Gaussians,
@@ -65,10 +71,10 @@ class Backend(ABC):
         """A context in which the gaussians learn by the plan while someone else moves task.poses. views: trained frame -> view."""
 
     @abstractmethod
-    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:
+    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """Test-time pose optimisation: moves the poses of `frames`, (n,) indices, to their images; the avatar stays.
 
-        views: of all T frames; steps: for each frame.
+        views: frame -> view; steps: for each frame.
         """
 
     def fit(self, task: Task, count: int) -> Fit:

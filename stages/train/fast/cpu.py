@@ -13,17 +13,19 @@ from gsac.stages.train.checkpoint import loop_state
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import AVERAGED, BEGIN, refit_config, refit_steps
-from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, STEPS, coarse_steps
+from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, STEPS, coarse_share, coarse_steps
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import correct_midway
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, Views
 
 
 class Cpu(Backend):
     """Every step by `Trainer.step`."""
+
+    device = "cpu"
 
     def train(self, task: Task, count: int) -> Trained:
         """As `Backend.train`; keeps checkpoints, and goes on from task.resumed where there is one."""
@@ -31,7 +33,7 @@ class Cpu(Backend):
         rng = np.random.default_rng(config.seed)
         fine, coarse = crop_views(task)
         steps = config.steps or STEPS
-        coarse_until = coarse_steps(steps)
+        coarse_until = coarse_steps(task, steps)
         order: list[int] = []
         if task.resumed is None:
             trainer, first = Trainer(init_gaussians(task, coarse, count), task), 0
@@ -42,7 +44,7 @@ class Cpu(Backend):
         midway = round(MIDWAY * steps) if config.pose_rounds else -1
         for step in range(first, steps):
             if step == midway:
-                correct_midway(task.poses, task.trained, trainer.gaussians, trainer.face, fine)
+                correct_midway(task.poses, task.trained, trainer.gaussians, trainer.face, coarse if step < coarse_until else fine)
             if not order:
                 order = [int(t) for t in rng.permutation(task.trained)]
             t, done = order.pop(), step / steps
@@ -57,18 +59,18 @@ class Cpu(Backend):
             trainer.fold_offsets()
         return Trained(trainer, fine, coarse)
 
-    def refit(self, task: Task, trainer: Trainer, views: dict[int, View]) -> Trainer:
+    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
         """As `Backend.refit`, in the trainer itself."""
         rng = np.random.default_rng(task.config.seed)
         trainer.config = refit_config(task.config)
         order: list[int] = []
         steps = refit_steps(task.config)
-        averaged = max(1, round(AVERAGED * steps))
+        averaged, coarse_until = max(1, round(AVERAGED * steps)), round(coarse_share(task) * steps) if coarse else 0
         sums = {name: np.zeros(value.shape) for name, value in trainer.values.items()}
         for step in range(steps):
             order = order or [int(t) for t in rng.permutation(task.trained)]
             t = order.pop()
-            trainer.step(t, views[t], BEGIN + (1 - BEGIN) * step / steps, rng.random(3), step)
+            trainer.step(t, (coarse if step < coarse_until else views)[t], BEGIN + (1 - BEGIN) * step / steps, rng.random(3), step)
             if step >= steps - averaged:
                 for name, value in trainer.values.items():
                     sums[name] += value
@@ -80,7 +82,7 @@ class Cpu(Backend):
         """As `Backend.open_rounds`."""
         yield CpuRounds(task, views, gaussians, plan)
 
-    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:
+    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""
         for t in map(int, frames):
             align_pose(gaussians, poses, t, views[t], steps)

@@ -31,7 +31,7 @@ from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.poses import bundle_adjust
 from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, TURN, Poses
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
-from gsac.stages.train.views import View, person_crop
+from gsac.stages.train.views import View, Views, person_crop
 
 STEPS = 3200
 """Steps where none are configured, more than twice the CPU's: 0.4 s more for 0.15 dB, 0.3 with poses moved to their images."""
@@ -43,14 +43,18 @@ SomeRecipe = TypeVar("SomeRecipe", bound=Recipe)
 class Cuda(Backend):
     """The steps of a training as one graph of kernels; equations of the poses are solved on the CPU."""
 
+    device = "cuda"
+
     def train(self, task: Task, count: int) -> Trained:
         """As `Backend.train`; keeps no checkpoints."""
         fine, coarse = crop_views(task)
         gaussians = init_gaussians(task, coarse, count)
-        recipe = make_recipe(task.config, count, **lpips_options(task))
+        steps = task.config.steps or STEPS
+        recipe = make_recipe(task.config, count, coarse_share=schedule.coarse_steps(task, steps) / steps,
+                             least=schedule.shortest_axis(task), **lpips_options(task))
         with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.lpips) as trainer:
             if task.config.pose_rounds:
-                correct_midway(trainer, task, fine)
+                correct_midway(trainer, task, coarse if recipe.coarse_share > schedule.MIDWAY else fine)
             train_until(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
             body = trainer.body
             folded = cloth_offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
@@ -64,15 +68,17 @@ class Cuda(Backend):
             kept.seen = middle.seen
             return Trained(kept, fine, coarse)
 
-    def refit(self, task: Task, trainer: Trainer, views: dict[int, View]) -> Trainer:
+    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
         """As `Backend.refit`."""
         gaussians = trainer.gaussians()
+        share = BEGIN + (1 - BEGIN) * schedule.coarse_share(task) if coarse else 0.0
         recipe = make_recipe(refit_config(task.config), len(gaussians), steps=refit_steps(task.config), begin=BEGIN,
-                             coarse_share=0.0, offset_rate=0.0, **POSES_STAY, **lpips_options(task))
+                             coarse_share=share, offset_rate=0.0, least=trainer.least, **POSES_STAY, **lpips_options(task))
         first = int(task.trained[0])
         whole = views[first].camera.focal == task.views[first].camera.focal  # smaller images of coarser levels have no windows
         network = task.lpips if whole else None
-        with open_trainer(CudaTrainer, task.poses, task.trained, [views], gaussians, recipe, network) as on_gpu:
+        with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, views] if coarse else [views], gaussians, recipe,
+                          network) as on_gpu:
             on_gpu.replace(gaussians, ~trainer.seen, trainer.reach)
             on_gpu.train(recipe.steps)
             kept = take_over(on_gpu, task)
@@ -85,12 +91,12 @@ class Cuda(Backend):
         where = {int(t): k for k, t in enumerate(task.trained)}
         rounds = [cuda_rounds.Round(np.array([where[int(t)] for t in one.frames]), one.backgrounds, one.done) for one in plan]
         recipe = make_recipe(task.config, len(gaussians), RoundsRecipe, rounds=rounds, steps=sum(len(one.frames) for one in rounds),
-                             **POSES_STAY)
+                             least=schedule.shortest_axis(task), **POSES_STAY)
         with open_trainer(RoundsTrainer, task.poses, task.trained, [views], gaussians, recipe) as trainer:
             yield CudaRounds(trainer, task, gaussians)
             task.gpu_seconds += trainer.seconds
 
-    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: list[View], steps: int) -> None:
+    def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""
         if not len(frames):
             return
@@ -130,7 +136,7 @@ def make_recipe(config: TrainConfig, count: int, kind: type[SomeRecipe] = Recipe
     """Recipe `fast` for `count` gaussians. more: fields of the recipe, which take precedence."""
     steps = config.steps or STEPS
     given = {"steps": steps, "largest": schedule.longest_axis(config, count),
-             "coarse_share": schedule.coarse_steps(steps) / steps, "offset_rate": schedule.OFFSET_RATE,
+             "end": schedule.END, "mu_end": schedule.MU_END, "offset_rate": schedule.OFFSET_RATE,
              "offset_share": schedule.OFFSET_SHARE, "offset_every": cloth_offsets.EVERY, "smoothness": cloth_offsets.SMOOTHNESS,
              "gain_rate": schedule.GAIN_RATE if config.exposure else 0.0, "turn_unit": TURN, "shift_unit": SHIFT,
              "expression_unit": EXPRESSION, "joint_unit": JOINT, "hand_share": HAND_SHARE}
@@ -139,7 +145,7 @@ def make_recipe(config: TrainConfig, count: int, kind: type[SomeRecipe] = Recipe
 
 def lpips_options(task: Task) -> dict[str, Any]:
     """Fields of a recipe for LPIPS of windows, for `make_recipe`."""
-    camera = task.views[0].camera
+    camera = task.views[0].frame
     return {"perceptual": LPIPS_WEIGHT, "perceptual_steps": LPIPS_STEPS, "frame_size": (camera.width, camera.height)}
 
 

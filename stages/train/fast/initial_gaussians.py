@@ -7,6 +7,7 @@ import numpy as np
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.cloth_offsets import fold
+from gsac.stages.train.gaussians.detail import find_detail
 from gsac.stages.train.gaussians.first_colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
@@ -29,10 +30,10 @@ def init_gaussians(task: Task, coarse: dict[int, View], count: int) -> Gaussians
     faces, offset = task.poses.body.faces, task.poses.offset
     plain = task.poses.rest(int(task.trained[0]))[0]
     rest = plain + offset
-    gaussians = Gaussians.area(rest, faces, count, task.config.seed)
     every = -(-len(task.trained) // COLOUR_FRAMES)
     frames = [PosedFrame(task.poses.vertices(int(t)), coarse[int(t)].camera, coarse[int(t)].pixels)
               for t in task.trained[::every]]
+    gaussians = Gaussians.area(rest, faces, count, task.config.seed, density=find_detail(frames, rest, faces, task.config.seed))
     sights = read_sights(frames, faces, gaussians)
     gaussians.light = find_light(sights, count) if task.config.light else None
     rgb, seen = mean_colours(sights, count, gaussians.light)

@@ -6,12 +6,14 @@ at its own size draws better there.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
+from gsac.avatar.person_height import person_height
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.initial_gaussians import crop_views
 from gsac.stages.train.fast.size_search import count_pixels, viewing_weight
@@ -52,23 +54,31 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
         fewer = merge_to_size(gaussians, worth, size, task.poses.body, rest)
         if len(fewer) >= len(gaussians):
             break
-        trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True)
+        trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True, halvings=halvings)
         trainer.freeze_unseen(views)
         gaussians = backend.refit(task, trainer, views).finish(views)[0]
+        gaussians.max_height_px = seen_height(task.poses, views)
         out.append(gaussians)
     return out
 
 
-def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, held: np.ndarray, views: list[View]) -> list[dict]:
+def seen_height(poses: Poses, views: dict[int, View]) -> float:
+    """Median height of the person in the views (frame -> view), whole px."""
+    joints = poses.to_params().joints
+    heights = [person_height(np.ptp(poses.rest(t)[0][:, 1]), joints[t], view.camera.focal[1]) for t, view in views.items()]
+    return float(round(np.median(heights)))
+
+
+def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views: Mapping[int, View], height: int) -> list[dict]:
     """Held-out psnr_fg and ssim of each level at its own image height, with its size and the same figures of the finest level.
 
-    held: (n,) indices of the frames; views: of all T.
+    views: held-out frame -> its whole view, `height` px high as the trained ones.
     """
     rows, candidates = [], []
     for (_, halvings), level in zip(LEVELS, levels, strict=False):
-        small = {int(t): halve(views[t], halvings) for t in held}
-        rows.append({"n_gaussians": len(level), "image_height": halve(views[0], halvings).camera.height})
-        candidates += [Candidate(gaussians, poses, held, small) for gaussians in (level, finest)]
+        small = {t: halve(view, halvings) for t, view in views.items()}
+        rows.append({"n_gaussians": len(level), "image_height": height // 2**halvings or 1})
+        candidates += [Candidate(gaussians, poses, list(small), small) for gaussians in (level, finest)]
     for k, judged_rows in enumerate(judge_all(candidates)):
         figures, name = summary(judged_rows), "_finest" if k % 2 else ""
         rows[k // 2] |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}

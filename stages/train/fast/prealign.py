@@ -10,6 +10,7 @@ import numpy as np
 
 from gsac.stages.train.fast.backend import Backend, Round
 from gsac.stages.train.fast.initial_gaussians import init_gaussians
+from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.poses.bundle_adjust import Corrections, are_apart
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, person_crop
@@ -33,7 +34,7 @@ def adjust(task: Task, backend: Backend) -> None:
     if not rounds or are_apart(task.poses.fit_pose[task.trained, 0]):
         return
     views = shrink_views(task)
-    count = min(COUNT, config.budget())
+    count = min(COUNT, budget(task, backend.device))
     plan = draw_rounds(list(views), rounds, np.random.default_rng([config.seed, 1]))
     with backend.open_rounds(task, views, init_gaussians(task, views, count), plan) as learned:
         corrections = Corrections(task.poses, learned.gaussians, learned.face, views)

@@ -1,8 +1,8 @@
 """`train.gaussians: auto`: searches for the smallest number of gaussians at no visible loss on held-out frames.
 
 The largest size is trained as always; each smaller size merges neighbours of the one before and refits the result. Sizes are
-judged on held-out frames whose poses are first moved to their images, once, with the largest avatar: a pose that is off would
-reward blur. The search ends at the first size that scores worse than the best, and takes the one before.
+judged on held-out frames, as filmed, whose poses are first moved to their images, once, with the largest avatar: a pose that is
+off would reward blur. The search ends at the first size that scores worse than the best, and takes the one before.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from gsac.avatar.joints import HEAD, JAW, WRISTS, J
 from gsac.avatar.metrics import psnr
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace, side_by_side
-from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.initial_gaussians import COLOUR_FRAMES
+from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.fast.size_rule import MOST_LOST, SizeScore, choose, optimism
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gaussians.merge import merge_to_size, skin_weights
 from gsac.stages.train.gaussians.unseen import level_heights
-from gsac.stages.train.judge.heldout import judge
+from gsac.stages.train.judge.heldout import Candidate, judge_person
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import carry_to_untrained
 from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import View
 
-SIZES = (FULL_SIZE, 8000, 6000, 4000, 3000, 2000, 1000)
-"""Largest first; the largest is taken where no frame can judge."""
+SHARES = 1, 2 / 3, 1 / 2, 1 / 3, 1 / 4, 1 / 6, 1 / 12
+"""Sizes, of the largest; the largest is taken where no frame can judge."""
 POSE_ROUNDS = 5
 """Rounds that move the held-out frames' poses, on any device: the choice shall not depend on it."""
 NEAR_JOINTS, NEAR_WEIGHT = [HEAD, *WRISTS, *range(JAW, J)], 3.0
@@ -40,24 +40,25 @@ NEAR_JOINTS, NEAR_WEIGHT = [HEAD, *WRISTS, *range(JAW, J)], 3.0
 
 def search(task: Task, backend: Backend) -> Fit:
     """The chosen size, with `size_curve` and `size_rule` among its figures."""
+    sizes = list_sizes(budget(task, backend.device))
     if not len(task.choosing):
-        return backend.fit(task, SIZES[0])
-    trainer, fine, coarse = backend.train(task, SIZES[0])
+        return backend.fit(task, sizes[0])
+    trainer, fine, coarse = backend.train(task, sizes[0])
     poses = carry_to_untrained(task.poses, task.trained)
     converge(trainer.gaussians(), poses, task.choosing, task.views, POSE_ROUNDS)
     scores: list[SizeScore] = []
     fits: list[Fit] = []
-    for size in SIZES:
-        task.progress(len(scores), len(SIZES), "sizes at most")
+    for size in sizes:
+        task.progress(len(scores), len(sizes), "sizes at most")
         if scores:
             gaussians = trainer.gaussians()
             worth = count_pixels(gaussians, task, coarse) * viewing_weight(gaussians, task.poses.body)
             fewer = merge_to_size(gaussians, worth, size, task.poses.body, trainer.rest)
             trainer = Trainer(level_heights(fewer, trainer.rest, trainer.faces), task, frozen_body=True)
             trainer.freeze_unseen(coarse)
-            trainer = backend.refit(task, trainer, fine)
+            trainer = backend.refit(task, trainer, fine, coarse)
         fits.append(Fit(*trainer.finish(coarse), dict(trainer.gains)))
-        rows = judge(fits[-1].gaussians, poses, task.choosing, task.views)
+        rows, = judge_person([Candidate(fits[-1].gaussians, poses, task.choosing, task.filmed)])
         scores.append(SizeScore(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
         if choose(scores) is not scores[-1] and not task.config.every_size:
             break
@@ -68,6 +69,11 @@ def search(task: Task, backend: Backend) -> Fit:
                             "choice, since it was made by them; other heldout_frames do not",
                "size_frames": task.choosing.tolist(), "size_optimism": optimism(scores)}
     return replace(fits[scores.index(best)], figures=figures)
+
+
+def list_sizes(largest: int) -> list[int]:
+    """Numbers of gaussians to try, largest first."""
+    return [round(share * largest) for share in SHARES]
 
 
 def count_pixels(gaussians: Gaussians, task: Task, views: dict[int, View]) -> np.ndarray:

@@ -20,7 +20,16 @@ from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backwa
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
-from gsac.stages.train.fast.schedule import GAIN_RATE, LATE_REACH, OFFSET_RATE, OFFSET_SHARE, longest_axis
+from gsac.stages.train.fast.schedule import (
+    END,
+    GAIN_RATE,
+    LATE_REACH,
+    MU_END,
+    OFFSET_RATE,
+    OFFSET_SHARE,
+    longest_axis,
+    shortest_axis,
+)
 from gsac.stages.train.finite import named_gradients, named_pose, require_finite
 from gsac.stages.train.gaussians.barely_seen import hold_barely_seen
 from gsac.stages.train.gaussians.cloth_offsets import Offsets, fold
@@ -49,13 +58,14 @@ class StepGradients(NamedTuple):
 class Trainer:
     """Gaussians with Adam's state, and one step of the optimisation."""
 
-    def __init__(self, gaussians: Gaussians, task: Task, frozen_body: bool = False):
-        """frozen_body: the surface and the poses stay where they are."""
+    def __init__(self, gaussians: Gaussians, task: Task, frozen_body: bool = False, halvings: int = 0):
+        """frozen_body: the surface and the poses stay where they are; halvings: of the images, to the size that it is drawn at."""
         self.config, self.poses = task.config, task.poses
         self.rest = task.poses.rest(int(task.trained[0]))[0]
         self.frozen_body, self.pose_rate = frozen_body, task.config.pose_rate
         self.offsets = None if frozen_body else Offsets(task.poses.body)
         self.faces, self.face, self.light = task.poses.body.faces, gaussians.face, gaussians.light
+        self.low_pass = gaussians.low_pass
         self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
                        "rgb": gaussians.rgb, "opacity_logit": opacity_logit(gaussians.opacity)[:, None]}
         self.values = {name: np.array(value, np.float32, order="C") for name, value in self.values.items()}
@@ -63,6 +73,7 @@ class Trainer:
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)
         self.start, self.largest = self.values["mu"].copy(), longest_axis(task.config, len(self.face))
+        self.least = shortest_axis(task, halvings)
         self.face_scale = face_frames(self.rest, self.faces).k[self.face].astype(np.float64)
         self.gains: dict[int, np.ndarray] = {}
         self.seen: np.ndarray | None = None
@@ -98,7 +109,7 @@ class Trainer:
         """A copy of the gaussians as they stand."""
         v = self.values
         return Gaussians(self.face, v["mu"].copy(), v["quat"].copy(), v["log_scale"].copy(), v["rgb"].copy(),
-                         sigmoid(v["opacity_logit"][:, 0]), self.light)
+                         sigmoid(v["opacity_logit"][:, 0]), self.light, self.low_pass)
 
     def step(self, t: int, view: View, done: float, background: np.ndarray, number: int) -> float:
         """One step on frame t. done: share of the steps so far; background: (3,) in 0..1; number: of the step. Returns the loss."""
@@ -131,7 +142,8 @@ class Trainer:
         """Of the loss of frame t. background: (3,) in 0..1; number: of the step."""
         config, v = self.config, self.values
         vertices = self.poses.vertices(t)
-        shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity_logit"][:, 0]), self.light)
+        shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity_logit"][:, 0]), self.light,
+                          self.low_pass)
         rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
         background = background.astype(np.float32)
         gain = self.gains.get(t, np.ones(3)).astype(np.float32)
@@ -207,9 +219,9 @@ class Trainer:
     def _move(self, grads: BoundGradients, opacity: np.ndarray, done: float) -> None:
         """One Adam step of the gaussians, then their limits."""
         config, v = self.config, self.values
-        rates = {"mu": config.mu_rate * 0.01**done, "quat": config.quat_rate * 0.1**done,
-                 "log_scale": config.scale_rate * 0.1**done, "rgb": config.rgb_rate * 0.1**done,
-                 "opacity_logit": config.opacity_rate * 0.1**done}
+        rates = {"mu": config.mu_rate * MU_END**done, "quat": config.quat_rate * END**done,
+                 "log_scale": config.scale_rate * END**done, "rgb": config.rgb_rate * END**done,
+                 "opacity_logit": config.opacity_rate * END**done}
         by_name = {"mu": grads.mu, "quat": grads.quat, "log_scale": grads.log_scale, "rgb": grads.rgb,
                    "opacity_logit": (grads.opacity * opacity * (1 - opacity))[:, None]}
         if self.seen is not None:
@@ -219,7 +231,7 @@ class Trainer:
         for name, rate in rates.items():
             adam_rows(v[name], by_name[name], self.first[name], self.second[name], self.count, rate)
         limit(v["mu"], v["quat"], v["log_scale"], v["rgb"], v["opacity_logit"], self.start, self.face_scale, config.needle,
-              self.largest, self.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
+              self.least, self.largest, self.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
 
 
 def opacity_logit(opacity: np.ndarray) -> np.ndarray:

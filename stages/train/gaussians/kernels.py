@@ -95,12 +95,12 @@ def count_rows(grad, count):
 
 
 @own_kernel(error_model="numpy")
-def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, largest, reach, pull):
+def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, least, largest, reach, pull):
     """Limits gaussians after a step, in place.
 
     quat (N, 4) is normalised; the longest axis is at most `needle` times the middle one and 10 times the shortest, and
-    at most `largest` m; mu (N, 3) moves back to start (N, 3) by the share `pull` and stays within `reach` m of it;
-    rgb stays in 0..1 and the opacity's logit in -9..9. face_scale: (N,) m per unit of mu at rest.
+    at most `largest` m, the shortest at least `least` m; mu (N, 3) moves back to start (N, 3) by the share `pull` and stays
+    within `reach` m of it; rgb stays in 0..1 and the opacity's logit in -9..9. face_scale: (N,) m per unit of mu at rest.
     """
     log_needle, log_flat = math.log(needle), math.log(10.0)
     for i in range(mu.shape[0]):
@@ -115,9 +115,13 @@ def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, largest, r
         a, b, d = log_scale[i, 0], log_scale[i, 1], log_scale[i, 2]
         high, low = max(a, b, d), min(a, b, d)
         middle = a + b + d - high - low
-        top = min(high, middle + log_needle, math.log(largest / max(face_scale[i], 1e-6)))
+        size = max(face_scale[i], 1e-6)
+        top = min(high, middle + log_needle, math.log(largest / size))
+        bottom = top - log_flat
+        if least > 0:
+            bottom = max(bottom, math.log(least / size))
         for c in range(3):
-            log_scale[i, c] = max(min(log_scale[i, c], top), top - log_flat)
+            log_scale[i, c] = max(min(log_scale[i, c], top), bottom)
         away = 0.0
         for c in range(3):
             mu[i, c] -= pull * (mu[i, c] - start[i, c])

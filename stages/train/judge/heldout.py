@@ -1,8 +1,8 @@
-"""Judges renders of held-out frames against the truth, and aligns their poses at test time."""
+"""Judges renders of frames, as large as these were filmed, against the truth, and aligns their poses at test time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from gsac.avatar.artifacts import write_frame
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
-from gsac.avatar.metrics import WHITE, composite, score
+from gsac.avatar.metrics import WHITE, composite, find_shown, score, score_person
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.rotation import about_y
 from gsac.avatar.threads import Workspace, side_by_side
@@ -22,7 +22,7 @@ from gsac.avatar.zbuffer import rasterise, visible_points
 from gsac.stages.train.finite import named_pose, require_finite
 from gsac.stages.train.gaussians.kernels import on_background, through_background
 from gsac.stages.train.poses.poses import Poses
-from gsac.stages.train.views import View, person_crop
+from gsac.stages.train.views import View, Views, person_crop
 
 TEST_RATE = 1e-3
 """Adam rate of the test-time pose optimisation."""
@@ -30,8 +30,8 @@ TEST_END, TEST_MASK = 0.05, 0.1
 """Factor that this rate falls to, and the weight of the mask beside the image."""
 FACE_WIDTH, HAND_MARGIN = 1.3, 0.15
 """Boxes that are judged on their own: side of the face's over the distance of the ears; margin round a hand's key points."""
-BOX_SLACK, LEAST_VISIBLE = 0.03, 0.4
-"""m that a key point may lie inside the body, and the least share of them in view."""
+BOX_SLACK, LEAST_VISIBLE, BOX_HEIGHT = 0.03, 0.4, 540
+"""m that a key point may lie inside the body, the least share of them in view, and px of the image, at most, that tells it."""
 ERROR_FULL = 0.5
 """Error at the last colour of the error maps."""
 
@@ -54,10 +54,10 @@ class Candidate(NamedTuple):
     gaussians: Gaussians
     poses: Poses
     frames: Iterable[int]
-    views: Mapping[int, View] | list[View]
+    views: Views
 
 
-def judge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: list[View], folder: Path | None = None,
+def judge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: Views, folder: Path | None = None,
           flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
     """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
     return judge_all([Candidate(gaussians, poses, frames, views)], folder, flip, lpips)[0]
@@ -67,24 +67,47 @@ def judge_all(candidates: list[Candidate], folder: Path | None = None, flip: boo
               lpips: Mapping[str, Lpips] | None = None) -> list[list[dict]]:
     """`judge` of each candidate, all their frames side by side."""
 
-    def row(frame: tuple[Candidate, int], workspace: Workspace) -> dict:
-        (gaussians, poses, _, views), t = frame
-        require_finite("when it is judged", named_pose(poses, t))
-        rgb, alpha = render_view(gaussians, poses, t, views[t], workspace)
-        require_finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
-        true_rgb, mask = truth(views[t])
-        scores = score(rgb, alpha, true_rgb, mask, find_boxes(poses, t, views[t].camera), flip, lpips)
+    def row(candidate: Candidate, t: int, workspace: Workspace) -> dict:
+        images, boxes = draw(candidate, t, workspace), find_boxes(candidate.poses, t, candidate.views[t].camera)
         if folder is not None:
-            render, real = composite(rgb, alpha, WHITE), composite(true_rgb, mask, WHITE)
-            error = np.abs(render - real).mean(2) / ERROR_FULL
-            heat = cv2.applyColorMap(np.uint8(np.clip(error, 0, 1) * 255), cv2.COLORMAP_INFERNO)
-            write_frame(folder / f"{t:06d}_truth.png", np.uint8(np.round(real * 255)))
-            write_frame(folder / f"{t:06d}_render.png", np.uint8(np.round(render * 255)))
-            write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(heat, cv2.COLOR_BGR2RGB))
-        return scores
+            write_pictures(folder, t, *images)
+        return score(*images, boxes, flip, lpips)
 
-    rows = iter(side_by_side(row, [(candidate, int(t)) for candidate in candidates for t in candidate.frames]))
+    return _of_each_frame(candidates, row)
+
+
+def judge_person(candidates: list[Candidate]) -> list[list[dict]]:
+    """`metrics.score_person` of each candidate's frames, all side by side: where avatars are only compared."""
+    return _of_each_frame(candidates, lambda candidate, t, workspace: score_person(*draw(candidate, t, workspace)))
+
+
+def _of_each_frame(candidates: list[Candidate], row: Callable[[Candidate, int, Workspace], dict]) -> list[list[dict]]:
+    rows = iter(side_by_side(lambda each, workspace: row(*each, workspace),
+                             [(candidate, int(t)) for candidate in candidates for t in candidate.frames]))
     return [[next(rows) for _ in candidate.frames] for candidate in candidates]
+
+
+def draw(candidate: Candidate, t: int, workspace: Workspace) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """rgb (H, W, 3) premultiplied and alpha (H, W) of the candidate in frame t, then those of `truth`. Raises StageError where a
+    number is not finite.
+    """
+    require_finite("when it is judged", named_pose(candidate.poses, t))
+    rgb, alpha = render_view(candidate.gaussians, candidate.poses, t, candidate.views[t], workspace)
+    require_finite("when it is judged", {f"render of frame {t}": rgb, f"alpha of frame {t}": alpha})
+    return rgb, alpha, *truth(candidate.views[t])
+
+
+def write_pictures(folder: Path, t: int, rgb: np.ndarray, alpha: np.ndarray, true_rgb: np.ndarray, mask: np.ndarray) -> None:
+    """%06d_truth, _render and _error PNGs of frame t on white. rgb, true_rgb: (H, W, 3) premultiplied; alpha, mask: (H, W)."""
+    area = find_shown(alpha, mask)  # the rest is white in both
+    render, real = composite(rgb[area], alpha[area], WHITE), composite(true_rgb[area], mask[area], WHITE)
+    heat = np.zeros(mask.shape, np.uint8)
+    heat[area] = np.clip(np.abs(render - real).mean(2) / ERROR_FULL, 0, 1) * 255
+    for name, image in (("truth", real), ("render", render)):
+        whole = np.full(rgb.shape, 255, np.uint8)
+        whole[area] = np.round(image * 255)
+        write_frame(folder / f"{t:06d}_{name}.png", whole)
+    write_frame(folder / f"{t:06d}_error.png", cv2.cvtColor(cv2.applyColorMap(heat, cv2.COLORMAP_INFERNO), cv2.COLOR_BGR2RGB))
 
 
 def find_boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int, int, int]]:
@@ -94,7 +117,9 @@ def find_boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int
     """
     vertices = poses.vertices(t)
     points = poses.body.keypoints(vertices)
-    depth = rasterise(vertices, poses.body.faces, camera)[2]
+    scale = min(1.0, BOX_HEIGHT / camera.height)
+    small = camera.scaled(max(1, round(scale * camera.width)), round(scale * camera.height))
+    depth = rasterise(vertices, poses.body.faces, small)[2]
     nose, ears = points[wholebody.BODY][0], points[wholebody.BODY][3:5]
     middle = 0.6 * nose + 0.4 * ears.mean(0)
     half = FACE_WIDTH / 2 * np.linalg.norm(ears[1] - ears[0]) * np.array([1.0, 1.0, 0.0])
@@ -103,13 +128,13 @@ def find_boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int
         areas[f"{side}_hand"] = points[part], points[part], HAND_MARGIN
     found = {}
     for name, (shown, extent, margin) in areas.items():
-        if not np.isfinite(extent).all() or visible_points(shown, depth, camera, BOX_SLACK).mean() < LEAST_VISIBLE:
+        if not np.isfinite(extent).all() or visible_points(shown, depth, small, BOX_SLACK).mean() < LEAST_VISIBLE:
             continue
         xy = camera.project(extent)
         low, high = xy.min(0), xy.max(0)
         room = margin * (high - low).max()
         (x0, y0), (x1, y1) = np.floor(low - room).astype(int), np.ceil(high + room).astype(int)
-        found[name] = max(x0, 0), max(y0, 0), min(x1, camera.width), min(y1, camera.height)
+        found[name] = max(int(x0), 0), max(int(y0), 0), min(int(x1), camera.width), min(int(y1), camera.height)
     return found
 
 

@@ -9,10 +9,10 @@ from gsac.avatar.likeness import SIZES, average, compare_parts
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.judge.heldout import find_boxes, render_view, truth
 from gsac.stages.train.poses.poses import Poses
-from gsac.stages.train.views import View
+from gsac.stages.train.views import Views
 
 
-def judge_likeness(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: list[View]) -> dict[str, dict | None]:
+def judge_likeness(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: Views) -> dict[str, dict | None]:
     """body, face and hands: `average` of `compare_parts` over the frames that show the part; None where none does.
 
     poses: aligned to the frames, so that an error of the pose is none of the avatar's.

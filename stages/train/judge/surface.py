@@ -44,12 +44,14 @@ def seen_area(poses: Poses, frames: np.ndarray, views: list[View]) -> float:
 
 def faces_in_view(vertices: np.ndarray, faces: np.ndarray, view: View) -> np.ndarray:
     """(F,) bool: `faces_before`, and the mask is there. vertices: (V, 3) m, camera frame; faces: (F, 3)."""
-    whole = view.camera
+    whole, pixels = view.frame, view.pixels[..., 3]
     scale = min(1.0, HEIGHT / whole.height)
     shown = faces_before(vertices, whole.scaled(round(whole.width * scale) or 1, round(whole.height * scale) or 1), faces)
     places = vertices[faces[shown]].mean(1)
-    x, y = np.clip(whole.project(places), 0, (whole.width - 1, whole.height - 1)).astype(int).T
-    shown[shown] = view.pixels[y, x, 3] >= MASKED
+    at = np.clip(whole.project(places), 0, (whole.width - 1, whole.height - 1)).astype(int) - view.corner
+    inside = ((at >= 0) & (at < pixels.shape[::-1])).all(1)
+    x, y = np.where(inside[:, None], at, 0).T
+    shown[shown] = inside & (pixels[y, x] >= MASKED)
     return shown
 
 

@@ -6,27 +6,26 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.camera import Camera
-from gsac.stages.train.views import MARGIN, View
+from gsac.stages.train.views import FAINT, MARGIN, View
 
-SHOWN = 25
-"""Of 255: a mask above it is of the person."""
 CLEAR = 10
 """px of background around all that is shown, at least: no window of SSIM that sees it, 11 px wide, then sees beyond the box."""
 
 
 def side_of(views: list[View]) -> int:
-    """px, side of the square that holds any of the views."""
-    return max(max(view.camera.width, view.camera.height) for view in views)
+    """px, side of the square that holds any of the views' frames."""
+    return max(max(view.frame.width, view.frame.height) for view in views)
 
 
 def square_crop(view: View, side: int, vertices: np.ndarray) -> View:
-    """The part of the square, with the view in its middle and nothing around it, that can show the person.
+    """The part of the square, with the view's frame in its middle and nothing around the view, that can show the person.
 
     That is the box of mask and body and a margin; in the rest of the square, render and frame are the same background.
     vertices: (V, 3) m, camera frame. The result's corner is in the square.
     """
-    camera, shift = view.camera, np.array([side - view.camera.width, side - view.camera.height]) // 2
-    rows, columns = np.nonzero(view.pixels[..., 3] > SHOWN)
+    camera, frame = view.camera, view.frame
+    shift = np.array([side - frame.width, side - frame.height]) // 2 + view.corner
+    rows, columns = np.nonzero(view.pixels[..., 3] > FAINT)
     places = camera.project(vertices[vertices[:, 2] > 0])
     points = np.concatenate([np.stack([columns, rows], 1), np.stack([columns, rows], 1) + 1, places]) + shift
     first, last = points.min(0), points.max(0)

@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.binding import bind_backward
+from gsac.avatar.draw_rule import ADDED
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import sigmoid
 from gsac.avatar.raster import BoundGradients, Rendering, render_backward, render_bound, screen_gradients
@@ -114,14 +115,14 @@ class Trainer:
         """A copy as they stand: rotations of length one, colours in 0..1."""
         shown = self.shown()
         return Gaussians(self.face, shown.mu.copy(), shown.quat / np.linalg.norm(shown.quat, axis=1, keepdims=True),
-                         shown.log_scale, np.clip(shown.rgb, 0, 1), shown.opacity)
+                         shown.log_scale, np.clip(shown.rgb, 0, 1), shown.opacity, low_pass=ADDED)
 
     def shown(self) -> Gaussians:
         """The gaussians as they are drawn while training."""
         v = self.values
         opacity = np.full(len(self.face), sigmoid(OPACITY_LOGIT), np.float32)
         return Gaussians(self.face, v["mu"], v["quat"], np.log(LARGEST) - np.log1p(np.exp(-v["scale_logit"])), v["rgb"],
-                         opacity)
+                         opacity, low_pass=ADDED)
 
     def step(self, views: dict[int, View], number: int, steps: int, backgrounds: np.ndarray, centres: np.ndarray) -> float:
         """Step `number`, from 0, of `steps` on a batch: frame -> view. Returns its loss.

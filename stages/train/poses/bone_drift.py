@@ -6,6 +6,8 @@ their gaussians and joints, until the fit's angles show the person where the ref
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gsac.avatar import rotation
@@ -46,7 +48,7 @@ def remove_drift(gaussians: list[Gaussians], poses: Poses, trained: np.ndarray) 
     out = []
     for g in gaussians:
         mu, quat, log_scale = unbind(plain, g.face, bind(turned, g.face, g.mu, g.quat, g.log_scale))
-        out.append(Gaussians(g.face, mu, quat, log_scale, g.rgb, g.opacity, g.light))
+        out.append(replace(g, mu=mu, quat=quat, log_scale=log_scale))
     return out
 
 

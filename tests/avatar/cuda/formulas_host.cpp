@@ -5,7 +5,7 @@
 typedef Vec<double> V;
 static V vec(const double *p) { return {p[0], p[1], p[2]}; }
 static void put(double *p, V v) { p[0] = v.x; p[1] = v.y; p[2] = v.z; }
-static Lens<double> lens_of(const double *l) { return {l[0], l[1], l[2], l[3], l[4], l[5]}; }
+static Lens<double> lens_of(const double *l) { return {l[0], l[1], l[2], l[3], l[4], l[5], l[6], l[7] != 0}; }
 static Bound<double> bound_of(const double *mean, const double *rotation, const double *scale) {
     Bound<double> g;
     g.mean = vec(mean);
@@ -76,7 +76,7 @@ void render_all(int n, const double *lens, const double *means, const double *ro
                     if (!s.seen) continue;
                     double dx = x + 0.5 - s.x, dy = y + 0.5 - s.y;
                     bool clipped;
-                    double a = alpha_of(dx * (dx * s.ha + dy * s.b) + dy * dy * s.hc, s.s_max, opacity[i], clipped);
+                    double a = alpha_of(dx * (dx * s.ha + dy * s.b) + dy * dy * s.hc, s.s_max, s.opacity, clipped);
                     double weight = composite(a, T);
                     const double *c = rgb + 3 * i;
                     if (pass == 0) {
@@ -207,8 +207,8 @@ void adam_dense(int n, double *value, const double *grad, double *first, double 
 }
 
 void limit_all(int n, double *mu, double *quat, double *log_scale, double *rgb, double *logit, const double *start,
-               const double *face_scale, double needle, double largest, double reach, double pull) {
-    Bounds<double> bounds = {needle, largest, reach};
+               const double *face_scale, double needle, double least, double largest, double reach, double pull) {
+    Bounds<double> bounds = {needle, least, largest, reach};
     for (int i = 0; i < n; ++i)
         limit(mu + 3 * i, quat + 4 * i, log_scale + 3 * i, rgb + 3 * i, logit[i], start + 3 * i, face_scale[i], bounds, pull);
 }

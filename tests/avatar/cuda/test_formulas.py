@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar import binding, light, skinning
 from gsac.avatar.camera import Camera
-from gsac.avatar.draw_rule import BRIGHTEST, DARKEST, cuda_constants
+from gsac.avatar.draw_rule import ADDED, BRIGHTEST, DARKEST, PIXEL, cuda_constants
 from gsac.avatar.raster import render, render_backward
 from gsac.stages.train.gaussians import kernels
 from gsac.stages.train.paper.densify import LARGEST
@@ -23,7 +23,10 @@ from support import haha
 HERE = Path(__file__).parent
 SOURCES = Path(binding.__file__).parent / "cuda"
 CAMERA = Camera((90.0, 84.0), (15.3, 11.8), 33, 21)
-LENS = np.array([*CAMERA.focal, *CAMERA.center, CAMERA.width, CAMERA.height])
+
+
+def lens(low_pass):
+    return np.array([*CAMERA.focal, *CAMERA.center, CAMERA.width, CAMERA.height, *low_pass])
 
 
 @pytest.fixture(scope="module")
@@ -89,10 +92,11 @@ def test_the_light_on_a_face_is_that_of_the_cpu_path(host):
     np.testing.assert_allclose(got, expected, rtol=1e-12)
 
 
-def test_projection_compositing_and_their_gradients_are_those_of_the_cpu_path(host):
+@pytest.mark.parametrize("low_pass", [ADDED, PIXEL], ids=["added", "pixel"])
+def test_projection_compositing_and_their_gradients_are_those_of_the_cpu_path(host, low_pass):
     rng = np.random.default_rng(2)
     scene = gaussians(rng, 30)
-    rendering = render(*scene, CAMERA)
+    rendering = render(*scene, CAMERA, low_pass=low_pass)
     grad = rng.normal(size=(CAMERA.height, CAMERA.width, 4))
     expected = render_backward(rendering.state, grad[..., :3].copy(), grad[..., 3].copy())
     order = np.argsort(scene[0][:, 2], kind="stable")
@@ -100,7 +104,7 @@ def test_projection_compositing_and_their_gradients_are_those_of_the_cpu_path(ho
     image = np.full(grad.shape, np.nan)
     got = [np.full(s, np.nan) for s in ((30, 3), (30, 3, 3), (30, 3), (30, 3), (30,))]
     with np.errstate(all="ignore"):
-        host("render_all", 30, LENS, *sorted_scene, grad, image, *got)
+        host("render_all", 30, lens(low_pass), *sorted_scene, grad, image, *got)
     assert np.abs(image - np.dstack([rendering.rgb, rendering.alpha])).max() < 2e-6  # the CPU's exp is a polynomial
     for name, a, b in zip(expected._fields, got, expected, strict=True):
         b = b[order]
@@ -137,8 +141,8 @@ def test_adam_and_limits_are_those_of_the_cpu_path(host):
     values[1][0] = 0
     start, face_scale = rng.normal(size=(n, 3)), rng.uniform(0, 0.2, n)
     ours, theirs = [v.copy() for v in values], [v.copy() for v in values]
-    host("limit_all", n, *ours, start, face_scale, 4.0, 0.05, 0.08, 1e-3)
-    kernels.limit(*theirs, start, face_scale, 4.0, 0.05, 0.08, 1e-3)
+    host("limit_all", n, *ours, start, face_scale, 4.0, 0.004, 0.05, 0.08, 1e-3)
+    kernels.limit(*theirs, start, face_scale, 4.0, 0.004, 0.05, 0.08, 1e-3)
     for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
 

@@ -24,7 +24,7 @@ pytestmark = [
 def assembly(make_scene):
     """Assembly of a kernel's float32 version, freshly compiled: what comes from numba's cache cannot be read."""
     scene = make_scene(5, 16, 16, 0)
-    rendering = raster.render(*(a.astype(np.float32) for a in scene.arguments), scene.camera)
+    rendering = raster.render(*(a.astype(np.float32) for a in scene.arguments), scene.camera, low_pass=scene.low_pass)
     raster.render_backward(rendering.state, scene.grad_rgb, scene.grad_alpha)
 
     def compile_fresh(kernel) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,7 @@ def test_image_gradients_and_losses_do_not_depend_on_the_number_of_threads(make_
     results = []
     for count in (1, workers):
         workspace = raster.Workspace(count)
-        rendering = raster.render_bound(vertices, faces, gaussians, scene.camera, workspace)
+        rendering = raster.render_bound(vertices, faces, replace(gaussians, low_pass=scene.low_pass), scene.camera, workspace)
         target = np.random.default_rng(1).random(rendering.rgb.shape).astype(np.float32)
         gradient = np.zeros_like(target)
         values = [loss(rendering.rgb, target, box=(3, 90, 5, 120), gradient=gradient, workspace=workspace).value
@@ -36,7 +38,7 @@ def test_image_gradients_and_losses_do_not_depend_on_the_number_of_threads(make_
 def test_a_step_repeats_bit_by_bit(make_scene):
     scene = make_scene(300, 64, 64, 9)
     arguments = [a.astype(np.float32) for a in scene.arguments]
-    first, second = (raster.render_backward(raster.render(*arguments, scene.camera).state, scene.grad_rgb, scene.grad_alpha)
-                     for _ in range(2))
+    states = [raster.render(*arguments, scene.camera, low_pass=scene.low_pass).state for _ in range(2)]
+    first, second = (raster.render_backward(state, scene.grad_rgb, scene.grad_alpha) for state in states)
     for a, b in zip(first, second, strict=True):
         assert a.tobytes() == b.tobytes()

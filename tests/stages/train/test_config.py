@@ -2,9 +2,12 @@
 
 import json
 from dataclasses import fields
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from gsac.avatar.camera import Camera
 from gsac.avatar.cuda import why_not
 from gsac.pipeline.keys import AUTO, DEVICES
 from gsac.pipeline.params import meanings
@@ -16,6 +19,7 @@ from gsac.stages.train.fast.cuda import STEPS, make_recipe
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.stage import check_device, run
+from gsac.stages.train.views import View
 
 
 def test_every_recipe_has_an_entry_for_every_device():
@@ -25,7 +29,26 @@ def test_every_recipe_has_an_entry_for_every_device():
 
 def test_the_docstrings_of_the_parameters_tell_the_full_size():
     told = [text for text in meanings(TrainConfig).values() if f"{config.FULL_SIZE:,}" in text]
-    assert len(told) == 2 and size_search.SIZES[0] == config.FULL_SIZE == TrainConfig().budget()
+    assert len(told) == 2 and size_search.list_sizes(config.FULL_SIZE)[0] == config.FULL_SIZE
+
+
+def filmed(pixels, **values):
+    """A task whose frames show that many pixels of a person."""
+    view = View(Camera((900.0, 900.0), (50.0, 50.0), 1000, 1000), np.zeros((1000, 1000, 4), np.uint8), (0, 0))
+    view.pixels.reshape(-1, 4)[:pixels, 3] = 255
+    return SimpleNamespace(views=[view], trained=np.array([0]), config=TrainConfig(**values))
+
+
+def test_sizes_and_coarse_steps_follow_from_the_pixels_of_the_person():
+    (small, least), (large, most) = schedule.SMALL, schedule.LARGE
+    sizes = [schedule.budget(filmed(int(pixels)), "cpu") for pixels in (100, large / 4, large, 9e5)]
+    assert sizes == [schedule.SIZES[0], config.FULL_SIZE / 2, config.FULL_SIZE, schedule.SIZES[1]]
+    assert schedule.budget(filmed(int(large)), "cuda") == config.FULL_SIZE * schedule.MORE_ON_CUDA
+    assert schedule.budget(filmed(int(large), gaussians=700), "cuda") == 700
+    shares = [schedule.coarse_share(filmed(int(pixels))) for pixels in (100, small, (small * large) ** 0.5, large, 9e5)]
+    np.testing.assert_allclose(shares, [least, least, (least + most) / 2, most, most], rtol=1e-4)
+    task = filmed(int(small))
+    assert schedule.coarse_steps(task, STEPS) == schedule.coarse_steps(task, schedule.STEPS) > schedule.coarse_steps(task, 400)
 
 
 def test_the_docstring_of_the_steps_tells_those_of_each_recipe():
@@ -33,10 +56,9 @@ def test_the_docstring_of_the_steps_tells_those_of_each_recipe():
     assert all(str(steps) in told for steps in (schedule.STEPS, STEPS, paper.STEPS))
 
 
-def test_a_configuration_tells_whether_the_size_is_searched_and_with_how_many_it_begins():
+def test_a_configuration_tells_whether_the_size_is_searched():
     assert TrainConfig().searches_size() and not TrainConfig(recipe="paper").searches_size()
-    given = TrainConfig(gaussians=700)
-    assert not given.searches_size() and given.budget() == 700
+    assert not TrainConfig(gaussians=700).searches_size()
 
 
 @pytest.mark.parametrize("device", ["auto", "cpu", "cuda"])
@@ -62,8 +84,7 @@ def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
     made = make_recipe(TrainConfig(mask=0.5, mu_rate=2e-3, exposure=True), 3000, batch=3)
     assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, STEPS)
     assert made.largest == schedule.longest_axis(TrainConfig(), 3000) == TrainConfig().largest * 2
-    assert made.coarse_share * STEPS == schedule.coarse_steps(STEPS)
-    assert schedule.coarse_steps(STEPS) == schedule.coarse_steps(schedule.STEPS) > schedule.coarse_steps(400)
+    assert (made.end, made.mu_end) == (schedule.END, schedule.MU_END)
     assert (made.offset_share, made.gain_rate) == (schedule.OFFSET_SHARE, schedule.GAIN_RATE)
     assert make_recipe(TrainConfig(steps=7), 12000).steps == 7 and make_recipe(TrainConfig(), 12000).gain_rate == 0
     shared = {f.name for f in fields(TrainConfig)} & {f.name for f in fields(made)}

@@ -5,12 +5,19 @@ import json
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import read_arrays
-from gsac.avatar.body import LOST, BodyParams
+from gsac.avatar.artifacts import read_arrays, read_frame
+from gsac.avatar.body import LOST, Body, BodyParams
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.metrics import summary
 from gsac.stages.contract import BadInput, StageError, make_config
-from gsac.stages.train import STAGE
+from gsac.stages.train import STAGE, stage
 from gsac.stages.train.fast import trainer
+from gsac.stages.train.judge.heldout import judge
+from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.stage import run
+from gsac.stages.train.views import read_whole
+
+QUICK = {"frames": 6, "steps": 8, "pose_rounds": 0, "pose_test_steps": 6}
 
 
 def metrics(job):
@@ -40,9 +47,9 @@ def test_held_out_frames_are_rendered_better_as_training_goes_on_and_poses_come_
     np.testing.assert_array_equal(before["betas"], after["betas"])
 
 
-EVERY_IMAGE = {"psnr_full", "psnr_full_black", "psnr_fg", "ssim", "lpips_alex", "lpips_vgg", "flip", "alpha_iou", "psnr_face",
-               "detail"}
-TOGETHER = EVERY_IMAGE | {"psnr_full_pooled", "psnr_full_black_pooled", "psnr_fg_pooled", "psnr_hands", "lpips"}
+EVERY_IMAGE = {"psnr_full", "psnr_full_black", "psnr_fg", "psnr_edge", "psnr_inside", "stray_edge_alpha", "ssim", "ssim_black",
+               "lpips_alex", "lpips_vgg", "lpips_alex_black", "lpips_vgg_black", "flip", "alpha_iou", "psnr_face", "detail"}
+TOGETHER = EVERY_IMAGE | {"psnr_full_pooled", "psnr_full_black_pooled", "psnr_fg_pooled", "psnr_hands", "lpips", "lpips_black"}
 
 
 @pytest.mark.slow
@@ -60,6 +67,28 @@ def test_every_figure_is_told_of_all_images_and_of_each_with_and_without_the_pos
     assert figures["psnr_fg_pooled"] <= figures["psnr_fg"]
     assert 0 < figures["flip_ttpo"] <= figures["flip"] * 1.05 < 1
     assert all(0 < row["flip"] < 1 for row in figures["heldout"])
+
+
+def test_held_out_frames_are_judged_as_filmed_and_at_the_small_size_whatever_was_trained_on(job, monkeypatch):
+    monkeypatch.setattr(stage, "SMALL", 64)
+    half, whole = job("half", height=64, **QUICK), job("whole", height=128, **QUICK)
+    run(half)
+    run(whole)
+    told = {}
+    for made, trained in ((half, [36, 64]), (whole, [72, 128])):
+        told[trained[1]] = figures = metrics(made)
+        assert figures["image_size"] == [72, 128] and figures["trained_size"] == trained
+        shapes = {read_frame(path).shape for path in (made.out / "heldout").glob("0*.png")}
+        assert shapes == {(128, 72, 3)}, "pictures are as filmed"
+        small = figures["at_64"]
+        assert set(small) == {f"{name}{end}" for name in stage.ALSO_SMALL for end in ("", "_ttpo")}
+        assert small["psnr_fg"] != figures["psnr_fg"] and small["psnr_fg_ttpo"] > small["psnr_fg"]
+        boxes = [row["face_box"] for row in figures["heldout"] if row["face_box"]]
+        assert boxes and all(0 <= x0 < x1 <= 72 and 0 <= y0 < y1 <= 64 for x0, y0, x1, y1 in boxes)
+    params, held = BodyParams.read(half.out / "body.npz"), told[64]["heldout_frames"]
+    views = read_whole(half.inputs["split/frames"], half.inputs["segment/alpha"], params.camera(72, 128), held)
+    rows = judge(Gaussians.read(half.out / "avatar.npz"), Poses(Body.load(), params), held, views)
+    assert told[64]["psnr_fg"] == pytest.approx(summary(rows)["psnr_fg"], abs=0.01), "of the frames as they are on disk"
 
 
 @pytest.mark.slow

@@ -48,7 +48,8 @@ public static class Read
         dump.Put("rgb", data.Levels[0].Rgb);
         dump.Put("opacity", data.Levels[0].Opacity);
         if (data.Light != null) dump.Put("light", data.Light);
-        dump.Put("blend", new float[] { data.LowPass, data.AlphaMax, data.AlphaMin, data.Ground });
+        dump.Put("blend", new float[] { data.LowPass, data.AlphaMax, data.AlphaMin, data.Ground, data.KeepsEnergy ? 1 : 0 });
+        dump.Put("heights", Array.ConvertAll(data.Levels, level => level.MaxHeight));
         foreach (KeyValuePair<string, GsacClip> pair in data.Clips) Write("clip." + pair.Key, pair.Value, dump);
         foreach (KeyValuePair<string, GsacClip> pair in data.Poses) Write("pose." + pair.Key, pair.Value, dump);
         Console.WriteLine(string.Join(" ", data.JointNames));

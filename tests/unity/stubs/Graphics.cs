@@ -117,7 +117,26 @@ namespace UnityEngine
     public sealed class Camera : Behaviour
     {
         internal static readonly List<Camera> All = new List<Camera>();
+        public enum StereoscopicEye { Left, Right }
+        internal float[] EyeFocal;
         public int cullingMask { get; set; } = -1;
+        public int pixelHeight { get; internal set; } = 1080;
+        public bool orthographic { get; set; }
+        public bool stereoEnabled { get { return EyeFocal != null; } }
+        public Matrix4x4 projectionMatrix { get; set; } = new Matrix4x4 { m00 = 1, m11 = 1.7320508f };
+        public Matrix4x4 worldToCameraMatrix { get { return ViewAt(0); } }
+        public Matrix4x4 GetStereoViewMatrix(StereoscopicEye eye) { return ViewAt(eye == StereoscopicEye.Left ? 0.032f : -0.032f); }
+        public Matrix4x4 GetStereoProjectionMatrix(StereoscopicEye eye) { return new Matrix4x4 { m00 = 1, m11 = EyeFocal[(int)eye] }; }
+        Matrix4x4 ViewAt(float side)
+        {
+            Matrix4x4 m = transform.worldToLocalMatrix;
+            m.m03 += side;
+            m.m20 = -m.m20;
+            m.m21 = -m.m21;
+            m.m22 = -m.m22;
+            m.m23 = -m.m23;
+            return m;
+        }
         public static int allCamerasCount { get { return All.Count; } }
         public static int GetAllCameras(Camera[] cameras)
         {

@@ -33,6 +33,7 @@ namespace UnityEngine
             Vector3 d = a - b;
             return Mathf.Sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
         }
+        public float magnitude { get { return Distance(this, zero); } }
     }
 
     public struct Vector4

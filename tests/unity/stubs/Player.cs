@@ -76,6 +76,8 @@ namespace UnityEngine
             Camera.All.Add(camera);
             return camera;
         }
+        public static void SetPixelHeight(Camera camera, int height) { camera.pixelHeight = height; }
+        public static void SetEyes(Camera camera, float[] focal) { camera.EyeFocal = focal; }
         public static void SetField(Component on, string field, object value)
         {
             on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);

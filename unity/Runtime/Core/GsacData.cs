@@ -11,6 +11,7 @@ namespace Gsac
         public float[] LogScale; // N x 3
         public float[] Rgb;      // N x 3, display colour
         public float[] Opacity;  // N, 0..1
+        public float MaxHeight;  // px: of the person up to which the level is drawn; 0: not said
 
         public int Count { get { return Face.Length; } }
     }
@@ -55,6 +56,7 @@ namespace Gsac
         public Dictionary<string, string> Provenance = new Dictionary<string, string>();
         public float Ground;
         public float LowPass = 0.3f;
+        public bool KeepsEnergy; // the low-pass spreads a gaussian's opacity over the area that it adds
         public float AlphaMax = 0.999f;
         public float AlphaMin = 1f / 255f;
         public bool IsMirrored;
@@ -65,6 +67,27 @@ namespace Gsac
         public int Joint(string name)
         {
             return System.Array.IndexOf(JointNames, name);
+        }
+
+        /// <summary>Whether the levels say up to which height of the person they are drawn.</summary>
+        public bool HasHeights
+        {
+            get
+            {
+                foreach (GsacLevel level in Levels)
+                {
+                    if (level.MaxHeight > 0) return true;
+                }
+                return false;
+            }
+        }
+
+        /// <summary>The coarsest level that a person of this height, px, may be drawn by.</summary>
+        public int LevelAt(float height)
+        {
+            int level = Levels.Length - 1;
+            while (level > 0 && !(Levels[level].MaxHeight >= height)) level--;
+            return level;
         }
 
         /// <summary>Reads a file; one that is too large is refused before it is read. Throws GsacException, IOException.</summary>

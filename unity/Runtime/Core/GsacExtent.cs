@@ -14,13 +14,19 @@ namespace Gsac
         public readonly float[] Radius;
         public readonly float Pad;
 
+        /// <summary>m: height of the rest mesh.</summary>
+        public readonly float Stature;
+
         public GsacExtent(GsacData data)
         {
             Radius = new float[data.JointCount];
             var moved = new float[data.VertexCount];
             for (int m = 0; m < data.ExpressionVertex.Length; m++) moved[data.ExpressionVertex[m]] += Length(data.ExpressionDelta, m * 3);
+            float low = float.MaxValue, high = float.MinValue;
             for (int v = 0; v < data.VertexCount; v++)
             {
+                low = Math.Min(low, data.Vertices[v * 3 + 1]);
+                high = Math.Max(high, data.Vertices[v * 3 + 1]);
                 for (int k = v * 4; k < v * 4 + 4; k++)
                 {
                     if (data.SkinWeight[k] <= 0) continue;
@@ -28,6 +34,7 @@ namespace Gsac
                     Radius[j] = Math.Max(Radius[j], Distance(data.Vertices, v * 3, data.Joints, j * 3) + moved[v]);
                 }
             }
+            Stature = high - low;
             foreach (GsacLevel level in data.Levels)
             {
                 for (int n = 0; n < level.Count; n++)

@@ -97,6 +97,7 @@ namespace Gsac
                 level.LogScale = file.Reals(prefix + ".log_scale", N, 3);
                 level.Rgb = file.Reals(prefix + ".rgb", N, 3);
                 level.Opacity = file.Reals(prefix + ".opacity", N);
+                level.MaxHeight = MaxHeight((Dictionary<string, object>)levels[i]);
                 for (int q = 0; q < level.Quat.Length; q += 4)
                 {
                     double length2 = 0;
@@ -105,6 +106,12 @@ namespace Gsac
                 }
                 data.Levels[i] = level;
             }
+        }
+
+        static float MaxHeight(Dictionary<string, object> level)
+        {
+            object said;
+            return level.TryGetValue("max_height_px", out said) && said != null ? Optional(level, "max_height_px", 0, 1, 1e6) : 0;
         }
 
         void ReadPoses(GsacData data)
@@ -168,6 +175,12 @@ namespace Gsac
             if (!file.Head.ContainsKey("blend")) return;
             Dictionary<string, object> blend = Table(file.Head, "blend");
             data.LowPass = Optional(blend, "low_pass_px2", data.LowPass, 0, 100);
+            object energy;
+            if (blend.TryGetValue("low_pass_energy", out energy))
+            {
+                if (!(energy is bool)) throw Bad(GsacFault.Head, "`low_pass_energy` is of the wrong kind");
+                data.KeepsEnergy = (bool)energy;
+            }
             data.AlphaMax = Optional(blend, "alpha_max", data.AlphaMax, 0, 1);
             data.AlphaMin = Optional(blend, "alpha_min", data.AlphaMin, 1e-6, 1);
         }

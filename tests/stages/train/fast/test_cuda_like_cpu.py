@@ -28,7 +28,7 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     from gsac.benchmarks.gpu.synthetic_clip import start
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import make_recipe
-    from gsac.stages.train.fast.schedule import GAIN_RATE, OFFSET_SHARE
+    from gsac.stages.train.fast.schedule import GAIN_RATE, OFFSET_SHARE, shortest_axis
     from gsac.stages.train.fast.trainer import Trainer
     from gsac.stages.train.gaussians.cloth_offsets import fold
     from gsac.stages.train.poses.poses import Poses
@@ -43,10 +43,11 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
         still.shots = [Shot(np.uint8(s.pixels * dim), camera) if t % 2 else s for t, s in enumerate(figure.shots)]
     params = BodyParams.from_pose(still.pose, still.transl, np.zeros(body.num_betas), np.zeros((4, len(body.expression_names))),
                                   camera.focal, camera.center)
-    task = SimpleNamespace(config=TrainConfig(steps=steps, exposure=exposure), poses=Poses(body, params), trained=np.arange(4))
+    task = SimpleNamespace(config=TrainConfig(steps=steps, exposure=exposure), poses=Poses(body, params), trained=np.arange(4),
+                           views=still.shots)
     gaussians = start(still.body, 2000)
     gaussians.light = LIGHT
-    cpu, recipe = Trainer(gaussians, task), make_recipe(task.config, 2000)
+    cpu, recipe = Trainer(gaussians, task), make_recipe(task.config, 2000, least=shortest_axis(task))
     cuda = CudaTrainer(still.body, [still.shots], task.poses.pose, task.poses.transl, gaussians, recipe)
     backgrounds, losses = cuda.buffers["background"].read()[:, 0], []
     for step in range(steps):

@@ -22,6 +22,8 @@ def test_a_level_draws_better_at_its_own_size_than_the_finest_does(job_anywhere,
     assert [row["image_height"] for row in figures] == [64, 32]
     for row in figures:
         assert row["psnr_fg"] > row["psnr_fg_finest"] + 0.5
+    assert [round(level.max_height_px / coarser[0].max_height_px, 1) for level in coarser] == [1, .5]
+    assert finest.max_height_px is None and 16 < coarser[0].max_height_px <= 64, "a person as high as half of the frame, or more"
     for level in coarser:
         np.testing.assert_array_equal(level.light, finest.light)
 

@@ -70,25 +70,26 @@ def test_a_size_is_the_mean_of_its_last_steps(monkeypatch):
 
 @pytest.mark.slow
 def test_sizes_are_judged_as_they_are_handed_out(job_anywhere, monkeypatch):
-    level_heights, judge, judged = trainer.level_heights, size_search.judge, []
+    level_heights, judge, judged = trainer.level_heights, size_search.judge_person, []
 
     def marked(gaussians, rest, faces):
         return replace(level_heights(gaussians, rest, faces), rgb=np.full_like(gaussians.rgb, 0.25))
 
-    def watched(gaussians, *rest):
-        judged.append(gaussians)
-        return judge(gaussians, *rest)
+    def watched(candidates):
+        judged.append(candidates[0].gaussians)
+        assert {view.camera.height for view in candidates[0].views.values()} == {128}, "as filmed, whatever is trained on"
+        return judge(candidates)
 
-    monkeypatch.setattr(size_search, "SIZES", (400, 40))
+    monkeypatch.setattr(size_search, "list_sizes", lambda largest: (400, 40))
     monkeypatch.setattr(trainer, "level_heights", marked)
-    monkeypatch.setattr(size_search, "judge", watched)
-    run(job_anywhere(gaussians="auto", frames=6, steps=12, pose_rounds=0, pose_test_steps=0))
+    monkeypatch.setattr(size_search, "judge_person", watched)
+    run(job_anywhere(gaussians="auto", height=64, frames=6, steps=12, pose_rounds=0, pose_test_steps=0))
     assert len(judged) == 2 and all((gaussians.rgb == 0.25).all() for gaussians in judged)
 
 
 @pytest.mark.slow
 def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywhere, monkeypatch):
-    monkeypatch.setattr(size_search, "SIZES", (1200, 600, 60, 30))
+    monkeypatch.setattr(size_search, "list_sizes", lambda largest: (1200, 600, 60, 30))
     monkeypatch.setattr(refit, "SHARE", 0.13)
     made = job_anywhere(gaussians="auto", pose_test_steps=0)
     run(made)
@@ -104,7 +105,7 @@ def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywher
 
 @pytest.mark.slow
 def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job_anywhere, monkeypatch):
-    monkeypatch.setattr(size_search, "SIZES", (500, 60))
+    monkeypatch.setattr(size_search, "list_sizes", lambda largest: (500, 60))
     monkeypatch.setattr(choose_heldout, "LONG", 6)
     made = job_anywhere(gaussians="auto", frames=10, steps=8, holdout=4, pose_rounds=0, pose_test_steps=0)
     run(made)
@@ -116,7 +117,7 @@ def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job_anywhere, monke
 
 @pytest.mark.slow
 def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules(job_anywhere, monkeypatch):
-    monkeypatch.setattr(size_search, "SIZES", (400, 40, 20))
+    monkeypatch.setattr(size_search, "list_sizes", lambda largest: (400, 40, 20))
     made = job_anywhere(gaussians="auto", every_size=True, frames=6, steps=12, pose_rounds=0, pose_test_steps=0)
     run(made)
     curve = json.loads((made.out / "metrics.json").read_text())["size_curve"]
@@ -128,7 +129,7 @@ def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules
 
 @pytest.mark.slow
 def test_auto_without_held_out_frames_takes_the_largest_size(job_anywhere, monkeypatch):
-    monkeypatch.setattr(size_search, "SIZES", (700, 300))
+    monkeypatch.setattr(size_search, "list_sizes", lambda largest: (700, 300))
     made = job_anywhere(gaussians="auto", frames=3, steps=5)
     run(made)
     assert json.loads((made.out / "metrics.json").read_text())["n_gaussians"] == 700

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import ADDED
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import shade
 from gsac.avatar.rotation import about_y, log
@@ -72,7 +73,7 @@ def filmed() -> Filmed:
     task = Task(list(views.values()), np.arange(len(YAWS)), np.zeros(0, int), poses, TrainConfig(), lambda *args: None)
     rest = poses.rest(0)[0]
     gaussians = Gaussians.area(rest, body.faces, 4000)
-    gaussians.light = LIGHT
+    gaussians.light, gaussians.low_pass = LIGHT, ADDED  # its fat splats show more of what lies behind
     at = centres_at_rest(gaussians, rest, body.faces)
     shirt = at[:, 1] > np.median(rest[:, 1])
     rng = np.random.default_rng(0)

@@ -354,6 +354,9 @@ def test_a_frame_lies_in_the_middle_of_its_square_and_what_can_show_the_person_i
     assert x == 0 and x + w == 35 + 12 and (y, y + h) == (0, 50) and (found.camera.width, found.camera.height) == (w, h)
     np.testing.assert_array_equal(found.pixels[10 - y:40 - y, 15 - x:35 - x], pixels[10:40, 5:25])
     assert found.pixels.sum() == pixels.sum()
+    of_crop = square.square_crop(view.crop(3, 8, 27, 44), square.side_of([view.crop(3, 8, 27, 44)]), vertices)
+    assert (of_crop.camera, of_crop.corner) == (found.camera, found.corner)
+    np.testing.assert_array_equal(of_crop.pixels, found.pixels)
 
 
 class Squares:

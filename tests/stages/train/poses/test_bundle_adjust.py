@@ -58,7 +58,7 @@ def test_a_render_is_compared_with_its_frame_as_plain_arrays_are():
 def test_the_equations_of_a_frame_are_its_slope_and_nearly_its_curvature(job):
     task, workspace = task_of(job(frames=2)), Workspace(1)
     poses, view = task.poses, person_crop(task.views[0])
-    gaussians = init_gaussians(task, {0: view, 1: person_crop(task.views[1])}, 3000)
+    gaussians = init_gaussians(task, {0: view, 1: person_crop(task.views[1])}, 800)
     share = photometric.joint_shares(poses.body, gaussians.face)
     normal = photometric.normal_equations(gaussians, share, poses, 0, view, workspace)
     rng = np.random.default_rng(0)
@@ -141,7 +141,7 @@ def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
     views = {t: person_crop(task.views[t]) for t in range(3)}
     poses = task.poses
     poses.transl[:, 0] -= TRUE_SHIFT
-    gaussians = init_gaussians(task, views, 3000)
+    gaussians = init_gaussians(task, views, 800)
     right = half_error(gaussians, poses, 0, views[0], Workspace(1))
     poses.transl[0, 0] += TRUE_SHIFT
     poses.pose[0, 16, 2] += 0.2

@@ -99,11 +99,12 @@ uint GsacSortKey(float depth, float2 range, uint bits, uint number)
     return ((uint)(top - floor(along * top)) << bits) | number;
 }
 
-// The ellipse of a gaussian on the screen, in pixels with x right and y up.
+// The ellipse of a gaussian on the screen, in pixels with x right and y up; kept: its area before the low-pass as a share of that after.
 struct GsacEllipse
 {
     float2 large;
     float2 small;
+    float kept;
 };
 
 // row0..2: model to eye, eye axes x right, y up, z ahead; eye: the mean there; focal, screen: px;
@@ -120,14 +121,18 @@ GsacEllipse GsacProject(float3 row0, float3 row1, float3 row2, float3 eye, float
     float3 s1 = float3(diagonal.x * j1.x + rest.x * j1.y + rest.y * j1.z,
                        rest.x * j1.x + diagonal.y * j1.y + rest.z * j1.z,
                        rest.y * j1.x + rest.z * j1.y + diagonal.z * j1.z);
-    float xx = dot(j0, s0) + lowPass;
+    float xx = dot(j0, s0);
     float xy = dot(j1, s0);
-    float yy = dot(j1, s1) + lowPass;
+    float yy = dot(j1, s1);
+    float bare = max(xx * yy - xy * xy, 0);
+    float determinant = bare + lowPass * (xx + yy + lowPass);
+    xx += lowPass;
+    yy += lowPass;
     float mean = 0.5 * (xx + yy);
     float spread = length(float2(0.5 * (xx - yy), xy));
     float most = mean + spread;
     // determinant / largest keeps the digits that mean - spread loses
-    float least = max((xx * yy - xy * xy) / most, 1e-6);
+    float least = max(determinant / most, 1e-6);
     float2 axis = float2(1, 0);
     if (spread > 1e-6 * mean)
     {
@@ -136,6 +141,7 @@ GsacEllipse GsacProject(float3 row0, float3 row1, float3 row2, float3 eye, float
     GsacEllipse e;
     e.large = sqrt(most) * axis;
     e.small = sqrt(least) * float2(-axis.y, axis.x);
+    e.kept = sqrt(bare / max(determinant, 1e-12));
     return e;
 }
 

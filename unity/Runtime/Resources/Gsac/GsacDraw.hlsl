@@ -12,6 +12,7 @@ float4 GsacModel0; // rows of the avatar's own space -> world
 float4 GsacModel1;
 float4 GsacModel2;
 float4 GsacBlend;  // px^2 added to the image covariance, most alpha, least alpha, 1 where the project blends linear colours
+uint GsacKeepsEnergy; // 1: the low-pass spreads a gaussian's opacity over the area that it adds
 uint GsacIndexBits;
 
 struct GsacCorner
@@ -55,6 +56,7 @@ GsacCorner GsacSplatCorner(uint vertex, float4x4 view, float4x4 projection, floa
     GsacEllipse e = GsacProject(float3(ex.x, ey.x, ez.x), float3(ex.y, ey.y, ez.y), -float3(ex.z, ey.z, ez.z),
                                 float3(eye.xy, depth), float3(s0.w, s1.xy), float3(s1.zw, s2.x),
                                 0.5 * screen * abs(lens), shift / lens, extent, GsacBlend.x);
+    if (GsacKeepsEnergy) corner.colour.a *= e.kept;
     float reach = GsacReach(corner.colour.a, GsacBlend.z);
     corner.sigmas = reach * float2((vertex & 1) ? 1.0 : -1.0, (vertex & 2) ? 1.0 : -1.0);
     float2 pixels = corner.sigmas.x * e.large + corner.sigmas.y * e.small;

@@ -51,10 +51,10 @@ class PoseNetworks:
         self._landmark = Network(models["pose_landmark_full"], threads)
         self._anchors = anchor_centers(self._detector.width, (8, 16, 32, 32, 32))
 
-    def persons(self, image: np.ndarray, threshold: float) -> list[Person]:
-        """image: (H, W, 3) uint8. Persons of at least this score, best first."""
+    def persons(self, image: np.ndarray, threshold: float, within: Region | None = None) -> list[Person]:
+        """image: (H, W, 3) uint8. Persons of at least this score, best first; within: looked for there, else in the whole frame."""
         size = self._detector.width
-        frame = full_frame(image.shape[1], image.shape[0])
+        frame = within or full_frame(image.shape[1], image.shape[0])
         raw, logits = self._detector(crop(image, frame, size, outside="black") * 2 - 1)
         found = suppress(decode(raw, logits, self._anchors, size, threshold))
         circles = frame.to_frame(found.points[:, :2])

@@ -1,0 +1,63 @@
+"""Frames as training and judging read them."""
+
+import numpy as np
+import pytest
+
+from gsac.avatar.artifacts import write_alpha, write_frame
+from gsac.avatar.camera import Camera
+from gsac.stages.train.views import View, person_crop, read_views, read_whole
+
+WIDTH, HEIGHT = 90, 160
+CAMERA = Camera((200.0, 200.0), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT)
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """Frames and masks of a block that moves to the right; nobody is in frame 2, and a haze without a person in frame 3."""
+    noise = np.random.default_rng(0)
+    for name in ("frames", "alpha"):
+        (tmp_path / name).mkdir()
+    for t in range(4):
+        alpha = np.zeros((HEIGHT, WIDTH), np.float32)
+        if t < 2:
+            alpha[40:120, 20 + 10 * t:50 + 10 * t] = 1
+        if t == 3:
+            alpha[:] = 0.05
+        write_frame(tmp_path / f"frames/{t:06d}.png", noise.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8))
+        write_alpha(tmp_path / f"alpha/{t:06d}.exr", alpha)
+    return tmp_path / "frames", tmp_path / "alpha"
+
+
+def test_frames_to_train_on_are_held_as_crops_of_the_person_that_know_their_whole_frame(folders):
+    views, empty = read_views(*folders, CAMERA, 80)
+    assert empty == [2, 3] and all(view.frame.height == 80 and view.frame.width == 45 for view in views)
+    for t, view in enumerate(views[:2]):
+        assert view.pixels.shape[0] < 60 and view.pixels.shape[1] < 36 and view.pixels.nbytes < 45 * 80 * 4 / 2
+        assert view.corner[0] + view.camera.center[0] == pytest.approx(22.5) and view.corner == (10 + 5 * t - 7, 20 - 7)
+        assert (view.pixels[..., 3] > 0).sum() == 40 * 15, "nothing of the person is lost"
+    assert all(views[t].pixels.nbytes == 4 for t in empty), "nobody needs no memory"
+
+
+def test_a_crop_of_a_crop_is_the_same_crop(folders):
+    view = read_views(*folders, CAMERA, 160)[0][1]
+    again = person_crop(view)
+    assert again.corner == view.corner and again.camera == view.camera and again.frame == view.frame
+    assert again.pixels.base is view.pixels or again.pixels is view.pixels, "and no copy"
+
+
+def test_frames_to_judge_by_are_whole_and_as_large_as_their_files_and_no_others_are_read(folders):
+    (folders[0] / "000000.png").write_bytes(b"torn")
+    views = read_whole(*folders, CAMERA, np.array([3, 1]))
+    assert list(views) == [3, 1] and views[1].camera == views[1].frame == CAMERA
+    assert views[1].pixels.shape == (HEIGHT, WIDTH, 4) and views[1].corner == (0, 0)
+    assert (views[1].pixels[40:120, 30:60, 3] == 255).all() and (views[1].pixels[..., 3] > 0).sum() == 80 * 30
+
+
+def test_a_view_is_reduced_by_area_with_its_camera_and_never_enlarged():
+    pixels = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
+    pixels[::2] = 200
+    view = View(CAMERA, pixels, (0, 0))
+    small = view.reduced(80)
+    assert small.pixels.shape == (80, 45, 4) and (small.pixels == 100).all()
+    assert small.camera == CAMERA.scaled(45, 80) == small.frame
+    assert view.reduced(160) is view and view.reduced(540) is view
