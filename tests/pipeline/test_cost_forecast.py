@@ -48,7 +48,9 @@ def test_the_demo_clip_is_foretold_within_one_and_a_half():
 
 
 def test_the_model_knows_the_recipes_own_steps():
-    assert {"cpu": schedule.STEPS, "cuda": cuda.STEPS} == cost_model.STEPS and schedule.COARSE_SHARE == cost_model.COARSE_SHARE
+    assert {"cpu": schedule.STEPS, "cuda": cuda.STEPS} == cost_model.STEPS
+    for name in ("SMALL", "LARGE", "SIZES", "MORE_ON_CUDA"):
+        assert getattr(schedule, name) == getattr(cost_model, name), name
 
 
 @pytest.mark.parametrize("device", ["cpu", "cuda"])
@@ -56,8 +58,9 @@ def test_more_frames_pixels_steps_or_gaussians_cost_more(device):
     few = costs(replace(DEMO, frames=30), device=device)
     for name, more in costs(device=device).items():
         assert more > few[name] or name == "export"
-    train = [costs(DEMO, "train.gaussians=6000", *more, device=device)["train"] for more in (
-        [], ["train.height=1280"], ["train.steps=6000"], ["train.gaussians=12000"], ["train.gaussians=auto"])]
+    train = [costs(DEMO, "train.gaussians=6000", "train.height=540", *more, device=device)["train"] for more in (
+        [], ["train.height=1280"], ["train.height=null"], ["train.steps=6000"], ["train.gaussians=12000"],
+        ["train.gaussians=auto"])]
     assert all(more > train[0] for more in train[1:])
 
 
