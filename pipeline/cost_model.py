@@ -22,7 +22,7 @@ SMALL, LARGE = (3e4, 0.15), (1.3e5, 0.7)
 """Pixels of a person, and the share of the steps that run at half the size."""
 SIZES, MORE_ON_CUDA = (3000, 30000), 1.5
 """Least and most gaussians where none are asked for, and the factor on them on the GPU."""
-PERSON = 0.08
+PERSON = 0.11
 """Pixels of a person, over those of a square as high as the frame."""
 SIZE_SEARCH = 1.4
 """Steps of training and of the refits of smaller sizes, over those of training alone."""
