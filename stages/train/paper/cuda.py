@@ -36,7 +36,7 @@ def make_recipe(task: Task) -> PaperRecipe:
     steps, batch = batches.order.shape
     return PaperRecipe(
         steps=steps, batch=batch, seed=task.config.seed, order=batches.order, background=batches.background, centre=batches.centre,
-        mu_rates=paper.mu_rate(np.arange(steps), steps), counts=np.array([densify.counts(step) for step in range(steps)]),
+        mu_rates=paper.mu_rates(steps), counts=np.array([densify.counts(step) for step in range(steps)]),
         rgb_rate=paper.RATES["rgb"], quat_rate=paper.RATES["quat"], scale_rate=paper.RATES["scale_logit"],
         pose_rate=body_adam.RATE, beta_rate=body_adam.RATE, expression_rate=HAND_SHARE * body_adam.RATE, hand_share=HAND_SHARE,
         jaw_share=HAND_SHARE, fresh=body_adam.FRESH, tiny=body_adam.TINY, masked=not text, ssim=losses.SSIM,

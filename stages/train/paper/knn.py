@@ -46,7 +46,7 @@ def pull_together(places: np.ndarray, rotations: np.ndarray, scales: np.ndarray,
 
 def find_nearest(places: np.ndarray) -> np.ndarray:
     """(N, K) int, the nearest of each of places (N, 3), itself among them."""
-    return KDTree(places).query(places, k=K)[1]
+    return np.asarray(KDTree(places).query(places, k=K)[1])
 
 
 def posed_quats(rotations: np.ndarray) -> np.ndarray:

@@ -77,9 +77,9 @@ def plan_batches(task: Task) -> Batches:
     return draw_batches(len(task.trained), min(BATCH, len(task.trained)), task.config.steps or STEPS, vertices, task.config.seed)
 
 
-def mu_rate(step: int | np.ndarray, steps: int) -> float | np.ndarray:
-    """Adam rate of the places at a step, from 0, or at steps (n,): HAHA's scheduler is one ahead."""
-    return MU_RATE * MU_DECAY ** ((step + 1) / steps)
+def mu_rates(steps: int) -> np.ndarray:
+    """(steps,) Adam rates of the places: HAHA's scheduler is one step ahead."""
+    return MU_RATE * MU_DECAY ** (np.arange(1, steps + 1) / steps)
 
 
 class Trainer:
@@ -149,7 +149,7 @@ class Trainer:
             moves[t] = grads.vertices
         require_finite(f"at step {number}",
                        {"loss": loss, **{f"gradient of {name}": gradient for name, gradient in total.items()}})
-        for name, rate in (RATES | {"mu": mu_rate(number, steps)}).items():
+        for name, rate in (RATES | {"mu": float(mu_rates(steps)[number])}).items():
             adam(self.values[name], total[name], self.first[name], self.second[name], number + 1, rate)
         self.body.step(moves)
         for t in moves:
