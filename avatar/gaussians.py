@@ -54,7 +54,7 @@ class Gaussians:
 
     def write(self, path: Path, coarser: Sequence[Gaussians] = ()) -> None:
         """To avatar.npz, float32 and face int32, `low_pass`, and where given `light` and coarser levels of detail, finest first."""
-        arrays = self._arrays() | {"low_pass": np.array(self.low_pass, np.float32)}
+        arrays = self._arrays() | {"low_pass": np.array(self.low_pass, np.float64)}
         if self.light is not None:
             arrays["light"] = np.asarray(self.light, np.float32)
         if coarser:

@@ -8,7 +8,7 @@ import numpy as np
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
-from gsac.avatar.draw_rule import BLUR, MAX_ALPHA, MIN_ALPHA
+from gsac.avatar.draw_rule import MAX_ALPHA, MIN_ALPHA, LowPass
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.joints import INDEX
 from gsac.avatar.skinning import joint_transforms, skin
@@ -37,6 +37,11 @@ def sort_steps(count: int) -> tuple[int, list[tuple[str, dict[str, int], int]]]:
                           keys // HAND // ACROSS_THREADS))
         steps.append(("SortMerge", stage | {"GsacSortShift": 0, "GsacSortStrides": 0}, keys >> BLOCK_BITS))
     return keys, steps
+
+
+def draw_rule(low_pass: LowPass, linear: int = 0) -> Parameters:
+    """The draw rule as the splats' shader takes it. linear: 1 where the project blends linear colours."""
+    return {"GsacBlend": [low_pass.px2, MAX_ALPHA, MIN_ALPHA, linear], "GsacKeepsEnergy": int(low_pass.keeps_energy)}
 
 
 def index_bits(count: int) -> int:
@@ -113,8 +118,6 @@ class Frame:
             view = np.eye(4)
             view[:3, 3] = side * -EYES_APART, -self.avatar.joints[INDEX["spine3"], 1], -distance
             views.append(view.T)
-        rule = [BLUR, MAX_ALPHA, MIN_ALPHA, 0]
         return {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(camera).T] * 2,
-                "_ScreenParams": [size, size, 0, 0], "GsacBlend": rule, "GsacKeepsEnergy": 0,
-                "GsacIndexBits": index_bits(self.count),
-                **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}
+                "_ScreenParams": [size, size, 0, 0], "GsacIndexBits": index_bits(self.count),
+                **draw_rule(self.avatar.gaussians.low_pass), **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}

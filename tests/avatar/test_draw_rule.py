@@ -35,6 +35,12 @@ def test_unitys_defaults_are_the_rule(name, expected):
     assert found(rf"float {name} = {NUMBER};", "unity/Runtime/**/*.cs") == {expected}
 
 
+def test_a_file_that_does_not_say_whether_the_low_pass_keeps_energy_is_drawn_by_the_rule_of_before():
+    viewer, unity = ((ROOT / name).read_text() for name in ("viewer/reader.js", "unity/Runtime/Core/GsacData.cs"))
+    assert "low_pass_energy: keepsEnergy = false" in viewer and "public bool KeepsEnergy;" in unity
+    assert not draw_rule.ADDED.keeps_energy and '"low_pass_energy": false' in (ROOT / "docs" / "gsac-format.md").read_text()
+
+
 @pytest.mark.parametrize(("name", "expected"), [("DARKEST", draw_rule.DARKEST), ("BRIGHTEST", draw_rule.BRIGHTEST)])
 def test_the_lights_clamp_is_the_same_in_unity_and_the_viewer(name, expected):
     assert found(rf"#define GSAC_{name} {NUMBER}", "unity/Runtime/Resources/Gsac/*.hlsl") == {expected}
@@ -50,6 +56,7 @@ def test_the_formats_page_states_the_rule():
 
 def test_the_cuda_text_holds_the_same_doubles():
     told = dict(re.findall(r"constexpr double (\w+) = (\S+);", source()))
-    names = {name: "NEAR_PLANE" if name == "NEAR" else name for name in vars(draw_rule) if name.isupper()}
-    assert {name: float(told[cuda]) for name, cuda in names.items()} == {name: getattr(draw_rule, name) for name in names}
+    numbers = {name: number for name, number in vars(draw_rule).items() if isinstance(number, (int, float))}
+    names = {name: "NEAR_PLANE" if name == "NEAR" else name for name in numbers}
+    assert {name: float(told[cuda]) for name, cuda in names.items()} == numbers
     assert np.float32(told["MIN_ALPHA"]) == np.float32(1.0 / 255)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar import artifacts, binding
+from gsac.avatar.draw_rule import PIXEL
 from gsac.avatar.gaussians import Gaussians
 
 
@@ -85,6 +86,7 @@ def test_coarser_levels_come_back_in_order_and_readers_that_know_none_read_the_f
     coarser[0].max_height_px, coarser[1].max_height_px = 270, 135
     finest.write(tmp_path / "avatar.npz", coarser)
     again = Gaussians.read_levels(tmp_path / "avatar.npz")
+    assert {level.low_pass for level in again} == {PIXEL}
     assert [len(level) for level in again] == [30, 10, 4] and [level.max_height_px for level in again] == [None, 270, 135]
     for level, wanted in zip(again, (finest, *coarser), strict=True):
         for name in artifacts.AVATAR_SHAPES:

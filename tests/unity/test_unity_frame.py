@@ -5,7 +5,7 @@ import pytest
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
-from gsac.avatar.draw_rule import DARKEST
+from gsac.avatar.draw_rule import DARKEST, PIXEL
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render
@@ -96,7 +96,8 @@ def test_the_draw_is_two_triangles_a_gaussian_with_the_files_blending_made_linea
     asked, _ = frame
     N = len(RiggedAvatar.read(files / "person.gsac").gaussians)
     assert int(asked["draw"][-1]) == 6 * N
-    np.testing.assert_allclose(asked["draw"][12:16], [.3, .999, 1 / 255, 1], rtol=1e-6)
+    np.testing.assert_allclose(asked["draw"][12:16], [PIXEL.px2, .999, 1 / 255, 1], rtol=1e-6)
+    assert asked["keeps_energy"] == 1
     corners = asked["indices"].view(np.uint32)[:6 * N].reshape(N, 6)
     np.testing.assert_array_equal(corners, np.arange(N)[:, None] * 4 + [0, 1, 2, 2, 1, 3])
 
@@ -119,7 +120,8 @@ def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, fra
     view[:3, 3] = -view[:3, :3] @ place
     screen = np.array([SIZE, SIZE, 0, 0])
     parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(camera).T, "_ScreenParams": screen,
-                  "GsacBlend": [*asked["draw"][12:15], 0], "GsacKeepsEnergy": 0, "GsacIndexBits": int(asked["draw"][16]),
+                  "GsacBlend": [*asked["draw"][12:15], 0], "GsacKeepsEnergy": int(asked["keeps_energy"][0]),
+                  "GsacIndexBits": int(asked["draw"][16]),
                   **{f"GsacModel{r}": model[r] for r in range(3)}}
     got = Painting(gpu, *passes[""], SIZE, SIZE, len(bound.means)).draw(parameters)
 

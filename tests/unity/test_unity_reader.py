@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gsac.avatar.draw_rule import PIXEL
 from gsac.avatar.gaussians import FIELDS
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.gsac_file.write import avatar_bytes
@@ -19,7 +20,9 @@ def got(mono, package, programs_folder, exported, tmp_path_factory):
     exe = mono.compile_csharp([*(package / "Runtime" / "Core").glob("*.cs"), programs_folder / "Dump.cs",
                                programs_folder / "Read.cs"], folder / "read.exe")
     avatar = RiggedAvatar.read(exported / "avatar.gsac")
-    (folder / "lit.gsac").write_bytes(avatar_bytes(replace(avatar, gaussians=replace(avatar.gaussians, light=LIGHT))))
+    coarser = [replace(level, max_height_px=height) for level, height in zip(avatar.coarser, (270, 135), strict=True)]
+    lit = replace(avatar, gaussians=replace(avatar.gaussians, light=LIGHT), coarser=coarser)
+    (folder / "lit.gsac").write_bytes(avatar_bytes(lit))
     lines = mono.run(exe, "dump", folder / "lit.gsac", folder / "arrays").splitlines()
     return mono.arrays(folder / "arrays"), lines
 
@@ -36,7 +39,8 @@ def test_mesh_skeleton_skin_expressions_and_gaussians_are_those_of_the_python_re
     for name in FIELDS:
         np.testing.assert_array_equal(got[0][name], np.ravel(getattr(avatar.gaussians, name)), name)
     np.testing.assert_array_equal(got[0]["light"], LIGHT.ravel())
-    np.testing.assert_allclose(got[0]["blend"], [.3, .999, 1 / 255, avatar.ground, 0], rtol=1e-6)
+    np.testing.assert_allclose(got[0]["blend"], [PIXEL.px2, .999, 1 / 255, avatar.ground, 1], rtol=1e-6)
+    np.testing.assert_array_equal(got[0]["heights"], [0, 270, 135])
 
 
 def test_names_poses_and_clips_are_those_of_the_python_reader(got, avatar):

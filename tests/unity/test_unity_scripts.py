@@ -166,6 +166,35 @@ def test_coarser_levels_are_drawn_from_afar_and_do_not_flicker_where_they_change
     assert drawn == [0, 1, 2, 2, 0, 0, 1, 1, 0], "at 3, 12, 30, 300, 3, 8.5, 9.2, 8.5 and 7.9 m; they change at 8 and 16"
 
 
+@pytest.fixture(scope="module")
+def levelled(figure, tmp_path_factory):
+    """The figure's file with levels up to 270 and 135 px, how many gaussians each has, and the rest shape's height, m."""
+    coarser = [replace(level, max_height_px=height) for level, height in zip(figure.coarser, (270, 135), strict=True)]
+    path = tmp_path_factory.mktemp("levelled") / "figure.gsac"
+    path.write_bytes(avatar_bytes(replace(figure, coarser=coarser)))
+    return path, [len(level) for level in (figure.gaussians, *coarser)], np.ptp(figure.vertices[:, 1])
+
+
+def test_the_persons_height_on_the_screen_decides_the_level_and_a_tenth_of_it_keeps_the_one_of_before(play, levelled):
+    path, counts, stature = levelled
+    heights = [400, 265, 250, 235, 250, 265, 275, 128, 115, 128, 60, 1000]
+    asked = [word for height in heights for word in (100, 2 * 100 / stature, height, "one")]  # the px alone change
+    drawn = [counts.index(int(n)) for n in play("heights", path, *asked).split()]
+    assert drawn == [0, 0, 0, 1, 1, 1, 0, 1, 2, 2, 2, 0]
+    asked = [word for away in (20, 40, 80, 160) for word in (away, 2 * 40 / stature, 250, "one")]
+    drawn = [counts.index(int(n)) for n in play("heights", path, *asked).split()]
+    assert drawn == [0, 0, 1, 2], "500, 250, 125 and 62 px in pictures of one size: 250 and 125 are within a tenth of 270 and 135"
+
+
+def test_the_larger_eye_of_a_headset_decides_and_without_perspective_the_distance_does_not(play, levelled):
+    path, counts, stature = levelled
+    focal = 2 * 100 / stature
+    asked = [(100, focal, 400, "left"), (100, focal, 400, "right"), (100, focal, 200, "left"), (100, focal / 100, 200, "flat"),
+             (5000, focal / 100, 400, "flat"), (1, focal / 100, 100, "flat"), (100, focal, 400, "hidden")]
+    drawn = [int(n) for n in play("heights", path, *(word for row in asked for word in row)).split()]
+    assert drawn == [counts[0], counts[0], counts[1], counts[1], counts[0], counts[2], 0]
+
+
 def test_every_level_is_bound_in_the_light_of_the_file_as_far_as_the_component_says(play, files, tmp_path, figure):
     light = np.linspace(-.4, .7, 12, dtype=np.float32).reshape(4, 3)
     (tmp_path / "lit.gsac").write_bytes(avatar_bytes(replace(figure, gaussians=replace(figure.gaussians, light=light))))

@@ -5,9 +5,11 @@ import pytest
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
+from gsac.avatar.draw_rule import ADDED, PIXEL
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.raster import render
 from gsac.avatar.rotation import exp
+from gsac.benchmarks.unity.frame import draw_rule
 from gsac.benchmarks.unity.gpu import Painting, projection
 from gsac.benchmarks.unity.packing import pack_avatar
 
@@ -37,13 +39,18 @@ def scene(exported):
     flip = np.diag([1.0, -1, -1])
     total = flip @ view[:, :3] @ model[:, :3]
     place = flip @ (view[:, :3] @ model[:, 3] + view[:, 3])
-    truth = render((bound.means @ total.T + place).astype(np.float32), (total @ bound.rotations).astype(np.float32),
-                   bound.scales, g.rgb, g.opacity, camera)
-    return {"avatar": avatar, "bound": bound, "model": model, "view": view, "camera": camera, "total": total, "place": place,
-            "truth": np.concatenate([truth.rgb, truth.alpha[..., None]], 2)}
+    scene = {"avatar": avatar, "bound": bound, "model": model, "view": view, "camera": camera, "total": total, "place": place}
+    return scene | {"truth": true_picture(scene, PIXEL)}
 
 
-def picture(gpu, passes, scene, pipeline, flipped=False, linear=0):
+def true_picture(scene, low_pass):
+    g, bound, total = scene["avatar"].gaussians, scene["bound"], scene["total"]
+    truth = render((bound.means @ total.T + scene["place"]).astype(np.float32), (total @ bound.rotations).astype(np.float32),
+                   bound.scales, g.rgb, g.opacity, scene["camera"], low_pass=low_pass)
+    return np.concatenate([truth.rgb, truth.alpha[..., None]], 2)
+
+
+def picture(gpu, passes, scene, pipeline, flipped=False, linear=0, low_pass=PIXEL):
     g, bound = scene["avatar"].gaussians, scene["bound"]
     N = len(g)
     half = bound.rotations * bound.scales[:, None]
@@ -58,13 +65,13 @@ def picture(gpu, passes, scene, pipeline, flipped=False, linear=0):
     eye = -scene["view"][:, :3].T @ scene["view"][:, 3]
     if pipeline == "HDRenderPipeline":
         view[:3, 3] = 0
-    screen = np.array([SIZE, SIZE, 0, 0])
+    size = scene["camera"].width
+    screen = np.array([size, size, 0, 0])
     parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(scene["camera"], flipped).T,
                   "_ScreenParams": screen, "_ScaledScreenParams": screen, "_ScreenSize": screen,
-                  "_WorldSpaceCameraPos": [*eye, 0], "GsacBlend": np.array([.3, .999, 1 / 255, linear]),
-                  "GsacKeepsEnergy": 0, "GsacIndexBits": 13,
+                  "_WorldSpaceCameraPos": [*eye, 0], "GsacIndexBits": 13, **draw_rule(low_pass, linear),
                   **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
-    return Painting(gpu, *passes[pipeline], SIZE, SIZE, N).draw(parameters)
+    return Painting(gpu, *passes[pipeline], size, size, N).draw(parameters)
 
 
 @pytest.mark.parametrize("pipeline", PIPELINES)
@@ -74,6 +81,34 @@ def test_the_picture_is_the_trainers_at_55_db(gpu, passes, scene, pipeline):
     mse = ((got - scene["truth"]) ** 2).mean()
     print(f"{pipeline or 'built-in'}: PSNR {-10 * np.log10(mse):.1f} dB, max {abs(got - scene['truth']).max():.4f}")
     assert -10 * np.log10(mse) > 55
+
+
+@pytest.mark.parametrize("low_pass", [ADDED, PIXEL._replace(px2=1.0), PIXEL._replace(px2=0.0)], ids=["added", "wide", "none"])
+def test_the_picture_is_the_trainers_by_whatever_low_pass_the_file_names(gpu, passes, scene, low_pass):
+    wanted = true_picture(scene, low_pass)
+    mse = ((picture(gpu, passes, scene, "", low_pass=low_pass) - wanted) ** 2).mean()
+    print(f"{low_pass}: PSNR {-10 * np.log10(mse):.1f} dB")
+    assert -10 * np.log10(mse) > 55 and abs(wanted - scene["truth"]).max() > .1
+
+
+def reduced(picture, size):
+    """(size, size, 4), each pixel the mean of those of a picture (n * size, n * size, 4)."""
+    n = len(picture) // size
+    return picture.reshape(size, n, size, n, 4).mean((1, 3))
+
+
+@pytest.mark.parametrize(("low_pass", "alike"), [(PIXEL, True), (ADDED, False)], ids=["energy kept", "added"])
+def test_with_energy_kept_the_person_looks_alike_at_half_and_at_two_and_four_times_the_size(gpu, passes, scene, low_pass, alike):
+    sizes = SIZE // 2, SIZE, 2 * SIZE, 4 * SIZE
+    pictures = {size: picture(gpu, passes, scene | {"camera": scene["camera"].scaled(size, size)}, "", low_pass=low_pass)
+                for size in sizes}
+    got = []
+    for size in sizes:
+        small, other = (reduced(pictures[s], min(size, SIZE)) for s in (size, SIZE))
+        person = other[..., 3] > .02
+        got.append(-10 * np.log10(((small - other)[person] ** 2).mean() + 1e-12))
+    print(low_pass, [f"{x:.1f} dB" for x in got])
+    assert (min(got) > 36) == alike
 
 
 def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, passes, scene):
@@ -87,7 +122,7 @@ def test_each_eye_of_a_headset_is_drawn_by_its_own_matrices_in_one_pass(gpu, pas
     assert abs(alone[0] - alone[1]).max() > .3, "the eyes see different things"
     views = [np.vstack([s["view"], [0, 0, 0, 1]]).T for s in (shifted, scene)]
     parameters = {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(scene["camera"]).T] * 2,
-                  "_ScreenParams": [SIZE, SIZE, 0, 0], "GsacBlend": [.3, .999, 1 / 255, 0], "GsacIndexBits": 13,
+                  "_ScreenParams": [SIZE, SIZE, 0, 0], "GsacIndexBits": 13, **draw_rule(PIXEL),
                   **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
     painting = Painting(gpu, *passes["stereo"], SIZE, SIZE, len(scene["bound"].means))
     for eye in (0, 1):

@@ -1,7 +1,6 @@
-"""Coarser levels of detail: each merges neighbours of the one before and is fitted to frames of the size it will be seen at.
+"""Coarser levels of detail: each merges neighbours of the one before and is fitted to frames of about the size it is seen at.
 
-On the screen no gaussian is narrower than a pixel's blur, so gaussians made for a near view look fat from afar; a level fitted
-at its own size draws better there.
+From afar many gaussians share a pixel, and then fewer that were fitted to small frames draw better.
 """
 
 from __future__ import annotations
@@ -9,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import numpy as np
-
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
-from gsac.avatar.person_height import person_height
 from gsac.stages.train.fast.backend import Backend
+from gsac.stages.train.fast.drawn_height import find_drawn_height
 from gsac.stages.train.fast.initial_gaussians import crop_views
 from gsac.stages.train.fast.size_search import count_pixels, viewing_weight
 from gsac.stages.train.fast.trainer import Trainer
@@ -30,11 +27,10 @@ class Level(NamedTuple):
     members: int
     """Gaussians of the finest level for each one of this level."""
     halvings: int
-    """How often the training images are halved, to the size at which a viewer draws this level."""
+    """How often the training images are halved, to the size at which this level is fitted."""
 
 
 LEVELS = (Level(3, 1), Level(9, 2))
-"""A person fills most of a frame of 540 px: a third is for persons of about 200 px, a ninth for 100, as in Unity's renderer."""
 LEAST = 100
 """Fewest gaussians of a level."""
 
@@ -56,17 +52,10 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
             break
         trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True, halvings=halvings)
         trainer.freeze_unseen(views)
-        gaussians = backend.refit(task, trainer, views).finish(views)[0]
-        gaussians.max_height_px = seen_height(task.poses, views)
+        finer, gaussians = gaussians, backend.refit(task, trainer, views).finish(views)[0]
+        gaussians.max_height_px = find_drawn_height(gaussians, finer, task.poses, views)
         out.append(gaussians)
     return out
-
-
-def seen_height(poses: Poses, views: dict[int, View]) -> float:
-    """Median height of the person in the views (frame -> view), whole px."""
-    joints = poses.to_params().joints
-    heights = [person_height(np.ptp(poses.rest(t)[0][:, 1]), joints[t], view.camera.focal[1]) for t, view in views.items()]
-    return float(round(np.median(heights)))
 
 
 def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views: Mapping[int, View], height: int) -> list[dict]:

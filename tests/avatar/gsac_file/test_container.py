@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gsac.avatar.draw_rule import ADDED, PIXEL
 from gsac.avatar.gsac_file.container import HEADER, MAGIC, MAX_FILE, VERSION, Fault, GsacError, pack, read_bytes, unpack
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.gsac_file.write import avatar_bytes
@@ -66,6 +67,18 @@ def test_a_light_is_written_and_read_and_without_one_no_block_is_there(figure, d
     np.testing.assert_array_equal(back.gaussians.light, light)
     assert avatar_bytes(back) == avatar_bytes(lit)
     assert "light" not in head_and_body(data)[0]["blocks"] and RiggedAvatar.from_bytes(data).gaussians.light is None
+
+
+def test_the_heights_of_levels_and_the_low_pass_are_written_and_read_and_of_old_files_they_are_the_old_ones(figure, data):
+    coarser = [replace(level, max_height_px=height) for level, height in zip(figure.coarser, (270.0, None), strict=True)]
+    for rule in (ADDED, PIXEL._replace(px2=.25)):
+        written = avatar_bytes(replace(figure, gaussians=replace(figure.gaussians, low_pass=rule), coarser=coarser))
+        back = RiggedAvatar.from_bytes(written)
+        assert [level.max_height_px for level in (back.gaussians, *back.coarser)] == [None, 270, None]
+        assert back.gaussians.low_pass == back.coarser[0].low_pass == rule and avatar_bytes(back) == written
+    head, body = head_and_body(data)
+    for blend in ({}, {"alpha_max": .9}):
+        assert RiggedAvatar.from_bytes(rebuilt(head | {"blend": blend}, body)).gaussians.low_pass == ADDED
 
 
 def test_same_avatar_same_bytes_and_a_second_round_changes_nothing(figure, data):

@@ -1,5 +1,7 @@
 """Coarser levels of detail: fewer gaussians, nearly the same picture from afar, in any pose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,8 +81,6 @@ def test_the_left_hand_stays_red(avatar):
 
 
 def test_gaussians_on_faces_without_area_and_a_single_gaussian_are_merged_without_nan(figure):
-    from dataclasses import replace
-
     vertices = figure.vertices.copy()
     vertices[figure.faces[0]] = vertices[figure.faces[0, 0]]
     for g in (figure.gaussians, figure.gaussians[:1]):
@@ -92,11 +92,11 @@ def test_gaussians_on_faces_without_area_and_a_single_gaussian_are_merged_withou
 
 def test_levels_that_were_trained_are_carried_on_as_they_are(person, tmp_path):
     finest = Gaussians.read(person["train/avatar.npz"])
-    finest.write(tmp_path / "avatar.npz", [finest[::4], finest[::16]])
+    finest.write(tmp_path / "avatar.npz", [replace(finest[::step], max_height_px=height) for step, height in ((4, 230), (16, 115))])
     (tmp_path / "out").mkdir()
     run(Job(person | {"train/avatar.npz": tmp_path / "avatar.npz"}, tmp_path / "out", ExportConfig(animations="")))
     levels = RiggedAvatar.read(tmp_path / "out" / "avatar.gsac").coarser
-    assert [len(level) for level in levels] == [1500, 375]
+    assert [(len(level), level.max_height_px) for level in levels] == [(1500, 230), (375, 115)]
     np.testing.assert_array_equal(levels[1].face, finest.face[::16])
     np.testing.assert_allclose(levels[1].rgb, finest.rgb[::16], atol=1e-3)
 

@@ -27,6 +27,7 @@ public static class Play
             case "benchmark": Benchmark(args[1], args[2]); break;
             case "import": Import(args[1]); break;
             case "levels": Levels(args[1]); break;
+            case "heights": Heights(args); break;
             case "light": Light(args[1]); break;
             case "inspector": Inspector(args[1]); break;
             case "demo": Demo(args[1]); break;
@@ -107,6 +108,7 @@ public static class Play
                 Bounds b = asked.worldBounds;
                 rows.AddRange(new[] { b.center.x, b.center.y, b.center.z, b.size.x, b.size.y, b.size.z, count });
                 dump.Put("draw", rows.ToArray());
+                dump.Put("keeps_energy", new[] { Player.Value(block, Shader.PropertyToID("GsacKeepsEnergy")).x });
                 dump.Put("GsacColours", Player.Words(Player.Buffer(block, Shader.PropertyToID("GsacColours"))));
                 dump.Put("indices", Player.Words(indices));
                 // right, up, ahead, place, as columns
@@ -283,6 +285,34 @@ public static class Play
         {
             camera.transform.SetPositionAndRotation(new Vector3(0, 1, away), Quaternion.Euler(0, 180, 0));
             Player.Frame(new[] { avatar.gameObject })();
+        }
+    }
+
+    /// <summary>
+    /// Gaussians drawn from words of m away, focal length over half the picture's height, the picture's px, and how: "one" eye,
+    /// "flat" (no perspective), a headset whose "left" or "right" eye is that one and the other half as long, "hidden" (another layer).
+    /// </summary>
+    static void Heights(string[] args)
+    {
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(args[1]), "person");
+        avatar.TPose();
+        avatar.SkipFade();
+        Camera camera = Player.AddCamera("eye");
+        int drawn = 0;
+        Player.OnDraw = (asked, indices, count) => drawn = count / 6;
+        for (int i = 2; i < args.Length; i += 4)
+        {
+            float focal = float.Parse(args[i + 1], CultureInfo.InvariantCulture);
+            string how = args[i + 3];
+            camera.transform.SetPositionAndRotation(new Vector3(0, 1, float.Parse(args[i], CultureInfo.InvariantCulture)), Quaternion.Euler(0, 180, 0));
+            camera.projectionMatrix = new Matrix4x4 { m00 = focal, m11 = focal };
+            camera.orthographic = how == "flat";
+            Player.SetPixelHeight(camera, int.Parse(args[i + 2]));
+            Player.SetEyes(camera, how == "left" ? new[] { focal, focal / 2 } : how == "right" ? new[] { focal / 2, focal } : null);
+            camera.cullingMask = how == "hidden" ? 0 : -1;
+            drawn = 0;
+            Player.Frame(new[] { avatar.gameObject })();
+            Console.WriteLine(drawn);
         }
     }
 
