@@ -7,7 +7,7 @@ and alpha, a frame is cut out by its mask; both are scored on the same backgroun
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -204,7 +204,7 @@ def mean_psnr(scores: list[dict[str, float]], *names: str) -> float | None:
     return float(np.mean(values)) if values else None
 
 
-def summary(scores: list[dict[str, float]]) -> dict[str, float | None]:
+def summary(scores: list[dict[str, float]]) -> dict[str, Any]:
     """Metrics of many images by `score`: `psnr_*` is the mean of the images' PSNR, `psnr_*_pooled` that of all pixels together.
 
     `lpips` is that of `lpips_net`, the first available network of `LPIPS`, and `lpips_black` the first one on black; None without

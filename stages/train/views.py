@@ -90,9 +90,13 @@ def read_whole(frames: Path, alphas: Path, camera: Camera, chosen: Iterable[int]
     Raises StageError for masks that do not fit the frames.
     """
     paths = pair_masks(frames, alphas)
-    chosen = [int(t) for t in chosen]
+    wanted = [int(t) for t in chosen]
+
+    def read(t: int) -> View:
+        return _read_view(*paths[t], camera)[0]
+
     with ThreadPoolExecutor(available_cores()) as pool:
-        return dict(zip(chosen, pool.map(lambda t: _read_view(*paths[t], camera)[0], chosen), strict=True))
+        return dict(zip(wanted, pool.map(read, wanted), strict=True))
 
 
 def pair_masks(frames: Path, alphas: Path) -> list[tuple[Path, Path]]:

@@ -9,14 +9,14 @@ from gsac.pipeline.project import Project
 
 
 def metrics(psnr, lpips=None):
-    return {"seconds": 40.0, "n_gaussians": 12000, "psnr_full_black": psnr, "ssim": 0.98, "lpips": lpips, "psnr_fg": psnr - 8,
+    return {"seconds": 40.0, "n_gaussians": 12000, "psnr_full_black": psnr, "ssim_black": 0.98, "lpips_black": lpips, "psnr_fg": psnr - 8,
             "psnr_hands": None, "psnr_fg_ttpo": psnr - 7}
 
 
 def test_a_cell_is_mean_and_spread_of_the_repeats_and_a_dash_where_one_was_not_measured():
     assert table.spread([metrics(30.0), metrics(32.0)], "psnr_full_black") == pytest.approx((31.0, 2**0.5))
     assert table.spread([metrics(30.0)], "psnr_full_black") == (30.0, 0.0)
-    assert table.spread([metrics(30.0, 0.05), metrics(30.0)], "lpips") is None
+    assert table.spread([metrics(30.0, 0.05), metrics(30.0)], "lpips_black") is None
     words = table.text({("a", "no fill"): [metrics(30.0), metrics(32.0)], ("a", "our fill"): [metrics(33.0)]})
     head, _, first, second = words.splitlines()
     assert [head.index(name) for name in ("time", "gaussians", "PSNR", "SSIM", "LPIPS")] == sorted(

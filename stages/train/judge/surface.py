@@ -50,7 +50,7 @@ def faces_in_view(vertices: np.ndarray, faces: np.ndarray, view: View) -> np.nda
     places = vertices[faces[shown]].mean(1)
     at = np.clip(whole.project(places), 0, (whole.width - 1, whole.height - 1)).astype(int) - view.corner
     inside = ((at >= 0) & (at < pixels.shape[::-1])).all(1)
-    x, y = np.where(inside[:, None], at, 0).T
+    x, y = np.where(inside, at.T, 0)
     shown[shown] = inside & (pixels[y, x] >= MASKED)
     return shown
 

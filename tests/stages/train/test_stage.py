@@ -83,6 +83,7 @@ def test_held_out_frames_are_judged_as_filmed_and_at_the_small_size_whatever_was
         small = figures["at_64"]
         assert set(small) == {f"{name}{end}" for name in stage.ALSO_SMALL for end in ("", "_ttpo")}
         assert small["psnr_fg"] != figures["psnr_fg"] and small["psnr_fg_ttpo"] > small["psnr_fg"]
+        assert figures["psnr_fg_ttpo"] > figures["psnr_fg"] + 0.5, "poses are moved onto the frames as filmed"
         boxes = [row["face_box"] for row in figures["heldout"] if row["face_box"]]
         assert boxes and all(0 <= x0 < x1 <= 72 and 0 <= y0 < y1 <= 64 for x0, y0, x1, y1 in boxes)
     params, held = BodyParams.read(half.out / "body.npz"), told[64]["heldout_frames"]
