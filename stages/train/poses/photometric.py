@@ -21,7 +21,7 @@ from gsac.avatar.raster import render_backward, render_bound, render_bound_backw
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.finite import require_finite
 from gsac.stages.train.poses.poses import Poses
-from gsac.stages.train.views import View, person_crop
+from gsac.stages.train.views import View, Views, person_crop
 
 TURNING = BODY.stop
 """Number of joints that turn: pelvis and body."""
@@ -94,8 +94,8 @@ def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: i
                            float(squares[:pixels].sum()), pixels)
 
 
-def converge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: list[View], rounds: int) -> None:
-    """Moves the poses of some frames to their images, the avatar held still. views: of all T.
+def converge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: Views, rounds: int) -> None:
+    """Moves the poses of some frames to their images, the avatar held still. views: frame -> view.
 
     Levenberg and Marquardt: a round that draws the frame worse is undone, and the next one steps shorter.
     """
