@@ -86,9 +86,12 @@ class Clip:
                 raise ArtifactError(f"{path}: field {each.name} is missing (has {', '.join(sorted(values))})")
         clip = cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
         try:
-            clip.crop = Crop(**values["crop"]) if values.get("crop") else None
-            clip.center = tuple(map(float, values["center"])) if values.get("center") else None
-        except (TypeError, ValueError) as e:
+            if cut := values.get("crop"):
+                clip.crop = Crop(int(cut["x"]), int(cut["y"]), int(cut["width"]), int(cut["height"]), float(cut["scale"]))
+            if values.get("center"):
+                x, y = map(float, values["center"])
+                clip.center = x, y
+        except (KeyError, TypeError, ValueError) as e:
             raise ArtifactError(f"{path}: crop and center must be an object of {', '.join(f.name for f in fields(Crop))}, "
                                 f"and two numbers ({e})") from e
         return clip

@@ -21,7 +21,7 @@ class SmplxConfig:
     height_m: float | None = None
     """Height of the person, m; fixes the scale, which one camera cannot see. null: the shape prior gives the scale."""
     focal_px: float | None = None
-    """Focal length, px, of a clip that does not carry it. null: estimated."""
+    """Focal length, px of the frames as split cut and scaled them, of a clip that does not carry it. null: estimated."""
     rounds: int = 2
     """`lm`: how often the correspondences of the silhouette and the spread of the person's pose are renewed."""
     iterations: int = 8

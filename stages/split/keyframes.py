@@ -7,6 +7,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from av.error import FFmpegError
 
 from gsac.stages.split.pick import pick_evenly
 from gsac.stages.split.probe import Video, open_video
@@ -25,7 +26,7 @@ def read_key_frames(path: Path, video: Video, count: int, width: int, height: in
             try:
                 container.seek(int(tick), stream=stream)
                 frame = next(container.decode(stream), None)
-            except av.FFmpegError:
+            except FFmpegError:
                 return
             if frame is None:
                 return

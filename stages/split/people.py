@@ -65,7 +65,10 @@ class People:
             persons = self._networks.persons(image, LEAST_SCORE, part)
             if persons:
                 break
-        for region in [person.region for person in persons] or [self._last] * (self._last is not None):
+        regions = [person.region for person in persons]
+        if not regions and self._last is not None:
+            regions = [self._last]
+        for region in regions:
             pose = self._networks.pose(image, region)
             if pose.score >= LEAST_SCORE:
                 self._last = pose.region
