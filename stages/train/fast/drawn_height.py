@@ -17,7 +17,7 @@ LOSS = 0.25
 OCTAVES = 2
 """How often the frames are halved below the size at which the level was fitted."""
 FRAMES = 6
-"""Trained frames that are looked at, at most."""
+"""Frames that are looked at, at most."""
 
 
 def find_drawn_height(level: Gaussians, finer: Gaussians, poses: Poses, views: dict[int, View]) -> float:
