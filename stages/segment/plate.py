@@ -65,10 +65,6 @@ class Difference:
         half = np.s_[y0 // HALF: y1 // HALF, x0 // HALF: x1 // HALF]
         return Difference(self.gain, self.empty[half], self.changed[half])
 
-    def scene(self, plate: Plate) -> Plate:
-        """The plate, or a part of it, in the frame's exposure."""
-        return Plate(expose(plate.image, self.gain), plate.known)
-
 
 def halve(image: np.ndarray) -> np.ndarray:
     """image: (H, W) or (H, W, 3). Returns it averaged down by two, (H // 2, W // 2, ...); an odd last row or column is left out."""

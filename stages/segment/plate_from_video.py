@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -18,26 +19,48 @@ SAMPLES = 24
 """Frames that the median is taken over, evenly spread over the clip."""
 LEAST_SEEN = 3
 """Fewest of them in which a pixel must be free of the person."""
-CLEAR = 0.01
-"""Distance kept from what may be the person, as a share of the frame's height."""
+CLEAR, NEAR = 0.01, 0.005
+"""Distance kept from what the network may take for the person, and from the outline, as shares of the frame's height."""
 BAND = 64
 """Rows that one thread sorts at a time."""
 MOST_CHANGED = 0.03
 """Share of the background that may differ from the median; with more the camera moved."""
 
+Person = Callable[[int, np.ndarray], np.ndarray]
+"""(index, image (H, W, 3) uint8) of a frame -> (H, W) bool, the person in it."""
+
 
 def learn_plate(paths: list[Path], xy: np.ndarray, score: np.ndarray, network: PersonMask) -> Plate | None:
-    """paths: T frames; xy: (T, 133, 2) px; score: (T, 133). None where too few frames show the person."""
-    regions = {t: person_region(np.nan_to_num(xy[t]), score[t])
-               for t in np.unique(np.linspace(0, len(paths) - 1, SAMPLES).astype(int)).tolist()}
+    """From where the network sees the person. paths: T frames; xy: (T, 133, 2) px; score: (T, 133).
+
+    None where too few frames show the person.
+    """
+    regions = {t: person_region(np.nan_to_num(xy[t]), score[t]) for t in sample(len(paths))}
+    seen = [t for t, region in regions.items() if region is not None]
+    return median_without(paths, seen, lambda t, image: network(image, regions[t]) > 0.05, CLEAR)
+
+
+def relearn_plate(paths: list[Path], shown: np.ndarray, outline: Person) -> Plate | None:
+    """From the person's outlines, which lie closer. paths: T frames; shown: (T,) bool, frames with a person.
+
+    None where too few frames show the person.
+    """
+    return median_without(paths, [t for t in sample(len(paths)) if shown[t]], outline, NEAR)
+
+
+def sample(frames: int) -> list[int]:
+    """Indices of at most SAMPLES of so many frames."""
+    return np.unique(np.linspace(0, frames - 1, SAMPLES).astype(int)).tolist()
+
+
+def median_without(paths: list[Path], frames: list[int], person: Person, clear: float) -> Plate | None:
+    """Median of some of the frames. clear: distance kept from the person, as a share of the height."""
     images, free = [], []
     with ThreadPoolExecutor(available_cores()) as pool:
-        seen = [t for t, region in regions.items() if region is not None]
-        for t, image in zip(seen, prefetch(pool, lambda t: read_frame(paths[t]), seen, available_cores()), strict=True):
-            reach = 2 * int(CLEAR * len(image)) + 1
-            person = (network(image, regions[t]) > 0.05).astype(np.uint8)
+        for t, image in zip(frames, prefetch(pool, lambda t: read_frame(paths[t]), frames, available_cores()), strict=True):
+            reach = 2 * int(clear * len(image)) + 1
             images.append(image)
-            free.append(cv2.dilate(person, np.ones((reach, reach), np.uint8)) == 0)
+            free.append(cv2.dilate(person(t, image).astype(np.uint8), np.ones((reach, reach), np.uint8)) == 0)
     if len(images) < 2 * LEAST_SEEN:
         return None
     return masked_median(np.stack(images), np.stack(free))

@@ -1,10 +1,12 @@
-"""Entry of segment: network, GrabCut, components and soft edge, frame by frame."""
+"""Entry of segment: the outlines of all frames, then their correction by the empty scene and the soft edges."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,16 +17,36 @@ from gsac.stages.frame_names import name_frames
 from gsac.stages.segment.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.stages.segment.components import keep_person
 from gsac.stages.segment.config import Method
+from gsac.stages.segment.correction import correct, match_scene
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.matting import soften
 from gsac.stages.segment.network import PersonMask, PoseMask, SelfieMask, person_region
 from gsac.stages.segment.plate import HALF, Plate, compare
-from gsac.stages.segment.plate_from_video import learn_plate
+from gsac.stages.segment.plate_from_video import learn_plate, relearn_plate
 
 METHODS: dict[Method, Callable[[dict[str, Path]], PersonMask]] = {"pose": PoseMask, "selfie": SelfieMask}
 """segment.method -> its class, made from the model files."""
 WIDE = 0.25
 """Margin around the person in which the scene is compared with the plate, as a share of the person's height."""
+
+MOSTLY = 0.5
+"""Least share of the frames that the plate of a video must fit for it to be learned again from their outlines."""
+
+
+class Cutout(NamedTuple):
+    """The person in a frame, before the soft edge."""
+
+    box: tuple[int, int, int, int]
+    """x0, y0, x1, y1 px of the part of the frame that `outline` is of."""
+    outline: np.ndarray
+    """(h, w) bool."""
+
+    def on_frame(self, shape: tuple[int, ...]) -> np.ndarray:
+        """(H, W) bool. shape: (H, W, ...) of the frame."""
+        x0, y0, x1, y1 = self.box
+        whole = np.zeros(shape[:2], bool)
+        whole[y0:y1, x0:x1] = self.outline
+        return whole
 
 
 def run(job: Job) -> None:
@@ -42,8 +64,8 @@ def run(job: Job) -> None:
         plate = Plate(image, np.ones(image.shape[:2], bool))
     elif job.config.use_plate and is_video:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
-    (job.out / "alpha").mkdir()
-    absent, other_scene = np.zeros((2, len(paths)), bool)
+    absent, fits = np.zeros((2, len(paths)), bool)
+    cutouts: list[Cutout | None] = [None] * len(paths)
 
     def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
         """Index, image and probability of each frame; the network has threads of its own, so one thread feeds it."""
@@ -53,32 +75,41 @@ def run(job: Job) -> None:
 
     def cut(masked: tuple[int, np.ndarray, np.ndarray | None]) -> View:
         t, image, probability = masked
+        absent[t] = probability is None
+        if absent[t]:
+            return make_view(image, np.zeros(image.shape[:2], np.float32))
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
-        if probability is None:
-            absent[t] = True
-            alpha = np.zeros(image.shape[:2], np.float32)
-        else:
-            alpha, plate_fits = segment_frame(image, probability, xy, score, plate, job.config.iterations)
-            if given and not plate_fits:
-                other_scene[t] = True
-            if not (alpha > 0.5).any():
-                raise StageError(f"frame {t} ({paths[t].name}): the mask is empty although a person was found there; "
-                                 "look at the frame, and remove it or try segment.method=selfie")
-        write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
-        return make_view(image, alpha)
+        cutouts[t], fits[t] = cut_frame(image, probability, xy, score, plate, job.config.iterations)
+        if not cutouts[t].outline.any():
+            raise StageError(f"frame {t} ({paths[t].name}): the mask is empty although a person was found there; "
+                             "look at the frame, and remove it or try segment.method=selfie")
+        return make_view(image, cutouts[t].on_frame(image.shape).astype(np.float32))
 
     def counted(views: Iterable[View]) -> Iterator[View]:
         for done, view in enumerate(views, 1):
             job.progress(done, len(paths), "frames")
             yield view
 
+    def outline(t: int, image: np.ndarray) -> np.ndarray:
+        return cutouts[t].on_frame(image.shape)
+
+    def soft(t: int) -> None:
+        image = read_frame(paths[t])
+        alpha = np.zeros(image.shape[:2], np.float32) if absent[t] else finish(image, cutouts[t], plate)
+        write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
+
     with ThreadPoolExecutor(available_cores()) as pool:
         sway = measure_sway(counted(prefetch(pool, cut, masks(pool), available_cores())))
+        if plate is not None and not given:
+            plate = relearn_plate(paths, ~absent, outline) if fits[~absent].mean() >= MOSTLY else None
+        (job.out / "alpha").mkdir()
+        deque(pool.map(soft, range(len(paths))), maxlen=0)
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
     if absent.any():
         job.warn(f"No person is in {name_frames(absent)}; the mask there is empty.")
-    if other_scene.any():
+    other_scene = ~fits & ~absent
+    if given and other_scene.any():
         job.warn(f"The plate does not show the scene of {name_frames(other_scene)} (did the camera move?); it is not used there.")
     moved = find_moved(sway, max(clip.width, clip.height))
     if is_video and moved.any():
@@ -90,25 +121,47 @@ def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, sc
                   plate: Plate | None, iterations: int) -> tuple[np.ndarray, bool]:
     """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).
 
-    Returns alpha (H, W) float32, and whether the plate, if any, fits the frame.
+    Returns alpha (H, W) float32 of a frame by itself, and whether the plate, if any, fits it.
+    """
+    cutout, fits = cut_frame(image, probability, xy, score, plate, iterations)
+    return finish(image, cutout, plate), fits
+
+
+def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,
+              plate: Plate | None, iterations: int) -> tuple[Cutout, bool]:
+    """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).
+
+    Returns the person's outline, and whether the plate, if any, fits the frame.
     """
     box = around(probability)
     if box is None:
-        return np.zeros(image.shape[:2], np.float32), True
+        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool)), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     corner = np.array(box[:2])
-    here = scene = None
+    here = None
     if plate is not None:
         x0, y0, x1, y1 = around(probability, margin=WIDE)
         here = compare(image[y0:y1, x0:x1], plate.part((x0, y0, x1, y1)), probability[y0:y1, x0:x1])
     if here is not None:
         here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
-        scene = here.scene(plate.part(box))
     outline = cut_out(image[part], probability[part], xy - corner, score, iterations, here)
-    outline = keep_person(outline, xy - corner, score)
+    return Cutout(box, keep_person(outline, xy - corner, score) > 0.5), plate is None or here is not None
+
+
+def finish(image: np.ndarray, cutout: Cutout, plate: Plate | None) -> np.ndarray:
+    """image: (H, W, 3) uint8. Returns its alpha (H, W) float32: the outline, corrected where the plate shows the scene, with a soft
+    edge."""
     alpha = np.zeros(image.shape[:2], np.float32)
-    alpha[part] = soften(image[part], outline, scene)
-    return alpha, plate is None or here is not None
+    outline = cutout.outline
+    if not outline.any():
+        return alpha
+    x0, y0, x1, y1 = cutout.box
+    part = image[y0:y1, x0:x1]
+    scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
+    if scene is not None:
+        outline = correct(part, outline, scene)
+    alpha[y0:y1, x0:x1] = soften(part, outline.astype(np.float32), scene)
+    return alpha
 
 
 def around(probability: np.ndarray, least: float = 0.05, margin: float = 0.04) -> tuple[int, int, int, int] | None:

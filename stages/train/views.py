@@ -14,6 +14,7 @@ from gsac.avatar.artifacts import frame_paths, read_alpha, read_frame
 from gsac.avatar.camera import Camera
 from gsac.avatar.threads import available_cores
 from gsac.stages.contract import StageError
+from gsac.stages.train.edge_colour import unmix
 
 MARGIN = 0.06
 """Margin round the mask's box, in units of its height: limbs may move there while poses are refined."""
@@ -117,7 +118,7 @@ def _read_view(path: Path, mask: Path, camera: Camera, height: int | None = None
     if not np.isfinite(alpha).all():
         raise StageError(f"{mask}: mask is not finite")
     alpha = np.clip(alpha, 0, 1)
-    pixels = np.dstack([rgb * alpha[..., None], alpha * 255])
+    pixels = np.dstack([unmix(rgb, alpha) * alpha[..., None], alpha * 255])
     h = min(height or rgb.shape[0], rgb.shape[0])
     w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
     if (w, h) != (rgb.shape[1], rgb.shape[0]):

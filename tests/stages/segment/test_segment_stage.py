@@ -114,6 +114,33 @@ def test_a_moving_camera_is_named_with_frames_and_px_but_photos_may_differ(tmp_p
     assert [warning.split(". ")[0] + "." for warning in warnings] == words
 
 
+def test_a_gap_that_the_network_fills_is_open_in_a_video_whose_other_frames_show_the_scene_there(tmp_path, monkeypatch):
+    (tmp_path / "frames").mkdir()
+    rng = np.random.default_rng(0)
+    wall = np.array((170, 165, 150)) + cv2.GaussianBlur(rng.normal(0, 30, (200, 160)).astype(np.float32), (0, 0), 3)[..., None]
+    person = cv2.ellipse(np.zeros((200, 160), np.float32), (70, 100), (24, 70), 0, 0, 360, 1, -1)
+    gap = np.zeros((200, 160), np.float32)
+    gap[80:120, 66:72] = 1
+    places = [8 * (t - 5) for t in range(12)]
+    for t, place in enumerate(places):
+        shown = np.roll(person - gap, place, axis=1)[..., None] > 0
+        frame = np.where(shown, np.uint8((40, 60, 140)), wall) + rng.normal(0, 1.5, (200, 160, 3))
+        write_frame(tmp_path / f"frames/{t:06d}.png", np.uint8(np.clip(frame, 0, 255)))
+    xy, score = np.zeros((12, 133, 2), np.float32), np.zeros((12, 133), np.float32)
+    xy[:, :4], score[:, :4] = [(70, 40), (74, 60), (66, 60), (70, 160)], 0.9
+    xy[:, :4, 0] += np.array(places)[:, None]
+    monkeypatch.setitem(stage.METHODS, "pose", lambda models: lambda image, region: np.roll(
+        person, round(float(region.center[0])) - 70, axis=1))
+    write_arrays(tmp_path / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=12) | {"xy": xy, "score": score})
+    Clip(10.0, [t / 10 for t in range(12)], 160, 200, None, "0").write(tmp_path / "clip.json")
+    stage.run(Job({"split/frames": tmp_path / "frames", "split/clip.json": tmp_path / "clip.json",
+                   "keypoints/keypoints.npz": tmp_path / "keypoints.npz"}, tmp_path, SegmentConfig()))
+    for path, place in zip(frame_paths(tmp_path / "alpha"), places, strict=True):
+        alpha = read_alpha(path)
+        assert alpha[np.roll(gap, place, axis=1) > 0].mean() < 0.1
+        assert alpha[np.roll(person - gap, place, axis=1) > 0].mean() > 0.97
+
+
 @pytest.mark.footage
 @pytest.mark.slow
 def test_truth_a_is_cut_out_with_an_iou_of_at_least_0_97(tmp_path):

@@ -1,0 +1,101 @@
+"""The outline's correction at full size by the plate, on painted pictures whose truth is known."""
+
+import cv2
+import numpy as np
+import pytest
+
+from gsac.avatar.artifacts import write_frame
+from gsac.stages.segment.correction import correct, match_scene
+from gsac.stages.segment.matting import soften
+from gsac.stages.segment.plate import Plate
+from gsac.stages.segment.plate_from_video import relearn_plate
+
+SIZE = HEIGHT, WIDTH = 240, 160
+PERSON = 60, 40, 130
+
+
+def wall():
+    """(H, W, 3) float: a textured wall."""
+    texture = cv2.GaussianBlur(np.random.default_rng(0).normal(0, 30, SIZE).astype(np.float32), (0, 0), 3)[..., None]
+    return np.array((150, 150, 140)) + texture
+
+
+def comb():
+    """(H, W) bool: a trunk with slits 4 to 6 px wide."""
+    person = np.zeros(SIZE, bool)
+    person[40:200, 40:120] = True
+    for column, width in ((56, 4), (74, 5), (94, 6)):
+        person[40:120, column: column + width] = False
+    return person
+
+
+def painted(person, background, seed=1):
+    mix = np.where(person[..., None], PERSON, background) + np.random.default_rng(seed).normal(0, 2, (*SIZE, 3))
+    return np.clip(mix, 0, 255).astype(np.uint8)
+
+
+def plate_of(background):
+    return Plate(painted(np.zeros(SIZE, bool), background, seed=5), np.ones(SIZE, bool))
+
+
+def test_narrow_gaps_that_show_the_scene_are_opened_and_the_rest_stays():
+    truth, background = comb(), wall()
+    filled = cv2.morphologyEx(truth.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)) > 0
+    image = painted(truth, background)
+    scene = match_scene(image, filled, plate_of(background))
+    before, after = (soften(image, outline.astype(np.float32), scene) for outline in (filled, correct(image, filled, scene)))
+    assert before[filled & ~truth].mean() > 0.5 and after[filled & ~truth].mean() < 0.1
+    assert after[truth].mean() > 0.99
+
+
+def test_a_rim_that_was_lost_comes_back_and_a_shadow_beside_it_does_not():
+    truth = np.zeros(SIZE, bool)
+    truth[40:200, 40:120] = True
+    shade = np.ones(SIZE)
+    shade[:, 120:] = cv2.GaussianBlur(np.full((HEIGHT, 40), 0.7), (0, 0), 2)
+    image = painted(truth, wall() * shade[..., None])
+    lost = cv2.erode(truth.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    scene = match_scene(image, lost, plate_of(wall()))
+    outline = correct(image, lost, scene)
+    assert (truth & ~outline).sum() < 0.1 * (truth & ~lost).sum()
+    assert (outline & ~truth).sum() < 0.002 * truth.sum()
+
+
+def test_clothes_that_look_like_the_scene_are_not_opened():
+    truth = np.zeros(SIZE, bool)
+    truth[40:200, 40:120] = True
+    background = wall()
+    image = painted(truth, background)
+    plate = plate_of(background)
+    image[80:160, 60:100] = plate.image[80:160, 60:100]
+    assert correct(image, truth, match_scene(image, truth, plate))[80:160, 60:100].all()
+
+
+def test_a_plate_is_fitted_to_the_exposure_and_one_of_another_place_is_refused():
+    truth = comb()
+    image = painted(truth, wall())
+    scene = match_scene(image, truth, plate_of(wall() * (1.2, 1.1, 0.9)))
+    outside = ~cv2.dilate(truth.astype(np.uint8), np.ones((9, 9), np.uint8)).astype(bool)
+    assert np.abs(scene.image[outside].astype(int) - image[outside]).mean() < 5
+    other = np.random.default_rng(9).integers(0, 255, (12, 8, 3)).astype(np.float64)
+    assert match_scene(image, truth, plate_of(cv2.resize(other, (WIDTH, HEIGHT)))) is None
+
+
+def test_what_the_plate_never_showed_is_left_alone():
+    truth, background = comb(), wall()
+    filled = cv2.morphologyEx(truth.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)) > 0
+    image, plate = painted(truth, background), plate_of(background)
+    plate.known[:130] = False
+    assert (correct(image, filled, match_scene(image, filled, plate))[:130] == filled[:130]).all()
+
+
+@pytest.mark.parametrize(("step", "known"), [(20, True), (0, False)])
+def test_a_plate_from_outlines_knows_the_scene_up_to_the_person(tmp_path, step, known):
+    shapes = [np.roll(comb(), step * t, axis=1) for t in range(-4, 4)]
+    paths = [tmp_path / f"{t:06d}.png" for t in range(8)]
+    for t, (path, shape) in enumerate(zip(paths, shapes, strict=True)):
+        write_frame(path, painted(shape, wall(), seed=t))
+    plate = relearn_plate(paths, np.ones(8, bool), lambda t, image: shapes[t])
+    assert (plate.known[42:118, 85:88].all()) == known
+    assert np.abs(plate.image.astype(int) - wall())[plate.known].mean() < 3
+    assert relearn_plate(paths, np.arange(8) < 3, lambda t, image: shapes[t]) is None
