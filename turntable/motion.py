@@ -1,4 +1,4 @@
-"""Motion of the person: one turn on the spot, the novel poses or the strong ones. World: y up, person at the origin, camera at +z."""
+"""Motion of the person: one turn on the spot, novel poses, strong ones. World: y up, person at the origin, camera at +z."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.body import Body
-from gsac.avatar.joints import INDEX, J
+from gsac.avatar.joints import INDEX, J, turn_joints
 from gsac.avatar.skinning import joint_transforms
 from gsac.turntable.footsteps import plant_feet
 from gsac.turntable.options import TurntableOptions
@@ -63,7 +63,7 @@ def _make_novel(body: Body, joints: np.ndarray, options: TurntableOptions, rng: 
     """`NOVEL_POSES` one after another, smoothly blended, while the yaw swings slowly."""
     T = options.frames
     rest = make_a_pose(rng)
-    keys = [_change_pose(rest, change) for change in NOVEL_POSES]
+    keys = [turn_joints(rest, change) for change in NOVEL_POSES]
     at = np.linspace(0, len(keys), T, endpoint=False)
     first = at.astype(int)
     blend = _smooth(np.clip((at - first - 0.35) / 0.65, 0, 1))[:, None, None]
@@ -80,7 +80,7 @@ def _make_strong(body: Body, joints: np.ndarray, options: TurntableOptions, rng:
     """`STRONG_POSES` over and over, each frame turned on from the one before."""
     T = options.frames
     rest = make_a_pose(rng)
-    pose = np.stack([_change_pose(rest, STRONG_POSES[t % len(STRONG_POSES)]) for t in range(T)])
+    pose = np.stack([turn_joints(rest, STRONG_POSES[t % len(STRONG_POSES)]) for t in range(T)])
     yaw = STRONG_TURN * np.arange(T)
     pose[:, 0] = (Rotation.from_euler("Y", yaw[:, None]) * Rotation.from_rotvec(pose[:, 0])).as_rotvec()
     return Motion(pose, np.zeros((T, 2)), yaw, make_expressions(body, options, rng))
@@ -214,19 +214,6 @@ def smooth_noise(rng: np.random.Generator, frames: int, scale: float, cycles: in
 def _smooth(x: np.ndarray) -> np.ndarray:
     """Smoothstep of x in 0..1."""
     return x * x * (3 - 2 * x)
-
-
-def _change_pose(rest: np.ndarray, change: dict[str, tuple]) -> np.ndarray:
-    """rest (55, 3) with the named joints set; a name without a side sets both, mirrored."""
-    pose = rest.copy()
-    for name, rotvec in change.items():
-        rotvec = np.radians(np.asarray(rotvec, float))
-        if name in INDEX:
-            pose[INDEX[name]] = rotvec
-            continue
-        pose[INDEX[f"left_{name}"]] = rotvec
-        pose[INDEX[f"right_{name}"]] = rotvec * [1, -1, -1]
-    return pose
 
 
 NOVEL_POSES = (
