@@ -97,7 +97,7 @@ def test_a_floater_is_stray_and_a_missing_limb_a_hole_in_the_true_outline():
     views = [View(camera, np.dstack([mask] * 4), (0, 0))]
     gaussians = Gaussians.area(body.v_template, body.faces, 6000)
     clean = novel_poses.judge_outline(gaussians, poses, views)
-    assert clean["stray"] < 0.06 and clean["holes"] < 0.01
+    assert clean["stray"] < 0.06 and clean["holes"] < 0.03
     places = body.v_template[body.faces[gaussians.face, 0]]
     bald = novel_poses.judge_outline(gaussians[places[:, 1] < np.quantile(places[:, 1], 0.9)], poses, views)
     assert bald["holes"] > clean["holes"] + 0.03 and bald["stray"] < clean["stray"]

@@ -8,7 +8,7 @@ person bends no joint, so bent ones are sampled. Where the clip's usual pose has
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames, unbind
 from gsac.avatar.body import Body
@@ -87,7 +87,7 @@ def faces_around(face: np.ndarray, places: np.ndarray, at: FaceFrames, rest: np.
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a))], 0)
     steady = np.flatnonzero(at.valid & (area > LEAST_AREA) & (area > SLENDER * longest))
-    near = steady[cKDTree(at.T[steady]).query(places, k=min(NEAR, len(steady)))[1].reshape(len(places), -1)]
+    near = steady[KDTree(at.T[steady]).query(places, k=min(NEAR, len(steady)))[1].reshape(len(places), -1)]
     near = np.concatenate([face[:, None], near], 1)
     skinned = face_weights(body)
     apart = 0.5 * np.abs(skinned[near] - skinned[face][:, None]).sum(-1)
