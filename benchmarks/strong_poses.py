@@ -22,7 +22,8 @@ JUDGED = ("stray_alpha", "torn_alpha", "needle_share")
 
 def main() -> None:
     """Prints a row for each clip as it is judged."""
-    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.strong_poses", description="Avatars in strong poses that no clip shows.")
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.strong_poses",
+                                     description="Avatars in strong poses that no clip shows.")
     training.declare(parser, "strong-poses")
     parser.add_argument("--views", type=int, default=12, metavar="N", help="pictures from each distance (default: 12)")
     options, say = parser.parse_args(), PlainReporter(sys.stderr)
