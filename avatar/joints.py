@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 J = 55
 NAMES = tuple((
     "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 left_foot right_foot neck "
@@ -25,3 +29,16 @@ FINGERS = slice(25, 55)
 POSE_PARTS = {"global_orient": slice(0, 1), "body_pose": slice(1, 22), "jaw_pose": slice(22, 23), "leye_pose": slice(23, 24),
               "reye_pose": slice(24, 25), "left_hand_pose": LEFT_HAND, "right_hand_pose": RIGHT_HAND}
 """SMPL-X's names for the parts of a pose -> their joints, in joint order; together they are all 55."""
+
+
+def turn_joints(pose: np.ndarray, turns: Mapping[str, tuple[float, float, float]]) -> np.ndarray:
+    """(55, 3) axis-angle: pose (55, 3) with the named joints set. turns: degrees, axis-angle; a name without a side sets both,
+    mirrored."""
+    out = pose.copy()
+    for name, degrees in turns.items():
+        turn = np.radians(np.asarray(degrees, float))
+        if name in INDEX:
+            out[INDEX[name]] = turn
+        else:
+            out[INDEX[f"left_{name}"]], out[INDEX[f"right_{name}"]] = turn, turn * [1, -1, -1]
+    return out

@@ -1,4 +1,4 @@
-"""Makes a truth clip: `clip.mp4` (`frames/` for novel poses), `mask/%06d.png` and `truth.npz`."""
+"""Makes a truth clip: `clip.mp4` (`frames/` for novel and strong poses), `mask/%06d.png` and `truth.npz`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SLACK[wholebody.FEET] = 0.05
 
 def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
               progress: Callable[[int, int, str], None] = lambda done, total, what: None, **changes: Any) -> Path:
-    """Writes a clip into out_dir, which is created if missing. Returns the path of `clip.mp4`, or of `frames` for novel poses.
+    """Writes a clip into out_dir, which is created if missing. Returns the path of `clip.mp4`, or of `frames` for other poses.
 
     Options are a TurntableOptions or keywords: `make_clip(out, seed=3, frames=40)`. A wrong one raises ValueError.
 
@@ -88,7 +88,7 @@ def make_view(person: Person, options: TurntableOptions, rng: np.random.Generato
     width, height = options.size
     fill = 0.73 if options.poses == "turn" else 0.53
     camera = Camera((options.focal_px,) * 2, (width / 2, height / 2), width, height)
-    distance = options.focal_px * person.height_m / (fill * min(height, width * 16 / 9))
+    distance = options.distance * options.focal_px * person.height_m / (fill * min(height, width * 16 / 9))
     eye = np.array([rng.uniform(-0.05, 0.05), rng.uniform(1.1, 1.4), distance])
     return Viewpoint(camera, look_at(eye, np.array([0, 0.5 * person.height_m, 0])), eye)
 

@@ -1,4 +1,4 @@
-"""Motion of the person: one turn on the spot, or the novel poses. World: y up, person at the origin, camera at +z."""
+"""Motion of the person: one turn on the spot, novel poses, strong ones. World: y up, person at the origin, camera at +z."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.body import Body
-from gsac.avatar.joints import INDEX, J
+from gsac.avatar.joints import INDEX, J, turn_joints
 from gsac.avatar.skinning import joint_transforms
 from gsac.turntable.footsteps import plant_feet
 from gsac.turntable.options import TurntableOptions
@@ -34,7 +34,8 @@ class Motion:
 
 def make_motion(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
     """joints: (55, 3) m, the person's joints in the T-pose."""
-    return (_make_turn if options.poses == "turn" else _make_novel)(body, joints, options, rng)
+    make = {"turn": _make_turn, "novel": _make_novel, "strong": _make_strong}[options.poses]
+    return make(body, joints, options, rng)
 
 
 def _make_turn(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
@@ -62,7 +63,7 @@ def _make_novel(body: Body, joints: np.ndarray, options: TurntableOptions, rng: 
     """`NOVEL_POSES` one after another, smoothly blended, while the yaw swings slowly."""
     T = options.frames
     rest = make_a_pose(rng)
-    keys = [_change_pose(rest, change) for change in NOVEL_POSES]
+    keys = [turn_joints(rest, change) for change in NOVEL_POSES]
     at = np.linspace(0, len(keys), T, endpoint=False)
     first = at.astype(int)
     blend = _smooth(np.clip((at - first - 0.35) / 0.65, 0, 1))[:, None, None]
@@ -72,6 +73,16 @@ def _make_novel(body: Body, joints: np.ndarray, options: TurntableOptions, rng: 
     yaw = 0.9 * np.sin(2 * np.pi * np.arange(T) / T * 2 + rng.random())
     lean = pose[:, 0].copy()
     pose[:, 0] = (Rotation.from_euler("Y", yaw[:, None]) * Rotation.from_rotvec(lean)).as_rotvec()
+    return Motion(pose, np.zeros((T, 2)), yaw, make_expressions(body, options, rng))
+
+
+def _make_strong(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
+    """`STRONG_POSES` over and over, each frame turned on from the one before."""
+    T = options.frames
+    rest = make_a_pose(rng)
+    pose = np.stack([turn_joints(rest, STRONG_POSES[t % len(STRONG_POSES)]) for t in range(T)])
+    yaw = STRONG_TURN * np.arange(T)
+    pose[:, 0] = (Rotation.from_euler("Y", yaw[:, None]) * Rotation.from_rotvec(pose[:, 0])).as_rotvec()
     return Motion(pose, np.zeros((T, 2)), yaw, make_expressions(body, options, rng))
 
 
@@ -205,19 +216,6 @@ def _smooth(x: np.ndarray) -> np.ndarray:
     return x * x * (3 - 2 * x)
 
 
-def _change_pose(rest: np.ndarray, change: dict[str, tuple]) -> np.ndarray:
-    """rest (55, 3) with the named joints set; a name without a side sets both, mirrored."""
-    pose = rest.copy()
-    for name, rotvec in change.items():
-        rotvec = np.radians(np.asarray(rotvec, float))
-        if name in INDEX:
-            pose[INDEX[name]] = rotvec
-            continue
-        pose[INDEX[f"left_{name}"]] = rotvec
-        pose[INDEX[f"right_{name}"]] = rotvec * [1, -1, -1]
-    return pose
-
-
 NOVEL_POSES = (
     {},
     {"hip": (-55, 12, 10), "knee": (75, 0, 0), "ankle": (-25, 0, 0), "spine1": (15, 0, 0), "spine2": (10, 0, 0),
@@ -231,3 +229,15 @@ NOVEL_POSES = (
     {"right_shoulder": (0, 20, -30), "right_elbow": (0, 95, 0), "right_hip": (-60, 0, -6), "right_knee": (80, 0, 0)},
 )
 """Degrees, axis-angle: stand, squat, arms raised, reach, twist, T-pose with a side bend, knee up."""
+
+STRONG_POSES = (
+    {"shoulder": (-9, -34, -29), "elbow": (0, -115, 0), "hip": (-45, 12, 8), "knee": (60, 0, 0), "ankle": (-20, 0, 0)},
+    {"collar": (0, 0, 18), "shoulder": (0, 0, 62), "elbow": (0, -12, 0)},
+    {"right_shoulder": (-70, 9, -13), "right_elbow": (0, 105, 0), "right_wrist": (0, 0, 15)},
+    {"shoulder": (46, 6, -50), "elbow": (0, -105, 0), "wrist": (0, 0, -20)},
+    {"hip": (-110, 20, 15), "knee": (125, 0, 0), "ankle": (-30, 0, 0), "pelvis": (25, 0, 0), "shoulder": (0, -75, -10)},
+    {"left_hip": (15, 0, 0), "left_knee": (120, 0, 0), "shoulder": (0, -80, 25), "elbow": (0, -120, 0)},
+)
+"""Degrees, axis-angle: guard, both arms up, wave, hands on hips, deep squat, heel to seat with hands to the shoulders."""
+STRONG_TURN = np.radians(135)
+"""Yaw between two frames: in twelve frames each pose is seen from two sides, and all together from eight."""

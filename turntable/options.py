@@ -24,8 +24,11 @@ class TurntableOptions:
     """Pixels, even; None: 9:16 portrait."""
     focal: float | None = None
     """Pixels; None: 1.05 times the longer side, a phone's main camera in video mode."""
-    poses: Literal["turn", "novel"] = "turn"
-    """`turn`: A-pose, once around. `novel`: squat, raised arms, reach, twist; PNG frames, no video, no noise."""
+    poses: Literal["turn", "novel", "strong"] = "turn"
+    """`turn`: A-pose, once around. `novel`: squat, raised arms, reach, twist; PNG frames, no video, no noise. `strong`: likewise,
+    elbows and knees bent by 100 degrees and more, both arms up, a wave, hands on hips, seen from all round."""
+    distance: float = 1.0
+    """Distance of the camera, as a factor on that from which the whole figure is seen."""
     feet: Literal["turning", "planted"] = "turning"
     """`turning`: feet turn with the body and lift alternately. `planted`: soles rest on the floor, then step after the body."""
     hidden_hand: HiddenHand = "none"
@@ -63,8 +66,9 @@ class TurntableOptions:
         for name in ("arm_swing", "sway", "outside", "clothing", "noise"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} is {getattr(self, name)}, expected 0 or more")
-        if not self.fps > 0:
-            raise ValueError(f"fps is {self.fps}, expected more than 0")
+        for name in ("fps", "distance"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} is {getattr(self, name)}, expected more than 0")
         if self.height % 2 or self.size[0] % 2:
             raise ValueError(f"size is {self.size[0]}x{self.height}, expected even numbers (H.264 wants them)")
         for name, kind in get_type_hints(type(self)).items():

@@ -16,13 +16,17 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, J
 from gsac.avatar.metrics import summary
-from gsac.stages.train.judge.heldout import judge
+from gsac.avatar.threads import Workspace, side_by_side
+from gsac.stages.train.judge.heldout import judge, render_view
+from gsac.stages.train.judge.novel_poses import disc
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
 ALIGN_ROUNDS = 16
 """Rounds of Gauss-Newton: novel poses are further off than held-out ones, and 40 steps of Adam would end half-way."""
+RIM = 1 / 240
+"""Share of the picture's height about the silhouette's edge where alpha may differ from the truth's."""
 
 
 def read_true_params(truth: Path, model: str) -> BodyParams:
@@ -32,11 +36,12 @@ def read_true_params(truth: Path, model: str) -> BodyParams:
     return BodyParams(**fields, sigma_joints=np.full((len(arrays["transl"]), J), 1e-3, np.float32), model=model)
 
 
-def judge_poses(trained: Path, clip: Path, folder: Path, height: int | None = None) -> dict[str, float | None]:
-    """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first aligned to its image.
+def judge_poses(trained: Path, clip: Path, folder: Path, height: int | None = None, name: str = "novel") -> dict[str, float | None]:
+    """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first aligned to its image;
+    also `stray_novel` and `holes_novel`, aligned, of `judge_outline`.
 
     trained: output folder of `train`; clip: a turntable's folder of novel poses; folder: for truth, render and error images;
-    height: px to judge at, None for the clip's own.
+    height: px to judge at, None for the clip's own; name: of the poses, in the place of `novel`.
     """
     body, gaussians = Body.load(), Gaussians.read(trained / "avatar.npz")
     truth = read_true_params(clip / "truth.npz", body.digest)
@@ -44,9 +49,25 @@ def judge_poses(trained: Path, clip: Path, folder: Path, height: int | None = No
     params = transfer_poses(BodyParams.read(trained / "body.npz"), truth, body)
     poses, frames = Poses(body, params), range(params.frames)
     folder.mkdir(parents=True, exist_ok=True)
-    found = rename_metrics(summary(judge(gaussians, poses, frames, views, folder, flip=True)), "novel")
+    found = rename_metrics(summary(judge(gaussians, poses, frames, views, folder, flip=True)), name)
     converge(gaussians, poses, frames, views, ALIGN_ROUNDS)
-    return found | rename_metrics(summary(judge(gaussians, poses, frames, views, flip=True)), "novel_aligned")
+    found |= rename_metrics(summary(judge(gaussians, poses, frames, views, flip=True)), f"{name}_aligned")
+    return found | {f"{what}_{name}": value for what, value in judge_outline(gaussians, poses, views).items()}
+
+
+def judge_outline(gaussians: Gaussians, poses: Poses, views: list[View]) -> dict[str, float]:
+    """`stray`: alpha farther than RIM outside of the true silhouette; `holes`: alpha missing farther than RIM inside of it; both
+    over the silhouette's area, mean over the frames."""
+
+    def of_frame(t: int, workspace: Workspace) -> tuple[float, float]:
+        alpha, mask = render_view(gaussians, poses, t, views[t], workspace)[1], views[t].pixels[..., 3]
+        rim = disc(max(1, round(RIM * views[t].camera.height)))
+        outside, inside = cv2.dilate(mask, rim) == 0, cv2.erode(mask, rim) == 255
+        area = max(float(mask.sum()) / 255, 1.0)
+        return float(alpha[outside].sum()) / area, float((1 - alpha)[inside].sum()) / area
+
+    stray, holes = np.mean(side_by_side(of_frame, range(len(views))), 0)
+    return {"stray": float(stray), "holes": float(holes)}
 
 
 def rename_metrics(metrics: dict[str, float | None], ending: str) -> dict[str, float | None]:

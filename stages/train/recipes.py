@@ -11,6 +11,7 @@ from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.cuda import Cuda
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.finite import named_values, require_finite
+from gsac.stages.train.gaussians.joint_faces import hold_at_joints
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.poses import bone_drift
@@ -18,13 +19,14 @@ from gsac.stages.train.task import Fit, Task
 
 
 def fit_fast(backend: Backend, task: Task) -> Fit:
-    """Aligns the poses, fits the given number of gaussians or searches for it, adds coarser levels, removes bone drift."""
+    """Aligns the poses, fits the given number of gaussians or searches for it, adds coarser levels; removes drift, holds joints."""
     if task.resumed is None:
         prealign.adjust(task, backend)
     fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, budget(task, backend.device))
     require_finite("after the last step", named_values(fit.gaussians))
     levels = [fit.gaussians, *lod.fit_levels(task, backend, fit)]
-    fit.gaussians, *fit.coarser = bone_drift.remove_drift(levels, task.poses, task.trained)
+    levels = bone_drift.remove_drift(levels, task.poses, task.trained)
+    fit.gaussians, *fit.coarser = [hold_at_joints(level, task.poses, task.trained) for level in levels]
     return fit
 
 

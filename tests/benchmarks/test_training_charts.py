@@ -6,6 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gsac.avatar.binding import face_frames
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.zbuffer import rasterise
 from gsac.benchmarks import training
 from gsac.benchmarks.command import names
 from gsac.benchmarks.size import bench as size
@@ -13,6 +17,8 @@ from gsac.benchmarks.size import chart as size_chart
 from gsac.benchmarks.speed_accuracy import chart, novel_poses, table
 from gsac.benchmarks.speed_accuracy.trial import Trial, hypervolume, pareto_front, seconds_to
 from gsac.stages.contract import BadInput
+from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.views import View
 
 
 def made(recipe, curve, clip="a", steps=100, seed=0):
@@ -80,6 +86,24 @@ def test_joints_are_moved_onto_the_rays_of_the_truth():
     truth = rng.normal(0, 0.4, (22, 3)) + [0.2, 0.1, 4.0]
     small, shift = 0.9 * truth, np.array([0.3, -0.2, 0.5])
     assert novel_poses.solve_translation(small - shift, truth) == pytest.approx(shift, abs=1e-9), "nearer and smaller looks alike"
+
+
+def test_a_floater_is_stray_and_a_missing_limb_a_hole_in_the_true_outline():
+    body = Body.load()
+    params = BodyParams.from_pose(np.array([[[np.pi, 0, 0], *np.zeros((54, 3))]]), np.array([[0, 0, 4.0]]), np.zeros(4),
+                                  np.zeros((1, body.exprdirs.shape[2])), 300.0, (110.0, 110.0))
+    poses, camera = Poses(body, params), params.camera(220, 220)
+    mask = np.uint8(255 * (rasterise(poses.vertices(0), body.faces, camera)[0] >= 0))
+    views = [View(camera, np.dstack([mask] * 4), (0, 0))]
+    gaussians = Gaussians.area(body.v_template, body.faces, 6000)
+    clean = novel_poses.judge_outline(gaussians, poses, views)
+    assert clean["stray"] < 0.06 and clean["holes"] < 0.03
+    places = body.v_template[body.faces[gaussians.face, 0]]
+    bald = novel_poses.judge_outline(gaussians[places[:, 1] < np.quantile(places[:, 1], 0.9)], poses, views)
+    assert bald["holes"] > clean["holes"] + 0.03 and bald["stray"] < clean["stray"]
+    gaussians.mu[0, 1] -= 0.5 / face_frames(body.v_template, body.faces).k[gaussians.face[0]]
+    gaussians.log_scale[0] += 2
+    assert novel_poses.judge_outline(gaussians, poses, views)["stray"] > clean["stray"] + 0.001
 
 
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):

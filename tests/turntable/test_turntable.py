@@ -10,6 +10,7 @@ import pytest
 from gsac.avatar.artifacts import frame_paths, read_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
+from gsac.avatar.joints import INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.turntable import clip
 from gsac.turntable.__main__ import main
@@ -183,9 +184,21 @@ def test_novel_poses_are_png_frames_with_masks(tmp_path):
     assert hips_over_floor.min() < 0.85 * hips_over_floor.max()  # the squat
 
 
+def test_strong_poses_bend_elbows_and_knees_by_100_degrees_and_more_and_the_camera_comes_nearer(tmp_path):
+    options = TurntableOptions(seed=2, frames=6, height=64, supersample=1, poses="strong")
+    changes = {"far": {}, "near": {"distance": 0.5, "frames": 1}}
+    far, near = (read_arrays(clip.make_clip(tmp_path / name, dataclasses.replace(options, **change)).parent / "truth.npz")
+                 for name, change in changes.items())
+    bend = np.degrees(np.linalg.norm(far["body_pose"].reshape(6, 21, 3), axis=2))
+    elbows, knees = (bend[:, [INDEX[f"{side}_{joint}"] - 1 for side in ("left", "right")]].max(1) for joint in ("elbow", "knee"))
+    assert (elbows >= 100).sum() == 4 and (knees >= 100).sum() == 2
+    np.testing.assert_array_equal(near["body_pose"][0], far["body_pose"][0])
+    assert near["joints"][0, :, 2].mean() == pytest.approx(0.5 * far["joints"][0, :, 2].mean(), rel=0.15)
+
+
 def test_bad_options_are_named():
     for change, word in (({"height": 33}, "even"), ({"poses": "dance"}, "poses"), ({"hidden_hand": "x"}, "hidden_hand"),
-                         ({"frames": 0}, "frames"), ({"noise": -1.0}, "noise"),
+                         ({"frames": 0}, "frames"), ({"noise": -1.0}, "noise"), ({"distance": 0.0}, "distance"),
                          ({"hidden_from": 0.9, "hidden_to": 0.2}, "hidden_from")):
         with pytest.raises(ValueError, match=word):
             TurntableOptions(**change).check()

@@ -12,6 +12,7 @@ import numpy as np
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import J, turn_joints
 from gsac.avatar.raster import render_bound
 from gsac.avatar.rotation import about_y
 from gsac.avatar.skinning import joint_transforms, skin
@@ -21,12 +22,15 @@ from gsac.stages.train.poses.poses import Poses
 
 POSES = {
     "T-pose": {},
-    "arms up": {"left_shoulder": (0, 0, 60), "right_shoulder": (0, 0, -60)},
-    "arms forward": {"left_shoulder": (0, -70, 0), "right_shoulder": (0, 70, 0)},
-    "squat": {"left_hip": (-80, 0, 10), "right_hip": (-80, 0, -10), "left_knee": (90, 0, 0), "right_knee": (90, 0, 0)},
+    "arms up": {"shoulder": (0, 0, 60)},
+    "arms forward": {"shoulder": (0, -70, 0)},
+    "squat": {"hip": (-80, 0, 10), "knee": (90, 0, 0)},
     "stride": {"left_hip": (-45, 0, 0), "right_hip": (25, 0, 0), "left_knee": (30, 0, 0), "right_knee": (15, 0, 0)},
+    "hands to the shoulders": {"shoulder": (0, -40, -40), "elbow": (0, -120, 0)},
+    "wave": {"right_shoulder": (-70, 0, 10), "right_elbow": (0, 105, 0), "left_shoulder": (0, 0, -60)},
+    "kneeling": {"hip": (-30, 0, 0), "knee": (115, 0, 0), "shoulder": (0, 0, -60)},
 }
-"""Degrees about a joint's own axes, on top of the T-pose."""
+"""Degrees, axis-angle, on top of the T-pose; a joint without a side is both, mirrored."""
 TURNS = (0, 90, 180, 270, 45)
 """Degrees about the upright axis of the views of each pose."""
 SIZE = 240
@@ -71,12 +75,10 @@ def disc(radius: int) -> np.ndarray:
 
 
 def pose_body(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.ndarray:
-    """(V, 3) m, the canonical body with some joints turned by degrees about x, y and z."""
+    """(V, 3) m, the canonical body with some joints turned, as `turn_joints` takes them."""
     body, (rest, joints) = poses.body, poses.rest(0)
-    pose = np.zeros((1, len(body.parents), 3))
-    for name, degrees in turns.items():
-        pose[0, body.joint_names.index(name)] = np.radians(degrees)
-    transforms = joint_transforms(pose, joints, body.parents)[0].astype(np.float32)
+    pose = turn_joints(np.zeros((J, 3)), turns)
+    transforms = joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32)
     return skin(rest, transforms, body.skin_index, body.skin_weight)
 
 
