@@ -62,11 +62,11 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
 
 
 def find_unseen(task: Task, gaussians: Gaussians) -> tuple[Poses, dict[int, View]] | None:
-    """The frames to choose by, as large as those trained on, and poses moved to them; None where there are none.
+    """The frames to choose by, as large as those trained on, and poses moved to them; None where none are at hand.
 
     In frames that were trained on, the finest level is flattered by all that it knows of these very frames.
     """
-    if not len(task.choosing):
+    if not task.filmed:
         return None
     height = task.views[int(task.trained[0])].frame.height
     views = {int(t): task.filmed[int(t)].reduced(height) for t in task.choosing}
