@@ -41,7 +41,8 @@ def measure_losses(level: Gaussians, finer: Gaussians, poses: Poses, views: dict
             real = truth(view)
             for which, gaussians in enumerate((level, finer)):
                 found = score_person(*render_view(gaussians, poses, t, view, workspace), *real)
-                errors[octave, which] += found["mse_fg"] * found["fg_pixels"]
+                if found["fg_pixels"]:
+                    errors[octave, which] += found["mse_fg"] * found["fg_pixels"]
             view = view.halved()
     errors = np.maximum(errors, 1e-12)
     return 10 * np.log10(errors[:, 0] / errors[:, 1])

@@ -192,6 +192,8 @@ class Trainer:
         if seen is None:
             seen = find_seen(pixels, gaussians, self.rest, self.faces)
             gaussians.rgb = fill_unseen(gaussians.rgb, seen, centres_at_rest(gaussians, self.rest, self.faces))
+        if self.gains:  # drawn without a gain, the avatar is as bright as the frames are on average
+            gaussians.rgb = np.clip(gaussians.rgb * np.mean(list(self.gains.values()), 0), 0, 1).astype(np.float32)
         gaussians.rgb = hold_barely_seen(gaussians, pixels, seen, self.rest, self.faces)
         return level_heights(gaussians, self.rest, self.faces), seen
 
