@@ -76,7 +76,8 @@ def run(job: Job) -> None:
         raise StageError(f"smplx/body.npz has {params.frames} poses, split/frames has {count} frames; run smplx again")
     body = load_body(job, "train", params.model)
     camera = params.camera(clip.width, clip.height)
-    views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height)
+    views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height,
+                              mixed=config.recipe == "paper")  # as published
     if len(empty) == count:
         raise StageError("segment/alpha: every mask is empty, there is no person to train on; look at segment")
     usable = np.ones(count, bool)

@@ -67,15 +67,18 @@ Views = Mapping[int, View] | list[View]
 """Views by frame."""
 
 
-def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None) -> tuple[list[View], list[int]]:
-    """All T frames, at most `height` px high (None: as they are), each cropped to its person. camera: of the frames on disk.
+def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None,
+               mixed: bool = False) -> tuple[list[View], list[int]]:
+    """All T frames, at most `height` px high (None: as they are), each cropped to its person.
+
+    camera: of the frames on disk; mixed: whether the soft edge keeps what it has of the background's colour.
 
     Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not fit the frames.
     """
     paths = pair_masks(frames, alphas)
 
     def read(pair: tuple[Path, Path]) -> tuple[View, bool]:
-        view, share = _read_view(*pair, camera, height)
+        view, share = _read_view(*pair, camera, height, mixed)
         if share < LEAST_SHARE or not (view.pixels[..., 3] > FAINT).any():
             return view.crop(0, 0, 1, 1), False
         return person_crop(view), True
@@ -110,7 +113,8 @@ def pair_masks(frames: Path, alphas: Path) -> list[tuple[Path, Path]]:
     return [(path, masks[path.stem]) for path in paths]
 
 
-def _read_view(path: Path, mask: Path, camera: Camera, height: int | None = None) -> tuple[View, float]:
+def _read_view(path: Path, mask: Path, camera: Camera, height: int | None = None,
+               mixed: bool = False) -> tuple[View, float]:
     """The frame cut out with its mask, at most `height` px high, and the share of it that the mask covers."""
     rgb, alpha = read_frame(path), read_alpha(mask)
     if alpha.shape != rgb.shape[:2]:
@@ -118,7 +122,7 @@ def _read_view(path: Path, mask: Path, camera: Camera, height: int | None = None
     if not np.isfinite(alpha).all():
         raise StageError(f"{mask}: mask is not finite")
     alpha = np.clip(alpha, 0, 1)
-    pixels = np.dstack([unmix(rgb, alpha) * alpha[..., None], alpha * 255])
+    pixels = np.dstack([(rgb if mixed else unmix(rgb, alpha)) * alpha[..., None], alpha * 255])
     h = min(height or rgb.shape[0], rgb.shape[0])
     w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
     if (w, h) != (rgb.shape[1], rgb.shape[0]):
