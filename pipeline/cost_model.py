@@ -15,10 +15,10 @@ from typing import Any
 from gsac.pipeline.footage import Footage
 from gsac.stages.train.config import FULL_SIZE
 
-STEPS = {"cpu": 1400, "cuda": 3200}
+STEPS = {"cpu": 1200, "cuda": 3200}
 """Steps of recipe fast where none are configured. A test holds these, and the four below, to the recipe, whose modules load too
 much to be asked here."""
-SMALL, LARGE = (3e4, 0.15), (1.3e5, 0.8)
+SMALL, LARGE = (3e4, 0.15), (1.6e5, 0.8)
 """Pixels of a person, and the share of the steps that run at half the size."""
 SIZES, MORE_ON_CUDA = (3000, 30000), 1.5
 """Least and most gaussians where none are asked for, and the factor on them on the GPU."""

@@ -33,7 +33,7 @@ class TrainConfig:
     every_size: bool = False
     """Whether auto tries all its sizes instead of stopping at the first that scores worse: for `gsac bench size`."""
     steps: int | None = None
-    """Optimisation steps; null: the recipe's own: fast 1400 of one frame, 3200 on cuda; paper 3000 of four frames."""
+    """Optimisation steps; null: the recipe's own: fast 1200 of one frame, 3200 on cuda; paper 3000 of four frames."""
     height: int | None = None
     """Height of the images to train on, px; null: the frames' own. Smaller frames are not enlarged."""
     seed: int = 0

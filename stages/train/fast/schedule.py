@@ -9,9 +9,9 @@ import numpy as np
 from gsac.stages.train.config import FULL_SIZE, TrainConfig
 from gsac.stages.train.task import Task
 
-STEPS = 1400
+STEPS = 1200
 """Steps on the CPU where none are configured."""
-SMALL, LARGE = (3e4, 0.15), (1.3e5, 0.8)
+SMALL, LARGE = (3e4, 0.15), (1.6e5, 0.8)
 """Pixels of a person in a frame, and the share of the steps, the first, that run at half the size: small images are cheap, large
 ones have little that half the size does not show. A longer training has no more of these steps than one of `STEPS`."""
 SIZES = 3000, 30000
