@@ -94,7 +94,7 @@ def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
     import cv2
 
     def energy(values):
-        slopes = (cv2.Sobel(np.float32(values), cv2.CV_32F, across, 1 - across, ksize=1)[region] for across in (0, 1))
+        slopes = (cv2.Sobel(np.asarray(values, np.float32), cv2.CV_32F, across, 1 - across, ksize=1)[region] for across in (0, 1))
         return sum(float(np.vdot(slope, slope)) for slope in slopes)
 
     own, true = energy(image), energy(truth)
@@ -177,7 +177,7 @@ def find_edge(person: np.ndarray, height: int) -> tuple[np.ndarray, np.ndarray, 
 
     if not person.any():
         return np.zeros_like(person), np.zeros_like(person), ~person
-    deep, far = (cv2.distanceTransform(np.uint8(area), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for area in (person, ~person))
+    deep, far = (cv2.distanceTransform(area.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for area in (person, ~person))
     edge, rim = EDGE * height / EDGE_HEIGHT, max(1.0, RIM * height / EDGE_HEIGHT)
     inside = deep > edge + 1
     return ~inside & (far <= edge), inside, far > rim
@@ -200,7 +200,7 @@ def figures(scores: dict[str, float]) -> dict[str, float | None]:
 
 def mean_psnr(scores: list[dict[str, float]], *names: str) -> float | None:
     """dB, the mean of the images' PSNR of one or more mean squared errors; None where none was measured."""
-    values = [psnr(s[name]) for s in scores for name in names if np.isfinite(s[name])]
+    values = [value for s in scores for name in names if (value := psnr(s[name])) is not None]
     return float(np.mean(values)) if values else None
 
 

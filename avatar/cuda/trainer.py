@@ -129,12 +129,14 @@ class CudaTrainer:
             self.device.replay(self._graph)
 
     def _replay_late(self, steps: int) -> None:
+        windows = self.windows
+        assert windows is not None
+        count, height, width = windows.size
         for _ in range(steps):
             for name in self.grids:
                 if name == "image_gradient":
-                    count, height, width = self.windows.size
                     self.device.launch("cut_window", (-(-height * width // 256), count), 256, self.scene)
-                    self.windows.launch()
+                    windows.launch()
                 self.launch(name)
 
     def step(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -111,12 +111,14 @@ def measure_paper(device: Device, figure: Figure, ceilings: tuple[float, float])
     from gsac.benchmarks.gpu.timing import evaluations, kernel_microseconds, nearest_milliseconds
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.paper import cuda as paper_cuda
+    from gsac.stages.train.task import Task
 
     model = Body.load()
     body = figure.body._replace(shape=model.shapedirs, joint_shape=np.tensordot(model.J_regressor, model.shapedirs, 1),
                                 expression=model.exprdirs)
-    recipe = paper_cuda.make_recipe(SimpleNamespace(config=TrainConfig(recipe="paper"), trained=figure.shots, views=figure.shots,
-                                                    poses=SimpleNamespace(body=model)))
+    views = [SimpleNamespace(camera=shot.camera, frame=shot.camera) for shot in figure.shots]
+    task = SimpleNamespace(config=TrainConfig(recipe="paper"), trained=views, views=views, poses=SimpleNamespace(body=model))
+    recipe = paper_cuda.make_recipe(cast(Task, task))
     start = paper_cuda.init_gaussians(len(body.faces), np.random.default_rng(0))
     trainer = PaperTrainer(body, [figure.shots], figure.pose, figure.transl, start, recipe, device)
     trainer.train(200)

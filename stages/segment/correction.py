@@ -75,7 +75,7 @@ def open_gaps(image: np.ndarray, scene: Plate, outline: np.ndarray) -> np.ndarra
     if area[gap].sum() > CAMOUFLAGE * np.count_nonzero(outline):
         outside = cv2.dilate((~outline).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         gap &= np.isin(np.arange(len(gap)), labels[outside])
-    return outline & ~gap[labels]
+    return outline & ~gap[labels.astype(np.intp)]
 
 
 def keep_squares(mask: np.ndarray) -> np.ndarray:

@@ -35,9 +35,9 @@ def learn_plate(paths: list[Path], xy: np.ndarray, score: np.ndarray, network: P
 
     None where too few frames show the person.
     """
-    regions = {t: person_region(np.nan_to_num(xy[t]), score[t]) for t in sample(len(paths))}
-    seen = [t for t, region in regions.items() if region is not None]
-    return median_without(paths, seen, lambda t, image: network(image, regions[t]) > 0.05, CLEAR)
+    found = {t: person_region(np.nan_to_num(xy[t]), score[t]) for t in sample(len(paths))}
+    regions = {t: region for t, region in found.items() if region is not None}
+    return median_without(paths, list(regions), lambda t, image: network(image, regions[t]) > 0.05, CLEAR)
 
 
 def relearn_plate(paths: list[Path], shown: np.ndarray, outline: Person) -> Plate | None:

@@ -65,7 +65,7 @@ def run(job: Job) -> None:
     elif job.config.use_plate and is_video:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
     absent, fits = np.zeros((2, len(paths)), bool)
-    cutouts: list[Cutout | None] = [None] * len(paths)
+    cutouts: dict[int, Cutout] = {}
 
     def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
         """Index, image and probability of each frame; the network has threads of its own, so one thread feeds it."""
@@ -76,7 +76,7 @@ def run(job: Job) -> None:
     def cut(masked: tuple[int, np.ndarray, np.ndarray | None]) -> View:
         t, image, probability = masked
         absent[t] = probability is None
-        if absent[t]:
+        if probability is None:
             return make_view(image, np.zeros(image.shape[:2], np.float32))
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
         cutouts[t], fits[t] = cut_frame(image, probability, xy, score, plate, job.config.iterations)

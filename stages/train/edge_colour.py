@@ -20,7 +20,8 @@ def unmix(rgb: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     edge = np.flatnonzero((alpha > 0) & ~sure)
     if not len(edge) or not sure.any():
         return rgb
-    away, label = cv2.distanceTransformWithLabels(np.uint8(~sure), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    away, label = cv2.distanceTransformWithLabels((~sure).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    label = label.astype(np.intp)
     place = np.empty(label.max() + 1, np.intp)
     place[label[sure]] = np.flatnonzero(sure)
     edge = edge[away.ravel()[edge] <= REACH]

@@ -70,7 +70,8 @@ class Cpu(Backend):
         for step in range(steps):
             order = order or [int(t) for t in rng.permutation(task.trained)]
             t = order.pop()
-            trainer.step(t, (coarse if step < coarse_until else views)[t], BEGIN + (1 - BEGIN) * step / steps, rng.random(3), step)
+            shown = coarse if coarse and step < coarse_until else views
+            trainer.step(t, shown[t], BEGIN + (1 - BEGIN) * step / steps, rng.random(3), step)
             if step >= steps - averaged:
                 for name, value in trainer.values.items():
                     sums[name] += value

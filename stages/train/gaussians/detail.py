@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.first_colours import PosedFrame, mean_colours, read_sights
@@ -27,7 +27,7 @@ def find_detail(frames: list[PosedFrame], rest: np.ndarray, faces: np.ndarray, s
         return np.ones(len(faces))
     centres = rest[faces].mean(1)
     places = centres[probes.face]
-    near = cKDTree(places[seen]).query(centres, k=min(NEAREST, int(seen.sum())))[1].reshape(len(faces), -1)
+    near = KDTree(places[seen]).query(centres, k=min(NEAREST, int(seen.sum())))[1].reshape(len(faces), -1)
     strength = found[seen][:, 0].astype(np.float64)[near].mean(1)
     return np.clip((strength / max(float(strength[probes.face].mean()), 1e-6)) ** POWER, LEAST, MOST)
 
