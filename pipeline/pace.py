@@ -58,6 +58,10 @@ class Course:
         self._begun: set[str] = set()
         self._usual = self._spent = 0.0
 
+    def has(self, stage: str) -> bool:
+        """Whether it is one of them: a benchmark reports other work, too, after a run."""
+        return stage in self._steps
+
     def place(self, stage: str) -> str:
         """`7/8`"""
         return f"{self._steps.index(stage) + 1}/{len(self._steps)}"

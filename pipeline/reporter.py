@@ -92,13 +92,13 @@ class PlainReporter(AbstractContextManager):
 
     def _titled(self, stage: str) -> str:
         """`7/8 train`"""
-        return f"{self._course.place(stage)} {stage}" if self._course is not None else stage
+        return f"{self._course.place(stage)} {stage}" if self._course is not None and self._course.has(stage) else stage
 
     def _words(self, stage: str, done: int, total: int, unit: str, now: float) -> str:
         """The stage's progress, and what is left of the run where earlier runs tell."""
         self._pace.hear(done, unit, now)
         words = self._pace.words(total)
-        if self._course is None:
+        if self._course is None or not self._course.has(stage):
             return words
         left = self._course.seconds_left(stage, now - self._began, self._pace.seconds_left(total))
         return words if left is None else f"{words}; whole run: about {duration(left)} left"

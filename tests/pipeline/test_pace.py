@@ -77,6 +77,14 @@ def test_a_piped_run_tells_what_is_left_of_the_whole(monkeypatch):
     assert lines.getvalue().splitlines()[-1] == "2/4 smplx: 200/300 steps, 5 steps/s, 20 s left; whole run: about 1 min 40 s left"
 
 
+def test_work_that_is_no_stage_of_the_run_is_told_by_its_own_name():
+    lines = io.StringIO()
+    reporter = PlainReporter(lines)
+    reporter.follows(course({"split": 2.0, "smplx": 60.0, "face": 3.0, "train": 80.0}))
+    reporter.progress("seed3_novel_12", 1, 12, "frames")
+    assert lines.getvalue() == "seed3_novel_12: 1/12 frames\n"
+
+
 def test_the_first_word_of_a_new_phase_is_sent_at_once():
     sent = io.StringIO()
     events = EventStream(sent)
