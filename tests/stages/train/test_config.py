@@ -41,11 +41,11 @@ def filmed(pixels, **values):
 
 def test_sizes_and_coarse_steps_follow_from_the_pixels_of_the_person():
     (small, least), (large, most) = schedule.SMALL, schedule.LARGE
-    sizes = [schedule.budget(filmed(int(pixels)), "cpu") for pixels in (100, large / 4, large, 9e5)]
+    sizes = [schedule.budget(filmed(int(pixels)), "cpu") for pixels in (100, large / 4, large, 9.9e5)]
     assert sizes == [schedule.SIZES[0], config.FULL_SIZE / 2, config.FULL_SIZE, schedule.SIZES[1]]
     assert schedule.budget(filmed(int(large)), "cuda") == config.FULL_SIZE * schedule.MORE_ON_CUDA
     assert schedule.budget(filmed(int(large), gaussians=700), "cuda") == 700
-    shares = [schedule.coarse_share(filmed(int(pixels))) for pixels in (100, small, (small * large) ** 0.5, large, 9e5)]
+    shares = [schedule.coarse_share(filmed(int(pixels))) for pixels in (100, small, (small * large) ** 0.5, large, 9.9e5)]
     np.testing.assert_allclose(shares, [least, least, (least + most) / 2, most, most], rtol=1e-4)
     task = filmed(int(small))
     assert schedule.coarse_steps(task, STEPS) == schedule.coarse_steps(task, schedule.STEPS) > schedule.coarse_steps(task, 400)
