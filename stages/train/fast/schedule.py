@@ -69,5 +69,5 @@ def shortest_axis(task: Task, halvings: int = 0) -> float:
 
     halvings: of the frames, to the size that the gaussians are drawn at.
     """
-    depth = float(np.median(task.poses.transl[task.trained, 2]))
+    depth = float(np.median(task.poses.fit_transl[task.trained, 2]))
     return FINEST * 2**halvings * depth / min(task.views[0].camera.focal)
