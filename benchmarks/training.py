@@ -42,7 +42,7 @@ def declare(parser: argparse.ArgumentParser, name: str) -> None:
     parser.add_argument("--frames", type=int, default=60, help="frames of such a clip (default: 60)")
     parser.add_argument("--run", type=Path, action="append", default=[], metavar="DIR",
                         help="folder of a finished `gsac run`, whose frames, masks and poses are taken; may be repeated")
-    parser.add_argument("--height", type=int, default=540, help="px that are trained on (default: 540)")
+    parser.add_argument("--height", type=int, default=None, help="px that are trained on (default: the frames' own)")
     parser.add_argument("--out", type=Path, default=Path(f"bench-{name}"), metavar="DIR", help=f"default: ./bench-{name}")
 
 

@@ -39,7 +39,7 @@ QUALITIES = {quality.name: quality for quality in (
             {"split": {"count": 40}, "train": {"height": 540, "steps": 700, "gaussians": 6000}}),
     Quality(STANDARD, "every parameter as in params.yaml"),
     Quality("fine", "the most that the clip gives, for several times the time",
-            {"split": {"max_height": 1920}, "train": {"steps": 4000, "gaussians": "auto"}},
+            {"split": {"max_height": 1920}, "train": {"steps": 4000}},
             {"train": {"steps": 6000, "gaussians": 25000}}),
 )}
 

@@ -184,6 +184,21 @@ template <class real> FORMULA Rows<real> rows_of(const Lens<real> &lens, const B
     return r;
 }
 
+// Covariance of a splat without the low-pass, and its determinant as a sum of squares: thin splats lose no digits.
+template <class real> struct Covariance { real xx, xy, yy, determinant; };
+
+template <class real> FORMULA Covariance<real> covariance_of(const Rows<real> &r) {
+    Covariance<real> c = {0, 0, 0, 0};
+    for (int j = 0; j < 3; ++j) {
+        c.xx += r.a[j] * r.a[j];
+        c.xy += r.a[j] * r.b[j];
+        c.yy += r.b[j] * r.b[j];
+    }
+    real m0 = r.a[1] * r.b[2] - r.a[2] * r.b[1], m1 = r.a[2] * r.b[0] - r.a[0] * r.b[2], m2 = r.a[0] * r.b[1] - r.a[1] * r.b[0];
+    c.determinant = m0 * m0 + m1 * m1 + m2 * m2;
+    return c;
+}
+
 // Centre (px), exponent s = ha dx^2 + b dx dy + hc dy^2, its largest value, half extents (px), opacity after the low-pass.
 template <class real> struct Splat { real x, y, ha, b, hc, s_max, wide, high, opacity; bool seen; };
 
@@ -191,28 +206,20 @@ template <class real> FORMULA Splat<real> project(const Lens<real> &lens, const 
     Splat<real> s;
     s.seen = g.mean.z > real(NEAR_PLANE) && g.mean.z < real(1e6) && opacity > real(MIN_ALPHA) && opacity < real(1e6);
     if (!s.seen) return s;
-    Rows<real> r = rows_of(lens, g);
-    real aa = 0, ab = 0, bb = 0;
-    for (int j = 0; j < 3; ++j) {
-        aa += r.a[j] * r.a[j];
-        ab += r.a[j] * r.b[j];
-        bb += r.b[j] * r.b[j];
-    }
-    // the determinant as a sum of squares: thin splats lose no digits
-    real m0 = r.a[1] * r.b[2] - r.a[2] * r.b[1], m1 = r.a[2] * r.b[0] - r.a[0] * r.b[2], m2 = r.a[0] * r.b[1] - r.a[1] * r.b[0];
-    real bare = m0 * m0 + m1 * m1 + m2 * m2, determinant = bare + lens.px2 * (aa + bb) + lens.px2 * lens.px2;
-    real xx = aa + lens.px2, yy = bb + lens.px2;
-    s.opacity = lens.keeps_energy ? opacity * sqrt(bare / determinant) : opacity;
+    Covariance<real> bare = covariance_of(rows_of(lens, g));
+    real determinant = bare.determinant + lens.px2 * (bare.xx + bare.yy) + lens.px2 * lens.px2;
+    real xx = bare.xx + lens.px2, yy = bare.yy + lens.px2;
+    s.opacity = lens.keeps_energy ? opacity * sqrt(bare.determinant / determinant) : opacity;
     s.x = g.mean.x / g.mean.z * lens.fx + lens.cx;
     s.y = g.mean.y / g.mean.z * lens.fy + lens.cy;
     s.ha = yy / (2 * determinant);
-    s.b = -ab / determinant;
+    s.b = -bare.xy / determinant;
     s.hc = xx / (2 * determinant);
     s.s_max = log(real(ALPHA_LEVELS) * s.opacity);
     s.wide = sqrt(2 * s.s_max * xx);
     s.high = sqrt(2 * s.s_max * yy);
-    s.seen = s.opacity > real(MIN_ALPHA) && determinant < real(1e30) && xx < real(1e15) && yy < real(1e15) && s.x < real(1e7) && s.x > real(-1e7) &&
-             s.y < real(1e7) && s.y > real(-1e7);
+    s.seen = s.opacity > real(MIN_ALPHA) && determinant < real(1e30) && xx < real(1e15) && yy < real(1e15) &&
+             s.x < real(1e7) && s.x > real(-1e7) && s.y < real(1e7) && s.y > real(-1e7);
     return s;
 }
 
@@ -228,17 +235,11 @@ FORMULA Bound<real> project_backward(const Lens<real> &lens, const Bound<real> &
     Rows<real> r = rows_of(lens, g);
     if (lens.keeps_energy) {
         // the opacity's factor sqrt(bare / determinant) has the slope (C^-1 - Q) / 2 in its logarithm, C without the low-pass
-        real aa = 0, ab = 0, bb = 0;
-        for (int j = 0; j < 3; ++j) {
-            aa += r.a[j] * r.a[j];
-            ab += r.a[j] * r.b[j];
-            bb += r.b[j] * r.b[j];
-        }
-        real n0 = r.a[1] * r.b[2] - r.a[2] * r.b[1], n1 = r.a[2] * r.b[0] - r.a[0] * r.b[2], n2 = r.a[0] * r.b[1] - r.a[1] * r.b[0];
-        real bare = n0 * n0 + n1 * n1 + n2 * n2, half = moments[0] / 2;
-        h00 += half * (bb / bare - a);
-        h01 -= half * (ab / bare + b);
-        h11 += half * (aa / bare - c);
+        Covariance<real> bare = covariance_of(r);
+        real half = moments[0] / 2;
+        h00 += half * (bare.yy / bare.determinant - a);
+        h01 -= half * (bare.xy / bare.determinant + b);
+        h11 += half * (bare.xx / bare.determinant - c);
     }
     real gjx = 0, gjy = 0, t2x = 0, t2y = 0;
     for (int j = 0; j < 3; ++j) {

@@ -27,7 +27,7 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--recipe", default="fast", choices=["fast", "paper"], help="recipe of the trainings (default: fast)")
     out.add_argument("--repeats", type=int, default=5, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 5)")
     out.add_argument("--steps", type=int, default=None, help="steps of a training (default: the recipe's)")
-    out.add_argument("--height", type=int, default=540, help="px that are trained on (default: 540)")
+    out.add_argument("--height", type=int, default=None, help="px that are trained on (default: the frames' own)")
     out.add_argument("--out", type=Path, default=Path("bench-paper-table"), metavar="DIR", help="default: ./bench-paper-table")
     return out
 

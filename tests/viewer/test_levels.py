@@ -21,13 +21,6 @@ FAR = {6.5: 0, 10.0: 1, 40.0: 2}
 
 
 @pytest.fixture(scope="module")
-def browser():
-    it = chromium.Browser(SIZE, SIZE, chromium.WEBGPU)
-    yield it
-    it.close()
-
-
-@pytest.fixture(scope="module")
 def levelled(figure):
     levels = zip(figure.coarser, HEIGHTS, strict=True)
     return replace(figure, coarser=[replace(level, max_height_px=height) for level, height in levels])

@@ -25,13 +25,6 @@ LIGHT = np.float32([[.8, .75, .7], [.3, .2, -.1], [.2, .1, .3], [.25, -.6, .2]])
 
 
 @pytest.fixture(scope="module")
-def browser():
-    it = chromium.Browser(SIZE, SIZE, chromium.WEBGPU)
-    yield it
-    it.close()
-
-
-@pytest.fixture(scope="module")
 def lit(exported):
     avatar = RiggedAvatar.read(exported / "avatar.gsac")
     return replace(avatar, gaussians=replace(avatar.gaussians, light=LIGHT))

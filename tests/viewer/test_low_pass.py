@@ -20,13 +20,6 @@ SIZE, BACKGROUND = 320, (0x3A, 0x60, 0x80)
 
 
 @pytest.fixture(scope="module")
-def browser():
-    it = chromium.Browser(SIZE, SIZE, chromium.WEBGPU)
-    yield it
-    it.close()
-
-
-@pytest.fixture(scope="module")
 def thin(figure):
     """The figure of gaussians of which most are smaller than a pixel."""
     return replace(figure, gaussians=replace(figure.gaussians, log_scale=figure.gaussians.log_scale - .7), coarser=[])
