@@ -82,7 +82,7 @@ def test_every_gradient_of_a_step_is_that_of_the_cpu_path(trainers, batch, text)
     from gsac.avatar.cuda.paper import ROWS
     from gsac.benchmarks.gpu.check import relative
 
-    cuda, cpu, step, _ = trainers(batch, 10, paper_text=text)
+    cuda, cpu, step, _ = trainers(batch, 110, paper_text=text)
     cuda.poison()
     cuda.train(1)
     moves = {}

@@ -18,6 +18,7 @@ def both():
     from gsac.benchmarks.gpu.synthetic_clip import figure, start
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import make_recipe
+    from gsac.stages.train.fast.schedule import shortest_axis
     from gsac.stages.train.gpu import body_arrays
     from gsac.stages.train.poses.poses import Poses
 
@@ -30,8 +31,9 @@ def both():
         expression = np.random.default_rng(1).random((4, body.exprdirs.shape[2])) * 0.2
         params = BodyParams.from_pose(pose, made.transl, np.zeros(body.num_betas), expression, camera.focal, camera.center)
         config = TrainConfig(steps=steps, expression_rate=1e-2, joint_rate=1e-3)
-        task = SimpleNamespace(config=config, poses=Poses(body, params), trained=np.arange(4))
-        gaussians, recipe = start(made.body, 3000), make_recipe(config, 3000, batch=batch, offset_rate=0.0)
+        task = SimpleNamespace(config=config, poses=Poses(body, params), trained=np.arange(4), views=made.shots)
+        gaussians = start(made.body, 3000)
+        recipe = make_recipe(config, 3000, batch=batch, offset_rate=0.0, least=shortest_axis(task))
         arrays = body_arrays(task.poses, task.trained, recipe)
         trainer = CudaTrainer(arrays, [made.shots], task.poses.pose, task.poses.transl, gaussians, recipe)
         opened.append(trainer)
@@ -51,9 +53,9 @@ def test_expression_and_joints_take_the_vertices_gradient_as_on_the_cpu(both, ba
     trainer.train(1)
     poses, config, joints = task.poses, task.config, np.zeros((55, 3))
     for t, grad in zip(trainer.order[0].tolist(), trainer.buffers["grad_vertices"].read(), strict=True):
-        grad_rest, grad_joints = poses.step(t, grad, config.pose_rate, config.pose_pull)
+        grad_rest, grad_joints = poses.step(t, grad / batch, config.pose_rate, config.pose_pull)
         poses.step_expression(t, poses.expression_gradient(grad_rest), config.expression_rate, config.pose_pull)
-        joints += grad_joints / batch
+        joints += grad_joints
     poses.step_joints(joints, config.joint_rate, config.pose_pull)
     found = {"expression": relative(trainer.buffers["expression_first"].read(), poses.expression_moments[0]),
              "joints": relative(trainer.buffers["joint_first"].read(), poses.joint_moments[0])}
@@ -83,4 +85,4 @@ def test_a_training_follows_the_cpus(both):
     trainer.train(24)
     np.testing.assert_allclose(trainer.losses()[:, 0], losses, rtol=0.02)
     assert relative(trainer.expressions(), task.poses.expression) < 0.2
-    assert relative(trainer.joint_offset(), task.poses.joint_offset) < 0.2 and np.abs(trainer.joint_offset()).max() > 1e-3
+    assert relative(trainer.joint_offset(), task.poses.joint_offset) < 0.2 and np.abs(trainer.joint_offset()).max() > 5e-4
