@@ -21,6 +21,8 @@ Result = TypeVar("Result")
 Share = Callable[..., None]
 """Type of `Workspace.share`: what it calls takes any arguments."""
 
+MOST_THREADS = 8
+"""Threads of one kernel at most: its shares grow too small; a GPU training's CPU half takes 12.8 s on 8 cores, 18.6 on 16."""
 _pools: dict[int, ThreadPoolExecutor] = {}
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pools.clear)
@@ -31,6 +33,11 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def kernel_threads() -> int:
+    """Threads of one kernel where no number is given."""
+    return min(MOST_THREADS, available_cores())
+
+
 class Workspace:
     """Buffers kept from step to step, and the threads that work on them.
 
@@ -38,8 +45,8 @@ class Workspace:
     """
 
     def __init__(self, workers: int | None = None):
-        """workers: threads to use; all available cores unless given."""
-        self.workers = workers or available_cores()
+        """workers: threads to use; `kernel_threads()` unless given."""
+        self.workers = workers or kernel_threads()
         self._buffers: dict[str, np.ndarray] = {}
 
     def take(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> np.ndarray:
@@ -72,9 +79,9 @@ def side_by_side(work: Callable[[Item, Workspace], Result], items: Iterable[Item
     A result must not lie in its workspace, which the next item uses.
     """
     items = list(items)
-    many = min(available_cores(), len(items))
+    many = min(kernel_threads(), len(items))
     if many <= 1:
-        workspace = Workspace(1) if available_cores() == 1 else Workspace()
+        workspace = Workspace()
         return [work(item, workspace) for item in items]
 
     def part(k: int) -> list[Result]:

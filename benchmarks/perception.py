@@ -58,7 +58,7 @@ def run_stage(stage: Stage, run: Callable[[Job], None], inputs: dict[str, Path],
     config = stage.config(**parameters)
     warnings: list[str] = []
     out.mkdir()
-    job = Job(inputs=inputs, out=out, config=config, warn=warnings.append,
+    job = Job(inputs=inputs, out=out, config=config, warn=lambda finding: warnings.append(finding.message),
               models={name: model_path(name, store) for name in stage.models(config)})
     cpu, wall = time.process_time(), time.perf_counter()
     run(job)

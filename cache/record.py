@@ -37,6 +37,8 @@ class RunInfo:
     device: str = "cpu"
     metrics: dict[str, Any] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    findings: list[dict[str, Any]] = field(default_factory=list)
+    """Code, severity, frames and figure of each warning, in their order; none in records made before there were codes."""
     notes: list[str] = field(default_factory=list)
     log_tail: str = ""
     timings: dict[str, Any] = field(default_factory=dict)

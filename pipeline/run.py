@@ -57,6 +57,7 @@ class StageResult:
     cpu_seconds: float = 0.0
     peak_rss_mb: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    findings: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     params: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
@@ -73,15 +74,16 @@ class StageResult:
         """Of a stage that has a record."""
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
-                   info.peak_rss_mb, info.warnings, info.notes, config_values(config), add_timings(info.metrics, info.timings),
-                   info.timings, record.parts.inputs, _ports(record))
+                   info.peak_rss_mb, info.warnings, info.findings, info.notes, config_values(config),
+                   add_timings(info.metrics, info.timings), info.timings, record.parts.inputs, _ports(record))
 
     def to_json(self) -> dict[str, Any]:
         """As run.json and --json hold it."""
         row = {
             "name": self.name, "status": self.outcome.value, "seconds": round(self.seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3), "peak_rss_mb": round(self.peak_rss_mb, 1), "key": self.key,
-            "reason": self.reason, "warnings": self.warnings, "notes": self.notes, "params": self.params, "timings": self.timings,
+            "reason": self.reason, "warnings": self.warnings, "findings": self.findings, "notes": self.notes,
+            "params": self.params, "timings": self.timings,
             "inputs": self.inputs, "outputs": self.outputs,
         }
         return row | ({"error": self.error} if self.error else {})

@@ -203,6 +203,8 @@ class StageRunner:
                 kept, tell = {"warning": (info.warnings, self.reporter.warning), "note": (info.notes, self.reporter.remark)}[
                     event["event"]]
                 kept.append(message)
+                if event["event"] == "warning":
+                    info.findings.append(event["finding"])
                 tell(name, message)
 
         order = {

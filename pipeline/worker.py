@@ -18,11 +18,14 @@ import threading
 import time
 import traceback
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from gsac.pipeline.errors import NO_ROOM, sentence
 from gsac.pipeline.tether import tether
 from gsac.stages.contract import BadInput, Job, Stage, StageError, make_config
+
+if TYPE_CHECKING:
+    from gsac.stages.findings import Finding  # it loads numpy
 
 LEAST_GAP_S = 0.1
 """At least this long between two progress events."""
@@ -54,9 +57,9 @@ class EventStream:
             self._last, self._unit = now, unit
             self.send("progress", done=int(done), total=int(total), unit=str(unit))
 
-    def warn(self, message: str) -> None:
+    def warn(self, finding: Finding) -> None:
         """Sends a warning for the user."""
-        self.send("warning", message=str(message))
+        self.send("warning", message=finding.message, finding=finding.to_json())
 
     def note(self, message: str) -> None:
         """Sends a note for the user."""

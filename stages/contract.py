@@ -14,7 +14,10 @@ import typing
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gsac.stages.findings import Finding  # it loads numpy
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,8 @@ class Job:
     device: str = "cpu"
     progress: Callable[[int, int, str], None] = lambda done, total, what: None
     """Reports progress: done, total, unit (`frames`, `steps`)."""
-    warn: Callable[[str], None] = lambda message: None
-    """Warns the user: a sentence that names the frame, file or parameter; kept in the cache record and the report."""
+    warn: Callable[[Finding], None] = lambda finding: None
+    """Warns the user; kept in the cache record and the report."""
     note: Callable[[str], None] = lambda message: None
     """Tells the user what holds for nearly every clip and is no fault of this one; kept as warnings are."""
     timing: Callable[[str, Any], None] = lambda name, value: None

@@ -43,7 +43,8 @@ def fit(case: FitCase, method: str, focal_given: bool) -> FitTrial:
         dataclasses.replace(clip, focal_px=case.truth.focal if focal_given else None).write(path)
         out = Path(folder) / "out"
         out.mkdir()
-        job = Job(case.inputs | {"split/clip.json": path}, out, SmplxConfig(method=method), warn=warnings.append)
+        job = Job(case.inputs | {"split/clip.json": path}, out, SmplxConfig(method=method),
+                  warn=lambda finding: warnings.append(finding.message))
         wall, cpu = time.perf_counter(), time.process_time()
         run(job)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu

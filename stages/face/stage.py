@@ -16,6 +16,7 @@ from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sig
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.head import HeadModel
 from gsac.stages.face.landmarks import align, read_averaged
+from gsac.stages.findings import Code, Finding
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
 DOUBT = 0.1
@@ -44,7 +45,7 @@ def run(job: Job) -> None:
             c = smooth(c, seen, smoothing_sigma(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, apart))
     else:
         c, own = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
-        job.warn("The face was never seen from the front; the avatar's face stays at rest.")
+        job.warn(Finding.of(Code.FACE_AT_REST))
     expression = fill_unseen(c, valid, times, config.rest_time)
     head = fit_head(actions, flame, own, expression) if valid.any() else {}
     write_arrays(job.out / "face.npz", valid=valid, expression=expression.astype(np.float32),

@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 from gsac.avatar.artifacts import Clip, check_keypoints, write_arrays
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import Job, StageError
+from gsac.stages.findings import Code, Finding
 from gsac.stages.handgap.fill import fill_gaps
 from gsac.stages.handgap.missing_hands import SIDES, MissingHands, find_missing, runs
 from gsac.stages.handgap.sigma import detection_sigma, person_height
@@ -51,14 +52,15 @@ def run(job: Job) -> None:
 def _report(job: Job, found: MissingHands, filled: np.ndarray) -> None:
     """Warns of what the user should know: hands never seen, taken for the other one, or left missing."""
     for i, side in enumerate(SIDES):
-        missing, name = found.hand[:, i], f"the {side} hand"
+        missing = found.hand[:, i]
         if missing.all():
-            job.warn(f"{name.capitalize()} is never seen in {len(missing)} frames; its pose will be a guess.")
+            job.warn(Finding.of(Code.HAND_NEVER_SEEN, figure=len(missing), side=side))
             continue
         if found.misplaced[:, i].any():
-            first = int(np.flatnonzero(found.misplaced[:, i])[0])
-            job.warn(f"{name.capitalize()} was detected in a wrong place in {int(found.misplaced[:, i].sum())} frames "
-                     f"(first: frame {first}); those detections are not used.")
-        for start, end in runs(missing & ~filled[:, HANDS[side]].all(axis=1)):
-            if missing[start] and not filled[start, HANDS[side]].all() and end - start > 1:
-                job.warn(f"{name.capitalize()} is missing from frame {start} to {end - 1}, too long to fill.")
+            job.warn(Finding.of(Code.HAND_MISPLACED, found.misplaced[:, i], side=side))
+        left = missing & ~filled[:, HANDS[side]].all(axis=1)
+        for start, end in runs(left):
+            if end - start == 1:
+                left[start] = False  # the fit bridges one frame
+        if left.any():
+            job.warn(Finding.of(Code.HAND_NOT_FILLED, left, side=side))

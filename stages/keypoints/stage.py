@@ -14,6 +14,7 @@ from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, read_frame, writ
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
+from gsac.stages.findings import Code, Finding
 from gsac.stages.frame_names import name_frames
 from gsac.stages.keypoints.config import DetectorName
 from gsac.stages.keypoints.cut_off import Cut, find_cuts, name_cuts
@@ -63,16 +64,14 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
         raise BadInput(f"No person was found: something like one shows in {name_frames(seen)} only, and never a face or a hand; "
                        f"{ADVICE}")
     if not seen.all():
-        job.warn(f"No person was found in {name_frames(~seen)}; these frames carry no points.")
+        job.warn(Finding.of(Code.NO_PERSON, ~seen))
     second = np.array([f.second_person for f in frames])
     if second.any():
-        job.warn(f"A second person was seen in {name_frames(second)}; only the first one is followed. "
-                 "Keep others out of the picture or cut these frames.")
+        job.warn(Finding.of(Code.SECOND_PERSON, second))
     if any(cuts):
-        job.warn(f"The edge of the picture cuts off {name_cuts(cuts)}; what lies outside is guessed. Stand in the middle, far "
-                 "enough away that head, hands and feet stay in the picture.")
+        job.warn(Finding.of(Code.CUT_OFF, np.array([bool(cut) for cut in cuts]), parts=name_cuts(cuts)))
     for side, points in HANDS.items():
         if not any(f.score[points].any() for f in frames):
-            job.warn(f"The {side} hand was never seen; its fingers stay at rest.")
+            job.warn(Finding.of(Code.HAND_NEVER_DETECTED, side=side))
     if not any(f.score[FACE].any() for f in frames):
-        job.warn("The face was never seen from the front; it stays without expression.")
+        job.warn(Finding.of(Code.FACE_NEVER_DETECTED))

@@ -13,7 +13,7 @@ import numpy as np
 from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import Job, StageError
-from gsac.stages.frame_names import name_frames
+from gsac.stages.findings import Code, Finding
 from gsac.stages.segment.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.stages.segment.components import keep_person
 from gsac.stages.segment.config import Method
@@ -107,14 +107,13 @@ def run(job: Job) -> None:
     if absent.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
     if absent.any():
-        job.warn(f"No person is in {name_frames(absent)}; the mask there is empty.")
+        job.warn(Finding.of(Code.EMPTY_MASK, absent))
     other_scene = ~fits & ~absent
     if given and other_scene.any():
-        job.warn(f"The plate does not show the scene of {name_frames(other_scene)} (did the camera move?); it is not used there.")
+        job.warn(Finding.of(Code.OTHER_SCENE, other_scene))
     moved = find_moved(sway, max(clip.width, clip.height))
     if is_video and moved.any():
-        job.warn(f"The camera moves by up to {np.nanmax(sway):.0f} px, in {name_frames(moved)}. Stand the phone on something firm, "
-                 "and do not zoom.")
+        job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
 
 
 def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,

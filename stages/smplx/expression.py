@@ -5,27 +5,26 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.body import Body
+from gsac.stages.findings import Code, Finding
 
 JAW_OPEN, JAW_ANGLE = 24, 0.38
 """Index of jawOpen in face.npz's 52 actions, and the angle, rad, of a fully open jaw."""
 
 
-def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
-    """Expression (T, E), jaw_pose (T, 3) rad and a sentence about what was lost, or "".
+def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, Finding | None]:
+    """Expression (T, E), jaw_pose (T, 3) rad and what was lost.
 
     face: arrays of face.npz, `expression` (T, 52), `jaw` (T, 3), ... The open body's expressions are the 52 actions. An official
     body's are FLAME's: taken from a FLAME head in face.npz; without one only the jaw moves.
     """
     actions, jaw = face["expression"], face["jaw"].astype(np.float32)
     if actions.shape[1] == len(body.expression_names) and body.jaw_actions.any():
-        return actions, jaw, ""
+        return actions, jaw, None
     if "flame_expression" in face:
         expression = np.zeros((len(actions), len(body.expression_names)), np.float32)
         known = min(expression.shape[1], face["flame_expression"].shape[1])
         expression[:, :known] = face["flame_expression"][:, :known]
-        return expression, face["flame_jaw"].astype(np.float32), ""
+        return expression, face["flame_jaw"].astype(np.float32), None
     jaw = jaw.copy()
     jaw[:, 0] += JAW_ANGLE * actions[:, JAW_OPEN]
-    return np.zeros((len(actions), len(body.expression_names)), np.float32), jaw, (
-        "This body model has no named facial actions: of the face only the jaw is carried over; a FLAME head (face.flame) "
-        "would bring the rest.")
+    return np.zeros((len(actions), len(body.expression_names)), np.float32), jaw, Finding.of(Code.JAW_ALONE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.stages.frame_names import name_frames
+from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.state import Fit
 
 POOR_IOU = 0.7
@@ -27,14 +27,13 @@ def find_lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.
             f"the body lies more than {FAR:.0%} of its height off the seen points": away}
 
 
-def describe_lost_frames(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[str]:
-    """Sentences for the user: lost frames by reason, and frames of low IoU that were kept.
+def describe_lost_frames(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[Finding]:
+    """What the user should know: lost frames by reason, and frames of low IoU that were kept.
 
     lost: reason -> frames (T,) bool; iou: (T,), NaN without alpha.
     """
-    out = [f"Not fitted, and not learned from: {name_frames(mask)}; {reason}." for reason, mask in lost.items() if mask.any()]
+    out = [Finding.of(Code.NOT_FITTED, mask, reason=reason) for reason, mask in lost.items() if mask.any()]
     poor = (np.nan_to_num(iou, nan=1.0) < POOR_IOU) & ~np.any(list(lost.values()), axis=0)
     if poor.any():
-        out.append(f"The body covers the silhouette badly (IoU below {POOR_IOU}) in {name_frames(poor)}, as in the clip's other "
-                   "frames: wide clothes, or a mask that holds more than the person.")
+        out.append(Finding.of(Code.POORLY_COVERED, poor, figure=POOR_IOU))
     return out

@@ -51,7 +51,7 @@ def run(job: Job) -> None:
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
     expression, jaw, silent = translate_expression(body, face)
-    if silent:
+    if silent is not None:
         job.warn(silent)
     params = to_params(body, fit.state, sightings.center, expression, fit.joint_offset)
     params.jaw_pose = jaw
@@ -59,8 +59,8 @@ def run(job: Job) -> None:
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = find_lost_frames(fit, seen, sightings.person_height)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
-    for sentence in (*fit.notes, *describe_lost_frames(lost, fit.iou)):
-        job.warn(sentence)
+    for finding in (*fit.notes, *describe_lost_frames(lost, fit.iou)):
+        job.warn(finding)
     if guesses := describe_guesses(job.config, params, clip):
         job.note(guesses)
     params.write(job.out / "body.npz")

@@ -8,6 +8,7 @@ import numpy as np
 
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
+from gsac.stages.findings import Finding
 
 
 @dataclass
@@ -47,7 +48,7 @@ class Fit:
     reprojection: np.ndarray  # (T,) median px of the body points
     steps: int
     joint_offset: np.ndarray | None = None  # (55, 3) m, where the method moves joints
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     """Sentences for the user."""
 
 

@@ -13,6 +13,7 @@ from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
 from gsac.avatar.artifacts import Crop, write_frame
 from gsac.stages.contract import BadInput
+from gsac.stages.findings import Code, Finding
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import plan_crop, principal_point
@@ -57,12 +58,12 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
 
 
 def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: SplitConfig, people: People | None,
-                 warn: Callable[[str], None], progress: Callable[[int, int, str], None]) -> dict:
+                 warn: Callable[[Finding], None], progress: Callable[[int, int, str], None]) -> dict:
     """Writes frames/%06d.png and frames/plate.png. people: who finds the person, None: the frames stay whole. Returns the Clip
     fields width, height, focal_px, notes, crop, center."""
     picks = [photos[i] for i in pick_evenly(len(photos), config.count)]
     if len(picks) < len(photos):
-        warn(f"{len(photos)} photos given, {len(picks)} kept evenly (split.count is {config.count}).")
+        warn(Finding.of(Code.PHOTOS_DROPPED, figure=len(picks), given=len(photos), count=config.count))
     usual = usual_size(picks)
     crop = find_crop(picks, usual, config, people)
     width, height = fit_size(*usual if crop is None else (crop.width, crop.height), config.max_height)
@@ -93,10 +94,10 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
     if not focals:
         raise unread[0]
     if unread:
-        warn(f"{len(unread)} of {len(picks)} photos left out: {'; '.join(map(str, unread))}")
+        warn(Finding.of(Code.PHOTOS_UNREAD, figure=len(unread), given=len(picks), reasons="; ".join(map(str, unread))))
     if other:
-        warn(f"{len(other)} of {len(picks)} photos have another size than {usual[0]}x{usual[1]} and were scaled to it: "
-             f"{', '.join(other)}. Use one camera that stands still, and photos that nobody cropped.")
+        warn(Finding.of(Code.PHOTO_SIZES, figure=len(other), given=len(picks), width=usual[0], height=usual[1],
+                        names=", ".join(other)))
     if plate is not None:
         rgb, _, had_alpha = read_photo(plate)
         if had_alpha:
@@ -104,8 +105,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         write_frame(frames / "plate.png", fit(rgb, Image.Exif())[0])
     known = [f for f in focals if f is not None]
     if known and max(known) > 1.02 * min(known):
-        warn(f"the photos' focal lengths differ ({min(known):.0f} to {max(known):.0f} px): was the zoom moved? "
-             "Their median is used.")
+        warn(Finding.of(Code.PHOTO_ZOOM, least=min(known), most=max(known)))
     return {"width": width, "height": height, "focal_px": float(np.median(known)) if known else None,
             "notes": sorted(notes), "crop": crop,
             "center": None if crop is None else principal_point(crop, (width, height), *usual)}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gsac.avatar.artifacts import Clip, frame_paths
 from gsac.stages.contract import BadInput, Job, StageError
+from gsac.stages.findings import Code, Finding
 from gsac.stages.split.config import NETWORKS
 from gsac.stages.split.crop import describe_crop
 from gsac.stages.split.people import People
@@ -39,7 +40,7 @@ def run(job: Job) -> None:
     if clip.timestamps_s is not None and len(clip.timestamps_s) != kept:
         raise StageError(f"{source.name}: {kept} frames and {len(clip.timestamps_s)} timestamps")
     if kept == 1:
-        job.warn(f"{source.name} gives one frame: the avatar will be right from one side only. Record a full turn.")
+        job.warn(Finding.of(Code.ONE_FRAME, name=source.name))
     if clip.crop is not None:
         job.note(describe_crop(clip.crop))
     clip.write(job.out / "clip.json")

@@ -14,6 +14,7 @@ from gsac.avatar.artifacts import Crop, frame_paths, read_frame
 from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.avatar.files import told_no_room
 from gsac.stages.contract import BadInput, StageError
+from gsac.stages.findings import Code, Finding
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_point, sides_near
@@ -31,7 +32,7 @@ LOOKS, CHECKS, TRIES = 12, 30, 3
 """Most key frames by which a crop is planned, most frames in which it is checked, and crops tried before the frames stay whole."""
 
 
-def split_video(path: Path, frames: Path, config: SplitConfig, people: People | None, warn: Callable[[str], None],
+def split_video(path: Path, frames: Path, config: SplitConfig, people: People | None, warn: Callable[[Finding], None],
                 progress: Callable[[int, int, str], None]) -> dict:
     """Writes frames/%06d.png. people: who finds the person, None: the frames stay whole. Returns the Clip fields fps, timestamps_s,
     width, height, focal_px, notes, crop, center."""
@@ -43,8 +44,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     if not len(video.ticks):
         raise BadInput(f"{path.name}: holds no frame; record the clip again.")
     if video.declared_frames > len(video.ticks):
-        warn(f"{path.name} is truncated: its header promises {video.declared_frames} frames and {len(video.ticks)} are "
-             "there. Those are used.")
+        warn(Finding.of(Code.VIDEO_TRUNCATED, figure=len(video.ticks), name=path.name, declared=video.declared_frames))
 
     times = (video.ticks - video.ticks[0]) * float(base)
     if not 0 <= times[-1] <= LONGEST_S:
@@ -68,10 +68,9 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     if written != len(shown):
         raise StageError(f"{path.name}: ffmpeg decoded {len(shown)} frames and wrote {written}; is the disk full?")
     if written < len(picks):
-        warn(f"{path.name} is damaged: {len(picks) - written} of the {len(picks)} frames to keep do not decode "
-             "and are left out.")
+        warn(Finding.of(Code.VIDEO_DAMAGED, figure=len(picks) - written, name=path.name, given=len(picks)))
     elif errors:
-        warn(f"{path.name}: ffmpeg met errors while decoding, so some frames may look broken: {errors[0]}")
+        warn(Finding.of(Code.VIDEO_BROKEN, name=path.name, error=errors[0]))
 
     notes = []
     if video.transfer in TRANSFER_NAMES:

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from gsac.avatar.npz import read_npz
+from gsac.stages.findings import Code, Finding
 
 EVERY_S = 10.0
 """Least seconds of training from one checkpoint to the next."""
@@ -30,7 +31,7 @@ State = dict[str, Any]
 class Checkpoints:
     """The newest state of one training. folder: made when there is something to write; None: nothing is kept."""
 
-    def __init__(self, folder: Path | None, warn: Callable[[str], None]):
+    def __init__(self, folder: Path | None, warn: Callable[[Finding], None]):
         self.path = None if folder is None else folder / FILE
         self.warn, self.cost = warn, 0.0
         self.began = self.last = time.perf_counter()
@@ -55,10 +56,9 @@ class Checkpoints:
                 os.fsync(file.fileno())
             os.replace(temp, self.path)
         except OSError as error:
-            self.warn(f"No checkpoint can be written to {self.path.parent} ({error.strerror}); should this run be stopped, the "
-                      "next one starts anew.")
             with contextlib.suppress(OSError):
                 temp.unlink()
+            self.warn(Finding.of(Code.NO_CHECKPOINT, folder=temp.parent, error=error.strerror))
             self.path = None
         self.last = time.perf_counter()
         self.cost = self.last - began
@@ -72,7 +72,7 @@ class Checkpoints:
             arrays = [found[f"arr_{k}"] for k in range(len(found))]
             return _put_together(json.loads(str(arrays[0])), arrays[1:])
         except (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
-            self.warn(f"The checkpoint {self.path} cannot be read ({error}); training starts anew.")
+            self.warn(Finding.of(Code.CHECKPOINT_UNREADABLE, path=self.path, error=error))
             return None
 
 

@@ -25,7 +25,7 @@ from gsac.avatar.metrics import figures, mean_psnr, summary
 from gsac.avatar.yaw import turn_seen
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
-from gsac.stages.frame_names import name_frames
+from gsac.stages.findings import Code, Finding
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.choose_heldout import hold_out, hold_out_for_choosing
 from gsac.stages.train.config import NETWORKS, TrainConfig
@@ -83,35 +83,34 @@ def run(job: Job) -> None:
     usable = np.ones(count, bool)
     usable[empty] = False
     if empty:
-        job.warn(f"The mask is empty in {name_frames(~usable)}; not trained on.")
+        job.warn(Finding.of(Code.MASK_NOT_TRAINED, ~usable))
     if params.lost.any():
-        job.warn(f"The body could not be fitted in {name_frames(params.lost)}; not trained on, not judged.")
+        job.warn(Finding.of(Code.POSE_NOT_TRAINED, params.lost))
         usable &= ~params.lost
     if not usable.any():
         raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
     held = hold_out(params.global_orient, usable, config.holdout)
     if not len(held):
-        job.warn(f"No frame is held out ({int(usable.sum())} usable frames, train.holdout is {config.holdout}): "
-                 "the quality of this avatar is not measured.")
+        job.warn(Finding.of(Code.NOT_MEASURED, figure=int(usable.sum()), holdout=config.holdout))
     choosing = held
     if config.searches_size():
         choosing = hold_out_for_choosing(params.global_orient, usable, held, config.holdout)
     trained = np.setdiff1d(np.flatnonzero(usable), np.union1d(held, choosing))
     turn = turn_seen(rotation.exp(params.global_orient[usable].astype(float)))
     if turn < LEAST_TURN:
-        job.warn(f"The frames show the person from {turn:.0f} of 360 degrees; the rest of the avatar is made up from that.")
+        job.warn(Finding.of(Code.PART_OF_TURN, figure=turn))
 
     if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].frame)):
         if config.lpips == "loss":
             raise BadInput(f"train.lpips is loss, but {why}; set train.lpips to judge")
-        job.warn(f"LPIPS takes no part in the loss: {why}.")
+        job.warn(Finding.of(Code.NO_LPIPS, why=why))
 
     run = Run(job, Poses(body, params), camera, views, trained, held, choosing)
     run.fit()
     if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
-        job.warn(f"No frame shows the {', '.join(parts)}; the avatar has there the colours of what lies around.")
+        job.warn(Finding.of(Code.PART_UNSEEN, parts=", ".join(parts)))
     if run.seen_area < LEAST_SEEN:
-        job.warn(f"The frames show {run.seen_area:.0%} of the body's surface; the rest has the colours of what lies around it.")
+        job.warn(Finding.of(Code.LITTLE_SEEN, figure=run.seen_area))
     run.write()
 
 

@@ -24,7 +24,7 @@ def run(job):
     if not words:
         raise BadInput("no word decodes")
     if len(words) == 1:
-        job.warn("the clip is truncated")
+        job.warn(Finding.of(Code.OTHER, what="the clip is truncated"))
     (job.out / "words").mkdir()
     for i, word in enumerate(words):
         (job.out / "words" / f"{i:06d}.txt").write_text(word)
@@ -35,6 +35,7 @@ def run(job):
 def slow(toy):
     """The toy project whose first stage tells when it reads."""
     toy.write("cut/stage.py", "import os\nfrom pathlib import Path\n\nfrom gsac.stages.contract import BadInput\n"
+                              "from gsac.stages.findings import Code, Finding\n"
                               "from gsac.toy.common import begin\n" + READ)
     return toy
 

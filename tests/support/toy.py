@@ -91,6 +91,7 @@ import time
 from pathlib import Path
 
 from gsac.stages.contract import BadInput, StageError
+from gsac.stages.findings import Code, Finding
 
 
 def begin(job, name):
@@ -109,7 +110,7 @@ def begin(job, name):
     if trouble == "killed":
         os.kill(os.getpid(), signal.SIGKILL)
     if trouble == "warning":
-        job.warn(f"{name}: word 2 is short")
+        job.warn(Finding.of(Code.OTHER, what=f"{name}: word 2 is short"))
     if trouble == "note":
         job.note("words are taken as they come")
     return trouble

@@ -18,6 +18,7 @@ import numpy as np
 import torch
 
 from gsac.avatar.body import Body
+from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.initial import estimate_start
@@ -81,9 +82,9 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     if sightings.seconds is not None:
         local, transl = smooth_rotations(local), smooth_linear(transl)
     state = State(local, transl, betas, start.log_focal, np.zeros(0))
-    notes = ("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's regression",)
+    notes = (Finding.of(Code.PAPER_START),)
     if objective.head is None:
-        notes += ("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) are off",)
+        notes += (Finding.of(Code.PAPER_NO_HEAD),)
     params = to_params(body, state, center, joint_offset=joint_offset)
     iou = sample_outlines(body, params, sightings.width, sightings.height, outlines)[1]
     return Fit(state, estimate_sigma(body, sightings, state, config, center), iou,

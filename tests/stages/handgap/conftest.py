@@ -102,7 +102,7 @@ def through_stage(person: Person, folder, photos=False, **config):
     Clip(None if photos else 10.0, times, 720, 1280, None, "0").write(folder / "clip.json")
     warnings = []
     run(Job({"keypoints/keypoints.npz": source, "split/clip.json": folder / "clip.json"}, out,
-            HandgapConfig(**config), warn=warnings.append))
+            HandgapConfig(**config), warn=lambda finding: warnings.append(finding.message)))
     check_filled_keypoints(out / "keypoints.npz")
     return read_arrays(out / "keypoints.npz"), warnings
 

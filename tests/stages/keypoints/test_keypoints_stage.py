@@ -77,7 +77,7 @@ def seen(**parts) -> Frame:
 
 def warnings_of(frames: list[Frame], cuts: list[set[Cut]] | None = None) -> list[str]:
     warnings: list[str] = []
-    report(Job({}, Path(), None, warn=warnings.append), frames, cuts or [set()] * len(frames))
+    report(Job({}, Path(), None, warn=lambda finding: warnings.append(finding.message)), frames, cuts or [set()] * len(frames))
     return warnings
 
 

@@ -46,7 +46,7 @@ def segment(folder, xy, score):
     (folder / "out").mkdir()
     stage.run(Job({"split/frames": folder / "frames", "split/clip.json": folder / "clip.json",
                    "keypoints/keypoints.npz": folder / "keypoints.npz"}, folder / "out", SegmentConfig(),
-                  warn=warnings.append, progress=lambda *step: seen.append(step)))
+                  warn=lambda finding: warnings.append(finding.message), progress=lambda *step: seen.append(step)))
     assert seen == [(1, 3, "frames"), (2, 3, "frames"), (3, 3, "frames")]
     return [read_alpha(p) for p in frame_paths(folder / "out/alpha")], warnings
 
@@ -110,7 +110,8 @@ def test_a_moving_camera_is_named_with_frames_and_px_but_photos_may_differ(tmp_p
     Clip(10.0 if times else None, [t / 10 for t in range(6)] if times else None, 200, 400, None, "0").write(tmp_path / "clip.json")
     warnings = []
     stage.run(Job({"split/frames": tmp_path / "frames", "split/clip.json": tmp_path / "clip.json",
-                   "keypoints/keypoints.npz": tmp_path / "keypoints.npz"}, tmp_path, SegmentConfig(), warn=warnings.append))
+                   "keypoints/keypoints.npz": tmp_path / "keypoints.npz"}, tmp_path, SegmentConfig(),
+            warn=lambda finding: warnings.append(finding.message)))
     assert [warning.split(". ")[0] + "." for warning in warnings] == words
 
 

@@ -22,7 +22,7 @@ def good() -> Fit:
 def said(fit: Fit, seen: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
     lost = find_lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT)
     assert np.sum(list(lost.values()), axis=0).max() <= 1  # one reason a frame
-    return np.any(list(lost.values()), axis=0), describe_lost_frames(lost, fit.iou)
+    return np.any(list(lost.values()), axis=0), [finding.message for finding in describe_lost_frames(lost, fit.iou)]
 
 
 def test_a_good_fit_loses_nothing_and_says_nothing(good):

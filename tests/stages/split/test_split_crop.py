@@ -58,7 +58,7 @@ def split(source, out, networks=NETWORKS, **config):
     told = []
     out.mkdir()
     stage.run(Job({"clip": source}, out, SplitConfig(max_height=MOST, **config), models=dict.fromkeys(networks, Path()),
-                  warn=told.append, note=told.append))
+                  warn=lambda finding: told.append(finding.message), note=told.append))
     clip = Clip.read(out / "clip.json")
     frames = [read_frame(p) for p in frame_paths(out / "frames")]
     assert {frame.shape for frame in frames} == {(clip.height, clip.width, 3)} and clip.height <= MOST

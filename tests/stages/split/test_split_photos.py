@@ -26,7 +26,7 @@ def photo(path, colour=(200, 60, 30), size=(60, 80), **save):
 def split(source, out, **config):
     warnings = []
     out.mkdir()
-    run(Job({"clip": source}, out, SplitConfig(**config), warn=warnings.append))
+    run(Job({"clip": source}, out, SplitConfig(**config), warn=lambda finding: warnings.append(finding.message)))
     return Clip.read(out / "clip.json"), [read_frame(p) for p in frame_paths(out / "frames")], warnings
 
 

@@ -32,7 +32,7 @@ def make_clip(path, *encode, size="160x120", rate=30, seconds=1.0, filters=None)
 def split(source, out, **config):
     warnings = []
     out.mkdir()
-    run(Job({"clip": source}, out, SplitConfig(**config), warn=warnings.append))
+    run(Job({"clip": source}, out, SplitConfig(**config), warn=lambda finding: warnings.append(finding.message)))
     clip = Clip.read(out / "clip.json")
     frames = frame_paths(out / "frames")
     assert [p.stem for p in frames] == [f"{i:06d}" for i in range(len(frames))]

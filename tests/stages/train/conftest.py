@@ -71,7 +71,7 @@ def job(tmp_path):
         out.mkdir()
         warnings = []
         made = Job({port: inputs / port for port in STAGE.inputs}, out, make_config(STAGE, SMALL | parameters),
-                   warn=warnings.append, device=device)
+                   warn=lambda finding: warnings.append(finding.message), device=device)
         made.warnings = warnings
         return made
     return make

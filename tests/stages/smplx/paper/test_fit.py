@@ -60,11 +60,11 @@ def test_the_face_terms_draw_the_fitted_head_towards_the_one_that_face_found(bod
 
 
 def test_without_a_head_mesh_the_fit_says_that_face_terms_are_off(body, fitted):
-    assert any("face terms" in note for note in fitted[1].notes)
+    assert any("face terms" in note.message for note in fitted[1].notes)
     sightings = sightings_of(body, facing_person(body), seconds=False, face=head_of(body, np.zeros(body.num_betas)))
     tiny = (Pass(2, 0.1, (1,), 1, True),)
     fit = fit_clip(body, sightings, [], SmplxConfig(method="paper"), lambda *done: None, tiny)
-    assert not any("face terms" in note for note in fit.notes)
+    assert not any("face terms" in note.message for note in fit.notes)
 
 
 @pytest.mark.parametrize("frames", [1, 65])

@@ -1,0 +1,127 @@
+"""What stages find wrong with a clip: every code with its sentence, its severity, and what the person who filmed can do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, StrEnum
+from typing import Any
+
+import numpy as np
+
+from gsac.stages.frame_names import name_frames
+
+
+class Severity(StrEnum):
+    """How much a finding takes from the avatar."""
+
+    NEWS = "news"
+    """Nothing that is seen, or a figure that is not measured."""
+    POORER = "poorer"
+    """Detail, or a part that the clip does not show: it is made up."""
+    WRONG = "wrong"
+    """The frames contradict each other or the body: without them, or filmed again, the avatar is better."""
+
+
+@dataclass(frozen=True)
+class Wording:
+    """What a code says."""
+
+    sentence: str
+    """Format string; `{frames}` are the frames concerned as `name_frames` has them, `{figure}` the figure."""
+    advice: str = ""
+    """What to do, as a person would say it."""
+    severity: Severity = Severity.POORER
+
+
+class Code(Enum):
+    """Everything that a stage may warn of."""
+
+    ONE_FRAME = Wording("{name} gives one frame: the avatar will be right from one side only.", "Record a full turn.")
+    PHOTOS_DROPPED = Wording("{given} photos given, {figure} kept evenly (split.count is {count}).", severity=Severity.NEWS)
+    PHOTOS_UNREAD = Wording("{figure} of {given} photos left out: {reasons}")
+    PHOTO_SIZES = Wording("{figure} of {given} photos have another size than {width}x{height} and were scaled to it: {names}.",
+                          "Use one camera that stands still, and photos that nobody cropped.")
+    PHOTO_ZOOM = Wording("the photos' focal lengths differ ({least:.0f} to {most:.0f} px): was the zoom moved? Their median is "
+                         "used.", "Do not zoom between photos.")
+    VIDEO_TRUNCATED = Wording("{name} is truncated: its header promises {declared} frames and {figure} are there. Those are used.",
+                              "Copy the file from the phone again.")
+    VIDEO_DAMAGED = Wording("{name} is damaged: {figure} of the {given} frames to keep do not decode and are left out.",
+                            "Copy the file from the phone again.")
+    VIDEO_BROKEN = Wording("{name}: ffmpeg met errors while decoding, so some frames may look broken: {error}",
+                           severity=Severity.WRONG)
+    NO_PERSON = Wording("No person was found in {frames}; these frames carry no points.")
+    SECOND_PERSON = Wording("A second person was seen in {frames}; only the first one is followed.",
+                            "Keep others out of the picture or cut these frames.")
+    CUT_OFF = Wording("The edge of the picture cuts off {parts}; what lies outside is guessed.",
+                      "Stand in the middle, far enough away that head, hands and feet stay in the picture.")
+    HAND_NEVER_DETECTED = Wording("The {side} hand was never seen; its fingers stay at rest.", "Show both hands, fingers apart.")
+    FACE_NEVER_DETECTED = Wording("The face was never seen from the front; it stays without expression.",
+                                  "Look into the camera for a second.")
+    HAND_NEVER_SEEN = Wording("The {side} hand is never seen in {figure} frames; its pose will be a guess.",
+                              "Show both hands, fingers apart.")
+    HAND_MISPLACED = Wording("The {side} hand was detected in a wrong place in {frames}; those detections are not used.")
+    HAND_NOT_FILLED = Wording("The {side} hand is missing in {frames}, too long to fill.", "Keep the hands in sight.")
+    EMPTY_MASK = Wording("No person is in {frames}; the mask there is empty.")
+    OTHER_SCENE = Wording("The plate does not show the scene of {frames} (did the camera move?); it is not used there.")
+    CAMERA_MOVES = Wording("The camera moves by up to {figure:.0f} px, in {frames}.",
+                           "Stand the phone on something firm, and do not zoom.", Severity.WRONG)
+    FACE_AT_REST = Wording("The face was never seen from the front; the avatar's face stays at rest.")
+    JAW_ALONE = Wording("This body model has no named facial actions: of the face only the jaw is carried over; a FLAME head "
+                        "(face.flame) would bring the rest.")
+    PAPER_START = Wording("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's "
+                          "regression", severity=Severity.NEWS)
+    PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "
+                            "are off", severity=Severity.NEWS)
+    NOT_FITTED = Wording("Not fitted, and not learned from: {frames}; {reason}.", severity=Severity.WRONG)
+    POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
+                             "frames: wide clothes, or a mask that holds more than the person.")
+    MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
+    POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
+    NOT_MEASURED = Wording("No frame is held out ({figure} usable frames, train.holdout is {holdout}): the quality of this avatar "
+                           "is not measured.", severity=Severity.NEWS)
+    PART_OF_TURN = Wording("The frames show the person from {figure:.0f} of 360 degrees; the rest of the avatar is made up from "
+                           "that.", "Record a full turn.")
+    NO_LPIPS = Wording("LPIPS takes no part in the loss: {why}.", severity=Severity.NEWS)
+    PART_UNSEEN = Wording("No frame shows the {parts}; the avatar has there the colours of what lies around.")
+    LITTLE_SEEN = Wording("The frames show {figure:.0%} of the body's surface; the rest has the colours of what lies around it.")
+    NO_CHECKPOINT = Wording("No checkpoint can be written to {folder} ({error}); should this run be stopped, the next one starts "
+                            "anew.", severity=Severity.NEWS)
+    CHECKPOINT_UNREADABLE = Wording("The checkpoint {path} cannot be read ({error}); training starts anew.", severity=Severity.NEWS)
+    OTHER = Wording("{what}")
+    """Of a stage that is not of this package."""
+
+    @property
+    def word(self) -> str:
+        """Its name in JSON."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A code as it was met in one clip."""
+
+    code: Code
+    message: str
+    """The sentence, filled in, and what to do."""
+    frames: list[list[int]] = field(default_factory=list)
+    """Runs of frames concerned, [first, last]; empty: the clip as a whole."""
+    figure: float | None = None
+
+    @classmethod
+    def of(cls, code: Code, frames: np.ndarray | None = None, figure: float | None = None, **words: Any) -> Finding:
+        """frames: (T,) bool, those concerned; figure: how much or how many; words: what else the sentence names."""
+        named = {} if frames is None else {"frames": name_frames(frames)}
+        wording = code.value
+        message = wording.sentence.format(**named, figure=figure, **words)
+        return cls(code, f"{message} {wording.advice}" if wording.advice else message,
+                   [] if frames is None else runs_of_frames(frames), None if figure is None else float(figure))
+
+    def to_json(self) -> dict[str, Any]:
+        """As records and `--json` have it, beside the message."""
+        return {"code": self.code.word, "severity": self.code.value.severity.value, "frames": self.frames, "figure": self.figure}
+
+
+def runs_of_frames(mask: np.ndarray) -> list[list[int]]:
+    """[first, last] of every run of True in mask, (T,) bool."""
+    index = np.flatnonzero(mask)
+    return [[int(run[0]), int(run[-1])] for run in np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(run)]
