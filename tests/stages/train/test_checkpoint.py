@@ -76,7 +76,7 @@ def test_a_training_that_was_killed_and_goes_on_gives_the_bytes_of_an_unbroken_o
                          ids=["cut short", "one bit", "empty"])
 def test_a_torn_checkpoint_is_told_and_not_read(tmp_path, spoil):
     warnings = []
-    kept = Checkpoints(tmp_path, warnings.append)
+    kept = Checkpoints(tmp_path, lambda finding: warnings.append(finding.message))
     kept.write({"step": 3, "deep": {"values": np.arange(1000.0)}})
     assert kept.read()["deep"]["values"][-1] == 999
     kept.path.write_bytes(spoil(kept.path.read_bytes()))
@@ -116,7 +116,7 @@ def test_checkpoints_are_written_no_oftener_than_their_cost_allows(tmp_path, mon
 def test_a_disk_that_takes_no_checkpoint_does_not_stop_the_training(tmp_path):
     warnings = []
     (tmp_path / "file").write_text("")
-    kept = Checkpoints(tmp_path / "file" / "key", warnings.append)
+    kept = Checkpoints(tmp_path / "file" / "key", lambda finding: warnings.append(finding.message))
     kept.write({"step": 1})
     assert len(warnings) == 1 and "No checkpoint can be written" in warnings[0] and not kept.due(ends=True)
     assert not os.path.exists(tmp_path / "file" / "key")
