@@ -10,6 +10,19 @@ JAW_OPEN, JAW_ANGLE = 24, 0.38
 """Index of jawOpen in face.npz's 52 actions, and the angle, rad, of a fully open jaw."""
 
 
+def acts_actions(body: Body, face: dict[str, np.ndarray]) -> bool:
+    """Whether the body's expressions are the facial actions of face.npz, (T, 52) and more arrays, as the open body's are."""
+    return face["expression"].shape[1] == len(body.expression_names) and bool(body.jaw_actions.any())
+
+
+def translate_rest(body: Body, face: dict[str, np.ndarray]) -> np.ndarray | None:
+    """The body's (E,) expression at rest, of the arrays of face.npz; None, its neutral face, where no face was seen.
+
+    An official body keeps its neutral face: its jaw is a joint, which a rest shape has none of.
+    """
+    return face.get("rest_expression") if acts_actions(body, face) else None
+
+
 def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
     """Expression (T, E), jaw_pose (T, 3) rad and a sentence about what was lost, or "".
 
@@ -17,7 +30,7 @@ def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.nd
     body's are FLAME's: taken from a FLAME head in face.npz; without one only the jaw moves.
     """
     actions, jaw = face["expression"], face["jaw"].astype(np.float32)
-    if actions.shape[1] == len(body.expression_names) and body.jaw_actions.any():
+    if acts_actions(body, face):
         return actions, jaw, ""
     if "flame_expression" in face:
         expression = np.zeros((len(actions), len(body.expression_names)), np.float32)
