@@ -53,7 +53,8 @@ class BodyParams:
     def read(cls, path: Path) -> BodyParams:
         """From body.npz; raises `ArtifactError` where an array is missing or has another shape."""
         arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE)
-        return cls(**{f.name: arrays[f.name] for f in fields(cls) if f.name in arrays} | {"model": str(arrays["model"])})
+        there = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays and f.name != "model"}
+        return cls(**there, model=str(arrays["model"]))
 
     def write(self, path: Path) -> None:
         """To body.npz, float32."""

@@ -172,7 +172,8 @@ class TruthRecorder:
         """The arrays of truth.npz by name, shapes (T, ...) as `make_clip` lists them."""
         p = self.params
         shaped, _ = self.person.body.rest(p.betas)
-        out = {name: getattr(p, name) for name in p.__dataclass_fields__ if name not in ("model", "sigma_joints", "rest_expression")}
+        out = {name: getattr(p, name) for name in p.__dataclass_fields__
+               if name not in ("model", "sigma_joints", "rest_expression")}
         out |= {"model": np.array(p.model), "keypoints": self.keypoints, "keypoints_visible": self.visible,
                 "hidden": self.hidden, "yaw": self.motion.yaw.astype(np.float32),
                 "height_m": np.float32(self.person.height_m), "rotation": self.view.rotation, "eye": self.view.eye,

@@ -16,9 +16,10 @@ def acts_actions(body: Body, face: dict[str, np.ndarray]) -> bool:
 
 
 def translate_rest(body: Body, face: dict[str, np.ndarray]) -> np.ndarray | None:
-    """The body's (E,) expression at rest, of the arrays of face.npz; None, its neutral face, where no face was seen.
+    """The body's (E,) expression at rest; None, its neutral face, where no face was seen.
 
-    An official body keeps its neutral face: its jaw is a joint, which a rest shape has none of.
+    face: arrays of face.npz, `expression` (T, 52) and, where a face was seen, `rest_expression` (52,). An official body keeps its
+    neutral face: its jaw is a joint, and joints rest without rotation.
     """
     return face.get("rest_expression") if acts_actions(body, face) else None
 

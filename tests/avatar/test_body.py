@@ -119,7 +119,8 @@ def test_params_survive_writing_and_reading(tmp_path, body):
 def test_a_resting_face_is_kept_and_files_without_one_are_read_and_written_as_before(tmp_path, body):
     params = BodyParams.from_pose(np.zeros((2, 55, 3)), np.zeros((2, 3)), np.zeros(4), np.zeros((2, 52)), 900, (1, 2))
     params.write(tmp_path / "body.npz")
-    assert "rest_expression" not in check_body(tmp_path / "body.npz") and BodyParams.read(tmp_path / "body.npz").rest_expression is None
+    assert "rest_expression" not in check_body(tmp_path / "body.npz")
+    assert BodyParams.read(tmp_path / "body.npz").rest_expression is None
     params.rest_expression = np.linspace(0, 1, 52, dtype=np.float32)
     params.write(tmp_path / "body.npz")
     np.testing.assert_array_equal(BodyParams.read(tmp_path / "body.npz").rest_expression, params.rest_expression)

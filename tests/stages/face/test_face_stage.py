@@ -80,7 +80,7 @@ def test_photos_have_no_time_so_an_unseen_face_rests_at_once(tmp_path, store):
     clip.write(ports["split/clip.json"])
     face, notes = run_face(ports, tmp_path, store)
     assert face["valid"].tolist() == [True, False]
-    np.testing.assert_array_equal(face["rest_expression"], face["expression"][0], err_msg="one look is all that is known of the rest")
+    np.testing.assert_array_equal(face["rest_expression"], face["expression"][0], err_msg="one look is all that is known")
     assert not face["expression"][1].any() and np.isfinite(face["landmarks"][0]).all()
     away = np.linalg.norm(face["head_vertices"] - face["head_template"], axis=1)  # the open body's head, as the person has it
     assert 1e-4 < away.mean() < 0.02 and face["head_faces"].max() < len(away) and face["head_eyes"].shape == (2, 3)
