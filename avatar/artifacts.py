@@ -214,6 +214,8 @@ HEAD_SHAPES: Shapes = {"head_template": ("N", 3), "head_vertices": ("N", 3), "he
 """Of face.npz where a face was seen: the person's resting head."""
 FLAME_SHAPES: Shapes = {"flame_expression": ("T", "X"), "flame_jaw": ("T", 3)}
 """Of face.npz where a FLAME file was given: how FLAME's face moves."""
+REST_SHAPE: Shapes = {"rest_expression": ("E",)}
+"""Of face.npz where a face was seen, and of body.npz where the body acts the facial actions: the person's face at rest."""
 BODY_SHAPES: Shapes = {
     "betas": ("B",), "expression": ("T", "E"), "global_orient": ("T", 3), "body_pose": ("T", 63),
     "left_hand_pose": ("T", 45), "right_hand_pose": ("T", 45), "jaw_pose": ("T", 3), "leye_pose": ("T", 3),
@@ -247,16 +249,20 @@ def check_filled_keypoints(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_face(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of face.npz by name: `FACE_SHAPES`, as valid (T,); all of `HEAD_SHAPES` and of `FLAME_SHAPES`, or none."""
-    return check_arrays(path, FACE_SHAPES, HEAD_SHAPES, FLAME_SHAPES)
+    """The arrays of face.npz by name: `FACE_SHAPES`, as valid (T,); all of `HEAD_SHAPES`, of `REST_SHAPE` and of `FLAME_SHAPES`, or
+    none.
+    """
+    return check_arrays(path, FACE_SHAPES, HEAD_SHAPES, REST_SHAPE, FLAME_SHAPES)
 
 
 def check_body(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3)."""
-    arrays = check_arrays(path, BODY_SHAPES)
+    """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3), and `REST_SHAPE` or not."""
+    arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE)
     for name, a in arrays.items():
         if not _finite(a):
             raise ArtifactError(f"{path}: array {name} is not finite")
+    if "rest_expression" in arrays and not (arrays["rest_expression"].min() >= 0 and arrays["rest_expression"].max() <= 1):
+        raise ArtifactError(f"{path}: array rest_expression must lie in 0..1")
     return arrays
 
 

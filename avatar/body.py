@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from gsac.avatar.artifacts import BODY_SHAPES, ArtifactError, check_arrays, write_arrays
+from gsac.avatar.artifacts import BODY_SHAPES, REST_SHAPE, ArtifactError, check_arrays, write_arrays
 from gsac.avatar.body_file import read_body_file
 from gsac.avatar.camera import Camera
 from gsac.avatar.joints import POSE_PARTS, J
@@ -47,16 +47,19 @@ class BodyParams:
     center: np.ndarray  # (2,) px
     sigma_joints: np.ndarray  # (T, 55) m
     model: str  # digest of the body file
+    rest_expression: np.ndarray | None = None  # (E,) 0..1, the person's face at rest; None: the body's neutral face
 
     @classmethod
     def read(cls, path: Path) -> BodyParams:
         """From body.npz; raises `ArtifactError` where an array is missing or has another shape."""
-        arrays = check_arrays(path, BODY_SHAPES)
-        return cls(**{f.name: arrays[f.name] for f in fields(cls) if f.name != "model"}, model=str(arrays["model"]))
+        arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE)
+        there = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays and f.name != "model"}
+        return cls(**there, model=str(arrays["model"]))
 
     def write(self, path: Path) -> None:
         """To body.npz, float32."""
-        arrays = {f.name: np.asarray(getattr(self, f.name), np.float32) for f in fields(self) if f.name != "model"}
+        arrays = {f.name: np.asarray(getattr(self, f.name), np.float32) for f in fields(self)
+                  if f.name != "model" and getattr(self, f.name) is not None}
         write_arrays(path, **arrays, model=np.array(self.model))
 
     @classmethod

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import wholebody
-from gsac.avatar.artifacts import write_arrays, write_frame, write_image
+from gsac.avatar.artifacts import BODY_SHAPES, write_arrays, write_frame, write_image
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.ffmpeg import ffmpeg_program
@@ -172,7 +172,7 @@ class TruthRecorder:
         """The arrays of truth.npz by name, shapes (T, ...) as `make_clip` lists them."""
         p = self.params
         shaped, _ = self.person.body.rest(p.betas)
-        out = {name: getattr(p, name) for name in p.__dataclass_fields__ if name not in ("model", "sigma_joints")}
+        out = {name: getattr(p, name) for name in BODY_SHAPES if name not in ("model", "sigma_joints")}
         out |= {"model": np.array(p.model), "keypoints": self.keypoints, "keypoints_visible": self.visible,
                 "hidden": self.hidden, "yaw": self.motion.yaw.astype(np.float32),
                 "height_m": np.float32(self.person.height_m), "rotation": self.view.rotation, "eye": self.view.eye,

@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import frame_paths, read_arrays, read_frame
+from gsac.avatar.artifacts import BODY_SHAPES, frame_paths, read_arrays, read_frame
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, J
@@ -32,7 +32,7 @@ RIM = 1 / 240
 def read_true_params(truth: Path, model: str) -> BodyParams:
     """The true body parameters in a turntable's truth.npz. model: digest of the body that they shall pose."""
     arrays = read_arrays(truth)
-    fields = {name: arrays[name] for name in BodyParams.__dataclass_fields__ if name not in ("model", "sigma_joints")}
+    fields = {name: arrays[name] for name in BODY_SHAPES if name not in ("model", "sigma_joints")}
     return BodyParams(**fields, sigma_joints=np.full((len(arrays["transl"]), J), 1e-3, np.float32), model=model)
 
 

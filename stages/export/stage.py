@@ -83,8 +83,12 @@ def warm(device: str) -> None:
 
 
 def rig_avatar(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAvatar:
-    """The avatar at rest, with betas and joint offsets applied and no expression."""
-    vertices, joints = body.rest(params.betas, None, params.joint_offset)
+    """The avatar at rest, with betas, joint offsets and the person's resting face applied.
+
+    An expression of weight 1 is the full action whatever the face at rest has of it: it moves the mesh by the part that is left.
+    """
+    vertices, joints = body.rest(params.betas, params.rest_expression, params.joint_offset)
+    left = 1 - (np.zeros(body.exprdirs.shape[2]) if params.rest_expression is None else params.rest_expression)
     moves = [np.flatnonzero(np.linalg.norm(body.exprdirs[:, :, e], axis=1) > MOVED)
              for e in range(len(body.expression_names))]
     return RiggedAvatar(
@@ -93,7 +97,7 @@ def rig_avatar(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAv
         expression_names=list(body.expression_names),
         expression_start=np.cumsum([0, *map(len, moves)]).astype(np.int32),
         expression_vertex=np.concatenate([*moves, []]).astype(np.int32),
-        expression_delta=np.concatenate([*(body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
+        expression_delta=np.concatenate([*(left[e] * body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
         jaw_actions=body.jaw_actions.astype(np.float32),
         gaussians=gaussians,
     )

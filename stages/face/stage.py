@@ -16,7 +16,11 @@ from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sig
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.head import HeadModel
 from gsac.stages.face.landmarks import align, read_averaged
+<<<<<<< HEAD
 from gsac.stages.findings import Code, Finding
+=======
+from gsac.stages.face.resting_face import find_resting_face
+>>>>>>> rest
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
 DOUBT = 0.1
@@ -47,10 +51,13 @@ def run(job: Job) -> None:
         c, own = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
         job.warn(Finding.of(Code.FACE_AT_REST))
     expression = fill_unseen(c, valid, times, config.rest_time)
-    head = fit_head(actions, flame, own, expression) if valid.any() else {}
+    seen_only = {}
+    if valid.any():
+        rest = find_resting_face(c, direction[valid])
+        seen_only = {**fit_head(actions, flame, own, expression), "rest_expression": rest.astype(np.float32)}
     write_arrays(job.out / "face.npz", valid=valid, expression=expression.astype(np.float32),
                  jaw=np.zeros((len(paths), 3), np.float32), shape=own.ravel().astype(np.float32),
-                 landmarks=landmarks.astype(np.float32), **head)
+                 landmarks=landmarks.astype(np.float32), **seen_only)
 
 
 def warm(device: str) -> None:

@@ -11,15 +11,39 @@ JAW_OPEN, JAW_ANGLE = 24, 0.38
 """Index of jawOpen in face.npz's 52 actions, and the angle, rad, of a fully open jaw."""
 
 
+<<<<<<< HEAD
 def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, Finding | None]:
     """Expression (T, E), jaw_pose (T, 3) rad and what was lost.
+=======
+def acts_actions(body: Body, face: dict[str, np.ndarray]) -> bool:
+    """Whether the body's expressions are the facial actions of face.npz, (T, 52) and more arrays, as the open body's are."""
+    return face["expression"].shape[1] == len(body.expression_names) and bool(body.jaw_actions.any())
+
+
+def translate_rest(body: Body, face: dict[str, np.ndarray]) -> np.ndarray | None:
+    """The body's (E,) expression at rest; None, its neutral face, where no face was seen.
+
+    face: arrays of face.npz, `expression` (T, 52) and, where a face was seen, `rest_expression` (52,). An official body keeps its
+    neutral face: its jaw is a joint, and joints rest without rotation.
+    """
+    return face.get("rest_expression") if acts_actions(body, face) else None
+
+
+def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
+    """Expression (T, E), jaw_pose (T, 3) rad and a sentence about what was lost, or "".
+>>>>>>> rest
 
     face: arrays of face.npz, `expression` (T, 52), `jaw` (T, 3), ... The open body's expressions are the 52 actions. An official
     body's are FLAME's: taken from a FLAME head in face.npz; without one only the jaw moves.
     """
     actions, jaw = face["expression"], face["jaw"].astype(np.float32)
+<<<<<<< HEAD
     if actions.shape[1] == len(body.expression_names) and body.jaw_actions.any():
         return actions, jaw, None
+=======
+    if acts_actions(body, face):
+        return actions, jaw, ""
+>>>>>>> rest
     if "flame_expression" in face:
         expression = np.zeros((len(actions), len(body.expression_names)), np.float32)
         known = min(expression.shape[1], face["flame_expression"].shape[1])

@@ -12,7 +12,7 @@ from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.expression import translate_expression
+from gsac.stages.smplx.expression import translate_expression, translate_rest
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
@@ -54,7 +54,7 @@ def run(job: Job) -> None:
     if silent is not None:
         job.warn(silent)
     params = to_params(body, fit.state, sightings.center, expression, fit.joint_offset)
-    params.jaw_pose = jaw
+    params.jaw_pose, params.rest_expression = jaw, translate_rest(body, face)
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = find_lost_frames(fit, seen, sightings.person_height)

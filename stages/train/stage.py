@@ -74,6 +74,8 @@ def run(job: Job) -> None:
     count = len(frame_paths(frames))
     if params.frames != count:
         raise StageError(f"smplx/body.npz has {params.frames} poses, split/frames has {count} frames; run smplx again")
+    if config.recipe == "paper":
+        params.rest_expression = None  # as published
     body = load_body(job, "train", params.model)
     camera = params.camera(clip.width, clip.height)
     views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar import wholebody
-from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.artifacts import ArtifactError, check_body
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.joints import INDEX, NAMES
 
@@ -114,6 +114,22 @@ def test_params_survive_writing_and_reading(tmp_path, body):
     params.write(tmp_path / "body.npz")
     back = BodyParams.read(tmp_path / "body.npz")
     assert np.array_equal(back.pose, params.pose) and back.model == body.digest and np.array_equal(back.focal, params.focal)
+
+
+def test_a_resting_face_is_kept_and_files_without_one_are_read_and_written_as_before(tmp_path, body):
+    params = BodyParams.from_pose(np.zeros((2, 55, 3)), np.zeros((2, 3)), np.zeros(4), np.zeros((2, 52)), 900, (1, 2))
+    params.write(tmp_path / "body.npz")
+    assert "rest_expression" not in check_body(tmp_path / "body.npz")
+    assert BodyParams.read(tmp_path / "body.npz").rest_expression is None
+    params.rest_expression = np.linspace(0, 1, 52, dtype=np.float32)
+    params.write(tmp_path / "body.npz")
+    np.testing.assert_array_equal(BodyParams.read(tmp_path / "body.npz").rest_expression, params.rest_expression)
+    check_body(tmp_path / "body.npz")
+    for wrong, said in ((params.rest_expression + 0.1, "must lie in 0..1"), (params.rest_expression[1:], "has shape")):
+        params.rest_expression = wrong
+        params.write(tmp_path / "body.npz")
+        with pytest.raises(ArtifactError, match=f"body.npz: array rest_expression {said}"):
+            check_body(tmp_path / "body.npz")
 
 
 def test_a_file_of_the_official_keys_drops_in(tmp_path):

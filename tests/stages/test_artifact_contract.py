@@ -18,6 +18,7 @@ from gsac.avatar.artifacts import (
     KEYPOINT_SHAPES,
     LEVEL_SHAPES,
     LIGHT_SHAPE,
+    REST_SHAPE,
     ArtifactError,
     Clip,
     Crop,
@@ -30,13 +31,13 @@ from support.artifacts import blank
 PORTS = {
     "keypoints/keypoints.npz": KEYPOINT_SHAPES,
     "handgap/keypoints.npz": FILLED_SHAPES,
-    "face/face.npz": {**FACE_SHAPES, **HEAD_SHAPES, **FLAME_SHAPES},
-    "smplx/body.npz": BODY_SHAPES,
-    "train/body.npz": BODY_SHAPES,
+    "face/face.npz": {**FACE_SHAPES, **HEAD_SHAPES, **REST_SHAPE, **FLAME_SHAPES},
+    "smplx/body.npz": {**BODY_SHAPES, **REST_SHAPE},
+    "train/body.npz": {**BODY_SHAPES, **REST_SHAPE},
     "train/avatar.npz": {**AVATAR_SHAPES, **LIGHT_SHAPE, **LEVEL_SHAPES},
 }
 """Port -> the arrays that its file may hold."""
-ALONE = ("light",)
+ALONE = ("light", "rest_expression")
 """Arrays that may be there or not, whatever else is."""
 STAGES = {name: importlib.import_module(f"gsac.stages.{name}").STAGE
           for name in ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")}

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import frame_paths, read_arrays
+from gsac.avatar.artifacts import BODY_SHAPES, frame_paths, read_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.camera import Camera
 from gsac.avatar.joints import INDEX
@@ -85,7 +85,7 @@ def test_the_parameters_pose_the_body_that_is_seen(made):
     _, truth = made
     body = Body.load()
     moved = dataclasses.replace(body, v_template=body.v_template + truth["shift"])
-    names = [f.name for f in dataclasses.fields(BodyParams) if f.name not in ("model", "sigma_joints", "joint_offset")]
+    names = [name for name in BODY_SHAPES if name not in ("model", "sigma_joints", "joint_offset")]
     offset = truth["joint_offset"] - body.J_regressor @ truth["shift"]
     params = BodyParams(**{n: truth[n] for n in names}, joint_offset=offset, model="", sigma_joints=np.zeros((6, 55)))
     vertices, joints = moved.posed(params)

@@ -156,8 +156,8 @@ def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: in
 
 
 def draw_all_round(gaussians: Gaussians, poses: Poses, size: int = 480) -> np.ndarray:
-    """(2 size, 3 size, 3) uint8: the avatar in its T-pose from the front, both sides, the back, below and above."""
-    vertices, _ = poses.rest(0)
+    """(2 size, 3 size, 3) uint8: the avatar in its T-pose, face at rest, from the front, both sides, the back, below and above."""
+    vertices = poses.at_rest()
     middle = (vertices.min(0) + vertices.max(0)) / 2
     half = float(np.abs(vertices - middle).max()) * 1.1
     upright = np.diag([1.0, -1.0, -1.0])

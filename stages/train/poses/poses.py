@@ -126,6 +126,10 @@ class Poses:
         vertices, joints = self.rests[t]
         return vertices, joints + self.joint_offset
 
+    def at_rest(self) -> np.ndarray:
+        """(V, 3) float32 m, in the T-pose and with the person's face at rest."""
+        return self.body.rest(self.betas, self.params.rest_expression, self.params.joint_offset)[0]
+
     def vertices(self, t: int) -> np.ndarray:
         """(V, 3) float32 m, camera frame, in the frame's pose as it is now."""
         rest, joints = self.rest(t)

@@ -61,6 +61,26 @@ def test_the_container_poses_and_moves_the_face_as_the_body_does(exported, perso
     assert error.max() < 5e-4, "deltas under 0.1 mm are left out"
 
 
+def test_without_expression_the_avatar_has_the_person_s_own_face_and_weight_1_is_the_full_action_all_the_same(person):
+    body, params = Body.load(), BodyParams.read(person["train/body.npz"])
+    params.rest_expression = np.zeros(52, np.float32)
+    own = {"jawOpen": 0.2, "eyeBlinkLeft": 0.25, "eyeBlinkRight": 0.3}
+    for name, value in own.items():
+        params.rest_expression[body.expression_names.index(name)] = value
+    gaussians = Gaussians.read(person["train/avatar.npz"])
+    avatar, neutral = rig_avatar(body, params, gaussians), rig_avatar(body, replace(params, rest_expression=None), gaussians)
+    np.testing.assert_allclose(avatar.vertices, body.rest(params.betas, params.rest_expression, params.joint_offset)[0], atol=1e-6)
+    assert np.linalg.norm(avatar.vertices - neutral.vertices, axis=1).max() > 2e-3
+    np.testing.assert_array_equal(avatar.joints, neutral.joints)
+    for e, name in enumerate(avatar.expression_names):
+        span = slice(avatar.expression_start[e], avatar.expression_start[e + 1])
+        acted, full = avatar.vertices.copy(), params.rest_expression.copy()
+        acted[avatar.expression_vertex[span]] += avatar.expression_delta[span]
+        full[e] = 1
+        apart = np.abs(acted - body.rest(params.betas, full, params.joint_offset)[0]).max()
+        assert apart < 1.1e-4, f"{name} beside its full action; what moves by less than 0.1 mm is left out"
+
+
 def test_the_light_of_the_clip_is_carried_on_and_left_out_where_there_is_none(person, exported):
     assert RiggedAvatar.read(exported / "avatar.gsac").gaussians.light is None
     gaussians, params = Gaussians.read(person["train/avatar.npz"]), BodyParams.read(person["train/body.npz"])

@@ -46,7 +46,8 @@ def unseen(folder: Path, frames: int, said: int) -> dict[str, Path]:
 def test_a_face_that_is_never_seen_rests_with_a_warning(tmp_path, store):
     face, notes = run_face(unseen(tmp_path, 3, 3), tmp_path, store)
     assert not face["valid"].any() and face["expression"].shape == (3, 52) and not face["expression"].any()
-    assert np.isnan(face["landmarks"]).all() and not face["shape"].any() and "head_vertices" not in face
+    assert np.isnan(face["landmarks"]).all() and not face["shape"].any()
+    assert not {"head_vertices", "rest_expression"} & face.keys()
     assert notes["warnings"] == ["The face was never seen from the front; the avatar's face stays at rest."]
 
 
@@ -79,6 +80,7 @@ def test_photos_have_no_time_so_an_unseen_face_rests_at_once(tmp_path, store):
     clip.write(ports["split/clip.json"])
     face, notes = run_face(ports, tmp_path, store)
     assert face["valid"].tolist() == [True, False]
+    np.testing.assert_array_equal(face["rest_expression"], face["expression"][0], err_msg="one look is all that is known")
     assert not face["expression"][1].any() and np.isfinite(face["landmarks"][0]).all()
     away = np.linalg.norm(face["head_vertices"] - face["head_template"], axis=1)  # the open body's head, as the person has it
     assert 1e-4 < away.mean() < 0.02 and face["head_faces"].max() < len(away) and face["head_eyes"].shape == (2, 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.stages.findings import Code
-from gsac.stages.smplx.expression import translate_expression
+from gsac.stages.smplx.expression import translate_expression, translate_rest
 
 
 def test_a_body_of_flames_expressions_takes_them_from_the_flame_head(body):
@@ -21,3 +21,15 @@ def test_a_body_of_flames_expressions_takes_them_from_the_flame_head(body):
     expression, jaw, silent = translate_expression(Official, face)
     assert np.array_equal(expression, face["flame_expression"][:, :10]) and np.array_equal(jaw, face["flame_jaw"]) and not silent
     assert np.array_equal(translate_expression(body, face)[0], face["expression"])  # the open body acts the actions themselves
+
+
+def test_the_face_at_rest_is_the_body_s_neutral_one_where_none_was_seen_or_the_body_has_other_expressions(body):
+    class Official:
+        expression_names = tuple(f"expression{i}" for i in range(10))
+        jaw_actions = np.zeros((10, 3))
+
+    face = {"expression": np.zeros((2, 52), np.float32)}
+    assert translate_rest(body, face) is None, "as in files of before"
+    face["rest_expression"] = np.full(52, 0.1, np.float32)
+    assert translate_rest(Official, face) is None
+    np.testing.assert_array_equal(translate_rest(body, face), face["rest_expression"])

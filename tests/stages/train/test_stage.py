@@ -107,6 +107,21 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_avatar(job_
 
 
 @pytest.mark.slow
+def test_the_resting_face_is_handed_on_and_alters_no_gaussian_but_recipe_paper_keeps_the_published_neutral_one(job):
+    made = {name: job(name, frames=6, steps=2, pose_test_steps=0, recipe=recipe)
+            for name, recipe in (("neutral", "fast"), ("own", "fast"), ("published", "paper"))}
+    run(made["neutral"])
+    body = made["own"].inputs["smplx/body.npz"]
+    params = BodyParams.read(body)
+    params.rest_expression = np.linspace(0, 0.3, params.expression.shape[1], dtype=np.float32)
+    params.write(body)
+    run(made["own"]), run(made["published"])
+    assert (made["neutral"].out / "avatar.npz").read_bytes() == (made["own"].out / "avatar.npz").read_bytes()
+    np.testing.assert_array_equal(BodyParams.read(made["own"].out / "body.npz").rest_expression, params.rest_expression)
+    assert BodyParams.read(made["published"].out / "body.npz").rest_expression is None
+
+
+@pytest.mark.slow
 def test_judging_is_a_phase_of_its_own_after_the_last_step(job):
     heard = []
     made = job(frames=6, steps=2, pose_test_steps=0)
