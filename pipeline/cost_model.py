@@ -7,21 +7,13 @@ and 1,400 steps; and for training on a GPU an H100. How much faster or slower an
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from gsac.pipeline.footage import Footage
-from gsac.stages.train.config import FULL_SIZE
+from gsac.stages.train.config import FAST_STEPS, asked_size, coarse_steps
 
-STEPS = {"cpu": 1200, "cuda": 3200}
-"""Steps of recipe fast where none are configured. A test holds these, and the four below, to the recipe, whose modules load too
-much to be asked here."""
-SMALL, LARGE = (3e4, 0.15), (1.6e5, 0.8)
-"""Pixels of a person, and the share of the steps that run at half the size."""
-SIZES, MORE_ON_CUDA = (3000, 30000), 1.5
-"""Least and most gaussians where none are asked for, and the factor on them on the GPU."""
 PERSON = 0.11
 """Pixels of a person, over those of a square as high as the frame."""
 SIZE_SEARCH = 1.4
@@ -80,23 +72,15 @@ def _train(config: Any, footage: Footage, device: str) -> Cost | None:
     if config.recipe != "fast":
         return None
     fine = footage.square * min(1, (config.height or footage.height) / footage.height) ** 2
-    more = MORE_ON_CUDA if device == "cuda" else 1
-    asked = more * FULL_SIZE * (PERSON * fine * 1e6 / LARGE[0]) ** 0.5
-    gaussians = config.gaussians if isinstance(config.gaussians, int) else min(max(asked, SIZES[0]), SIZES[1])
-    steps = config.steps or STEPS[device]
-    square = fine * (1 - 0.75 * _coarse_share(fine) * min(steps, STEPS["cpu"]) / steps)  # of a step, in the mean
+    person = PERSON * fine * 1e6  # pixels
+    gaussians = config.gaussians if isinstance(config.gaussians, int) else asked_size(person, device)
+    steps = config.steps or FAST_STEPS[device]
+    square = fine * (1 - 0.75 * coarse_steps(person, steps) / steps)  # of a step, in the mean
     search = SIZE_SEARCH if config.searches_size() else 1
     if device == "cuda":
         return Cost(2.9 + 0.01 * footage.frames + search * steps * (0.0005 + 0.0002 * square + 1e-8 * gaussians), 1.0)
     poses_and_judging = 3 + footage.frames * (0.15 + 0.25 * footage.square)
     return Cost(poses_and_judging + search * steps * (0.007 + 0.04 * square + 2e-7 * gaussians), 0.38)
-
-
-def _coarse_share(square: float) -> float:
-    """Share of the steps, of a training as long as usual, that run at half the size."""
-    (small, least), (large, most) = SMALL, LARGE
-    part = math.log(max(PERSON * square * 1e6, 1) / small) / math.log(large / small)
-    return least + (most - least) * min(max(part, 0.0), 1.0)
 
 
 def _export(config: Any, footage: Footage, device: str) -> Cost:

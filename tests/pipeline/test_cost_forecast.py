@@ -18,7 +18,7 @@ from gsac.pipeline.keys import Keys
 from gsac.pipeline.params import resolve
 from gsac.pipeline.plan import plan_waiting
 from gsac.pipeline.project import Project
-from gsac.stages.train.fast import cuda, schedule
+from gsac.stages.train import config
 
 PROJECT = Project.at_hand()
 STAGES = list(PROJECT.graph.steps)
@@ -47,10 +47,14 @@ def test_the_demo_clip_is_foretold_within_one_and_a_half():
     assert all(DEMO_TOOK[name] / 2 <= told[name] <= 2 * DEMO_TOOK[name] for name in STAGES)
 
 
-def test_the_model_knows_the_recipes_own_steps():
-    assert {"cpu": schedule.STEPS, "cuda": cuda.STEPS} == cost_model.STEPS
-    for name in ("SMALL", "LARGE", "SIZES", "MORE_ON_CUDA"):
-        assert getattr(schedule, name) == getattr(cost_model, name), name
+def test_the_model_follows_the_recipes_own_steps_sizes_and_coarse_share(monkeypatch):
+    told = [costs()["train"]]
+    for change in (lambda: monkeypatch.setattr(config, "SIZES", (40000, 50000)),
+                   lambda: monkeypatch.setattr(config, "LARGE", (1.6e5, 0.2)),
+                   lambda: monkeypatch.setitem(config.FAST_STEPS, "cpu", 3000)):
+        change()
+        told.append(costs()["train"])
+    assert told == sorted(set(told)), "each of them makes it longer"
 
 
 @pytest.mark.parametrize("device", ["cpu", "cuda"])
