@@ -25,7 +25,8 @@ def through_background(share: Share, grad_image: np.ndarray, rgb: np.ndarray, al
                        grad_gain: np.ndarray) -> float:
     """Backward pass of `on_background` plus mask_weight * mean((alpha - mask)^2), whose value it returns.
 
-    Other arguments as there; grad_image: (h, w, 3). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
+    share: `Workspace.share`; grad_image: (h, w, 3); rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8
+    premultiplied; background, gain: (3,). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
     """
     sums = np.empty((len(alpha), 4))
     share(_through_background, grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, sums)
