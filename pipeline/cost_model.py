@@ -1,8 +1,8 @@
 """What a stage costs, by frames, pixels, steps and gaussians, on the machine that the coefficients were measured on.
 
-That is a server of two cores without a GPU: whole runs of nine clips of 1 to 120 frames, and training at 540 and 1280 px with 700
-and 1,400 steps; and for training on a GPU an H100. How much faster or slower another machine is, its own runs tell:
-`pipeline.cost_forecast`.
+That is a server of two cores without a GPU: whole runs in draft and standard, and runs up to the body fit, of clips of 7 to 120
+frames, by `gsac bench forecast`; and for training on a GPU an H100. How much faster or slower another machine is, its
+own runs tell: `pipeline.cost_forecast`.
 """
 
 from __future__ import annotations
@@ -100,14 +100,14 @@ def _once(config: Any, footage: Footage) -> tuple[float, ...]:
 
 
 MODELS = {
-    ("split", "cpu"): Model(_split, (0.2, 0.045), 0.15),
-    ("keypoints", "cpu"): Model(_keypoints, (0.25, 0.1, 0.01), 0.1),
-    ("handgap", "cpu"): Model(_frames, (0.25, 0.005), 0.0),
-    ("segment", "cpu"): Model(_segment, (0.4, 0.03, 0.05, 0.05), 0.15),
-    ("face", "cpu"): Model(_frames, (0.55, 0.012), 0.1),
-    ("smplx", "cpu"): Model(_smplx, (1.3, 0.03, 0.0006), 0.6),
-    ("train", "cpu"): Model(_train("cpu"), (3, 0.15, 0.25, 0.007, 0.04, 2e-7), 0.38),
+    ("split", "cpu"): Model(_split, (0.65, 0.04), 0.1),
+    ("keypoints", "cpu"): Model(_keypoints, (0.5, 0.1, 0.013), 0.07),
+    ("handgap", "cpu"): Model(_frames, (0.19, 0.0039), 0.0),
+    ("segment", "cpu"): Model(_segment, (0.4, 0.14, 0.023, 0.023), 0.05),
+    ("face", "cpu"): Model(_frames, (0.58, 0.011), 0.1),
+    ("smplx", "cpu"): Model(_smplx, (1.7, 0.013, 0.0008), 0.45),
+    ("train", "cpu"): Model(_train("cpu"), (2.7, 0.11, 0.075, 0.0063, 0.043, 2e-7), 0.15),
     ("train", "cuda"): Model(_train("cuda"), (2.9, 0.01, 0, 0.0005, 0.0002, 1e-8), 1.0),
-    ("export", "cpu"): Model(_once, (1.8,), 0.0),
+    ("export", "cpu"): Model(_once, (2.0,), 0.0),
 }
 """By stage and device class."""
