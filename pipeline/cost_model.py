@@ -1,27 +1,19 @@
 """What a stage costs, by frames, pixels, steps and gaussians, on the machine that the coefficients were measured on.
 
-That is a server of two cores without a GPU: whole runs of nine clips of 1 to 120 frames, and training at 540 and 1280 px with 700
-and 1,400 steps; and for training on a GPU an H100. How much faster or slower another machine is, its own runs tell:
-`pipeline.cost_forecast`.
+That is a server of two cores without a GPU: whole runs in draft and standard, and runs up to the body fit, of clips of 7 to 120
+frames, by `gsac bench forecast`; and for training on a GPU an H100. How much faster or slower another machine is, its
+own runs tell: `pipeline.cost_forecast`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from gsac.pipeline.footage import Footage
-from gsac.stages.train.config import FULL_SIZE
+from gsac.stages.train.config import FAST_STEPS, asked_size, coarse_steps
 
-STEPS = {"cpu": 1200, "cuda": 3200}
-"""Steps of recipe fast where none are configured. A test holds these, and the four below, to the recipe, whose modules load too
-much to be asked here."""
-SMALL, LARGE = (3e4, 0.15), (1.6e5, 0.8)
-"""Pixels of a person, and the share of the steps that run at half the size."""
-SIZES, MORE_ON_CUDA = (3000, 30000), 1.5
-"""Least and most gaussians where none are asked for, and the factor on them on the GPU."""
 PERSON = 0.11
 """Pixels of a person, over those of a square as high as the frame."""
 SIZE_SEARCH = 1.4
@@ -41,69 +33,81 @@ class Cost:
         return self.cpu_seconds * (self.serial + (1 - self.serial) / cores)
 
 
+@dataclass(frozen=True)
+class Model:
+    """CPU seconds of a stage: a sum of terms, each with a coefficient that was measured (`gsac bench forecast`)."""
+
+    terms: Callable[[Any, Footage], tuple[float, ...] | None]
+    """Terms for a config and footage; None of a method that was never measured."""
+    coefficients: tuple[float, ...]
+    """CPU s for each of the terms."""
+    serial: float
+    """As in `Cost`."""
+
+
 def stage_cost(stage: str, config: Any, footage: Footage, device: str) -> Cost | None:
     """Cost of a stage on a device class (cpu, cuda); None of one that is not known, or whose method was never measured."""
-    return _COSTS[stage](config, footage, device) if stage in _COSTS else None
-
-
-def _split(config: Any, footage: Footage, device: str) -> Cost:
-    return Cost(0.2 + 0.045 * footage.frames * footage.megapixels, 0.15)
-
-
-def _keypoints(config: Any, footage: Footage, device: str) -> Cost | None:
-    if config.detector != "mediapipe":
+    model = find_model(stage, device)
+    terms = model and model.terms(config, footage)
+    if not (model and terms):
         return None
-    return Cost(0.25 + footage.frames * (0.1 + 0.01 * footage.megapixels), 0.1)
+    return Cost(sum(each * term for each, term in zip(model.coefficients, terms, strict=True)), model.serial)
 
 
-def _handgap(config: Any, footage: Footage, device: str) -> Cost:
-    return Cost(0.25 + 0.005 * footage.frames, 0.0)
+def find_model(stage: str, device: str) -> Model | None:
+    """The model of a stage on a device class, where there is one."""
+    return MODELS.get((stage, "cuda")) if device == "cuda" and (stage, "cuda") in MODELS else MODELS.get((stage, "cpu"))
 
 
-def _segment(config: Any, footage: Footage, device: str) -> Cost:
-    of_outline = 0.05 + 0.05 * config.iterations
-    return Cost(0.4 + footage.frames * (0.03 + of_outline * footage.square), 0.15)
+def _split(config: Any, footage: Footage) -> tuple[float, ...]:
+    return 1, footage.frames * footage.megapixels
 
 
-def _face(config: Any, footage: Footage, device: str) -> Cost:
-    return Cost(0.55 + 0.012 * footage.frames, 0.1)
+def _keypoints(config: Any, footage: Footage) -> tuple[float, ...] | None:
+    return (1, footage.frames, footage.frames * footage.megapixels) if config.detector == "mediapipe" else None
 
 
-def _smplx(config: Any, footage: Footage, device: str) -> Cost | None:
-    if config.method != "lm":
-        return None
+def _frames(config: Any, footage: Footage) -> tuple[float, ...]:
+    return 1, footage.frames
+
+
+def _segment(config: Any, footage: Footage) -> tuple[float, ...]:
+    person = footage.frames * footage.square
+    return 1, footage.frames, person, config.iterations * person
+
+
+def _smplx(config: Any, footage: Footage) -> tuple[float, ...] | None:
     steps = config.rounds * config.iterations / 16
-    return Cost(1.3 + steps * (0.03 * footage.frames + 0.0006 * footage.frames ** 2), 0.6)
+    return (1, steps * footage.frames, steps * footage.frames ** 2) if config.method == "lm" else None
 
 
-def _train(config: Any, footage: Footage, device: str) -> Cost | None:
-    if config.recipe != "fast":
-        return None
-    fine = footage.square * min(1, (config.height or footage.height) / footage.height) ** 2
-    more = MORE_ON_CUDA if device == "cuda" else 1
-    asked = more * FULL_SIZE * (PERSON * fine * 1e6 / LARGE[0]) ** 0.5
-    gaussians = config.gaussians if isinstance(config.gaussians, int) else min(max(asked, SIZES[0]), SIZES[1])
-    steps = config.steps or STEPS[device]
-    square = fine * (1 - 0.75 * _coarse_share(fine) * min(steps, STEPS["cpu"]) / steps)  # of a step, in the mean
-    search = SIZE_SEARCH if config.searches_size() else 1
-    if device == "cuda":
-        return Cost(2.9 + 0.01 * footage.frames + search * steps * (0.0005 + 0.0002 * square + 1e-8 * gaussians), 1.0)
-    poses_and_judging = 3 + footage.frames * (0.15 + 0.25 * footage.square)
-    return Cost(poses_and_judging + search * steps * (0.007 + 0.04 * square + 2e-7 * gaussians), 0.38)
+def _train(device: str) -> Callable[[Any, Footage], tuple[float, ...] | None]:
+    def terms(config: Any, footage: Footage) -> tuple[float, ...] | None:
+        if config.recipe != "fast":
+            return None
+        fine = footage.square * min(1, (config.height or footage.height) / footage.height) ** 2
+        person = PERSON * fine * 1e6  # pixels
+        gaussians = config.gaussians if isinstance(config.gaussians, int) else asked_size(person, device)
+        steps = config.steps or FAST_STEPS[device]
+        square = fine * (1 - 0.75 * coarse_steps(person, steps) / steps)  # of a step, in the mean
+        of_all = steps * (SIZE_SEARCH if config.searches_size() else 1)
+        return 1, footage.frames, footage.frames * footage.square, of_all, of_all * square, of_all * gaussians
+    return terms
 
 
-def _coarse_share(square: float) -> float:
-    """Share of the steps, of a training as long as usual, that run at half the size."""
-    (small, least), (large, most) = SMALL, LARGE
-    part = math.log(max(PERSON * square * 1e6, 1) / small) / math.log(large / small)
-    return least + (most - least) * min(max(part, 0.0), 1.0)
+def _once(config: Any, footage: Footage) -> tuple[float, ...]:
+    return (1,)
 
 
-def _export(config: Any, footage: Footage, device: str) -> Cost:
-    return Cost(1.8, 0.0)
-
-
-_COSTS: dict[str, Callable[[Any, Footage, str], Cost | None]] = {
-    "split": _split, "keypoints": _keypoints, "handgap": _handgap, "segment": _segment, "face": _face, "smplx": _smplx,
-    "train": _train, "export": _export,
+MODELS = {
+    ("split", "cpu"): Model(_split, (0.65, 0.04), 0.1),
+    ("keypoints", "cpu"): Model(_keypoints, (0.5, 0.1, 0.013), 0.07),
+    ("handgap", "cpu"): Model(_frames, (0.19, 0.0039), 0.0),
+    ("segment", "cpu"): Model(_segment, (0.4, 0.14, 0.023, 0.023), 0.05),
+    ("face", "cpu"): Model(_frames, (0.58, 0.011), 0.1),
+    ("smplx", "cpu"): Model(_smplx, (1.7, 0.013, 0.0008), 0.45),
+    ("train", "cpu"): Model(_train("cpu"), (2.7, 0.11, 0.075, 0.0063, 0.043, 2e-7), 0.15),
+    ("train", "cuda"): Model(_train("cuda"), (2.9, 0.01, 0, 0.0005, 0.0002, 1e-8), 1.0),
+    ("export", "cpu"): Model(_once, (2.0,), 0.0),
 }
+"""By stage and device class."""

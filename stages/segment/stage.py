@@ -40,6 +40,8 @@ class Cutout(NamedTuple):
     """x0, y0, x1, y1 px of the part of the frame that `outline` is of."""
     outline: np.ndarray
     """(h, w) bool."""
+    image: np.ndarray
+    """(h, w, 3) uint8, that part of the frame."""
 
     def on_frame(self, shape: tuple[int, ...]) -> np.ndarray:
         """(H, W) bool. shape: (H, W, ...) of the frame."""
@@ -94,8 +96,8 @@ def run(job: Job) -> None:
         return cutouts[t].on_frame(image.shape)
 
     def soft(t: int) -> None:
-        image = read_frame(paths[t])
-        alpha = np.zeros(image.shape[:2], np.float32) if absent[t] else finish(image, cutouts[t], plate)
+        shape = clip.height, clip.width
+        alpha = np.zeros(shape, np.float32) if absent[t] else finish(cutouts.pop(t), shape, plate)
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
     with ThreadPoolExecutor(available_cores()) as pool:
@@ -123,7 +125,7 @@ def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, sc
     Returns alpha (H, W) float32 of a frame by itself, and whether the plate, if any, fits it.
     """
     cutout, fits = cut_frame(image, probability, xy, score, plate, iterations)
-    return finish(image, cutout, plate), fits
+    return finish(cutout, image.shape[:2], plate), fits
 
 
 def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,
@@ -134,7 +136,7 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
     """
     box = around(probability)
     if box is None:
-        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool)), True
+        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0]), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     corner = np.array(box[:2])
     here = None
@@ -144,18 +146,17 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
     if here is not None:
         here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
     outline = cut_out(image[part], probability[part], xy - corner, score, iterations, here)
-    return Cutout(box, keep_person(outline, xy - corner, score) > 0.5), plate is None or here is not None
+    return Cutout(box, keep_person(outline, xy - corner, score) > 0.5, image[part].copy()), plate is None or here is not None
 
 
-def finish(image: np.ndarray, cutout: Cutout, plate: Plate | None) -> np.ndarray:
-    """image: (H, W, 3) uint8. Returns its alpha (H, W) float32: the outline, corrected where the plate shows the scene, with a soft
-    edge."""
-    alpha = np.zeros(image.shape[:2], np.float32)
+def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.ndarray:
+    """Alpha (H, W) float32 of a frame: the outline, corrected where the plate shows the scene, with a soft edge. shape: H, W."""
+    alpha = np.zeros(shape, np.float32)
     outline = cutout.outline
     if not outline.any():
         return alpha
     x0, y0, x1, y1 = cutout.box
-    part = image[y0:y1, x0:x1]
+    part = cutout.image
     scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
     if scene is not None:
         outline = correct(part, outline, scene)

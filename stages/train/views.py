@@ -122,12 +122,31 @@ def _read_view(path: Path, mask: Path, camera: Camera, height: int | None = None
     if not np.isfinite(alpha).all():
         raise StageError(f"{mask}: mask is not finite")
     alpha = np.clip(alpha, 0, 1)
-    pixels = np.dstack([(rgb if mixed else unmix(rgb, alpha)) * alpha[..., None], alpha * 255])
     h = min(height or rgb.shape[0], rgb.shape[0])
     w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
-    if (w, h) != (rgb.shape[1], rgb.shape[0]):
-        pixels = cv2.resize(pixels, (w, h), interpolation=cv2.INTER_AREA)
-    return View(camera.scaled(w, h), np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0)), float(alpha.mean())
+    if (w, h) == (rgb.shape[1], rgb.shape[0]):
+        pixels, area = np.zeros((h, w, 4), np.uint8), _shown(alpha)
+        pixels[area] = _to_bytes(_cut_out(rgb[area], alpha[area], mixed))
+    else:
+        pixels = _to_bytes(cv2.resize(_cut_out(rgb, alpha, mixed), (w, h), interpolation=cv2.INTER_AREA))
+    return View(camera.scaled(w, h), pixels, (0, 0)), float(alpha.mean())
+
+
+def _shown(alpha: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of all that the mask, alpha (H, W), shows: elsewhere the cut-out is zero."""
+    hits = [np.flatnonzero((alpha > 0).any(axis)) for axis in (1, 0)]
+    rows, columns = (slice(at[0], at[-1] + 1) if len(at) else slice(0, 0) for at in hits)
+    return rows, columns
+
+
+def _cut_out(rgb: np.ndarray, alpha: np.ndarray, mixed: bool) -> np.ndarray:
+    """(H, W, 4) float32 in 0..255, premultiplied RGB and mask. rgb: (H, W, 3) uint8; alpha: (H, W)."""
+    return np.dstack([(rgb if mixed else unmix(rgb, alpha)) * alpha[..., None], alpha * 255])
+
+
+def _to_bytes(pixels: np.ndarray) -> np.ndarray:
+    """(H, W, 4) uint8."""
+    return np.clip(np.round(pixels), 0, 255).astype(np.uint8)
 
 
 def person_crop(view: View) -> View:

@@ -10,10 +10,11 @@ import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.checkpoint import loop_state
+from gsac.stages.train.config import FAST_STEPS, coarse_share, coarse_steps
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import AVERAGED, BEGIN, refit_config, refit_steps
-from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, STEPS, coarse_share, coarse_steps
+from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, person_pixels
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import correct_midway
@@ -32,8 +33,8 @@ class Cpu(Backend):
         config = task.config
         rng = np.random.default_rng(config.seed)
         fine, coarse = crop_views(task)
-        steps = config.steps or STEPS
-        coarse_until = coarse_steps(task, steps)
+        steps = config.steps or FAST_STEPS[self.device]
+        coarse_until = coarse_steps(person_pixels(task), steps)
         order: list[int] = []
         if task.resumed is None:
             trainer, first = Trainer(init_gaussians(task, coarse, count), task), 0
@@ -65,7 +66,7 @@ class Cpu(Backend):
         trainer.config = refit_config(task.config)
         order: list[int] = []
         steps = refit_steps(task.config)
-        averaged, coarse_until = max(1, round(AVERAGED * steps)), round(coarse_share(task) * steps) if coarse else 0
+        averaged, coarse_until = max(1, round(AVERAGED * steps)), round(coarse_share(person_pixels(task)) * steps) if coarse else 0
         sums = {name: np.zeros(value.shape) for name, value in trainer.values.items()}
         for step in range(steps):
             order = order or [int(t) for t in rng.permutation(task.trained)]

@@ -18,7 +18,7 @@ from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.rounds import RoundsRecipe, RoundsTrainer
 from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
-from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.config import FAST_STEPS, TrainConfig, coarse_share, coarse_steps
 from gsac.stages.train.fast import schedule
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
@@ -33,8 +33,6 @@ from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, 
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
 from gsac.stages.train.views import View, Views, person_crop
 
-STEPS = 3200
-"""Steps where none are configured, more than twice the CPU's: 0.4 s more for 0.15 dB, 0.3 with poses moved to their images."""
 POSES_STAY = {"pose_rate": 0.0, "expression_rate": 0.0, "joint_rate": 0.0}
 
 SomeRecipe = TypeVar("SomeRecipe", bound=Recipe)
@@ -49,8 +47,8 @@ class Cuda(Backend):
         """As `Backend.train`; keeps no checkpoints."""
         fine, coarse = crop_views(task)
         gaussians = init_gaussians(task, coarse, count)
-        steps = task.config.steps or STEPS
-        recipe = make_recipe(task.config, count, coarse_share=schedule.coarse_steps(task, steps) / steps,
+        steps = task.config.steps or FAST_STEPS["cuda"]
+        recipe = make_recipe(task.config, count, coarse_share=coarse_steps(schedule.person_pixels(task), steps) / steps,
                              least=schedule.shortest_axis(task), **lpips_options(task))
         with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.lpips) as trainer:
             if task.config.pose_rounds:
@@ -71,7 +69,7 @@ class Cuda(Backend):
     def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
         """As `Backend.refit`."""
         gaussians = trainer.gaussians()
-        share = BEGIN + (1 - BEGIN) * schedule.coarse_share(task) if coarse else 0.0
+        share = BEGIN + (1 - BEGIN) * coarse_share(schedule.person_pixels(task)) if coarse else 0.0
         recipe = make_recipe(refit_config(task.config), len(gaussians), steps=refit_steps(task.config), begin=BEGIN,
                              coarse_share=share, offset_rate=0.0, least=trainer.least, **POSES_STAY, **lpips_options(task))
         first = int(task.trained[0])
@@ -134,7 +132,7 @@ def correct_midway(trainer: CudaTrainer, task: Task, views: dict[int, View]) -> 
 
 def make_recipe(config: TrainConfig, count: int, kind: type[SomeRecipe] = Recipe, **more: Any) -> SomeRecipe:
     """Recipe `fast` for `count` gaussians. more: fields of the recipe, which take precedence."""
-    steps = config.steps or STEPS
+    steps = config.steps or FAST_STEPS["cuda"]
     given = {"steps": steps, "largest": schedule.longest_axis(config, count),
              "end": schedule.END, "mu_end": schedule.MU_END, "offset_rate": schedule.OFFSET_RATE,
              "offset_share": schedule.OFFSET_SHARE, "offset_every": cloth_offsets.EVERY, "smoothness": cloth_offsets.SMOOTHNESS,

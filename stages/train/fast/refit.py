@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gsac.stages.train.config import TrainConfig
-from gsac.stages.train.fast.schedule import STEPS
+from gsac.stages.train.config import FAST_STEPS, TrainConfig
 
 SHARE, BEGIN = 0.2, 0.15
 """Steps, as a share of the training's; their rates are those of a training from this share of its steps on."""
@@ -17,7 +16,7 @@ WIDENED = 3.0
 
 def refit_steps(config: TrainConfig) -> int:
     """Number of steps."""
-    return max(1, round(SHARE * (config.steps or STEPS)))
+    return max(1, round(SHARE * (config.steps or FAST_STEPS["cpu"])))
 
 
 def refit_config(config: TrainConfig) -> TrainConfig:

@@ -1,23 +1,12 @@
-"""The numbers that recipe `fast` fixes itself, on the CPU and on the GPU: steps, their shares, and rates that are no parameter."""
+"""The numbers that recipe `fast` fixes itself, on the CPU and on the GPU: shares of the steps, and rates that are no parameter."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from gsac.stages.train.config import FULL_SIZE, TrainConfig
+from gsac.stages.train.config import FULL_SIZE, TrainConfig, asked_size
 from gsac.stages.train.task import Task
 
-STEPS = 1200
-"""Steps on the CPU where none are configured."""
-SMALL, LARGE = (3e4, 0.15), (1.6e5, 0.8)
-"""Pixels of a person in a frame, and the share of the steps, the first, that run at half the size: small images are cheap, large
-ones have little that half the size does not show. A longer training has no more of these steps than one of `STEPS`."""
-SIZES = 3000, 30000
-"""Least and most gaussians where none are asked for: `FULL_SIZE` for a person of `LARGE`, half as many for a quarter of it."""
-MORE_ON_CUDA = 1.5
-"""Factor on them on the GPU, where they cost least."""
 MIDWAY = 0.3
 """Share of the steps after which the poses of all frames are corrected together once more."""
 OFFSET_SHARE = 0.6
@@ -34,24 +23,10 @@ LATE_REACH = 0.25
 """Share of `train.reach` that a gaussian may move once the surface is folded in: clothes and hair are in the gaussians by then."""
 
 
-def coarse_share(task: Task) -> float:
-    """Share of the steps, the first, that run at half the size."""
-    (small, least), (large, most) = SMALL, LARGE
-    part = math.log(max(person_pixels(task), 1) / small) / math.log(large / small)
-    return least + (most - least) * min(max(part, 0.0), 1.0)
-
-
-def coarse_steps(task: Task, steps: int) -> int:
-    """Number of steps, of `steps`, that run at half the size."""
-    return math.ceil(coarse_share(task) * min(steps, STEPS))
-
-
 def budget(task: Task, device: str) -> int:
     """Gaussians: as many as asked for, or those that the size search starts from on `device` (cpu, cuda)."""
-    if isinstance(task.config.gaussians, int):
-        return task.config.gaussians
-    more = MORE_ON_CUDA if device == "cuda" else 1.0
-    return round(min(max(more * FULL_SIZE * (person_pixels(task) / LARGE[0]) ** 0.5, SIZES[0]), SIZES[1]), -3)
+    asked = task.config.gaussians
+    return asked if isinstance(asked, int) else asked_size(person_pixels(task), device)
 
 
 def person_pixels(task: Task) -> float:

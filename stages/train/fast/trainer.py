@@ -115,19 +115,32 @@ class Trainer:
         """One step on frame t. done: share of the steps so far; background: (3,) in 0..1; number: of the step. Returns the loss."""
         config = self.config
         loss, grads, opacity, grad_gain = self.gradients(t, view, background, number)
-        self._move(grads, opacity, done)
-        if not self.frozen_body:
-            grad_rest, grad_joints = self.poses.step(t, grads.vertices, self.pose_rate * 0.01**done, config.pose_pull)
-            self._shape_body(t, grad_rest, grad_joints, done)
-            if self.offsets:
-                self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
-                self.poses.offset = self.offsets.offset
+        self.workspace.share(self._advance, t, self._by_name(grads, opacity), grads.vertices, done)
         if config.exposure:
             gain = self.gains.get(t, np.ones(3))
             self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
         require_finite(f"after step {number}",
                        self.values | {"offset of the surface": self.poses.offset, **named_pose(self.poses, t)})
         return loss
+
+    def _advance(self, worker: int, workers: int, t: int, grads: dict[str, np.ndarray], grad_vertices: np.ndarray,
+                 done: float) -> None:
+        """A worker's share of a step: the first one moves frame t's body, where that is learned, the others the gaussians."""
+        if not self.frozen_body:
+            if worker == 0:
+                self._move_body(t, grad_vertices, done)
+            if workers > 1:
+                worker, workers = worker - 1, workers - 1
+        if worker >= 0:
+            self._move(worker, workers, grads, done)
+
+    def _move_body(self, t: int, grad_vertices: np.ndarray, done: float) -> None:
+        """One step of frame t's pose and of the body's shape. grad_vertices: (V, 3)."""
+        grad_rest, grad_joints = self.poses.step(t, grad_vertices, self.pose_rate * 0.01**done, self.config.pose_pull)
+        self._shape_body(t, grad_rest, grad_joints, done)
+        if self.offsets:
+            self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
+            self.poses.offset = self.offsets.offset
 
     def _shape_body(self, t: int, grad_rest: np.ndarray, grad_joints: np.ndarray, done: float) -> None:
         """One step of frame t's expression and of the joints at rest, where these and the poses are learned."""
@@ -147,11 +160,13 @@ class Trainer:
         rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
         background = background.astype(np.float32)
         gain = self.gains.get(t, np.ones(3)).astype(np.float32)
-        image, target = np.empty_like(rendering.rgb), np.empty_like(rendering.rgb)
-        on_background(rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
+        take, real = self.losses.take, rendering.rgb.dtype
+        image, target, grad_rgb = (take(name, rendering.rgb.shape, real) for name in ("image", "target", "grad_rgb"))
+        grad_alpha = take("grad_alpha", rendering.alpha.shape, real)
+        on_background(self.workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
         loss, grad_image = self._image_loss(image, target)
-        grad_rgb, grad_alpha, grad_gain = np.empty_like(image), np.empty_like(rendering.alpha), np.empty(3)
-        loss += through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain,
+        grad_gain = np.empty(3)
+        loss += through_background(self.workspace.share, grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain,
                                    config.mask, grad_rgb, grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
         require_finite(f"at step {number}", {"loss": loss, **named_gradients(grads)})
@@ -209,7 +224,9 @@ class Trainer:
 
     def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:
         config = self.config
-        loss, gradient = losses.l2(image, target, workspace=self.losses)
+        gradient = self.losses.take("gradient", image.shape, image.dtype)
+        gradient[:] = 0
+        loss, _ = losses.l2(image, target, gradient=gradient, workspace=self.losses)
         if config.ssim:
             similarity = losses.ssim(image, target, factor=-config.ssim, gradient=gradient, workspace=self.losses).value
             loss += config.ssim * (1 - similarity)
@@ -218,22 +235,28 @@ class Trainer:
                                                 workspace=self.losses).value
         return loss, gradient
 
-    def _move(self, grads: BoundGradients, opacity: np.ndarray, done: float) -> None:
-        """One Adam step of the gaussians, then their limits."""
-        config, v = self.config, self.values
-        rates = {"mu": config.mu_rate * MU_END**done, "quat": config.quat_rate * END**done,
-                 "log_scale": config.scale_rate * END**done, "rgb": config.rgb_rate * END**done,
-                 "opacity_logit": config.opacity_rate * END**done}
+    def _by_name(self, grads: BoundGradients, opacity: np.ndarray) -> dict[str, np.ndarray]:
+        """Name of a value -> its gradient (N, ...), zero where no frame shows the gaussian."""
         by_name = {"mu": grads.mu, "quat": grads.quat, "log_scale": grads.log_scale, "rgb": grads.rgb,
                    "opacity_logit": (grads.opacity * opacity * (1 - opacity))[:, None]}
         if self.seen is not None:
             for grad in by_name.values():
                 grad[~self.seen] = 0
-        count_rows(by_name["rgb"], self.count)
+        return by_name
+
+    def _move(self, worker: int, workers: int, grads: dict[str, np.ndarray], done: float) -> None:
+        """One Adam step of a worker's share of the gaussians, then their limits. grads: (N, ...)."""
+        config, v, n = self.config, self.values, len(self.face)
+        own = slice(n * worker // workers, n * (worker + 1) // workers)
+        rates = {"mu": config.mu_rate * MU_END**done, "quat": config.quat_rate * END**done,
+                 "log_scale": config.scale_rate * END**done, "rgb": config.rgb_rate * END**done,
+                 "opacity_logit": config.opacity_rate * END**done}
+        count_rows(grads["rgb"][own], self.count[own])
         for name, rate in rates.items():
-            adam_rows(v[name], by_name[name], self.first[name], self.second[name], self.count, rate)
-        limit(v["mu"], v["quat"], v["log_scale"], v["rgb"], v["opacity_logit"], self.start, self.face_scale, config.needle,
-              self.least, self.largest, self.reach, config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
+            adam_rows(v[name][own], grads[name][own], self.first[name][own], self.second[name][own], self.count[own], rate)
+        limit(v["mu"][own], v["quat"][own], v["log_scale"][own], v["rgb"][own], v["opacity_logit"][own], self.start[own],
+              self.face_scale[own], config.needle, self.least, self.largest, self.reach,
+              config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
 
 
 def opacity_logit(opacity: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Fused numba kernels of a training step: composition over a background, Adam, the gaussians' limits."""
+"""Fused kernels of a training step: composition over a background, Adam, the gaussians' limits. They release the GIL."""
 
 from __future__ import annotations
 
@@ -7,18 +7,40 @@ import math
 import numpy as np
 
 from gsac.avatar.numba_kernel import own_kernel
+from gsac.avatar.threads import Share
 
 
-@own_kernel(error_model="numpy", fastmath=True)
-def on_background(rgb, alpha, pixels, background, gain, image, target):
+def on_background(share: Share, rgb: np.ndarray, alpha: np.ndarray, pixels: np.ndarray, background: np.ndarray, gain: np.ndarray,
+                  image: np.ndarray, target: np.ndarray) -> None:
     """Composes render and frame over one colour: image = gain * rgb + (1 - alpha) bg, target likewise from the cut-out frame.
 
-    rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8 premultiplied; background, gain: (3,).
-    image, target: (h, w, 3), written.
+    share: `Workspace.share`; rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8 premultiplied; background, gain:
+    (3,). image, target: (h, w, 3), written.
     """
+    share(_on_background, rgb, alpha, pixels, background, gain, image, target)
+
+
+def through_background(share: Share, grad_image: np.ndarray, rgb: np.ndarray, alpha: np.ndarray, pixels: np.ndarray,
+                       background: np.ndarray, gain: np.ndarray, mask_weight: float, grad_rgb: np.ndarray, grad_alpha: np.ndarray,
+                       grad_gain: np.ndarray) -> float:
+    """Backward pass of `on_background` plus mask_weight * mean((alpha - mask)^2), whose value it returns.
+
+    share: `Workspace.share`; grad_image: (h, w, 3); rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8
+    premultiplied; background, gain: (3,). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
+    """
+    sums = np.empty((len(alpha), 4))
+    share(_through_background, grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, sums)
+    total = sums.sum(0)
+    grad_gain[:] = total[1:]
+    return float(total[0])
+
+
+@own_kernel(nogil=True, error_model="numpy", fastmath=True)
+def _on_background(worker, workers, rgb, alpha, pixels, background, gain, image, target):
     byte = rgb.dtype.type(1 / 255)
     one = rgb.dtype.type(1)
-    for y in range(rgb.shape[0]):
+    height = rgb.shape[0]
+    for y in range(height * worker // workers, height * (worker + 1) // workers):
         for x in range(rgb.shape[1]):
             clear, clear_target = one - alpha[y, x], one - pixels[y, x, 3] * byte
             for c in range(3):
@@ -26,30 +48,29 @@ def on_background(rgb, alpha, pixels, background, gain, image, target):
                 target[y, x, c] = pixels[y, x, c] * byte + clear_target * background[c]
 
 
-@own_kernel(error_model="numpy", fastmath=True)
-def through_background(grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, grad_gain):
-    """Backward pass of `on_background` plus mask_weight * mean((alpha - mask)^2), whose value it returns.
-
-    Other arguments as there; grad_image: (h, w, 3). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
-    """
+@own_kernel(nogil=True, error_model="numpy", fastmath=True)
+def _through_background(worker, workers, grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, sums):
+    """sums: (h, 4), of each row the mask's term and the gain's gradient."""
     byte = rgb.dtype.type(1 / 255)
     share = rgb.dtype.type(mask_weight / alpha.size)
-    loss = 0.0
-    grad_gain[:] = 0
-    for y in range(rgb.shape[0]):
+    height = rgb.shape[0]
+    for y in range(height * worker // workers, height * (worker + 1) // workers):
+        term, red, green, blue = 0.0, 0.0, 0.0, 0.0
         for x in range(rgb.shape[1]):
             difference = alpha[y, x] - pixels[y, x, 3] * byte
-            loss += share * difference * difference
+            term += share * difference * difference
             g = 2 * share * difference
             for c in range(3):
                 g -= grad_image[y, x, c] * background[c]
                 grad_rgb[y, x, c] = grad_image[y, x, c] * gain[c]
-                grad_gain[c] += grad_image[y, x, c] * rgb[y, x, c]
+            red += grad_image[y, x, 0] * rgb[y, x, 0]
+            green += grad_image[y, x, 1] * rgb[y, x, 1]
+            blue += grad_image[y, x, 2] * rgb[y, x, 2]
             grad_alpha[y, x] = g
-    return loss
+        sums[y, 0], sums[y, 1], sums[y, 2], sums[y, 3] = term, red, green, blue
 
 
-@own_kernel(error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def adam_rows(value, grad, first, second, count, rate):
     """One Adam step (0.9, 0.99) of the rows of value (N, C) whose gradient is not zero; count: (N,) steps of each row.
 
@@ -84,7 +105,7 @@ def adam(value, grad, first, second, count, rate):
             value[i, c] -= scale * first[i, c] / (math.sqrt(second[i, c] * unbias) + 1e-8)
 
 
-@own_kernel(error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def count_rows(grad, count):
     """Adds one to count (N,) where the row of grad (N, C) is not zero."""
     for i in range(grad.shape[0]):
@@ -94,7 +115,7 @@ def count_rows(grad, count):
                 break
 
 
-@own_kernel(error_model="numpy")
+@own_kernel(nogil=True, error_model="numpy")
 def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, least, largest, reach, pull):
     """Limits gaussians after a step, in place.
 

@@ -142,14 +142,15 @@ def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: in
     """Test-time pose optimisation: moves the pose of frame t in `poses` to its own image; the avatar stays."""
     view, workspace = person_crop(view), Workspace()
     background, gain, grad_gain = np.full(3, 1, np.float32), np.ones(3, np.float32), np.empty(3)
+    image, target, grad_rgb = (np.empty((*view.pixels.shape[:2], 3), np.float32) for _ in range(3))
+    grad_alpha = np.empty(view.pixels.shape[:2], np.float32)
     for step in range(steps):
         rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
-        image, target = np.empty_like(rendering.rgb), np.empty_like(rendering.rgb)
-        on_background(rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
-        grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(rendering.alpha)
-        grad_image = (image - target) * np.float32(2 / image.size)
-        through_background(grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK, grad_rgb,
-                           grad_alpha, grad_gain)
+        on_background(workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
+        image -= target
+        image *= np.float32(2 / image.size)
+        through_background(workspace.share, image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK,
+                           grad_rgb, grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
         require_finite(f"at step {step} of its pose at test time", {f"gradient of frame {t}": grads.vertices})
         poses.step(t, grads.vertices, TEST_RATE * TEST_END ** (step / steps), 0.0)

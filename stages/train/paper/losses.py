@@ -60,7 +60,7 @@ def picture_loss(picture: Picture, share: float, text: bool, workspace: Workspac
     """
     p, gain, grad_gain = picture, np.ones(3, np.float32), np.empty(3)
     image, target = np.empty_like(p.rgb), np.empty_like(p.rgb)
-    on_background(p.rgb, p.alpha, p.pixels, p.background, gain, image, target)
+    on_background(workspace.share, p.rgb, p.alpha, p.pixels, p.background, gain, image, target)
     part = share * p.alpha.size / p.side**2  # a mean over the box as its part of the mean over the square
     seen = 1 if text else (p.alpha * p.mask)[..., None]
     value, gradient = losses.l2(image * seen, target * seen, factor=part, workspace=workspace)
@@ -75,7 +75,8 @@ def picture_loss(picture: Picture, share: float, text: bool, workspace: Workspac
     if network is not None and centre is not None:
         value += perceptual(network, image, target, p, centre, LPIPS_WEIGHT * share, gradient)
     grad_rgb, grad_alpha = np.empty_like(image), np.empty_like(p.alpha)
-    through_background(gradient, p.rgb, p.alpha, p.pixels, p.background, gain, 0.0, grad_rgb, grad_alpha, grad_gain)
+    through_background(workspace.share, gradient, p.rgb, p.alpha, p.pixels, p.background, gain, 0.0, grad_rgb, grad_alpha,
+                       grad_gain)
     return float(value), grad_rgb, grad_alpha
 
 

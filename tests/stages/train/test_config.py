@@ -15,7 +15,7 @@ from gsac.stages.contract import BadInput, make_config
 from gsac.stages.train import STAGE, config
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.fast import schedule, size_search
-from gsac.stages.train.fast.cuda import STEPS, make_recipe
+from gsac.stages.train.fast.cuda import make_recipe
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.stage import check_device, run
@@ -40,20 +40,20 @@ def filmed(pixels, **values):
 
 
 def test_sizes_and_coarse_steps_follow_from_the_pixels_of_the_person():
-    (small, least), (large, most) = schedule.SMALL, schedule.LARGE
+    (small, least), (large, most) = config.SMALL, config.LARGE
     sizes = [schedule.budget(filmed(int(pixels)), "cpu") for pixels in (100, large / 4, large, 9.9e5)]
-    assert sizes == [schedule.SIZES[0], config.FULL_SIZE / 2, config.FULL_SIZE, schedule.SIZES[1]]
-    assert schedule.budget(filmed(int(large)), "cuda") == config.FULL_SIZE * schedule.MORE_ON_CUDA
+    assert sizes == [config.SIZES[0], config.FULL_SIZE / 2, config.FULL_SIZE, config.SIZES[1]]
+    assert schedule.budget(filmed(int(large)), "cuda") == config.FULL_SIZE * config.MORE_ON_CUDA
     assert schedule.budget(filmed(int(large), gaussians=700), "cuda") == 700
-    shares = [schedule.coarse_share(filmed(int(pixels))) for pixels in (100, small, (small * large) ** 0.5, large, 9.9e5)]
+    shares = [config.coarse_share(pixels) for pixels in (100, small, (small * large) ** 0.5, large, 9.9e5)]
     np.testing.assert_allclose(shares, [least, least, (least + most) / 2, most, most], rtol=1e-4)
-    task = filmed(int(small))
-    assert schedule.coarse_steps(task, STEPS) == schedule.coarse_steps(task, schedule.STEPS) > schedule.coarse_steps(task, 400)
+    usual, more = config.FAST_STEPS["cpu"], config.FAST_STEPS["cuda"]
+    assert config.coarse_steps(small, more) == config.coarse_steps(small, usual) > config.coarse_steps(small, 400)
 
 
 def test_the_docstring_of_the_steps_tells_those_of_each_recipe():
     told = meanings(TrainConfig)["steps"]
-    assert all(str(steps) in told for steps in (schedule.STEPS, STEPS, paper.STEPS))
+    assert all(str(steps) in told for steps in (*config.FAST_STEPS.values(), paper.STEPS))
 
 
 def test_a_configuration_tells_whether_the_size_is_searched():
@@ -82,14 +82,14 @@ def test_the_losses_of_the_papers_text_are_refused_where_another_recipe_would_pa
 
 def test_the_gpu_is_told_what_the_configuration_and_the_recipe_say():
     made = make_recipe(TrainConfig(mask=0.5, mu_rate=2e-3, exposure=True), 3000, batch=3)
-    assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, STEPS)
+    assert (made.mask, made.mu_rate, made.batch, made.steps) == (0.5, 2e-3, 3, config.FAST_STEPS["cuda"])
     assert made.largest == schedule.longest_axis(TrainConfig(), 3000) == TrainConfig().largest * 2
     assert (made.end, made.mu_end) == (schedule.END, schedule.MU_END)
     assert (made.offset_share, made.gain_rate) == (schedule.OFFSET_SHARE, schedule.GAIN_RATE)
     assert make_recipe(TrainConfig(steps=7), 12000).steps == 7 and make_recipe(TrainConfig(), 12000).gain_rate == 0
     shared = {f.name for f in fields(TrainConfig)} & {f.name for f in fields(made)}
-    config = TrainConfig(steps=9)
-    assert {n: getattr(make_recipe(config, 12000), n) for n in shared} == {n: getattr(config, n) for n in shared}
+    told = TrainConfig(steps=9)
+    assert {n: getattr(make_recipe(told, 12000), n) for n in shared} == {n: getattr(told, n) for n in shared}
 
 
 def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_able(monkeypatch):

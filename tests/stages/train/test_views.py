@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import write_alpha, write_frame
+from gsac.avatar.artifacts import read_alpha, read_frame, write_alpha, write_frame
 from gsac.avatar.camera import Camera
+from gsac.stages.train.edge_colour import unmix
 from gsac.stages.train.views import View, person_crop, read_views, read_whole
 
 WIDTH, HEIGHT = 90, 160
@@ -51,6 +52,19 @@ def test_frames_to_judge_by_are_whole_and_as_large_as_their_files_and_no_others_
     assert list(views) == [3, 1] and views[1].camera == views[1].frame == CAMERA
     assert views[1].pixels.shape == (HEIGHT, WIDTH, 4) and views[1].corner == (0, 0)
     assert (views[1].pixels[40:120, 30:60, 3] == 255).all() and (views[1].pixels[..., 3] > 0).sum() == 80 * 30
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_a_cut_out_is_that_of_the_whole_frame_wherever_the_person_stands(folders, mixed):
+    soft = np.zeros((HEIGHT, WIDTH), np.float32)
+    soft[90:, 60:] = np.random.default_rng(1).random((70, 30)) ** 0.2
+    write_alpha(folders[1] / "000000.exr", soft)
+    view = read_views(*folders, CAMERA, None, mixed)[0][0]
+    rgb, alpha = read_frame(folders[0] / "000000.png"), read_alpha(folders[1] / "000000.exr")
+    whole = np.round(np.dstack([(rgb if mixed else unmix(rgb, alpha)) * alpha[..., None], alpha * 255])).astype(np.uint8)
+    (x, y), (h, w) = view.corner, view.pixels.shape[:2]
+    np.testing.assert_array_equal(view.pixels, whole[y:y + h, x:x + w])
+    assert view.pixels[..., 3].sum(dtype=int) == whole[..., 3].sum(dtype=int)
 
 
 def test_a_view_is_reduced_by_area_with_its_camera_and_never_enlarged():

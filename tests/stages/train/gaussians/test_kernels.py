@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from gsac.avatar.threads import Workspace
 from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on_background, through_background
+
+SHARE = Workspace(2).share
 
 
 def images(seed=0, h=7, w=5):
@@ -20,11 +23,11 @@ def test_backgrounds_gradient_agrees_with_central_differences():
 
     def loss(rgb, alpha, gain):
         image, target = np.empty_like(rgb), np.empty_like(rgb)
-        on_background(rgb, alpha, pixels, background, gain, image, target)
+        on_background(SHARE, rgb, alpha, pixels, background, gain, image, target)
         return (image * weight).sum() + 0.3 * ((alpha - pixels[..., 3] / 255) ** 2).mean()
 
     got = [np.empty_like(rgb), np.empty_like(alpha), np.empty(3)]
-    term = through_background(weight, rgb, alpha, pixels, background, gain, 0.3, *got)
+    term = through_background(SHARE, weight, rgb, alpha, pixels, background, gain, 0.3, *got)
     assert term == pytest.approx(0.3 * ((alpha - pixels[..., 3] / 255) ** 2).mean())
     values = [rgb, alpha, gain]
     for which in range(3):
@@ -41,8 +44,22 @@ def test_frame_and_render_of_the_same_content_agree_on_any_background():
     _, _, pixels, background, _ = images()
     alpha = pixels[..., 3] / 255
     image, target = np.empty((*alpha.shape, 3)), np.empty((*alpha.shape, 3))
-    on_background(pixels[..., :3] / 255, alpha, pixels, background, np.ones(3), image, target)
+    on_background(SHARE, pixels[..., :3] / 255, alpha, pixels, background, np.ones(3), image, target)
     np.testing.assert_allclose(image, target, atol=1e-12)
+
+
+def test_a_background_gives_the_same_bytes_on_any_number_of_threads():
+    rgb, alpha, pixels, background, gain = images(h=70, w=33)
+
+    def both(workers: int) -> list[np.ndarray]:
+        share, (image, target, grad_rgb), grad_alpha = Workspace(workers).share, np.empty((3, *rgb.shape)), np.empty_like(alpha)
+        grad_gain = np.empty(3)
+        on_background(share, rgb, alpha, pixels, background, gain, image, target)
+        term = through_background(share, image - target, rgb, alpha, pixels, background, gain, 0.3, grad_rgb, grad_alpha, grad_gain)
+        return [image, target, grad_rgb, grad_alpha, grad_gain, np.array(term)]
+
+    for one, more in zip(both(1), both(3), strict=True):
+        np.testing.assert_array_equal(one, more)
 
 
 def test_adam_moves_a_row_by_the_rate_at_first_and_leaves_rows_without_gradient():

@@ -1,0 +1,1 @@
+"""How long runs were told to take, and how long they took."""
