@@ -16,11 +16,8 @@ from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sig
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.head import HeadModel
 from gsac.stages.face.landmarks import align, read_averaged
-<<<<<<< HEAD
-from gsac.stages.findings import Code, Finding
-=======
 from gsac.stages.face.resting_face import find_resting_face
->>>>>>> rest
+from gsac.stages.findings import Code, Finding
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
 DOUBT = 0.1

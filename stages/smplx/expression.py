@@ -11,10 +11,6 @@ JAW_OPEN, JAW_ANGLE = 24, 0.38
 """Index of jawOpen in face.npz's 52 actions, and the angle, rad, of a fully open jaw."""
 
 
-<<<<<<< HEAD
-def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, Finding | None]:
-    """Expression (T, E), jaw_pose (T, 3) rad and what was lost.
-=======
 def acts_actions(body: Body, face: dict[str, np.ndarray]) -> bool:
     """Whether the body's expressions are the facial actions of face.npz, (T, 52) and more arrays, as the open body's are."""
     return face["expression"].shape[1] == len(body.expression_names) and bool(body.jaw_actions.any())
@@ -29,21 +25,15 @@ def translate_rest(body: Body, face: dict[str, np.ndarray]) -> np.ndarray | None
     return face.get("rest_expression") if acts_actions(body, face) else None
 
 
-def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, str]:
-    """Expression (T, E), jaw_pose (T, 3) rad and a sentence about what was lost, or "".
->>>>>>> rest
+def translate_expression(body: Body, face: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, Finding | None]:
+    """Expression (T, E), jaw_pose (T, 3) rad and what was lost.
 
     face: arrays of face.npz, `expression` (T, 52), `jaw` (T, 3), ... The open body's expressions are the 52 actions. An official
     body's are FLAME's: taken from a FLAME head in face.npz; without one only the jaw moves.
     """
     actions, jaw = face["expression"], face["jaw"].astype(np.float32)
-<<<<<<< HEAD
-    if actions.shape[1] == len(body.expression_names) and body.jaw_actions.any():
-        return actions, jaw, None
-=======
     if acts_actions(body, face):
-        return actions, jaw, ""
->>>>>>> rest
+        return actions, jaw, None
     if "flame_expression" in face:
         expression = np.zeros((len(actions), len(body.expression_names)), np.float32)
         known = min(expression.shape[1], face["flame_expression"].shape[1])
