@@ -74,8 +74,8 @@ class Cuda(Backend):
         gaussians = trainer.gaussians()
         share = pace.begin + (1 - pace.begin) * schedule.coarse_share(task) if coarse else 0.0
         recipe = make_recipe(refit_config(task.config, pace), len(gaussians), steps=refit_steps(task.config, pace),
-                             begin=pace.begin,
-                             coarse_share=share, offset_rate=0.0, least=trainer.least, **POSES_STAY, **lpips_options(task))
+                             begin=pace.begin, coarse_share=share, offset_rate=0.0, least=trainer.least, **POSES_STAY,
+                             **lpips_options(task))
         first = int(task.trained[0])
         whole = views[first].camera.focal == task.views[first].camera.focal  # smaller images of coarser levels have no windows
         network = task.lpips if whole else None

@@ -36,12 +36,12 @@ class Level(NamedTuple):
     """Of its refit."""
 
 
-LEVELS = (Level(600, 8000, GENTLE), Level(400, 4000, FIRM), Level(150, 1300, FIRM))
+LEVELS = (Level(600, 8000, GENTLE), Level(360, 4000, FIRM), Level(150, 1300, FIRM))
 """As many as such images ask for. The first is fitted a tenth higher than the 540 px that it is meant for: viewers take a coarser
 level only where the person is a tenth lower than it allows."""
 FEWER = 2 / 3
 """Gaussians of a level over those of the one before, at most."""
-MOVED = 400
+MOVED = 300
 """px, height of the person in the images that poses are moved to before a level is looked at: smaller ones tell them poorly."""
 FRAMES = 6
 """Frames that are looked at, at most, to find up to which height a level is drawn."""

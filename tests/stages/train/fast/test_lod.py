@@ -28,7 +28,8 @@ def test_a_level_is_drawn_up_to_where_it_is_as_good_as_more_gaussians(job_anywhe
     assert [row["max_height_px"] for row in figures] == [level.max_height_px for level in coarser]
     tall, small = (level.max_height_px for level in coarser)
     assert finest.max_height_px is None and 82 >= tall > small >= 12
-    assert [row["image_height"] / row["max_height_px"] for row in figures] == pytest.approx([128 / 86] * 2, rel=.05), "frames are taller"
+    taller = [row["image_height"] / row["max_height_px"] for row in figures]
+    assert taller == pytest.approx([128 / 86] * 2, rel=.05), "the frames, than the person"
     assert lost[0] < -0.5 and len(lost) == 2, "dB: from afar better than more gaussians"
     for level in coarser:
         np.testing.assert_array_equal(level.light, finest.light)
