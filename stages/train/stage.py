@@ -189,7 +189,7 @@ class Run:
     def fit(self) -> None:
         """Runs the recipe, from a checkpoint where there is one."""
         config, chosen_by = self.job.config, {}
-        if config.searches_size():
+        if config.recipe == "fast":
             chosen_by = self.filmed if self.choosing is self.held else self.read(self.choosing)
         self.began = read_clocks()
         task = Task(self.views, self.trained, self.choosing, self.poses, config, self.job.progress, self.checkpoint,

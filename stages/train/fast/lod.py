@@ -15,7 +15,7 @@ from gsac.avatar.metrics import summary
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.drawn_height import find_drawn_height, typical_height
 from gsac.stages.train.fast.initial_gaussians import crop_views
-from gsac.stages.train.fast.refit import FIRM, GENTLE, Pace
+from gsac.stages.train.fast.refit import FIRM, GENTLE
 from gsac.stages.train.fast.size_search import POSE_ROUNDS, count_pixels, viewing_weight
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gaussians.merge import merge_to_size
@@ -32,11 +32,9 @@ class Level(NamedTuple):
     """px, height of the person in the images that this level is fitted to."""
     most: int
     """Its gaussians, at most."""
-    pace: Pace
-    """Of its refit."""
 
 
-LEVELS = (Level(600, 8000, GENTLE), Level(360, 4000, FIRM), Level(150, 1300, FIRM))
+LEVELS = (Level(600, 8000), Level(360, 4000), Level(150, 1300))
 """As many as such images ask for. The first is fitted a tenth higher than the 540 px that it is meant for: viewers take a coarser
 level only where the person is a tenth lower than it allows."""
 FEWER = 2 / 3
@@ -65,12 +63,14 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
         fewer = merge_to_size(tried, worth, size, body, rest)
         trainer = Trainer(level_heights(fewer, rest, body.faces), task, frozen_body=True, scale=scale)
         trainer.freeze_unseen(views)
-        gaussians = backend.refit(task, trainer, views, level.pace).finish(views)[0]
+        pace = FIRM if len(tried) >= 2 * size else GENTLE
+        gaussians = backend.refit(task, trainer, views, pace).finish(views)[0]
         shown = {t: view.scaled(scale) for t, view in looked_at.items()}
         finer_poses = own_poses or move(finer, task, poses, coarse)
         own_poses = move(gaussians, task, poses, coarse)
-        gaussians.max_height_px = find_drawn_height(Candidate(gaussians, own_poses, list(shown), shown),
-                                                    Candidate(finer, finer_poses, list(shown), shown))
+        found = find_drawn_height(Candidate(gaussians, own_poses, list(shown), shown),
+                                  Candidate(finer, finer_poses, list(shown), shown))
+        gaussians.max_height_px = min(found, finer.max_height_px or found)
         out.append(gaussians)
         finer = gaussians
     return out

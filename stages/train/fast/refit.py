@@ -23,7 +23,7 @@ class Pace(NamedTuple):
 OF_SIZE = Pace(0.2, 0.15, 0.1, 3.0)
 """For a size that may become the finest level."""
 GENTLE = Pace(0.1, 0.5, 0.7, 1.5)
-"""For a coarser level of nearly as many: in small frames large steps would do more harm than merging did."""
+"""For a coarser level of more than half as many: in small frames large steps would do more harm than merging did."""
 FIRM = Pace(0.14, 0.15, 0.5, 3.0)
 """For a coarser level of half as many and fewer."""
 

@@ -8,10 +8,9 @@ import pytest
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.fast import drawn_height, lod, size_search
-from gsac.stages.train.fast.refit import FIRM, GENTLE
 from gsac.stages.train.stage import run
 
-SMALL_LEVELS = (lod.Level(80, 600, GENTLE), lod.Level(50, 200, FIRM))
+SMALL_LEVELS = (lod.Level(80, 600), lod.Level(50, 200))
 """For a person 86 px tall."""
 
 
@@ -44,6 +43,18 @@ def test_a_size_that_was_tried_and_not_taken_is_where_a_level_begins(job_anywher
     monkeypatch.setattr(size_search, "choose", lambda scores: scores[0])
     run(job_anywhere(gaussians="auto", frames=6, steps=12, pose_rounds=0, pose_test_steps=0))
     assert begun == [620, 600]
+
+
+@pytest.mark.slow
+def test_a_level_is_drawn_no_higher_than_the_one_before_also_with_a_number_that_was_asked_for(job_anywhere, monkeypatch):
+    heights, looked_at = iter([40.0, 60.0]), []
+    monkeypatch.setattr(lod, "find_drawn_height", lambda level, finer: (looked_at.append(set(level.frames)), next(heights))[1])
+    monkeypatch.setattr(lod, "LEVELS", SMALL_LEVELS)
+    made = job_anywhere(gaussians=900, frames=6, steps=12, pose_rounds=0, pose_test_steps=0)
+    run(made)
+    figures = json.loads((made.out / "metrics.json").read_text())
+    assert [row["max_height_px"] for row in figures["levels"]] == [40, 40]
+    assert looked_at == [set(figures["heldout_frames"])] * 2, "frames that were not trained on"
 
 
 def test_an_avatar_540_px_tall_has_a_level_of_at_most_8000_gaussians_also_where_viewers_hesitate():
