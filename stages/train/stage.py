@@ -190,7 +190,7 @@ class Run:
     def fit(self) -> None:
         """Runs the recipe, from a checkpoint where there is one."""
         config, chosen_by = self.job.config, {}
-        if config.searches_size():
+        if config.recipe == "fast":
             chosen_by = self.filmed if self.choosing is self.held else self.read(self.choosing)
         self.began = read_clocks()
         task = Task(self.views, self.trained, self.choosing, self.poses, config, self.job.progress, self.checkpoint,
@@ -329,7 +329,7 @@ class Run:
                                                  strict=True)],
             "lpips_in_loss": self.in_loss is not None,
             "levels": judge_levels(gaussians, self.result.coarser, poses,
-                                   {t: view.reduced(trained.height) for t, view in self.filmed.items()}, trained.height),
+                                   {t: view.reduced(trained.height) for t, view in self.filmed.items()}),
             "likeness": judge_likeness(gaussians, aligned, held, self.filmed),
             "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),

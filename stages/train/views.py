@@ -52,6 +52,10 @@ class View:
         """The view at half its size, with corner (0, 0)."""
         return self.resized(max(1, self.camera.width // 2), max(1, self.camera.height // 2))
 
+    def scaled(self, scale: float) -> View:
+        """The view at `scale` of its size, with corner (0, 0); as it is where that is not smaller."""
+        return self if scale >= 1 else self.resized(*(max(1, round(scale * side)) for side in (self.camera.width, self.camera.height)))
+
     def reduced(self, height: int) -> View:
         """The view at a height, px, with corner (0, 0); as it is where it is not higher."""
         w, h = self.camera.width, self.camera.height

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.fast.refit import Pace
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Fit, Task
@@ -59,8 +60,9 @@ class Backend(ABC):
         """Fits `count` gaussians to the trained frames; refines their poses in task.poses."""
 
     @abstractmethod
-    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
-        """Fits merged gaussians anew in `refit.refit_steps`; poses and unseen gaussians stay.
+    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,
+              coarse: dict[int, View] | None = None) -> Trainer:
+        """Fits merged gaussians anew at a pace; poses and unseen gaussians stay.
 
         views: trained frame -> view; coarse: the same at half the size for the first steps, where they shall be coarse.
         """

@@ -13,7 +13,7 @@ from gsac.stages.train.checkpoint import loop_state
 from gsac.stages.train.config import FAST_STEPS, coarse_share, coarse_steps
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
-from gsac.stages.train.fast.refit import AVERAGED, BEGIN, refit_config, refit_steps
+from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
 from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, person_pixels
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.judge.heldout import align_pose
@@ -60,19 +60,21 @@ class Cpu(Backend):
             trainer.fold_offsets()
         return Trained(trainer, fine, coarse)
 
-    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
+    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,
+              coarse: dict[int, View] | None = None) -> Trainer:
         """As `Backend.refit`, in the trainer itself."""
         rng = np.random.default_rng(task.config.seed)
-        trainer.config = refit_config(task.config)
+        trainer.config = refit_config(task.config, pace)
         order: list[int] = []
-        steps = refit_steps(task.config)
-        averaged, coarse_until = max(1, round(AVERAGED * steps)), round(coarse_share(person_pixels(task)) * steps) if coarse else 0
+        steps = refit_steps(task.config, pace)
+        averaged = max(1, round(pace.averaged * steps))
+        coarse_until = round(coarse_share(person_pixels(task)) * steps) if coarse else 0
         sums = {name: np.zeros(value.shape) for name, value in trainer.values.items()}
         for step in range(steps):
             order = order or [int(t) for t in rng.permutation(task.trained)]
             t = order.pop()
             shown = coarse if coarse and step < coarse_until else views
-            trainer.step(t, shown[t], BEGIN + (1 - BEGIN) * step / steps, rng.random(3), step)
+            trainer.step(t, shown[t], pace.begin + (1 - pace.begin) * step / steps, rng.random(3), step)
             if step >= steps - averaged:
                 for name, value in trainer.values.items():
                     sums[name] += value

@@ -22,7 +22,7 @@ from gsac.stages.train.config import FAST_STEPS, TrainConfig, coarse_share, coar
 from gsac.stages.train.fast import schedule
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
-from gsac.stages.train.fast.refit import BEGIN, refit_config, refit_steps
+from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians import cloth_offsets
@@ -66,12 +66,14 @@ class Cuda(Backend):
             kept.seen = middle.seen
             return Trained(kept, fine, coarse)
 
-    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], coarse: dict[int, View] | None = None) -> Trainer:
-        """As `Backend.refit`."""
+    def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,
+              coarse: dict[int, View] | None = None) -> Trainer:
+        """As `Backend.refit`, without the mean of the last steps."""
         gaussians = trainer.gaussians()
-        share = BEGIN + (1 - BEGIN) * coarse_share(schedule.person_pixels(task)) if coarse else 0.0
-        recipe = make_recipe(refit_config(task.config), len(gaussians), steps=refit_steps(task.config), begin=BEGIN,
-                             coarse_share=share, offset_rate=0.0, least=trainer.least, **POSES_STAY, **lpips_options(task))
+        share = pace.begin + (1 - pace.begin) * coarse_share(schedule.person_pixels(task)) if coarse else 0.0
+        recipe = make_recipe(refit_config(task.config, pace), len(gaussians), steps=refit_steps(task.config, pace),
+                             begin=pace.begin, coarse_share=share, offset_rate=0.0, least=trainer.least, **POSES_STAY,
+                             **lpips_options(task))
         first = int(task.trained[0])
         whole = views[first].camera.focal == task.views[first].camera.focal  # smaller images of coarser levels have no windows
         network = task.lpips if whole else None

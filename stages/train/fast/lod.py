@@ -8,11 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
 from gsac.stages.train.fast.backend import Backend
-from gsac.stages.train.fast.drawn_height import find_drawn_height
+from gsac.stages.train.fast.drawn_height import find_drawn_height, typical_height
 from gsac.stages.train.fast.initial_gaussians import crop_views
+from gsac.stages.train.fast.refit import FIRM, GENTLE
 from gsac.stages.train.fast.size_search import POSE_ROUNDS, count_pixels, viewing_weight
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gaussians.merge import merge_to_size
@@ -25,74 +28,93 @@ from gsac.stages.train.views import View
 
 
 class Level(NamedTuple):
-    members: int
-    """Gaussians of the finest level for each one of this level."""
-    halvings: int
-    """How often the training images are halved, to the size at which this level is fitted."""
+    height: float
+    """px, height of the person in the images that this level is fitted to."""
+    most: int
+    """Its gaussians, at most."""
 
 
-LEVELS = (Level(3, 1), Level(9, 2))
-LEAST = 100
-"""Fewest gaussians of a level."""
+LEVELS = (Level(600, 8000), Level(360, 4000), Level(150, 1300))
+"""As many as such images ask for. The first is fitted a tenth higher than the 540 px that it is meant for: viewers take a coarser
+level only where the person is a tenth lower than it allows."""
+FEWER = 2 / 3
+"""Gaussians of a level over those of the one before, at most."""
+MOVED = 300
+"""px, height of the person in the images that poses are moved to before a level is looked at: smaller ones tell them poorly."""
+FRAMES = 6
+"""Frames that are looked at, at most, to find up to which height a level is drawn."""
 
 
 def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
-    """Levels below fit.gaussians, the finest of them first; fewer than `LEVELS` where an avatar has few gaussians."""
-    rest = task.poses.rest(int(task.trained[0]))[0]
-    views, halvings = crop_views(task)[0], 0
-    poses, looked_at = find_unseen(task, fit.gaussians) or (task.poses, views)
-    out, gaussians = [], fit.gaussians
+    """Levels below fit.gaussians, the finest of them first; none of `LEVELS` that has as many gaussians as the one before it."""
+    rest, body = task.poses.rest(int(task.trained[0]))[0], task.poses.body
+    filmed = crop_views(task)[0]
+    tall = typical_height(task.poses, filmed)
+    poses, looked_at = find_frames(task, filmed)
+    coarse = {t: view.scaled(MOVED / tall) for t, view in looked_at.items()}
+    out, finer, own_poses = [], fit.gaussians, None
     for level in LEVELS:
-        size = len(fit.gaussians) // level.members
-        if size < LEAST:
-            break
-        views = {t: halve(view, level.halvings - halvings) for t, view in views.items()}
-        looked_at = {t: halve(view, level.halvings - halvings) for t, view in looked_at.items()}
-        halvings = level.halvings
-        worth = count_pixels(gaussians, task, views) * viewing_weight(gaussians, task.poses.body)
-        fewer = merge_to_size(gaussians, worth, size, task.poses.body, rest)
-        if len(fewer) >= len(gaussians):
-            break
-        trainer = Trainer(level_heights(fewer, rest, task.poses.body.faces), task, frozen_body=True, halvings=halvings)
+        if len(finer) <= level.most:
+            continue
+        scale, size = min(1.0, level.height / tall), min(level.most, round(FEWER * len(finer)))
+        views = {t: view.scaled(scale) for t, view in filmed.items()}
+        tried = min((one for one in (finer, *fit.smaller) if len(one) >= size), key=len)
+        worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
+        fewer = merge_to_size(tried, worth, size, body, rest)
+        trainer = Trainer(level_heights(fewer, rest, body.faces), task, frozen_body=True, scale=scale)
         trainer.freeze_unseen(views)
-        finer, gaussians = gaussians, backend.refit(task, trainer, views).finish(views)[0]
-        gaussians.max_height_px = find_drawn_height(gaussians, finer, poses, looked_at)
+        pace = FIRM if len(tried) >= 2 * size else GENTLE
+        gaussians = backend.refit(task, trainer, views, pace).finish(views)[0]
+        shown = {t: view.scaled(scale) for t, view in looked_at.items()}
+        finer_poses = own_poses or move(finer, task, poses, coarse)
+        own_poses = move(gaussians, task, poses, coarse)
+        found = find_drawn_height(Candidate(gaussians, own_poses, list(shown), shown),
+                                  Candidate(finer, finer_poses, list(shown), shown))
+        gaussians.max_height_px = min(found, finer.max_height_px or found)
         out.append(gaussians)
+        finer = gaussians
     return out
 
 
-def find_unseen(task: Task, gaussians: Gaussians) -> tuple[Poses, dict[int, View]] | None:
-    """The frames to choose by, as large as those trained on, and poses moved to them; None where none are at hand.
+def find_frames(task: Task, views: dict[int, View]) -> tuple[Poses, dict[int, View]]:
+    """Some frames to look at and all poses: as large as those that are trained on, and not trained on where such are at hand.
 
     In frames that were trained on, the finest level is flattered by all that it knows of these very frames.
+    views: trained frame -> view.
+    """
+    poses = task.poses
+    if task.filmed:
+        height, poses = task.views[int(task.trained[0])].frame.height, carry_to_untrained(task.poses, task.trained)
+        views = {int(t): task.filmed[int(t)].reduced(height) for t in task.choosing}
+    return poses, dict(list(views.items())[::-(-len(views) // FRAMES)])
+
+
+def move(gaussians: Gaussians, task: Task, poses: Poses, views: dict[int, View]) -> Poses:
+    """The poses, those of untrained frames moved to their views by these gaussians.
+
+    With poses that the finer level moved, a level would also pay for lying elsewhere than that one, which nobody sees.
     """
     if not task.filmed:
-        return None
-    height = task.views[int(task.trained[0])].frame.height
-    views = {int(t): task.filmed[int(t)].reduced(height) for t in task.choosing}
-    poses = carry_to_untrained(task.poses, task.trained)
-    converge(gaussians, poses, task.choosing, {t: view.halved() for t, view in views.items()}, POSE_ROUNDS)
-    return poses, views
+        return poses
+    poses = poses.copy()
+    converge(gaussians, poses, views, views, POSE_ROUNDS)
+    return poses
 
 
-def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views: Mapping[int, View], height: int) -> list[dict]:
-    """Held-out psnr_fg and ssim of each level at its own image height, with its size and the same figures of the finest level.
+def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views: Mapping[int, View]) -> list[dict]:
+    """Held-out psnr_fg and ssim of each level where the person is as tall as it is drawn at most, with its size and the same
+    figures of the finest level.
 
-    views: held-out frame -> its whole view, `height` px high as the trained ones.
+    views: held-out frame -> its whole view, as large as the trained ones.
     """
+    tall = typical_height(poses, views) if views else np.nan
     rows, candidates = [], []
-    for (_, halvings), level in zip(LEVELS, levels, strict=False):
-        small = {t: halve(view, halvings) for t, view in views.items()}
-        rows.append({"n_gaussians": len(level), "image_height": height // 2**halvings or 1})
+    for level in levels:
+        small = {t: view.scaled(level.max_height_px / tall) for t, view in views.items()}
+        height = next((view.camera.height for view in small.values()), None)
+        rows.append({"n_gaussians": len(level), "max_height_px": level.max_height_px, "image_height": height})
         candidates += [Candidate(gaussians, poses, list(small), small) for gaussians in (level, finest)]
     for k, judged_rows in enumerate(judge_all(candidates)):
         figures, name = summary(judged_rows), "_finest" if k % 2 else ""
         rows[k // 2] |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}
     return rows
-
-
-def halve(view: View, times: int) -> View:
-    """The view at half its size, `times` over."""
-    for _ in range(times):
-        view = view.halved()
-    return view

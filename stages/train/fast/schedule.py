@@ -39,10 +39,10 @@ def longest_axis(config: TrainConfig, count: int) -> float:
     return config.largest * max(1, FULL_SIZE / count) ** 0.5
 
 
-def shortest_axis(task: Task, halvings: int = 0) -> float:
+def shortest_axis(task: Task, scale: float = 1.0) -> float:
     """m, the shortest axis (standard deviation at rest) that a gaussian may have: the frames tell nothing finer.
 
-    halvings: of the frames, to the size that the gaussians are drawn at.
+    scale: size that the gaussians are drawn at, of the frames'.
     """
     depth = float(np.median(task.poses.fit_transl[task.trained, 2]))
-    return FINEST * 2**halvings * depth / min(task.views[0].camera.focal)
+    return FINEST / scale * depth / min(task.views[0].camera.focal)

@@ -19,6 +19,7 @@ from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.initial_gaussians import COLOUR_FRAMES
+from gsac.stages.train.fast.refit import OF_SIZE
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.fast.size_rule import MOST_LOST, SizeScore, choose, optimism
 from gsac.stages.train.fast.trainer import Trainer
@@ -56,7 +57,7 @@ def search(task: Task, backend: Backend) -> Fit:
             fewer = merge_to_size(gaussians, worth, size, task.poses.body, trainer.rest)
             trainer = Trainer(level_heights(fewer, trainer.rest, trainer.faces), task, frozen_body=True)
             trainer.freeze_unseen(coarse)
-            trainer = backend.refit(task, trainer, fine, coarse)
+            trainer = backend.refit(task, trainer, fine, OF_SIZE, coarse)
         fits.append(Fit(*trainer.finish(coarse), dict(trainer.gains)))
         rows, = judge_person([Candidate(fits[-1].gaussians, poses, task.choosing, task.filmed)])
         scores.append(SizeScore(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
@@ -68,7 +69,8 @@ def search(task: Task, backend: Backend) -> Fit:
                             "poses moved to the images, and as sharp; size_optimism: by how many dB these frames flatter the "
                             "choice, since it was made by them; other heldout_frames do not",
                "size_frames": task.choosing.tolist(), "size_optimism": optimism(scores)}
-    return replace(fits[scores.index(best)], figures=figures)
+    taken = scores.index(best)
+    return replace(fits[taken], figures=figures, smaller=[fit.gaussians for fit in fits[taken + 1:]])
 
 
 def list_sizes(largest: int) -> list[int]:

@@ -58,8 +58,8 @@ class StepGradients(NamedTuple):
 class Trainer:
     """Gaussians with Adam's state, and one step of the optimisation."""
 
-    def __init__(self, gaussians: Gaussians, task: Task, frozen_body: bool = False, halvings: int = 0):
-        """frozen_body: the surface and the poses stay where they are; halvings: of the images, to the size that it is drawn at."""
+    def __init__(self, gaussians: Gaussians, task: Task, frozen_body: bool = False, scale: float = 1.0):
+        """frozen_body: the surface and the poses stay where they are; scale: size that it is drawn at, of the images'."""
         self.config, self.poses = task.config, task.poses
         self.rest = task.poses.rest(int(task.trained[0]))[0]
         self.frozen_body, self.pose_rate = frozen_body, task.config.pose_rate
@@ -73,7 +73,7 @@ class Trainer:
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)
         self.start, self.largest = self.values["mu"].copy(), longest_axis(task.config, len(self.face))
-        self.least = shortest_axis(task, halvings)
+        self.least = shortest_axis(task, scale)
         self.face_scale = face_frames(self.rest, self.faces).k[self.face].astype(np.float64)
         self.gains: dict[int, np.ndarray] = {}
         self.seen: np.ndarray | None = None

@@ -36,7 +36,7 @@ run(Job({port: Path(path) for port, path in inputs.items()}, Path(out), make_con
 """
 
 
-FEW = {"config.SIZES": (2000, 2000), "fast.size_search.SHARES": (1, 0.5), "fast.refit.SHARE": 0.4}
+FEW = {"config.SIZES": (2000, 2000), "fast.size_search.SHARES": (1, 0.5)}
 GROWS_SOON = {"paper.densify.FIRST": 1, "paper.densify.EVERY": 4, "paper.densify.PHASE": 2}
 
 

@@ -51,7 +51,7 @@ def test_text_that_is_not_auto_is_refused():
         make_config(STAGE, {"gaussians": "many"})
 
 
-def test_a_size_is_the_mean_of_its_last_steps(monkeypatch):
+def test_a_size_is_the_mean_of_its_last_steps():
     config, places = make_config(STAGE, {"steps": 100}), []
 
     class Steps:
@@ -61,9 +61,8 @@ def test_a_size_is_the_mean_of_its_last_steps(monkeypatch):
             self.values = {"mu": self.values["mu"] + np.float32(number)}
             places.append(self.values["mu"])
 
-    monkeypatch.setattr(refit, "SHARE", 0.4)
-    monkeypatch.setattr("gsac.stages.train.fast.cpu.AVERAGED", 0.1)
-    refitted = Cpu().refit(SimpleNamespace(config=config, trained=np.arange(3)), Steps(), dict.fromkeys(range(3)))
+    refitted = Cpu().refit(SimpleNamespace(config=config, trained=np.arange(3)), Steps(), dict.fromkeys(range(3)),
+                            refit.Pace(share=0.4, begin=0.15, averaged=0.1, widened=3.0))
     assert len(places) == 40
     np.testing.assert_allclose(refitted.values["mu"], np.mean(places[-4:], 0))
 
@@ -90,7 +89,7 @@ def test_sizes_are_judged_as_they_are_handed_out(job_anywhere, monkeypatch):
 @pytest.mark.slow
 def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywhere, monkeypatch):
     monkeypatch.setattr(size_search, "list_sizes", lambda largest: (1200, 600, 60, 30))
-    monkeypatch.setattr(refit, "SHARE", 0.13)
+    monkeypatch.setattr(size_search, "OF_SIZE", refit.OF_SIZE._replace(share=0.13))
     made = job_anywhere(gaussians="auto", pose_test_steps=0)
     run(made)
     figures = json.loads((made.out / "metrics.json").read_text())
