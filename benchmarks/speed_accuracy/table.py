@@ -6,6 +6,7 @@ import csv
 import typing
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -82,9 +83,10 @@ def read_csv(path: Path) -> list[Trial]:
     if not rows or (missing := {*SHEET, *CURVE} - set(rows[0])):
         raise BadInput(f"{path}: " + (f"there is no column {', '.join(sorted(missing))}" if rows else "there is no row")
                        + "; give the speed_accuracy.csv of another `gsac bench speed-accuracy`")
-    hints, out = typing.get_type_hints(Trial), {}
+    hints = typing.get_type_hints(Trial)
+    out: dict[tuple, Trial] = {}
     for row in rows:
-        values = {name: _typed(row[name], hints[name]) for name in SHEET}
+        values: dict[str, Any] = {name: _typed(row[name], hints[name]) for name in SHEET}
         trial = out.setdefault(tuple(values[name] for name in ("clip", "device", "way", "seed")), Trial(**values))
         trial.curve.append((float(row[CURVE[0]]), float(row[CURVE[1]])))
     return list(out.values())

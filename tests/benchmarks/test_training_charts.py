@@ -98,7 +98,7 @@ def test_charts_and_csv_are_written(tmp_path):
     for path in chart.draw([FAST, PAPER, on_gpu], tmp_path) + size_chart.draw({"a": rungs}, {"a": [(400, 24.0)]}, tmp_path):
         assert path.stat().st_size > 5000
     words = (tmp_path / "speed_accuracy.svg").read_text()
-    assert all(f"{point.system}: " in words for point in POINTS) and "another protocol" in words
+    assert all(point.system in words for point in POINTS) and "another protocol" in words
 
 
 def test_ends_are_compared_in_novel_poses_where_both_were_judged_there():
