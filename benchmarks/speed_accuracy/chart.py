@@ -75,8 +75,8 @@ def _draw_published(axes: plt.Axes) -> None:
         axes.annotate(point.system, (point.seconds, point.psnr), xytext=(0, 6), textcoords="offset points", fontsize=6,
                       color="0.35", ha="center")
     axes.annotate("hollow: published by others, seconds of training alone, another protocol:\n"
-                  "PSNR of whole white frames of 540 px on PeopleSnapshot\n(ExAvatar: NeuMan; JOintGS: NeuMan, tight boxes)", (0.02, 0.985), xycoords="axes fraction",
-                  fontsize=7, color="0.35", va="top")
+                  "PSNR of whole white frames of 540 px on PeopleSnapshot\n(ExAvatar: NeuMan; JOintGS: NeuMan, tight boxes)",
+                  (0.02, 0.985), xycoords="axes fraction", fontsize=7, color="0.35", va="top")
     axes.set(xlim=(15, 1e6), ylim=(axes.get_ylim()[0], axes.get_ylim()[1] + 3))
 
 
