@@ -8,16 +8,21 @@ import multiprocessing
 import os
 import resource
 import shutil
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+import numpy as np
+
 from gsac.benchmarks.clip_runs import render_clip, run_clip
 from gsac.cache.store import Store
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.rows import read_json, rows_of
+from gsac.pipeline.run_folder import RUN
 from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, Job, make_config
 from gsac.stages.train import STAGE
@@ -33,6 +38,8 @@ class Case:
     """Port of `train` -> file or folder."""
     novel: Path | None = None
     """Folder of a truth clip of the same person in other poses."""
+    before: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    """(2,) CPU and wall seconds of the stages before training, when they ran."""
 
 
 def declare(parser: argparse.ArgumentParser, name: str) -> None:
@@ -46,20 +53,22 @@ def declare(parser: argparse.ArgumentParser, name: str) -> None:
     parser.add_argument("--out", type=Path, default=Path(f"bench-{name}"), metavar="DIR", help=f"default: ./bench-{name}")
 
 
-def prepare_cases(options: argparse.Namespace, say: PlainReporter, novel: int = 0, exact: bool = False) -> list[Case]:
+def prepare_cases(options: argparse.Namespace, say: PlainReporter, novel: int = 0, exact: bool = False, variant: str = "",
+                  settings: tuple[str, ...] = ()) -> list[Case]:
     """The clips of the options, rendered and fitted unless they are kept.
 
-    novel: frames in novel poses to render of each person; exact: adds each rendered clip with its true poses, `NAME_exact`.
+    novel: frames in novel poses to render of each person; exact: adds each rendered clip with its true poses, `NAME_exact`;
+    variant, settings: of `fit_clip`, for rendered clips. A finished run is taken as it is.
     """
     seeds = options.seeds if options.seeds is not None else [] if options.run else [31]
     found = [read_run(folder) for folder in options.run]
     for seed in seeds:
         clip = render_clip(clip_folder(options.out, f"seed{seed}_{options.frames}"), say, seed=seed, frames=options.frames)
-        case = fit_clip(options.out, clip, "", say)
+        case = fit_clip(options.out, clip, variant if settings else "", say, settings)
         if novel:
             case.novel = render_clip(clip_folder(options.out, f"seed{seed}_novel_{novel}"), say, seed=seed, frames=novel,
                                      poses="novel")
-        found += [case, _with_truth(case, options.out)] if exact else [case]
+        found += [case, with_truth(case, clip, options.out)] if exact else [case]
     return found
 
 
@@ -69,7 +78,14 @@ def read_run(folder: Path) -> Case:
     for port, path in inputs.items():
         if not path.exists():
             raise BadInput(f"{folder}: there is no {port}; give the folder of a finished `gsac run`")
-    return Case(folder.name, inputs)
+    return Case(folder.name, inputs, before=seconds_before(folder))
+
+
+def seconds_before(folder: Path) -> np.ndarray:
+    """(2,) CPU and wall seconds of the stages of a run before training; a stage of the cache has those of when it ran."""
+    rows = rows_of(read_json(folder / RUN))
+    ahead = list(rows.values())[:list(rows).index(STAGE.name) if STAGE.name in rows else None]
+    return np.array([sum(row.get(name) or 0.0 for row in ahead) for name in ("cpu_seconds", "seconds")])
 
 
 def side_by_side(work: Callable, calls: list[tuple], jobs: int) -> list:
@@ -115,6 +131,25 @@ def _train(inputs: dict[str, Path], folder: Path, values: dict, cores: list[int]
     return timings, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
 
 
+def export(case: Case, folder: Path, cores: list[int] | None = None) -> np.ndarray:
+    """Exports a training's avatar into its folder `export`. Returns (2,) CPU and wall seconds. folder, cores: of `train`."""
+    (folder / "export").mkdir()
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(_export, (case.inputs["split/clip.json"], folder, cores))
+
+
+def _export(clip: Path, folder: Path, cores: list[int] | None) -> np.ndarray:
+    if cores:
+        os.sched_setaffinity(0, cores)
+    from gsac.stages.export import STAGE as EXPORT
+    from gsac.stages.export.stage import run
+
+    began = np.array([time.process_time(), time.perf_counter()])
+    run(Job({"split/clip.json": clip, "train/avatar.npz": folder / "avatar.npz", "train/body.npz": folder / "body.npz"},
+            folder / "export", make_config(EXPORT, {})))
+    return np.array([time.process_time(), time.perf_counter()]) - began
+
+
 def _find_networks(config: TrainConfig) -> dict[str, Path]:
     """Files of the optional networks that the user has brought."""
     from gsac.pipeline.model_store import ModelStore
@@ -123,16 +158,16 @@ def _find_networks(config: TrainConfig) -> dict[str, Path]:
     return models.need([name for name in config.wishes() if name in models.brought], print)
 
 
-def _with_truth(case: Case, out: Path) -> Case:
-    """The case with the true body in place of the fitted one."""
+def with_truth(case: Case, clip: Path, out: Path) -> Case:
+    """The case with the true body in place of the fitted one. clip: folder of the truth clip; out: for the body's file."""
     from gsac.avatar.body import Body
     from gsac.benchmarks.speed_accuracy.novel_poses import read_true_params
 
     name = f"{case.name}_exact"
     path = out / "runs" / name / "smplx" / "body.npz"
     path.parent.mkdir(parents=True, exist_ok=True)
-    read_true_params(clip_folder(out, case.name) / "truth.npz", Body.load().digest).write(path)
-    return Case(name, case.inputs | {"smplx/body.npz": path}, case.novel)
+    read_true_params(clip / "truth.npz", Body.load().digest).write(path)
+    return Case(name, case.inputs | {"smplx/body.npz": path}, case.novel, case.before)
 
 
 def clip_folder(out: Path, name: str) -> Path:
@@ -147,4 +182,4 @@ def fit_clip(out: Path, folder: Path, variant: str, say: PlainReporter, settings
     """
     name = f"{folder.name}_{variant}" if variant else folder.name
     run = run_clip(folder, out / "runs" / name, ("segment", "smplx"), Store.open(say=say.note), say, settings)
-    return Case(name, {port: run.path(port) for port in STAGE.inputs})
+    return Case(name, {port: run.path(port) for port in STAGE.inputs}, before=seconds_before(run.root))

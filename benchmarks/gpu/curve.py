@@ -1,8 +1,8 @@
 """python -m gsac.benchmarks.gpu.curve --run DIR: held-out quality against seconds on the GPU, both recipes, one process each.
 
-Writes curve.csv, a row for each checkpoint, which `gsac bench speed-accuracy --gpu-curve FILE` draws beside the CPU's curves, and
-curve.json, the summary with the device's name. GPU seconds run from the first step's kernels to the last's, waits included; wall
-seconds are those of the whole fit: first colours, upload, steps, read back. Judging is in neither.
+Writes curve.csv, a row for each checkpoint, and curve.json, the summary with the device's name. GPU seconds run from the first
+step's kernels to the last's, waits included; wall seconds are those of the whole fit: first colours, upload, steps, read back.
+Judging is in neither.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import csv
 import json
 import multiprocessing
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,20 +26,6 @@ CHECKPOINTS = 40
 TORCH = "torch + gsplat"
 """Device name of the baseline's curves."""
 COLUMNS = ("clip", "recipe", "device", "steps", "seed", "n_gaussians", "gpu_seconds", "wall_seconds", "psnr_fg")
-
-
-@dataclass
-class Curve:
-    """Quality of one training over its time on the GPU."""
-
-    clip: str
-    recipe: str
-    device: str
-    """`cuda`, or `TORCH`."""
-    steps: int
-    n_gaussians: int
-    points: list[tuple[float, float]]
-    """Seconds on the GPU and held-out psnr_fg, dB."""
 
 
 def main() -> None:
@@ -110,22 +95,6 @@ def write(rows: list[tuple], path: Path) -> None:
     """Writes curve.csv."""
     with open(path, "w", newline="") as f:
         csv.writer(f).writerows([COLUMNS, *rows])
-
-
-def read(path: Path) -> list[Curve]:
-    """Reads curve.csv. Raises BadInput with the names of missing columns."""
-    with open(path, newline="") as f:
-        rows = list(csv.DictReader(f))
-    if not rows or (missing := set(COLUMNS) - set(rows[0])):
-        raise BadInput(f"{path}: " + (f"there is no column {', '.join(sorted(missing))}" if rows else "there is no row")
-                       + "; give the curve.csv of `python -m gsac.benchmarks.gpu.curve`")
-    out: dict[tuple, Curve] = {}
-    for row in rows:
-        key = tuple(row[name] for name in ("clip", "recipe", "device", "steps", "seed"))
-        curve = out.setdefault(key, Curve(*key[:3], int(row["steps"]), 0, []))
-        curve.n_gaussians = int(row["n_gaussians"])
-        curve.points.append((float(row["gpu_seconds"]), float(row["psnr_fg"])))
-    return list(out.values())
 
 
 def device_name() -> str:

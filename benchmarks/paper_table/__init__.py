@@ -1,1 +1,1 @@
-"""The paper's table: no hand fill, the paper's fill and ours, on clips in which a hand is hidden."""
+"""The paper's table: poses given, detections left alone, the paper's fill and ours, on clips in which a hand is hidden."""

@@ -1,6 +1,8 @@
-"""gsac bench speed-accuracy: held-out quality against CPU seconds of training, in one run on the same clips and frames.
+"""gsac bench speed-accuracy: held-out quality against the seconds from clip to avatar, presets and the paper's recipe side by side.
 
-A curve's seconds are CPU seconds of all threads, with loading of compiled kernels, without judging.
+The seconds are of all stages from split to export; judging is left out. On the CPU they are of all threads; where training runs on
+a GPU they are by the clock, and only of trainings that had it alone. A stage before training that comes from the cache has the
+seconds of when it ran.
 """
 
 from __future__ import annotations
@@ -10,63 +12,83 @@ import sys
 from pathlib import Path
 
 from gsac.benchmarks import training
-from gsac.benchmarks.speed_accuracy.trial import Trial
+from gsac.benchmarks.speed_accuracy.trial import PAPER, Trial
+from gsac.pipeline.quality import QUALITIES, STANDARD
 from gsac.pipeline.reporter import PlainReporter
 
-CURVE = 16
-"""Checkpoints of a curve."""
+CURVE = 6
+"""Judged checkpoints of a training with the first seed."""
 
 
 def parser() -> argparse.ArgumentParser:
     out = argparse.ArgumentParser(prog="gsac bench speed-accuracy", description=__doc__.splitlines()[0])
     training.declare(out, "speed-accuracy")
-    out.add_argument("--recipes", nargs="+", default=["fast", "paper"], choices=["fast", "paper"])
-    out.add_argument("--budgets", type=int, nargs="+", default=[400, 1600, 3200], metavar="STEPS",
-                     help="steps of recipe fast, one training each (default: 400 1600 3200)")
-    out.add_argument("--paper-steps", type=int, default=3000, metavar="STEPS", help="steps of recipe paper (default: 3000)")
-    out.add_argument("--repeats", type=int, default=1, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 1)")
+    out.add_argument("--ways", nargs="+", default=[*QUALITIES, PAPER], choices=[*QUALITIES, PAPER],
+                     help="presets of --quality, or recipe paper (default: all)")
+    out.add_argument("--device", default="cpu", choices=["cpu", "cuda"], help="where training runs (default: cpu)")
+    out.add_argument("--repeats", type=int, default=3, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 3)")
     out.add_argument("--jobs", type=int, default=1, metavar="N",
                      help="trainings side by side, each on its share of the cores (default: 1)")
     out.add_argument("--novel", type=int, default=0, metavar="FRAMES",
                      help="also judge this many frames in novel poses against truth; rendered clips only (default: 0)")
     out.add_argument("--exact", action="store_true", help="also train rendered clips with their true poses")
-    out.add_argument("--gpu-curve", type=Path, metavar="CSV",
-                     help="curve.csv of `python -m gsac.benchmarks.gpu.curve`, drawn beside the CPU's curves of the same clips")
+    out.add_argument("--beside", type=Path, action="append", default=[], metavar="CSV",
+                     help="speed_accuracy.csv of another device or machine, told and drawn with these; may be repeated")
     return out
 
 
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
-    from gsac.benchmarks.gpu import curve
     from gsac.benchmarks.speed_accuracy import chart, table
 
     say = PlainReporter(sys.stderr)
-    on_gpu = curve.read(options.gpu_curve) if options.gpu_curve else []
     options.out.mkdir(parents=True, exist_ok=True)
-    trials = measure(training.prepare_cases(options, say, options.novel, options.exact), options, say)
-    words = table.text(trials)
+    beside = [trial for path in options.beside for trial in table.read_csv(path)]
+    trials = measure(options, say)
+    table.write_csv(trials, options.out / "speed_accuracy.csv")
+    words = table.text(trials + beside)
     print(words)
     (options.out / "speed_accuracy.txt").write_text(words + "\n")
-    table.write_csv(trials, options.out / "speed_accuracy.csv")
-    chart.draw(trials, options.out, on_gpu)
+    chart.draw(trials + beside, options.out)
     return 0
 
 
-def measure(cases: list[training.Case], options: argparse.Namespace, say: PlainReporter) -> list[Trial]:
-    """Runs all trainings of the cases. Long ones start first, so that jobs side by side end together."""
-    from gsac.benchmarks.speed_accuracy import novel_poses
+def measure(options: argparse.Namespace, say: PlainReporter) -> list[Trial]:
+    """Runs all trainings of the clips. What is finished is in speed_accuracy.csv, should the rest be stopped."""
+    from gsac.benchmarks.speed_accuracy import novel_poses, table
     from gsac.benchmarks.speed_accuracy.trial import make_trial
 
-    def one(case: training.Case, recipe: str, steps: int, seed: int, cores: list[int] | None) -> Trial:
-        folder = options.out / "trainings" / f"{case.name}_{recipe}{steps}_{seed}"
-        metrics = training.train(case, folder, cores, recipe=recipe, steps=steps, seed=seed, height=options.height, curve=CURVE,
+    cases = {way: training.prepare_cases(options, say, options.novel, options.exact, way, settings_before(way, options.device))
+             for way in dict.fromkeys(STANDARD if way == PAPER else way for way in options.ways)}
+    trials: list[Trial] = []
+
+    def one(case: training.Case, clip: str, way: str, seed: int, cores: list[int] | None) -> None:
+        folder = options.out / "trainings" / f"{clip}_{way}_{options.device}_{seed}"
+        values = train_values(way, options.device) | ({"height": options.height} if options.height else {})
+        metrics = training.train(case, folder, cores, **values, device=options.device, seed=seed, curve=0 if seed else CURVE,
                                  flip=True)
         if case.novel:
             metrics |= novel_poses.judge_poses(folder, case.novel, folder / "novel")
-        say.note(f"{folder.name}: {metrics['psnr_fg']:.2f} dB after {metrics['cpu_seconds']:.1f} CPU s")
-        return make_trial(case.name, metrics)
+        trial = make_trial(clip, way, metrics, case.before, training.export(case, folder, cores))
+        if options.jobs > 1:
+            trial.wall_s = None
+        say.note(f"{folder.name}: {trial.psnr_fg:.2f} dB after {trial.cpu_s:.1f} CPU s")
+        trials.append(trial)
+        table.write_csv(trials, options.out / "speed_accuracy.csv")
 
-    calls = [(case, recipe, steps, seed) for recipe in sorted(options.recipes, reverse=True) for case in cases
-             for steps in (options.budgets if recipe == "fast" else [options.paper_steps]) for seed in range(options.repeats)]
-    trials = training.side_by_side(one, calls, options.jobs)
-    return sorted(trials, key=lambda t: [c.name for c in cases].index(t.clip))
+    calls = [(case, plain.name, way, seed) for seed in range(options.repeats) for way in options.ways
+             for case, plain in zip(cases[STANDARD if way == PAPER else way], next(iter(cases.values())), strict=True)]
+    training.side_by_side(one, calls, options.jobs)
+    names = [(clip, way) for way in options.ways for _, clip, its, _ in calls if its == way]
+    return sorted(trials, key=lambda t: (names.index((t.clip, t.way)), t.seed))
+
+
+def train_values(way: str, device: str) -> dict:
+    """Parameters of `train` that a way sets."""
+    return {"recipe": PAPER} if way == PAPER else dict(QUALITIES[way].on(device).get("train", {}))
+
+
+def settings_before(way: str, device: str) -> tuple[str, ...]:
+    """`stage.key=value` of what a preset sets for the stages before training."""
+    return tuple(f"{stage}.{key}={value}" for stage, values in QUALITIES[way].on(device).items() if stage != "train"
+                 for key, value in values.items())

@@ -1,56 +1,88 @@
-"""The chart: quality against seconds, one panel a clip."""
+"""The chart: quality against seconds from clip to avatar, CPU and GPU side by side, published points of others hollow."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 
-from gsac.benchmarks.gpu.curve import TORCH, Curve
-from gsac.benchmarks.speed_accuracy.trial import Trial, pareto_front
+from gsac.benchmarks.speed_accuracy.published import POINTS
+from gsac.benchmarks.speed_accuracy.table import groups
+from gsac.benchmarks.speed_accuracy.trial import Trial
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-COLOURS = {"fast": "#0b6e4f", "paper": "#b5532a"}
-GPU_LINES = {"cuda": "--", TORCH: ":"}
+COLOURS = ("#0b6e4f", "#b5532a", "#33508a", "#8a6d33", "#6a3d7a")
+MARKERS = {"draft": "^", "standard": "o", "fine": "s", "paper": "X"}
+QUALITIES = {"psnr_fg": "held-out PSNR on the person, as filmed, dB", "flip": "FLIP, held out, as filmed (less is better)"}
+TICKS = (20, 50, 100, 200, 500, 1000, 3000, 10_000, 50_000)
+FEW_TICKS = (25, 30, 35, 40, 60, 80)
+SECONDS = {"cpu": "CPU seconds of all threads, clip to avatar", "cuda": "seconds by the clock, clip to avatar; training on a GPU"}
 
 
-def draw(trials: list[Trial], folder: Path, on_gpu: Sequence[Curve] = ()) -> list[Path]:
+def draw(trials: list[Trial], folder: Path) -> list[Path]:
     """Writes speed_accuracy.png and speed_accuracy.svg and returns their paths.
 
-    A line is a training, its dot the end; grey steps are the Pareto front of the clip on the CPU. on_gpu: drawn dashed (torch
-    dotted) over seconds on the GPU.
+    A point is a way's mean over its seeds with their standard deviation; thin lines are trainings on their way there. The published
+    points stand by their own protocols, in the panel of PSNR on a GPU.
     """
-    clips = list(dict.fromkeys(t.clip for t in [*trials, *on_gpu]))
-    figure, panels = plt.subplots(1, len(clips), figsize=(5.4 * len(clips), 4.4), layout="constrained", squeeze=False)
-    for axes, clip in zip(panels[0], clips, strict=True):
-        own = [t for t in trials if t.clip == clip]
-        if best := pareto_front([p for t in own for p in t.curve]):
-            axes.step(*zip(*best, strict=True), where="post", color="0.75", lw=5, alpha=0.6, zorder=0, label="Pareto line, CPU")
-        named = set()
-        for t in own:
-            colour, kind = COLOURS[t.recipe], (t.recipe, t.steps)
-            label = None if kind in named else f"{t.recipe}, {t.steps} steps, {t.n_gaussians} gaussians"
-            named.add(kind)
-            axes.plot(*zip(*t.curve, strict=True), color=colour, lw=1.4, alpha=0.8, label=label)
-            axes.plot(*t.curve[-1], "o", color=colour, ms=6)
-            axes.annotate(f"{t.psnr_fg:.1f}", t.curve[-1], xytext=(5, 5), textcoords="offset points", fontsize=7, color=colour)
-        for c in (c for c in on_gpu if c.clip == clip):
-            axes.plot(*zip(*c.points, strict=True), GPU_LINES[c.device], color=COLOURS[c.recipe], lw=1.4,
-                      label=f"{c.recipe}, {c.steps} steps, {'GPU' if c.device == 'cuda' else c.device}, {c.n_gaussians} gaussians")
-            axes.plot(*c.points[-1], "D", color=COLOURS[c.recipe], ms=5)
-            axes.annotate(f"{c.points[-1][1]:.1f}", c.points[-1], xytext=(5, 5), textcoords="offset points", fontsize=7,
-                          color=COLOURS[c.recipe])
-        seconds = "seconds of training: of all CPU threads, or of the GPU (dashed)" if on_gpu else "CPU seconds of training"
-        axes.set(xscale="log", xlabel=seconds, ylabel="held-out PSNR on the person, dB", title=clip)
-        axes.xaxis.set_major_formatter("{x:g}")
-        axes.grid(alpha=0.25, which="both", lw=0.5)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(fontsize=7, frameon=False, loc="lower right")
+    devices = [device for device in SECONDS if any(t.device == device for t in trials)]
+    figure, panels = plt.subplots(len(QUALITIES), len(devices), figsize=(6.4 * len(devices), 8.6), layout="constrained",
+                                  squeeze=False)
+    colours = dict(zip(dict.fromkeys(t.clip for t in trials), COLOURS * len(trials), strict=False))
+    for column, device in enumerate(devices):
+        for row, (name, words) in enumerate(QUALITIES.items()):
+            axes = panels[row, column]
+            axes.set_xscale("log")
+            for (clip, _, way), some in groups([t for t in trials if t.device == device]).items():
+                _draw_way(axes, some, name, colours[clip], MARKERS[way])
+            if name == "psnr_fg":
+                for t in (t for t in trials if t.device == device and len(t.curve) > 1):
+                    axes.plot(*zip(*t.curve, strict=True), color=colours[t.clip], lw=0.8, alpha=0.5)
+                axes.set_title(f"training on {'a GPU' if device == 'cuda' else 'the CPU'}")
+                if device == devices[-1]:
+                    _draw_published(axes)
+            axes.set_ylabel(words)
+            low, high = axes.get_xlim()
+            ticks = [x for x in (TICKS if high > 3 * low else FEW_TICKS) if low <= x <= high]
+            axes.set_xticks(ticks, [f"{x:,}" for x in ticks])
+            axes.minorticks_off()
+            axes.grid(alpha=0.25, which="both", lw=0.5)
+            axes.spines[["top", "right"]].set_visible(False)
+        panels[-1, column].set_xlabel(SECONDS[device])
+    _draw_legend(panels[-1, 0], colours, list(dict.fromkeys(t.way for t in trials)))
     paths = [folder / "speed_accuracy.png", folder / "speed_accuracy.svg"]
     for path in paths:
-        figure.savefig(path, dpi=160)
+        figure.savefig(path, dpi=110)
     plt.close(figure)
     return paths
+
+
+def _draw_way(axes: plt.Axes, some: list[Trial], name: str, colour: str, marker: str) -> None:
+    """The mean of one way's seeds, with bars of a standard deviation in seconds and quality."""
+    times, values = ([x for x in found if x is not None] for found in ([t.seconds for t in some], [getattr(t, name) for t in some]))
+    if times and values:
+        spread = [np.std(found, ddof=1) if len(found) > 1 else 0.0 for found in (times, values)]
+        axes.errorbar(np.mean(times), np.mean(values), spread[1], spread[0], fmt=marker, color=colour, ms=7, capsize=3, lw=1)
+
+
+def _draw_published(axes: plt.Axes) -> None:
+    """Hollow markers of other systems, and what sets them apart."""
+    for point in POINTS:
+        axes.plot(point.seconds, point.psnr, "D", mfc="none", color="0.45", ms=6)
+        axes.annotate(point.system, (point.seconds, point.psnr), xytext=(0, 6), textcoords="offset points", fontsize=6,
+                      color="0.35", ha="center")
+    axes.annotate("hollow: published by others, seconds of training alone, another protocol:\n"
+                  "PSNR of whole white frames of 540 px on PeopleSnapshot\n(ExAvatar: NeuMan; JOintGS: NeuMan, tight boxes)",
+                  (0.02, 0.985), xycoords="axes fraction", fontsize=7, color="0.35", va="top")
+    axes.set(xlim=(15, 1e6), ylim=(axes.get_ylim()[0], axes.get_ylim()[1] + 3))
+
+
+def _draw_legend(axes: plt.Axes, colours: dict[str, str], ways: list[str]) -> None:
+    """Colours are clips, markers are ways."""
+    marks = [plt.Line2D([], [], color=colour, lw=3, label=clip) for clip, colour in colours.items()]
+    marks += [plt.Line2D([], [], color="0.3", marker=MARKERS[way], lw=0, label=way if way != "paper" else "recipe paper")
+              for way in ways]
+    axes.legend(handles=marks, fontsize=7, frameon=False, ncols=2)

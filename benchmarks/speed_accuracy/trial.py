@@ -1,36 +1,40 @@
-"""One training as a curve of quality over seconds, and measures of curves."""
+"""One way from a clip to an avatar: what it took and how good it became."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from gsac.stages.contract import BadInput
 
-WORST_S, WORST_DB = 3600.0, 20.0
-"""Reference point of the hypervolume: seconds and dB."""
-NOVEL = ("flip", "psnr_novel", "psnr_novel_aligned", "flip_novel", "flip_novel_aligned", "stray_alpha", "needle_share")
+NOVEL = ("psnr_novel", "psnr_novel_aligned", "flip_novel", "flip_novel_aligned", "stray_alpha", "needle_share")
 """Optional metrics of a training."""
+PAPER = "paper"
+"""The way that trains by recipe paper; the others are presets of `--quality`."""
 
 
 @dataclass
 class Trial:
-    """One training: its curve and the metrics of its end."""
+    """One run of a clip in one way: seconds from clip to avatar, judging left out, and the metrics of its end."""
 
     clip: str
-    recipe: str
-    steps: int
+    way: str
+    """Preset of `--quality`, or `PAPER`."""
+    device: str
+    """`cpu`, or `cuda`."""
     seed: int
-    curve: list[tuple[float, float]]
-    """CPU seconds so far and held-out psnr_fg, dB."""
+    steps: int
     cpu_s: float
+    wall_s: float | None
+    """None: others ran beside."""
     psnr_fg: float
     psnr_fg_ttpo: float | None
+    flip: float | None
     ssim: float
     detail: float
     n_gaussians: int
     peak_gb: float
-    flip: float | None = None
     psnr_novel: float | None = None
     """In novel poses, if their truth was rendered. `_aligned`: each pose aligned with its image first."""
     psnr_novel_aligned: float | None = None
@@ -38,35 +42,29 @@ class Trial:
     flip_novel_aligned: float | None = None
     stray_alpha: float | None = None
     needle_share: float | None = None
+    curve: list[tuple[float, float]] = field(default_factory=list)
+    """Seconds so far (`seconds`) and held-out psnr_fg, dB; the last point is the end of training, before the export."""
+
+    @property
+    def seconds(self) -> float | None:
+        """From clip to avatar: of all CPU threads, or, where training runs on a GPU, by the clock, if known."""
+        return self.cpu_s if self.device == "cpu" else self.wall_s
 
 
-def make_trial(clip: str, metrics: dict) -> Trial:
-    """metrics: of `benchmarks.training.train`. Raises BadInput if no frame was held out."""
-    curve = [(row["cpu_seconds"], row["psnr_fg"]) for row in metrics["curve"] if "psnr_fg" in row]
-    if not curve or metrics["psnr_fg"] is None:
+def make_trial(clip: str, way: str, metrics: dict, before: np.ndarray, after: np.ndarray) -> Trial:
+    """metrics: of `benchmarks.training.train`; before, after: (2,) CPU and wall seconds of the stages before training and of the
+    export. Raises BadInput if no frame was held out."""
+    if metrics["psnr_fg"] is None:
         raise BadInput(f"{clip}: no frame is held out, there is nothing to compare by")
-    curve.append((metrics["cpu_seconds"], metrics["psnr_fg"]))
-    return Trial(clip, metrics["recipe"], metrics["steps"], metrics["seed"], curve, metrics["cpu_seconds"], metrics["psnr_fg"],
-                 metrics["psnr_fg_ttpo"], metrics["ssim"], metrics["detail"], metrics["n_gaussians"], metrics["peak_gb"],
-                 **{name: metrics.get(name) for name in NOVEL})
+    clock = 0 if metrics["device"] == "cpu" else 1
+    name = ("cpu_seconds", "seconds")[clock]
+    curve = [(before[clock] + row[name], row["psnr_fg"]) for row in [*metrics["curve"], metrics] if "psnr_fg" in row]
+    cpu_s, wall_s = before + (metrics["cpu_seconds"], metrics["seconds"]) + after
+    return Trial(clip, way, metrics["device"], metrics["seed"], metrics["steps"], cpu_s, wall_s, metrics["psnr_fg"],
+                 metrics["psnr_fg_ttpo"], metrics["flip"], metrics["ssim"], metrics["detail"], metrics["n_gaussians"],
+                 metrics["peak_gb"], **{name: metrics.get(name) for name in NOVEL}, curve=curve)
 
 
 def seconds_to(trial: Trial, quality: float) -> float | None:
-    """CPU seconds of the first checkpoint that reaches the quality, dB; None if none does."""
+    """Seconds of the first point of the curve that reaches the quality, dB; None if none does."""
     return next((s for s, q in trial.curve if q >= quality), None)
-
-
-def pareto_front(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Points (seconds, dB) that no other beats in both, sorted by seconds."""
-    out: list[tuple[float, float]] = []
-    for s, q in sorted(points, key=lambda p: (p[0], -p[1])):
-        if not out or q > out[-1][1]:
-            out.append((s, q))
-    return out
-
-
-def hypervolume(points: list[tuple[float, float]]) -> float:
-    """Area between the Pareto front and (`WORST_S`, `WORST_DB`), in decades times dB."""
-    line = [p for p in pareto_front(points) if p[0] < WORST_S and p[1] > WORST_DB]
-    ends = [s for s, _ in line[1:]] + [WORST_S] if line else []
-    return sum((q - WORST_DB) * math.log10(end / s) for (s, q), end in zip(line, ends, strict=True))

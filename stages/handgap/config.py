@@ -7,7 +7,8 @@ from typing import Literal
 
 from gsac.stages.contract import BadInput
 
-Method = Literal["turning", "gp", "hermite", "paper", "paper-literal"]
+Method = Literal["turning", "gp", "hermite", "paper", "paper-literal", "none"]
+Rule = Literal["places", "paper"]
 
 
 @dataclass
@@ -15,7 +16,11 @@ class HandgapConfig:
     method: Method = "turning"
     """How the arm moves through a gap. turning: one Gaussian process of the arm's joint rotations in the frame of the turning body;
     gp: a Gaussian process of each segment in the image; hermite: a cubic with the speeds at both ends; paper: each segment turns at
-    a constant rate; paper-literal: the paper's equations exactly as printed."""
+    a constant rate; paper-literal: the paper's equations exactly as printed; none: no hand is taken for missing, and detections
+    stay as they are."""
+    rule: Rule = "places"
+    """Which hands are missing. places: those with low scores, and those detected in a wrong place; paper: those whose wrist and
+    palm both score below lost_score, with wrist and elbow."""
     seen_score: float = 0.5
     """Score from which on a lost hand counts as seen again."""
     lost_score: float = 0.3

@@ -19,7 +19,7 @@ METHODS: dict[Method, FillArm] = {
     "paper": partial(fill_by_segments, paper.interpolate),
     "paper-literal": partial(fill_by_segments, paper_literal.interpolate),
 }
-"""handgap.method -> the function that fills an arm."""
+"""handgap.method -> the function that fills an arm; `none` has no arm to fill."""
 
 
 def fill_gaps(xy: np.ndarray, score: np.ndarray, world: np.ndarray, found: MissingHands, times: np.ndarray, config: HandgapConfig,

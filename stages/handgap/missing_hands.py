@@ -78,6 +78,11 @@ def find_missing(xy: np.ndarray, score: np.ndarray, times: np.ndarray | None, co
     return MissingHands(hand, wrist, elbow, misplaced)
 
 
+def leave_all(frames: int) -> MissingHands:
+    """No hand is missing, nothing is wrong."""
+    return MissingHands(*np.zeros((4, frames, 2), bool))
+
+
 def torso_length(xy: np.ndarray, score: np.ndarray) -> np.ndarray:
     """xy: (T, 133, 2) px; score: (T, 133). Returns (T,) px: the frame's, but no less than the clip's upper quartile, as a bent
     torso looks short; inf, which no length exceeds, where shoulders and hips are never seen together."""

@@ -10,9 +10,12 @@ from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.handgap.fill import fill_gaps
-from gsac.stages.handgap.missing_hands import SIDES, MissingHands, find_missing, runs
+from gsac.stages.handgap.missing_hands import SIDES, MissingHands, find_missing, leave_all, runs
+from gsac.stages.handgap.paper_rule import find_missing_as_paper
 from gsac.stages.handgap.sigma import detection_sigma, person_height
 
+RULES = {"places": find_missing, "paper": find_missing_as_paper}
+"""handgap.rule -> the function that finds missing hands."""
 FILLED_SCORE = 0.5
 """Score of a filled point whose sigma is a detection's; it falls as sigma grows."""
 
@@ -29,7 +32,7 @@ def run(job: Job) -> None:
 
     score = np.where(np.isfinite(xy).all(axis=2), score, 0)
     xy = np.nan_to_num(xy)
-    found = find_missing(xy, score, times, job.config)
+    found = leave_all(len(xy)) if job.config.method == "none" else RULES[job.config.rule](xy, score, times, job.config)
     filled, drift = np.zeros(score.shape, bool), np.zeros(score.shape)
     if times is not None:
         with threadpool_limits(1, "blas"):  # small matrices: threads cost more than they give, ten times more on a busy machine

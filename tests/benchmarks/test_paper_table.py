@@ -3,7 +3,7 @@
 import pytest
 
 from gsac.benchmarks.paper_table import table
-from gsac.benchmarks.paper_table.bench import FILLS, parser
+from gsac.benchmarks.paper_table.bench import FILLS, GIVEN, parser
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 
@@ -32,6 +32,7 @@ def test_the_sheet_has_a_row_for_each_repeat(tmp_path):
 
 def test_every_way_to_fill_is_a_setting_that_the_stage_takes():
     configs = {name: resolve(Project.at_hand(), sets=settings, only="handgap")["handgap"] for name, settings in FILLS.items()}
-    assert configs["no fill"].max_gap_s == 0 and configs["paper's fill"].method == "paper"
-    assert configs["our fill"] == resolve(Project.at_hand(), only="handgap")["handgap"]
+    assert configs["detections as they are"].method == "none"
+    assert (configs["paper's fill"].method, configs["paper's fill"].rule) == ("paper", "paper"), "with its own rule"
+    assert configs["our fill"] == configs[GIVEN] == resolve(Project.at_hand(), only="handgap")["handgap"]
     assert parser().parse_args([]).repeats == 5

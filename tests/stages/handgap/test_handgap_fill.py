@@ -9,10 +9,11 @@ from gsac.avatar.wholebody import ARM, HANDS, PALM
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.handgap import STAGE
 from gsac.stages.handgap.arm_segments import turn_with_palm
-from gsac.stages.handgap.config import Method
+from gsac.stages.handgap.config import Method, Rule
 from gsac.stages.handgap.fill import METHODS, fill_gaps
 from gsac.stages.handgap.methods import gp, hermite, paper, paper_literal
 from gsac.stages.handgap.missing_hands import MissingHands
+from gsac.stages.handgap.stage import RULES
 
 SEGMENTWISE = {"paper": paper.interpolate, "hermite": hermite.interpolate, "gp": gp.interpolate}
 GOOD = ("turning", *SEGMENTWISE)
@@ -170,8 +171,16 @@ def test_seen_points_are_untouched(synthetic, tmp_path):
     assert np.isnan(out["world"][out["filled"]]).all() and not np.isnan(out["world"][kept]).any()
 
 
+def test_without_a_method_all_detections_stay_as_they_are(synthetic, tmp_path):
+    person = synthetic.put_on_other(synthetic.lose(synthetic.turning(), "left", 40, 50), "right", 60, 66)
+    out, warnings = synthetic.through_stage(person, tmp_path, method="none")
+    assert np.array_equal(out["xy"], person.xy.astype("f4")) and np.array_equal(out["score"], person.score.astype("f4"))
+    assert not out["missing"].any() and not out["filled"].any() and not warnings
+    assert np.array_equal(out["world"], person.world.astype("f4")), "nothing is taken for unseen"
+
+
 def test_every_named_method_exists_and_others_are_refused():
-    assert tuple(METHODS) == get_args(Method)
+    assert (*METHODS, "none") == get_args(Method) and tuple(RULES) == get_args(Rule)
     with pytest.raises(BadInput, match="handgap.method.*'spline'.*hermite"):
         make_config(STAGE, {"method": "spline"})
     with pytest.raises(BadInput, match="handgap.max_gap_s"):

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from gsac.avatar.wholebody import ARM
+
 LEFT, RIGHT = 0, 1
 
 
@@ -116,3 +118,13 @@ def test_photos_are_never_filled(synthetic, tmp_path):
     out, _ = synthetic.through_stage(person, tmp_path, photos=True)
     assert np.argwhere(out["missing"]).tolist() == [[2, LEFT], [4, RIGHT]]
     assert not out["filled"].any() and (out["score"][2, 91:112] == 0).all() and (out["score"][4, 112:133] == 0).all()
+
+
+def test_the_papers_rule_goes_by_the_scores_of_wrist_and_palm_and_fills_the_elbow_too(synthetic, tmp_path):
+    person = synthetic.lose(synthetic.turning(), "left", 20, 24)
+    synthetic.lose(person, "left", 40, 44, wrist=False)
+    synthetic.put_on_other(person, "right", 60, 66)
+    out, _ = synthetic.through_stage(person, tmp_path, method="paper", rule="paper")
+    assert np.flatnonzero(out["missing"][:, LEFT]).tolist() == [20, 21, 22, 23], "its wrist is seen from 40 on: not missing"
+    assert not out["missing"][:, RIGHT].any(), "a wrong place with a good score is believed"
+    assert out["filled"][20:24, ARM["left"][1]].all(), "the elbow, which was seen, is placed anew"
