@@ -54,7 +54,8 @@ class View:
 
     def scaled(self, scale: float) -> View:
         """The view at `scale` of its size, with corner (0, 0); as it is where that is not smaller."""
-        return self if scale >= 1 else self.resized(*(max(1, round(scale * side)) for side in (self.camera.width, self.camera.height)))
+        w, h = self.camera.width, self.camera.height
+        return self if scale >= 1 else self.resized(max(1, round(scale * w)), max(1, round(scale * h)))
 
     def reduced(self, height: int) -> View:
         """The view at a height, px, with corner (0, 0); as it is where it is not higher."""

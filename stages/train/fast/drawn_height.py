@@ -25,7 +25,7 @@ def find_drawn_height(level: Candidate, finer: Candidate) -> float:
     """
     lost = np.minimum.accumulate(measure_losses(level, finer))
     octaves = np.interp(LOSS, lost[::-1], np.arange(OCTAVES + 1.0)[::-1])
-    return float(round(typical_height(level.poses, level.views) / 2**octaves))
+    return float(round(typical_height(level.poses, _by_frame(level)) / 2**octaves))
 
 
 def typical_height(poses: Poses, views: Mapping[int, View]) -> float:
@@ -36,10 +36,14 @@ def typical_height(poses: Poses, views: Mapping[int, View]) -> float:
 
 def measure_losses(level: Candidate, finer: Candidate) -> np.ndarray:
     """(OCTAVES + 1,) dB by which `finer` shows the person better than `level`, in the views and in those halved ever again."""
-    views, candidates = level.views, []
+    views, candidates = _by_frame(level), []
     for _ in range(OCTAVES + 1):
         candidates += [level._replace(views=views), finer._replace(views=views)]
         views = {t: view.halved() for t, view in views.items()}
     errors = [sum(row["mse_fg"] * row["fg_pixels"] for row in rows if row["fg_pixels"]) for rows in judge_person(candidates)]
     of_level, of_finer = np.maximum(errors, 1e-12).reshape(-1, 2).T
     return 10 * np.log10(of_level / of_finer)
+
+
+def _by_frame(candidate: Candidate) -> dict[int, View]:
+    return {t: candidate.views[t] for t in candidate.frames}

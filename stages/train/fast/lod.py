@@ -110,6 +110,7 @@ def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views
     tall = typical_height(poses, views) if views else np.nan
     rows, candidates = [], []
     for level in levels:
+        assert level.max_height_px is not None  # as `fit_levels` makes them
         small = {t: view.scaled(level.max_height_px / tall) for t, view in views.items()}
         height = next((view.camera.height for view in small.values()), None)
         rows.append({"n_gaussians": len(level), "max_height_px": level.max_height_px, "image_height": height})
