@@ -20,9 +20,11 @@ from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, WRISTS, J
 from gsac.avatar.skinning import joint_transforms
 from gsac.avatar.zbuffer import visible_points
 from gsac.turntable.appearance import make_appearance
+from gsac.turntable.behaviour import behave
 from gsac.turntable.motion import Motion, make_motion
 from gsac.turntable.options import TurntableOptions
 from gsac.turntable.person import Person, make_person
+from gsac.turntable.pocket import cover_hands
 from gsac.turntable.render import SHADOW, Picture, Studio
 from gsac.turntable.room import make_lighting, make_room
 from gsac.turntable.viewpoint import Viewpoint, look_at
@@ -60,13 +62,14 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
         folder.mkdir(parents=True)
     person = make_person(options, np.random.default_rng([options.seed, 1]))
     motion = make_motion(person.body, person.joints, options, np.random.default_rng([options.seed, 2]))
+    behave(motion, person, options, np.random.default_rng([options.seed, 6]))
     studio = make_studio(person, options)
     params = place_person(person, motion, studio.view)
     truth = TruthRecorder(person, motion, params, studio.view)
     video = VideoWriter(out / "clip.mp4", options) if turn else None
     try:
         for t in range(options.frames):
-            bare, drawn, joints = pose_person(person, params, t)
+            bare, drawn, joints = pose_person(person, params, t, motion.covered[t])
             picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
             frame = develop(picture, options, t, noise=turn)
             write_image(out / "mask" / f"{t:06d}.png", picture.mask)
@@ -124,11 +127,14 @@ def place_person(person: Person, motion: Motion, view: Viewpoint) -> BodyParams:
                                 person.joint_offset, person.body.digest)
 
 
-def pose_person(person: Person, params: BodyParams, t: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bare body (V, 3), drawn mesh (N, 3) and joints (55, 3) of frame t, m, camera frame."""
+def pose_person(person: Person, params: BodyParams, t: int,
+                covered: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bare body (V, 3), drawn mesh (N, 3) and joints (55, 3) of frame t, m, camera frame. covered: (2,) bool, hands in pockets."""
     transforms = joint_transforms(params.pose[t][None], person.joints, person.body.parents)[0]
     bare, drawn = person.pose(transforms, params.expression[t])
     joints = np.einsum("jab,jb->ja", transforms[..., :3], person.joints) + transforms[..., 3]
+    if covered is not None and covered.any():
+        drawn = cover_hands(person, bare, drawn, joints, covered)
     return bare + params.transl[t], drawn + params.transl[t], joints + params.transl[t]
 
 
