@@ -16,7 +16,7 @@ RAISED = 0.10
 """m off the body at which a hand passes on its way."""
 COVERED = 0.9
 """Share of the way from which on a hand that goes into a pocket is under the cloth."""
-POCKET = Goal("hip", (0.085, -0.105, 0.065), (-0.1, -0.97, 0.12), (-0.8, 0, -0.6), (0.10, -0.26, -0.09), 0.06, under=True)
+POCKET = Goal("hip", (0.080, -0.115, 0.062), (-0.1, -0.97, 0.12), (-0.8, 0, -0.6), (0.10, -0.26, -0.09), 0.06, under=True)
 HIP = Goal("hip", (0.115, 0.06, 0.075), (-0.15, -0.45, 0.85), (-0.93, -0.1, -0.3), (0.22, -0.20, -0.10), 0.2)
 HAIR = Goal("head", (0.045, 0.165, -0.03), (-0.45, 0.25, -0.85), (-0.25, -0.9, -0.1), (0.22, 0.17, 0.06), 0.25, under=True)
 INNER = Goal("spine2", (-0.145, 0.03, 0.20), (-0.95, 0.1, -0.25), (0, -0.1, -1), (0.10, -0.25, 0.09), 0.15)

@@ -75,6 +75,8 @@ class TurntableOptions:
     """Samples a pixel along each axis."""
     vertices: bool = True
     """Whether truth.npz holds the bare body's vertices (0.16 MB a frame)."""
+    drawn: bool = False
+    """Whether truth.npz holds the surface with clothes, hair and what is held, too."""
     lossless: bool = False
     """Whether the frames before coding are kept, as frames/%06d.png."""
 

@@ -113,7 +113,7 @@ def choose(outfit: Outfit, options: TurntableOptions) -> Outfit:
     """The outfit as the options want it; what they leave open is as drawn."""
     changes: dict[str, Any] = {"hat": options.hat != "none"}
     if options.top == "hoodie":
-        changes |= {"sleeve": 0.72, "hem": 0.01, "neckline": 0.45, "wide": 0.034}
+        changes |= {"sleeve": 0.72, "hem": 0.08, "neckline": 0.45, "wide": 0.034}
     if options.legs == "skirt":
         changes |= {"cuff": -0.08}
     if options.hair == "long":
@@ -128,7 +128,10 @@ def accessories(rest: np.ndarray, template: np.ndarray, joints: np.ndarray, shel
     surface = {name: shell.rest[np.unique(shell.pair)] for name, shell in worn.items()}
     out = []
     if options.legs == "skirt":
-        out.append(skirt(rest, template, joints, outfit.hem, options.clothing))
+        used = np.unique(worn["shirt"].pair)
+        used = used[np.abs(template[used, 0]) < 0.2]
+        tucked = worn["shirt"].rest[used] if not outfit.wide else rest[used]
+        out.append(skirt(np.concatenate([rest[np.abs(template[:, 0]) < 0.3], tucked]), joints, outfit.hem, options.clothing))
     if options.top == "hoodie":
         out.append(hood(joints, options.clothing))
     if options.hair == "long":

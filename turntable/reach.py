@@ -76,7 +76,7 @@ def reach(person: Person, start: np.ndarray, side: str, goal: Goal) -> np.ndarra
         rolled = x[6:9] - hinge * (x[6:9] @ hinge)
         return np.concatenate([
             (at[knuckle] - target) * 25, (along - fingers) * 0.8, (facing - palm) * 0.8, (at[elbow] - bent) * 4,
-            x[:3] * 1.2, rolled * [0.25, 0, 1.0], x[9:] * [0.4, 0.5, 0.35], solid.depth(arm.place(a)) * 12])
+            x[:3] * 1.2, rolled * [0.25, 0, 1.0], x[9:] * [0.4, 0.5, 0.35], solid.depth(arm.place(a)) * 40])
 
     found = least_squares(residuals, np.concatenate([start[chain[0]], first.ravel(), np.zeros(3)]), max_nfev=60, ftol=1e-4)
     out = start.copy()

@@ -14,14 +14,13 @@ EYES_OF = {1: slice(13574, 13646), -1: slice(13646, 13718)}
 SECTORS = 48
 
 
-def skirt(rest: np.ndarray, template: np.ndarray, joints: np.ndarray, hem: float, thick: float) -> Piece:
-    """From the waist to the knees around both legs, wider below. rest, template: (V, 3) m; joints: (55, 3) m; hem: m, the shirt's."""
-    top = joints[INDEX["pelvis"], 1] + hem - 0.153 + 0.06
+def skirt(trunk: np.ndarray, joints: np.ndarray, hem: float, thick: float) -> Piece:
+    """From the waist to the knees, wider below. trunk: (K, 3) m, what it goes around; joints: (55, 3) m; hem: m, the shirt's."""
+    top = joints[INDEX["pelvis"], 1] + hem - 0.153 + 0.08
     low = joints[INDEX["left_knee"], 1] - 0.01
     rows = np.linspace(top, low, 28)
     angle = np.arange(SECTORS) * 2 * np.pi / SECTORS
     way = np.stack([np.sin(angle), np.zeros(SECTORS), np.cos(angle)], 1)
-    trunk = rest[np.abs(template[:, 0]) < 0.3]
     axis = np.array([0, 0, joints[INDEX["pelvis"], 2] + 0.01])
     radius = np.stack([((trunk[np.abs(trunk[:, 1] - y) < 0.02] - axis) @ way.T).max(0) for y in rows])
     down = np.linspace(0, 1, len(rows))[:, None]
