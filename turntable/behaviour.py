@@ -19,23 +19,23 @@ COVERED = 0.9
 POCKET = Goal("hip", (0.080, -0.115, 0.062), (-0.1, -0.97, 0.12), (-0.8, 0, -0.6), (0.10, -0.26, -0.09), 0.06, under=True)
 HIP = Goal("hip", (0.115, 0.06, 0.075), (-0.15, -0.45, 0.85), (-0.93, -0.1, -0.3), (0.22, -0.20, -0.10), 0.2)
 HAIR = Goal("head", (0.045, 0.165, -0.03), (-0.45, 0.25, -0.85), (-0.25, -0.9, -0.1), (0.22, 0.17, 0.06), 0.25, under=True)
-INNER = Goal("spine2", (-0.145, 0.03, 0.20), (-0.95, 0.1, -0.25), (0, -0.1, -1), (0.10, -0.25, 0.09), 0.15)
+INNER = Goal("spine2", (-0.125, 0.02, 0.20), (-0.95, 0.1, -0.25), (0, -0.1, -1), (0.10, -0.25, 0.09), 0.15)
 OUTER = Goal("spine2", (-0.17, 0.10, 0.22), (-0.9, 0.3, -0.3), (-0.2, -0.1, -1), (0.10, -0.24, 0.10), 0.2)
 PHONE = Goal("spine2", (0.07, 0.16, 0.31), (-0.35, 0.75, 0.45), (-0.3, 0.5, -0.85), (0.05, -0.27, 0.02), 0.45)
-TALK = Goal("spine2", (0.15, -0.04, 0.33), (-0.3, 0.25, 0.9), (-0.75, 0.5, 0), (0.08, -0.26, -0.02), 0.25)
+TALK = Goal("spine2", (0.19, -0.02, 0.36), (-0.2, 0.3, 0.9), (-0.75, 0.5, 0), (0.13, -0.25, 0.04), 0.25)
 
 REACHES = {
     "left_pocket": (("left", POCKET),), "right_pocket": (("right", POCKET),), "pockets": (("left", POCKET), ("right", POCKET)),
     "left_hip": (("left", HIP),), "right_hip": (("right", HIP),), "hips": (("left", HIP), ("right", HIP)),
-    "left_hair": (("left", HAIR),), "right_hair": (("right", HAIR),), "crossed": (("left", INNER), ("right", OUTER)),
+    "left_hair": (("left", HAIR),), "right_hair": (("right", HAIR),), "crossed": (("left", INNER), ("right", OUTER), ("left", INNER)),
     "left_phone": (("left", PHONE),), "right_phone": (("right", PHONE),), "talking": (("left", TALK), ("right", TALK)),
 }
-"""Behaviour -> its hands, one after the other: the later lies over the earlier."""
+"""Behaviour -> its hands, one after the other, each out of the way of the others; the first may have to give way again."""
 BOWED = {"looking_down": {"neck": 20.0, "head": 24.0, "spine3": 5.0}, "phone": {"neck": 12.0, "head": 16.0}}
 """Behaviour -> joints of spine and head that it bends forward, degrees."""
 CALM = [INDEX[name] for name in ("spine1", "spine2", "spine3")]
 """Joints that rest while a hand lies on the body."""
-GESTURE = {"shoulder": 0.05, "elbow": 0.16, "wrist": 0.16, "head": 0.05}
+GESTURE = {"shoulder": 0.025, "elbow": 0.09, "wrist": 0.14, "head": 0.05}
 """Joint -> rad, standard deviation of its motion while talking."""
 
 
@@ -54,7 +54,7 @@ def behave(motion: Motion, person: Person, options: TurntableOptions, rng: np.ra
     for side, wanted in reaches:
         goal = reach(person, goal, side, wanted)
         via = reach(person, via, side, wanted.raised(RAISED))
-    for k, (side, wanted) in enumerate(reaches):
+    for k, (side, wanted) in enumerate(dict(reaches).items()):
         late = 0.25 * k if what == "crossed" else 0.0
         moving = [INDEX[f"{side}_{name}"] for name in CHAIN] + fingers_of(side)
         go_by_way(pose, moving, via, goal, np.clip(there * (1 + late) - late, 0, 1))

@@ -34,6 +34,11 @@ FEET = [INDEX["left_ankle"], INDEX["right_ankle"], INDEX["left_foot"], INDEX["ri
 """Joints of ankles and balls of the feet."""
 HIDDEN_SHARE = 0.10
 """A hand counts as hidden when a smaller share of its vertices is visible."""
+TRUNK = [INDEX[name] for name in ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "neck", "left_collar",
+                                  "right_collar", "head", "jaw")]
+"""Joints that lie deep, unlike those of limbs; the trunk is as thick as it is at their height."""
+DEEPEST = 0.18
+"""m, the most that a joint of the trunk lies below the surface."""
 JOINT_SLACK = 0.015
 """m, likewise for joints, beyond the thickness of their limb."""
 SLACK = np.full(133, 0.025)
@@ -155,9 +160,13 @@ def develop(picture: Picture, options: TurntableOptions, t: int, noise: bool) ->
 def joint_depths(person: Person) -> np.ndarray:
     """(55,) m by which each joint may lie below the drawn surface and still count as seen: its limb's thickness with clothes."""
     drawn = person.rest[person.pair[:, 0]]
-    drawn = drawn + (person.rest[person.pair[:, 1]] - drawn) * person.share[:, None]
-    distance, _ = cKDTree(drawn[np.unique(person.faces)]).query(person.joints, k=60)
-    return distance.mean(1) * 1.25 + JOINT_SLACK
+    drawn = (drawn + (person.rest[person.pair[:, 1]] - drawn) * person.share[:, None])[np.unique(person.faces)]
+    out = cKDTree(drawn).query(person.joints, k=60)[0].mean(1) * 1.25
+    for joint in TRUNK:
+        away = drawn - person.joints[joint]
+        level = (np.abs(away[:, 1]) < 0.03) & (np.abs(away[:, 0]) < 0.12)
+        out[joint] = min(np.percentile(np.hypot(away[level, 0], away[level, 2]), 90), DEEPEST)
+    return out + JOINT_SLACK
 
 
 def skin_is_seen(points: np.ndarray, skin: np.ndarray, seen: np.ndarray) -> np.ndarray:

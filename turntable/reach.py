@@ -22,6 +22,8 @@ TOUCH = 0.004
 """m by which skin and cloth give way where an arm lies on them."""
 FAR = 0.12
 """m from the surface beyond which a point is judged no more."""
+HARD = (2.0, 12.0, 40.0)
+"""Weights of depth in the body, one after the other: first the arm finds its way, then it keeps out."""
 SAMPLES = 400
 """Points of an arm that are kept out of the body."""
 
@@ -66,8 +68,8 @@ def reach(person: Person, start: np.ndarray, side: str, goal: Goal) -> np.ndarra
     first = aim_bones(joints, chain, start, bent, target - 0.09 * fingers)
     hinge = np.array([0, 1.0, 0])
 
-    def residuals(x: np.ndarray) -> np.ndarray:
-        """Of the rotations x (12,): hand's place and directions, elbow's place, depth in the body, and bends no joint can do."""
+    def residuals(x: np.ndarray, hard: float) -> np.ndarray:
+        """Of the rotations x (12,): hand's place and directions, elbow's place, bends no joint can do, `hard` times the depth."""
         trial = start.copy()
         trial[chain] = x.reshape(4, 3)
         a = joint_transforms(trial[None], joints, parents)[0]
@@ -76,11 +78,13 @@ def reach(person: Person, start: np.ndarray, side: str, goal: Goal) -> np.ndarra
         rolled = x[6:9] - hinge * (x[6:9] @ hinge)
         return np.concatenate([
             (at[knuckle] - target) * 25, (along - fingers) * 0.8, (facing - palm) * 0.8, (at[elbow] - bent) * 4,
-            x[:3] * 1.2, rolled * [0.25, 0, 1.0], x[9:] * [0.4, 0.5, 0.35], solid.depth(arm.place(a)) * 40])
+            x[:3] * 1.2, rolled * [0.25, 0, 1.0], x[9:] * [0.3, 0.5, 0.3], hard * solid.depth(arm.place(a))])
 
-    found = least_squares(residuals, np.concatenate([start[chain[0]], first.ravel(), np.zeros(3)]), max_nfev=60, ftol=1e-4)
+    x = np.concatenate([start[chain[0]], first.ravel(), np.zeros(3)])
+    for hard in HARD:
+        x = least_squares(residuals, x, args=(hard,), diff_step=1e-3, max_nfev=40, ftol=1e-5).x
     out = start.copy()
-    out[chain] = found.x.reshape(4, 3)
+    out[chain] = x.reshape(4, 3)
     return out
 
 
@@ -103,9 +107,7 @@ def aim_bones(joints: np.ndarray, chain: list[int], start: np.ndarray, elbow: np
 
 def turn_between(a: np.ndarray, b: np.ndarray) -> Rotation:
     """The least rotation from direction a (3,) to direction b (3,)."""
-    axis = np.cross(unit(a), unit(b))
-    angle = np.arctan2(np.linalg.norm(axis), unit(a) @ unit(b))
-    return Rotation.from_rotvec(unit(axis) * angle if angle > 1e-6 else np.zeros(3))
+    return Rotation.align_vectors(b[None], a[None])[0]
 
 
 def unit(v: np.ndarray) -> np.ndarray:

@@ -72,8 +72,8 @@ def hood(joints: np.ndarray, thick: float) -> Piece:
     neck = joints[INDEX["neck"]]
     along = np.linspace(-2.0, 2.0, 33)  # from the left of the throat over the back to the right
     behind = np.cos(along / 2)
-    centre = np.stack([0.105 * np.sin(along), neck[1] - 0.035 - 0.045 * behind**2,
-                       neck[2] - 0.005 - (0.075 + 0.045 * behind) * np.cos(along)], 1)
+    centre = np.stack([0.122 * np.sin(along), neck[1] - 0.035 - 0.045 * behind**2,
+                       neck[2] - 0.005 - (0.09 + 0.05 * behind) * np.cos(along)], 1)
     out = np.stack([np.sin(along), np.zeros_like(along), -np.cos(along)], 1)
     size = (0.35 + 0.65 * behind)[:, None, None] * thick
     turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
@@ -124,7 +124,7 @@ def brim(hat: Shell, template: np.ndarray, joints: np.ndarray) -> Piece:
 def phone(joints: np.ndarray, side: str) -> Piece:
     """A phone in the palm of a hand, its screen towards the person's eyes. joints: (55, 3) m."""
     wrist, knuckle = joints[INDEX[f"{side}_wrist"]], joints[INDEX[f"{side}_middle1"]]
-    centre = wrist + 1.05 * (knuckle - wrist) + [0, -0.027, 0.004]
+    centre = wrist + 1.05 * (knuckle - wrist) + [0, -0.034, 0.004]
     half = np.array([0.074, 0.0045, 0.036])
     points, paint, faces = [], [], []
     for axis in range(3):
