@@ -20,3 +20,8 @@ def turn_seen(turns: np.ndarray) -> float:
     """turns: (T, 3, 3) as in `yaw`. How many of the 360 degrees of yaw the frames cover: all but the widest gap between them."""
     at = np.sort(np.degrees(yaw(turns)))
     return 360 - float(np.diff(at, append=at[0] + 360).max()) if len(at) else 0.0
+
+
+def name_side(yaw: float) -> str:
+    """The side of a body that the camera sees, in words: front, right side, back, left side. yaw: rad, as `yaw` gives it."""
+    return ("front", "right side", "back", "left side")[round(yaw / (np.pi / 2)) % 4]

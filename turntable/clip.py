@@ -161,7 +161,7 @@ def joint_depths(person: Person) -> np.ndarray:
     """(55,) m by which each joint may lie below the drawn surface and still count as seen: its limb's thickness with clothes."""
     drawn = person.rest[person.pair[:, 0]]
     drawn = (drawn + (person.rest[person.pair[:, 1]] - drawn) * person.share[:, None])[np.unique(person.faces)]
-    out = cKDTree(drawn).query(person.joints, k=60)[0].mean(1) * 1.25
+    out = cKDTree(drawn).query(person.joints, k=60)[0].mean(1) * 1.6
     for joint in TRUNK:
         away = drawn - person.joints[joint]
         level = (np.abs(away[:, 1]) < 0.03) & (np.abs(away[:, 0]) < 0.12)

@@ -70,9 +70,9 @@ def long_hair(hair: np.ndarray, drawn: np.ndarray, joints: np.ndarray, thick: fl
 def hood(joints: np.ndarray, thick: float) -> Piece:
     """A hood that lies on neck and back. joints: (55, 3) m."""
     neck = joints[INDEX["neck"]]
-    along = np.linspace(-2.0, 2.0, 33)  # from the left of the throat over the back to the right
+    along = np.linspace(-1.7, 1.7, 33)  # from the left of the throat over the back to the right
     behind = np.cos(along / 2)
-    centre = np.stack([0.122 * np.sin(along), neck[1] - 0.035 - 0.045 * behind**2,
+    centre = np.stack([0.130 * np.sin(along), neck[1] - 0.03 - 0.045 * behind**2,
                        neck[2] - 0.005 - (0.09 + 0.05 * behind) * np.cos(along)], 1)
     out = np.stack([np.sin(along), np.zeros_like(along), -np.cos(along)], 1)
     size = (0.35 + 0.65 * behind)[:, None, None] * thick

@@ -330,7 +330,7 @@ class Run:
             "lpips_in_loss": self.in_loss is not None,
             "levels": judge_levels(gaussians, self.result.coarser, poses,
                                    {t: view.reduced(trained.height) for t, view in self.filmed.items()}),
-            "likeness": judge_likeness(gaussians, aligned, held, self.filmed),
+            "likeness": judge_likeness(gaussians, aligned, held, small, self.camera.height),
             "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
