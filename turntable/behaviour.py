@@ -27,8 +27,9 @@ TALK = Goal("spine2", (0.19, -0.02, 0.36), (-0.2, 0.3, 0.9), (-0.75, 0.5, 0), (0
 REACHES = {
     "left_pocket": (("left", POCKET),), "right_pocket": (("right", POCKET),), "pockets": (("left", POCKET), ("right", POCKET)),
     "left_hip": (("left", HIP),), "right_hip": (("right", HIP),), "hips": (("left", HIP), ("right", HIP)),
-    "left_hair": (("left", HAIR),), "right_hair": (("right", HAIR),), "crossed": (("left", INNER), ("right", OUTER), ("left", INNER)),
-    "left_phone": (("left", PHONE),), "right_phone": (("right", PHONE),), "talking": (("left", TALK), ("right", TALK)),
+    "left_hair": (("left", HAIR),), "right_hair": (("right", HAIR),),
+    "crossed": (("left", INNER), ("right", OUTER), ("left", INNER)), "left_phone": (("left", PHONE),),
+    "right_phone": (("right", PHONE),), "talking": (("left", TALK), ("right", TALK)),
 }
 """Behaviour -> its hands, one after the other, each out of the way of the others; the first may have to give way again."""
 BOWED = {"looking_down": {"neck": 20.0, "head": 24.0, "spine3": 5.0}, "phone": {"neck": 12.0, "head": 16.0}}

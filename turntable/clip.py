@@ -54,11 +54,11 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
 
     Options are a TurntableOptions or keywords: `make_clip(out, seed=3, frames=40)`. A wrong one raises ValueError.
 
-    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m, camera frame; vertices (T, V, 3) m, bare body (option
-    `vertices`); joints_visible (T, 55) bool; keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad; hidden (T, 2)
-    bool, left and right hand; height_m; rotation (3, 3) and eye (3,), world -> camera; shift (V, 3) m of the bare T-pose
-    from the shape basis; with option `drawn` the surface as drawn, drawn (T, N, 3) m, drawn_faces (F, 3), drawn_material (F,) into
-    `person.MATERIALS`; and the arrays of `BodyParams`, whose posed body is the truth up to that shift.
+    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m, camera frame, joints_visible (T, 55) bool; vertices (T, V, 3) m,
+    bare body (option `vertices`); keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad;
+    hidden (T, 2) bool, left and right hand; height_m; rotation (3, 3) and eye (3,), world -> camera; shift (V, 3) m of the bare
+    T-pose from the shape basis; with option `drawn` the surface as drawn, drawn (T, N, 3) m, drawn_faces (F, 3), drawn_material
+    (F,) into `person.MATERIALS`; and the arrays of `BodyParams`, whose posed body is the truth up to that shift.
     mask: coverage of each pixel by the person with all that is worn or held; above 127 is the silhouette.
     """
     options = options or TurntableOptions(**changes)
@@ -202,7 +202,8 @@ class TruthRecorder:
         self.visible[t] = visible_points(near, picture.depth, big, 0.0) & self.person.body.known_keypoints
         nearer = joints * (1 - self.deep / np.linalg.norm(joints, axis=1))[:, None]
         self.joints_visible[t] = visible_points(nearer, picture.depth, big, 0.0)
-        for side, (hand, keys, fingers) in enumerate(zip(self.hands, wholebody.HANDS.values(), (LEFT_HAND, RIGHT_HAND), strict=True)):
+        parts = zip(self.hands, wholebody.HANDS.values(), (LEFT_HAND, RIGHT_HAND), strict=True)
+        for side, (hand, keys, fingers) in enumerate(parts):
             seen = visible_points(bare[hand], picture.depth, big, 0.004)
             self.hidden[t, side] = seen.mean() < HIDDEN_SHARE
             if self.motion.covered[t, side]:

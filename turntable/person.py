@@ -105,7 +105,7 @@ def make_person(options: TurntableOptions, rng: np.random.Generator) -> Person:
     region = np.load(REGIONS)["share"].T.astype(np.float32) / 255
     outfit = choose(outfit, options)
     shells, hidden = dress(body, rest, region, outfit, options.clothing, rng)
-    pieces = accessories(rest, body.v_template, joints, shells, outfit, options)
+    pieces = accessories(body, rest, joints, shells, outfit, options)
     return assemble(body, outfit, betas, rest, joints, joint_offset, region, shells, hidden, pieces)
 
 
@@ -121,9 +121,10 @@ def choose(outfit: Outfit, options: TurntableOptions) -> Outfit:
     return replace(outfit, **changes)
 
 
-def accessories(rest: np.ndarray, template: np.ndarray, joints: np.ndarray, shells: list[Shell], outfit: Outfit,
+def accessories(body: Body, rest: np.ndarray, joints: np.ndarray, shells: list[Shell], outfit: Outfit,
                 options: TurntableOptions) -> list[Piece]:
-    """What the options want beside shells. rest, template: (V, 3) m; joints: (55, 3) m."""
+    """What the options want beside shells. rest: (V, 3) m; joints: (55, 3) m."""
+    template = body.v_template
     worn = {shell.material: shell for shell in shells}
     surface = {name: shell.rest[np.unique(shell.pair)] for name, shell in worn.items()}
     out = []
@@ -133,7 +134,7 @@ def accessories(rest: np.ndarray, template: np.ndarray, joints: np.ndarray, shel
         tucked = worn["shirt"].rest[used] if not outfit.wide else rest[used]
         out.append(skirt(np.concatenate([rest[np.abs(template[:, 0]) < 0.3], tucked]), joints, outfit.hem, options.clothing))
     if options.top == "hoodie":
-        out.append(hood(joints, options.clothing))
+        out.append(hood(rest[:EYES.start], body.faces[(body.faces < EYES.start).all(1)], joints, options.clothing))
     if options.hair == "long":
         around = np.concatenate([rest, surface["shirt"], *(piece.rest for piece in out)])
         out.append(long_hair(surface["hair"], around, joints, options.clothing))

@@ -6,8 +6,10 @@ Places are m in the T-pose: +x to the person's left, +y up, +z forward.
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gsac.avatar.joints import INDEX
+from gsac.avatar.mesh import vertex_normals
 from gsac.turntable.shell import Piece, Shell
 
 EYES_OF = {1: slice(13574, 13646), -1: slice(13646, 13718)}
@@ -67,8 +69,8 @@ def long_hair(hair: np.ndarray, drawn: np.ndarray, joints: np.ndarray, thick: fl
     return piece("hair", points, grid_faces(len(rows), len(columns), False), ("head", "spine3"), np.stack([high, 1 - high], 1))
 
 
-def hood(joints: np.ndarray, thick: float) -> Piece:
-    """A hood that lies on neck and back. joints: (55, 3) m."""
+def hood(skin: np.ndarray, faces: np.ndarray, joints: np.ndarray, thick: float) -> Piece:
+    """A hood that lies on neck and back. skin: (V, 3) m; faces: (F, 3) of the skin; joints: (55, 3) m."""
     neck = joints[INDEX["neck"]]
     along = np.linspace(-1.7, 1.7, 33)  # from the left of the throat over the back to the right
     behind = np.cos(along / 2)
@@ -79,6 +81,9 @@ def hood(joints: np.ndarray, thick: float) -> Piece:
     turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     ring = 0.034 * np.cos(turn)[None, :, None] * out[:, None] + 0.058 * np.sin(turn)[None, :, None] * [0, 1.0, 0]
     points = (centre[:, None] + size * ring).reshape(-1, 3)
+    nearest = cKDTree(skin).query(points)[1]
+    outward = vertex_normals(skin, faces)[nearest]
+    points += outward * np.maximum(0.004 - ((points - skin[nearest]) * outward).sum(1), 0)[:, None]
     return piece("shirt", points, grid_faces(len(along), len(turn), True), ("spine3",), np.ones((len(points), 1)))
 
 
@@ -130,7 +135,7 @@ def phone(joints: np.ndarray, side: str) -> Piece:
     for axis in range(3):
         for way in (-1, 1):
             u, v = np.roll(np.arange(3), -axis)[1:]
-            for k, (a, b) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
                 corner = np.zeros(3)
                 corner[[axis, u, v]] = way, a, b
                 points.append(centre + corner * half)
