@@ -234,7 +234,7 @@ def hair_field(template: np.ndarray, region: np.ndarray, outfit: Outfit) -> np.n
 
 
 def hat_field(template: np.ndarray, region: np.ndarray) -> np.ndarray:
-    """(N,) m, positive under a hat: from the middle of the forehead over the ears to the nape. template: (N, 3) m; region: (N, 6)."""
+    """(N,) m, positive under a hat: from the forehead over the ears to the nape. template: (N, 3) m; region: (N, 6)."""
     x, y, z = template.T
     line = np.interp(np.arctan2(np.abs(x), z - 0.045), [0, 0.9, 1.5, np.pi], [0.945, 0.935, 0.905, 0.870])
     return np.where((y > 0.77) & (np.abs(x) < 0.13), np.minimum(y - line, 0.04 - 0.10 * region[:, 1]), -1.0)
