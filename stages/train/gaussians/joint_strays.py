@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from scipy.spatial import KDTree
 
+from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
 from gsac.avatar.raster import render_backward, render_bound
@@ -22,29 +24,34 @@ from gsac.stages.train.poses.poses import Poses
 
 TURNS = 3
 """Sides that each pose is looked at from."""
-OFF = 0.03
-"""m off the silhouette of the body from which alpha of `FULL_SIZE` gaussians begins to count, fewer are wider; from twice as far all
-of it does."""
+OFF = 0.022
+"""m off the body from which alpha of `FULL_SIZE` gaussians begins to count (fewer are wider); from twice as far all does."""
 LEAST = 2e-5
 """Stray alpha of a gaussian in a bent pose, over the silhouettes' area, that is too much."""
-USUAL = 1.5
-"""Times its stray alpha in the clip's usual pose that a gaussian of hair, shoe or sleeve may have in any other."""
+GROWN = 0.005
+"""m farther from the body than in the clip's usual pose that a gaussian has to reach there: hair, shoes and wide clothes stay."""
 ROUNDS, SHRUNK = 4, 0.75
 """Rounds that shrink what strays, and the factor of one on its standard deviations."""
 
 
 def shrink_strays(gaussians: Gaussians, poses: Poses, frames: np.ndarray) -> Gaussians:
     """The gaussians, some smaller. frames: (n,) trained ones, whose median pose is the usual one."""
-    usual = np.median(poses.pose[frames], 0)
-    usual[0] = 0
-    bodies = [_posed(poses, int(frames[0]), pose) for pose in (usual, *(turn_joints(usual, turns) for turns in BENDS))]
+    pose, faces = np.median(poses.pose[frames], 0), poses.body.faces
+    pose[0] = 0
+    usual = put_in_pose(poses, int(frames[0]), pose)
+    bent = [put_in_pose(poses, int(frames[0]), turn_joints(pose, turns)) for turns in BENDS]
     out = gaussians[np.arange(len(gaussians))]
+
+    def find_large(posed: np.ndarray, workspace: Workspace) -> np.ndarray:
+        large = np.flatnonzero(find_stray(out, posed, faces, workspace) > LEAST)
+        return large[find_reach(out[large], posed, faces) > find_reach(out[large], usual, faces) + GROWN]
+
     for _ in range(ROUNDS):
-        stray, *bent = side_by_side(lambda posed, workspace: find_stray(out, posed, poses.body.faces, workspace), bodies)
-        large = np.max(bent, 0) - USUAL * stray > LEAST
-        if not large.any():
+        found = side_by_side(find_large, bent)
+        bent = [posed for posed, large in zip(bent, found, strict=True) if len(large)]
+        if not bent:
             break
-        out.log_scale[large] += np.float32(np.log(SHRUNK))
+        out.log_scale[np.unique(np.concatenate(found))] += np.float32(np.log(SHRUNK))
     return out
 
 
@@ -65,7 +72,16 @@ def find_stray(gaussians: Gaussians, posed: np.ndarray, faces: np.ndarray, works
     return stray
 
 
-def _posed(poses: Poses, t: int, pose: np.ndarray) -> np.ndarray:
+def find_reach(gaussians: Gaussians, posed: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(N,) m from the body posed (V, 3) m to the ends of the gaussians: of the centre from its vertices, and the longest axis.
+
+    faces: (F, 3).
+    """
+    bound = bind(face_frames(posed, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    return KDTree(posed).query(bound.means)[0] + bound.scales.max(1)
+
+
+def put_in_pose(poses: Poses, t: int, pose: np.ndarray) -> np.ndarray:
     """(V, 3) m, the body of frame t in another pose, (55, 3) axis-angle."""
     body, (rest, joints) = poses.body, poses.rest(t)
     transforms = joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32)
