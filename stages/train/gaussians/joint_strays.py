@@ -64,7 +64,7 @@ def find_stray(gaussians: Gaussians, posed: np.ndarray, faces: np.ndarray, works
     for side in range(TURNS):
         vertices, camera, metre = turn_before_camera(posed, 360 * side / TURNS)
         body = rasterise(vertices, faces, camera)[0] >= 0
-        away = cv2.distanceTransform(np.uint8(~body), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / metre
+        away = cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / metre
         counted = np.clip(away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
         rendering = render_bound(vertices, faces, gaussians, camera, workspace)
         added = render_backward(rendering.state, counted, np.zeros_like(rendering.alpha)).rgb[:, 0]
