@@ -217,7 +217,7 @@ def smooth_noise(rng: np.random.Generator, frames: int, scale: float, cycles: in
 
 
 def smoothstep(x: np.ndarray) -> np.ndarray:
-    """Smoothstep of x in 0..1."""
+    """Smoothstep (n,) of x (n,) in 0..1."""
     return x * x * (3 - 2 * x)
 
 

@@ -53,7 +53,7 @@ class Axis:
         return (points - self.start) @ self.way
 
     def raise_over(self, cloth: np.ndarray, hand: np.ndarray, over: float) -> np.ndarray:
-        """Cloth (n, 3) m moved away from the axis until it lies `over` m outside of the hand (k, 3) m."""
+        """(n, 3) m: the cloth moved away from the axis until it lies `over` m outside. cloth: (n, 3) m; hand: (k, 3) m."""
         along, under = self.along(cloth), self.along(hand)
         out, held = cloth - self.start - along[:, None] * self.way, hand - self.start - under[:, None] * self.way
         far, reach = np.linalg.norm(out, axis=1), np.linalg.norm(held, axis=1)

@@ -89,7 +89,7 @@ def reach(person: Person, start: np.ndarray, side: str, goal: Goal) -> np.ndarra
 
 
 def curl_fingers(pose: np.ndarray, side: str, curl: float) -> np.ndarray:
-    """Pose (55, 3) with the fingers of a side bent by `curl` rad at each joint."""
+    """(55, 3) axis-angle with the fingers of a side bent by `curl` rad at each joint. pose: (55, 3)."""
     out, sign = pose.copy(), 1.0 if side == "left" else -1.0
     for finger, share in (("index", 0.9), ("middle", 1.0), ("ring", 1.1), ("pinky", 1.15)):
         for k in (1, 2, 3):
@@ -98,7 +98,10 @@ def curl_fingers(pose: np.ndarray, side: str, curl: float) -> np.ndarray:
 
 
 def aim_bones(joints: np.ndarray, chain: list[int], start: np.ndarray, elbow: np.ndarray, wrist: np.ndarray) -> np.ndarray:
-    """(2, 3) axis-angle of shoulder and elbow that point the bones of the arm at the places elbow (3,) and wrist (3,) m."""
+    """(2, 3) axis-angle of shoulder and elbow that point the bones of the arm at places.
+
+    joints: (55, 3) m, T-pose; start: (55, 3) axis-angle; elbow, wrist: (3,) m.
+    """
     upper = turn_between(joints[chain[2]] - joints[chain[1]], elbow - joints[chain[1]])
     local = (Rotation.from_rotvec(start[chain[0]]).inv() * upper)
     lower = turn_between(joints[chain[3]] - joints[chain[2]], upper.inv().apply(wrist - elbow))

@@ -88,7 +88,7 @@ def hood(skin: np.ndarray, faces: np.ndarray, joints: np.ndarray, thick: float) 
 
 
 def glasses(rest: np.ndarray, joints: np.ndarray) -> list[Piece]:
-    """Two rims, a bridge and two temples. rest: (V, 3) m."""
+    """Two rims, a bridge and two temples. rest: (V, 3) m; joints: (55, 3) m."""
     turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     lines, rims = [], {}
     for sign, eye in EYES_OF.items():
@@ -164,7 +164,7 @@ def tube(material: str, line: np.ndarray, closed: bool, radius: float, joint: st
 
 
 def piece(material: str, points: np.ndarray, faces: np.ndarray, joints: tuple[str, ...], weight: np.ndarray) -> Piece:
-    """A piece whose points (M, 3) m follow up to four joints with weight (M, len(joints)); painted by place."""
+    """A piece that follows up to four joints, painted by place. points: (M, 3) m; faces: (F, 3); weight: (M, len(joints))."""
     index = np.zeros((len(points), 4), np.int64)
     share = np.zeros((len(points), 4), np.float32)
     index[:, :len(joints)] = [INDEX[name] for name in joints]
