@@ -171,7 +171,7 @@ def joint_depths(person: Person) -> np.ndarray:
 
 def skin_is_seen(points: np.ndarray, skin: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """(n,) bool: whether any of the eight points of skin (k, 3) nearest to each point (n, 3) is seen (k,) bool."""
-    return seen[cKDTree(skin).query(points, k=8)[1]].any(1)
+    return np.any(seen[cKDTree(skin).query(points, k=8)[1]], axis=1)
 
 
 class TruthRecorder:
