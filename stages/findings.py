@@ -87,6 +87,15 @@ class Code(Enum):
     NO_CHECKPOINT = Wording("No checkpoint can be written to {folder} ({error}); should this run be stopped, the next one starts "
                             "anew.", severity=Severity.NEWS)
     CHECKPOINT_UNREADABLE = Wording("The checkpoint {path} cannot be read ({error}); training starts anew.", severity=Severity.NEWS)
+    FROZEN = Wording("The picture stands still in {frames} while time goes on; these frames are not used.",
+                     "Film without pausing, with no other program open on the phone.", Severity.WRONG)
+    REPEATED = Wording("Pictures repeat in {frames}; these frames are not used.",
+                       "Send the file as the phone recorded it, not a copy with another frame rate.", Severity.NEWS)
+    SCENE_CUT = Wording("Another scene begins in {frames}.", "Give one shot, from one stand.", Severity.WRONG)
+    EXPOSURE_STEPS = Wording("Exposure or white balance is off by up to {figure:.0%} in {frames}.",
+                             "Lock exposure and focus before the turn: hold a finger on the person in the picture.")
+    BLURRED = Wording("The picture is blurred in {frames}.",
+                      "Clean the lens, let the phone focus on the person, film in more light and turn slower.")
     OTHER = Wording("{what}")
     """Of a stage that is not of this package."""
 

@@ -86,9 +86,9 @@ def run(job: Job) -> None:
     usable[empty] = False
     if empty:
         job.warn(Finding.of(Code.MASK_NOT_TRAINED, ~usable))
-    if params.lost.any():
-        job.warn(Finding.of(Code.POSE_NOT_TRAINED, params.lost))
-        usable &= ~params.lost
+    usable &= ~params.lost
+    if (failed := params.lost & clip.shows_own_moment(count)).any():
+        job.warn(Finding.of(Code.POSE_NOT_TRAINED, failed))
     if not usable.any():
         raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
     held = hold_out(params.global_orient, usable, config.holdout)
