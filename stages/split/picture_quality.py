@@ -113,12 +113,13 @@ def correlate(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def measure_exposure(blocks: np.ndarray) -> np.ndarray:
-    """blocks: (T, h, w, 3), 0..255. Returns (T, 3) log of each colour against the clip's median picture; NaN in frames that show
-    something else."""
+    """blocks: (T, h, w, 3), 0..255. Returns (T, 3) log of each colour against the frame of median brightness; NaN in frames that show
+    something else than most."""
     usual = np.median(blocks, 0)
     gains = np.median(np.log((blocks + DARKEST) / (usual + DARKEST)), (1, 2))
     alike = [correlate(each, usual) >= ALIKE for each in blocks]
-    return np.where(np.array(alike)[:, None], gains, np.nan)
+    gains = np.where(np.array(alike)[:, None], gains, np.nan)
+    return gains - gains[np.argsort(gains.mean(1))[sum(alike) // 2]]  # a frame: the median may lie between two exposures
 
 
 def find_exposure_steps(gains: np.ndarray) -> np.ndarray:
