@@ -86,12 +86,13 @@ def _quantile(image: np.ndarray) -> float:
 
 
 def find_repeats(blocks: np.ndarray) -> np.ndarray:
-    """blocks: (T, h, w, 3), 0..255. Returns (T,) bool: pictures that show what an earlier one shows, all in a row since then."""
+    """blocks: (T, h, w, 3), 0..255. Returns (T,) bool: pictures that show what an earlier one shows, all in a row since then; none
+    where nothing moves all through the clip."""
     repeated, shown = np.zeros(len(blocks), bool), 0
     for t in range(1, len(blocks)):
         repeated[t] = np.abs(blocks[t] - blocks[shown]).mean(-1).max() < STILL
         shown = shown if repeated[t] else t
-    return repeated
+    return repeated & (shown > 0)
 
 
 def find_scene_cuts(blocks: np.ndarray) -> np.ndarray:
@@ -130,7 +131,7 @@ def find_exposure_steps(gains: np.ndarray) -> np.ndarray:
 
 
 def find_blurred(sharpness: np.ndarray) -> np.ndarray:
-    """sharpness: (T, 3) of `measure_sharpness`. Returns (T,) bool: frames that are blurred, or far more than the clip's sharpest."""
+    """sharpness: (T, 3) of `measure_sharpness`. Returns (T,) bool: frames that are blurred, or far more than the sharpest."""
     sharpness = np.where(np.isfinite(sharpness), sharpness, 1)
     softer = sharpness[:, 1:] < SOFTER * np.percentile(sharpness[:, 1:], SHARPEST, 0)
     return (sharpness[:, 0] < BLURRED) | softer.any(1)
