@@ -81,7 +81,7 @@ class ClipCheck:
         runs = entry["frames"]
         if not self.times or not runs or sum(last - first + 1 for first, last in runs) == len(self.times):
             return ""
-        spans = [f"{self.times[first]:.1f}" + (f" to {self.times[last]:.1f}" if last > first else "") for first, last in runs[:MOST]]
+        spans = [" to ".join(f"{self.times[t]:.1f}" for t in sorted({first, last})) for first, last in runs[:MOST]]
         return f" (at {', '.join(spans)}{', ...' if len(runs) > MOST else ''} s)"
 
 

@@ -42,8 +42,9 @@ class FirstLook:
         front = np.stack([across[:, 2], across[:, 1], -across[:, 0]], 1)[np.isfinite(across).all(1)]
         body = slice(0, 17)
         hands = np.concatenate([span(xy[:, hand], score[:, hand]) for hand in HANDS.values()])
-        return cls(len(xy), int(seen.sum()), _large(span(xy[:, body], score[:, body]), 75) / BODY_SPAN, degrees_covered(yaw_of(front)),
-                   _large(span(xy[:, FACE], score[:, FACE])), _large(hands))
+        height = _large(span(xy[:, body], score[:, body]), 75) / BODY_SPAN
+        return cls(len(xy), int(seen.sum()), height, degrees_covered(yaw_of(front)), _large(span(xy[:, FACE], score[:, FACE])),
+                   _large(hands))
 
     @property
     def sentence(self) -> str:

@@ -42,7 +42,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--force", action="append", default=[], metavar="STAGE",
                          help="run this stage again; may be repeated")
     command.add_argument("--replace", action="store_true", help="put this clip's avatar in place of another clip's in DIR")
-    command.add_argument("--anyway", action="store_true", help="go on where nothing can come of the clip: hardly any frame with a person")
+    command.add_argument("--anyway", action="store_true", help="go on where nothing can come of the clip, as without a person")
     add_quality(command)
     add_person(command)
     add_params(command)

@@ -25,7 +25,8 @@ def find_lost_frames(fit: Fit, seen: np.ndarray, height: float, own: np.ndarray)
     usual = np.median(iou[seen]) if seen.any() else 1.0
     uncovered = seen & (iou < min(POOR_IOU, usual - FALL))
     away = seen & ~uncovered & (off > FAR * height)
-    return {REPEATED: ~own, "no person is seen": own & ~seen, f"the body covers the silhouette badly (IoU below {POOR_IOU})": uncovered,
+    return {REPEATED: ~own, "no person is seen": own & ~seen,
+            f"the body covers the silhouette badly (IoU below {POOR_IOU})": uncovered,
             f"the body lies more than {FAR:.0%} of its height off the seen points": away}
 
 

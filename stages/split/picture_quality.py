@@ -26,7 +26,7 @@ OTHER_PICTURE, SAME_PLACE = 12.0, 0.5
 """Of another scene: the median change of a block, of 255, and the correlation of the blocks below which it is one."""
 MIRRORED = 0.8
 """Correlation with the mirrored picture from which on a scene is the same one."""
-ALIKE = 0.8
+ALIKE = 0.5
 """Least correlation with the clip's median picture for exposure to be compared."""
 STEP, TINT = np.log(1.2), np.log(1.1)
 """Change of exposure, and of one colour against the others, that leaves patches on an avatar."""
@@ -37,8 +37,8 @@ DETAIL = 0.99
 FLAT = 6
 """Edges, of 255, below which a picture is too plain to tell its blur."""
 BLURRED = 0.65
-"""Sharpness below which a picture is blurred: it is 0.5 where a picture holds nothing that one half as large does not, and from 0.72
-on in filmed ones."""
+"""Sharpness below which a picture is blurred: it is 0.5 where one half as large holds all that it holds, and from 0.67 on in
+filmed ones."""
 SOFTER = 0.75
 """Share of the clip's own sharpness, across or along, below which a frame moved or lost its focus."""
 SHARPEST = 90
@@ -63,8 +63,8 @@ def look_at(picture: np.ndarray) -> Look:
 
 
 def measure_sharpness(picture: np.ndarray) -> np.ndarray:
-    """Edges of picture (H, W, 3) uint8 against those of one half as large. Returns (3,), 0.5 to about 1: of all edges, of upright ones,
-    of level ones; NaN where it is too plain to tell."""
+    """Edges of picture (H, W, 3) uint8 against those of one half as large. Returns (3,), 0.5 to about 1: of all edges, of upright
+    and of level ones; NaN where it is too plain to tell."""
     grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
     half = cv2.resize(grey, (max(2, grey.shape[1] // 2), max(2, grey.shape[0] // 2)), interpolation=cv2.INTER_AREA)
     fine, coarse = measure_edges(grey), measure_edges(half)
@@ -96,13 +96,13 @@ def find_repeats(blocks: np.ndarray) -> np.ndarray:
 
 
 def find_scene_cuts(blocks: np.ndarray) -> np.ndarray:
-    """blocks: (T, h, w, 3), 0..255. Returns (T,) bool: the first frames of other scenes; not those of a flash, a black or a mirrored
-    picture."""
+    """blocks: (T, h, w, 3), 0..255. Returns (T,) bool: the first frames of other scenes; not those of a flash, of black or mirrored
+    pictures."""
     cuts = np.zeros(len(blocks), bool)
     for t in range(1, len(blocks) - 1):
-        before, after = blocks[t - 1], blocks[t:t + 2]
-        cuts[t] = all(np.median(np.abs(each - before)) > OTHER_PICTURE and abs(correlate(each, before)) < SAME_PLACE
-                      and correlate(each[:, ::-1], before) < MIRRORED and each.std() > OTHER_PICTURE for each in after)
+        cuts[t] = all(np.median(np.abs(after - before)) > OTHER_PICTURE and abs(correlate(after, before)) < SAME_PLACE
+                      and correlate(after[:, ::-1], before) < MIRRORED and min(after.std(), before.std()) > OTHER_PICTURE
+                      for before in blocks[max(0, t - 2):t] for after in blocks[t:t + 2])
     return cuts
 
 
@@ -114,8 +114,8 @@ def correlate(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def measure_exposure(blocks: np.ndarray) -> np.ndarray:
-    """blocks: (T, h, w, 3), 0..255. Returns (T, 3) log of each colour against the frame of median brightness; NaN in frames that show
-    something else than most."""
+    """blocks: (T, h, w, 3), 0..255. Returns (T, 3) log of each colour against the frame of median brightness; NaN in frames
+    that show something else than most."""
     usual = np.median(blocks, 0)
     gains = np.median(np.log((blocks + DARKEST) / (usual + DARKEST)), (1, 2))
     alike = [correlate(each, usual) >= ALIKE for each in blocks]

@@ -184,8 +184,8 @@ def _picture_filters(video: Video, crop: Crop | None, width: int, height: int) -
 
 def _run(path: Path, video: Video, output: list[str], folder: Path | None, on_frame: Callable[[int], None] = lambda done: None,
          read: Callable[[IO[bytes]], None] = lambda pictures: None) -> Written:
-    """Runs ffmpeg. read: reads what it writes to its output, to the end. Returns the ticks of the frames that passed `showinfo`, their
-    time base, and its error lines."""
+    """Runs ffmpeg. read: reads what it writes to its output, to the end. Returns the ticks of the frames that passed `showinfo`,
+    their time base, and its error lines."""
     decoder = ["-c:v", video.decoder] if video.decoder else []
     limits = [word for name, value in LIMITS.items() for word in (f"-{name}", value)]
     command = [ffmpeg_program(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
