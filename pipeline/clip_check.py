@@ -89,8 +89,9 @@ def check_clip(frames: Path, clip: Path, keypoints: Path, findings: list[tuple[s
     """The check by outputs of split and keypoints, and by what these stages found: sentences with their entries."""
     times, points, found = Clip.read(clip).timestamps_s, check_keypoints(keypoints), []
     look = FirstLook.of(points)
-    if look.frames > 1 and look.turn < LEAST_TURN:
-        found.append(Finding.of(Code.PART_OF_TURN, figure=look.turn))
+    turn = look.turn * look.frames / max(look.frames - 1, 1)  # the clip shows what lies between those frames, too
+    if look.frames > 1 and turn < LEAST_TURN:
+        found.append(Finding.of(Code.PART_OF_TURN, figure=turn))
     if times is not None:
         sway = measure_sway(backgrounds(frames, points["xy"], points["score"]))
         longer = max(read_frame(frame_paths(frames)[0]).shape)

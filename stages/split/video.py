@@ -195,6 +195,7 @@ def _run(path: Path, video: Video, output: list[str], folder: Path | None, on_fr
     # The output pattern is relative to `folder`: a % in the folder's own name is no pattern.
     with (ThreadPoolExecutor(1) as reader, subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                                             stderr=subprocess.PIPE) as process):
+        assert process.stdout is not None and process.stderr is not None
         reading = reader.submit(read, process.stdout)
         try:
             for line in io.TextIOWrapper(process.stderr, errors="replace"):

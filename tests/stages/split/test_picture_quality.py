@@ -39,7 +39,8 @@ def again(pictures, *places):
     shown = list(pictures)
     for t in places:
         first = next(p for p in range(t, -1, -1) if p not in places)
-        shown[t] = np.clip(np.round(shown[first] + np.random.default_rng(100 + t).normal(0, 1, shown[t].shape)), 0, 255).astype(np.uint8)
+        noise = np.random.default_rng(100 + t).normal(0, 1, shown[t].shape)
+        shown[t] = np.clip(np.round(shown[first] + noise), 0, 255).astype(np.uint8)
     return shown
 
 
