@@ -67,10 +67,12 @@ class ClipCheck:
 
     @property
     def lines(self) -> list[str]:
-        """What people read: the verdict, what was seen, each finding with its times."""
+        """What people read: the verdict, what was seen, each finding with its times; of a clip without hope only why it is so."""
+        told = [(message, entry) for message, entry in self.findings
+                if self.prospect is not Prospect.HOPELESS or entry["severity"] == Severity.HOPELESS.value]
         length = f" The clip lasts {self.times[-1] - self.times[0]:.1f} s." if self.times else ""
         return [self.prospect.sentence, f"{self.look.sentence}{length}",
-                *(f"- {message}{self._when(entry)}" for message, entry in self.findings)]
+                *(f"- {message}{self._when(entry)}" for message, entry in told)]
 
     def to_json(self) -> dict[str, Any]:
         """The object of `--json`, but for the stages."""
