@@ -107,7 +107,7 @@ def find_scene_cuts(blocks: np.ndarray) -> np.ndarray:
 
 
 def correlate(a: np.ndarray, b: np.ndarray) -> float:
-    """Correlation, -1..1, of two arrays (...) of one shape; 0 where one is constant."""
+    """a, b: (...) of one shape. Returns their correlation, -1..1; 0 where one is constant."""
     a, b = a - a.mean(), b - b.mean()
     size = np.sqrt((a * a).sum() * (b * b).sum())
     return float((a * b).sum() / size) if size > 1e-6 else 0.0
