@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -48,6 +49,8 @@ def run(job: Job) -> None:
     outlines = read_outlines(frame_paths(job.inputs["segment/alpha"]))
     if len(outlines) != len(sightings.xy):
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
+    own = clip.shows_own_moment(len(outlines))
+    outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
     expression, jaw, silent = translate_expression(body, face)
@@ -57,7 +60,7 @@ def run(job: Job) -> None:
     params.jaw_pose, params.rest_expression = jaw, translate_rest(body, face)
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
-    lost = find_lost_frames(fit, seen, sightings.person_height)
+    lost = find_lost_frames(fit, seen, sightings.person_height, own)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
     for finding in (*fit.notes, *describe_lost_frames(lost, fit.iou)):
         job.warn(finding)
