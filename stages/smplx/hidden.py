@@ -27,6 +27,9 @@ OFTEN = 0.1
 """Share of the frames in which a limb must cross a pixel."""
 GUESS = 0.03
 """Depth, as a share of the height, from which on a point is a guess that counts for nothing; before that its sigma grows."""
+RIM, EDGE = 0.05, 2
+"""Width of the picture's rim, as a share of the height, inside which points of a person who is cut off there are guesses; pixels of
+the outline's picture in which the mask reaches its end."""
 GROWTH = 2.0
 """Growth of sigma, per px of depth."""
 LIMBS = [[INDEX[name] for name in pair.split()] for pair in (
@@ -64,15 +67,24 @@ def hide(sightings: Sightings, occluder: np.ndarray | None, outlines: list[Outli
 
     occluder: (h, w) bool, as `find_occluder` has it.
     """
-    height, size = _height(outlines), np.array([sightings.width, sightings.height])
+    height = _height(outlines)
     depth = np.zeros(sightings.score.shape)
     if occluder is not None:
         depth = _at(_depth(~occluder) * outlines[0].scale, sightings.xy, outlines[0].scale)
-    outside = np.nan_to_num(np.maximum(-sightings.xy, sightings.xy - size).max(-1), nan=0).clip(0)
-    away = np.maximum(depth, outside)
+    away = np.maximum(depth, _outside(sightings, outlines, RIM * height))
     score = np.where(away > GUESS * height, 0, sightings.score)
     sigma = np.hypot(sightings.sigma, GROWTH * away).astype(sightings.sigma.dtype)
     return replace(sightings, score=score, sigma=sigma), (sightings.score > 0) & (depth > DEEP * height)
+
+
+def _outside(sightings: Sightings, outlines: list[Outline], rim: float) -> np.ndarray:
+    """(T, 133) px, depth of each point outside the picture. rim: px; where the picture's edge cuts the person off, the detector puts
+    what lies outside just inside of it, so the picture counts as smaller by that much there."""
+    x, y = np.moveaxis(np.nan_to_num(sightings.xy, nan=0), -1, 0)
+    beyond = -x, x - sightings.width, -y, y - sightings.height
+    ends = np.s_[:, :EDGE], np.s_[:, -EDGE:], np.s_[:EDGE], np.s_[-EDGE:]
+    cut = np.array([[outline.mask[end].any() for end in ends] for outline in outlines])  # (T, 4)
+    return np.max([side + rim * cut[:, i, None] for i, side in enumerate(beyond)], axis=0).clip(0)
 
 
 def describe_hidden(behind: np.ndarray) -> list[Finding]:
