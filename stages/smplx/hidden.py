@@ -78,8 +78,11 @@ def hide(sightings: Sightings, occluder: np.ndarray | None, outlines: list[Outli
 
 
 def _outside(sightings: Sightings, outlines: list[Outline], rim: float) -> np.ndarray:
-    """(T, 133) px, depth of each point outside the picture. rim: px; where the picture's edge cuts the person off, the detector puts
-    what lies outside just inside of it, so the picture counts as smaller by that much there."""
+    """(T, 133) px, depth of each point outside the picture.
+
+    rim: px by which the picture counts as smaller on a side where it cuts the person off, for the detector puts there what lies
+    outside just inside of it.
+    """
     x, y = np.moveaxis(np.nan_to_num(sightings.xy, nan=0), -1, 0)
     beyond = -x, x - sightings.width, -y, y - sightings.height
     ends = np.s_[:, :EDGE], np.s_[:, -EDGE:], np.s_[:EDGE], np.s_[-EDGE:]

@@ -1,4 +1,4 @@
-"""Spread of the body's acceleration before the camera, wider where the trunk's points say that the camera shakes or the person dances.
+"""Spread of the acceleration of transl: wider where the trunk's points say that the camera shakes or the person dances.
 
 A held camera moves the person by centimetres from frame to frame. A stiff prior on transl would lay that into the pose.
 """
