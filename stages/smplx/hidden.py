@@ -59,7 +59,7 @@ def find_occluder(sightings: Sightings, outlines: list[Outline]) -> np.ndarray |
     behind = ~shown & (crossed >= max(2, OFTEN * len(deep)))
     count, label = cv2.connectedComponents(behind.astype(np.uint8))
     kept = np.isin(label, [part for part in range(1, count) if depth[label == part].max() > DEEP * height])
-    return _grow(kept, REACH * height / scale) & ~shown if kept.any() else None
+    return _grow(kept, ~shown, round(REACH * height / scale)) if kept.any() else None
 
 
 def hide(sightings: Sightings, occluder: np.ndarray | None, outlines: list[Outline]) -> tuple[Sightings, np.ndarray]:
@@ -126,6 +126,9 @@ def _draw_limbs(xy: np.ndarray, seen: np.ndarray, shape: tuple[int, int], scale:
     return out
 
 
-def _grow(mask: np.ndarray, radius: float) -> np.ndarray:
-    """(h, w) bool, the mask (h, w) and what lies within radius pixels of it."""
-    return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5) <= radius
+def _grow(mask: np.ndarray, free: np.ndarray, steps: int) -> np.ndarray:
+    """(h, w) bool, what of `free` (h, w) can be reached from the mask (h, w) in so many steps of a pixel, without leaving it."""
+    out, within = mask.astype(np.uint8), free.astype(np.uint8)
+    for _ in range(steps):
+        out = cv2.dilate(out, np.ones((3, 3), np.uint8)) & within
+    return out > 0

