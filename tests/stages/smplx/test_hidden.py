@@ -1,4 +1,4 @@
-"""What stands before the person, or lies outside the picture, is unknown: named, not fitted to; a person in full view is left alone."""
+"""What stands before the person, or lies outside the picture, is named and not fitted; a person in full view is left alone."""
 
 from __future__ import annotations
 
