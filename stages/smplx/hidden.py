@@ -33,8 +33,8 @@ the outline's picture in which the mask reaches its end."""
 GROWTH = 2.0
 """Growth of sigma, per px of depth."""
 LIMBS = [[INDEX[name] for name in pair.split()] for pair in (
-    "nose left_shoulder", "nose right_shoulder", "left_shoulder right_shoulder", "left_hip right_hip", "left_shoulder left_hip",
-    "right_shoulder right_hip", "left_shoulder right_hip", "right_shoulder left_hip", "left_hip left_knee", "right_hip right_knee",
+    "left_shoulder right_shoulder", "left_hip right_hip", "left_shoulder left_hip", "right_shoulder right_hip",
+    "left_shoulder right_hip", "right_shoulder left_hip", "left_hip left_knee", "right_hip right_knee",
     "left_knee left_ankle", "right_knee right_ankle", "left_ankle left_big_toe", "right_ankle right_big_toe",
     "left_shoulder left_elbow", "right_shoulder right_elbow", "left_elbow left_wrist", "right_elbow right_wrist")]
 TRUNK_AND_LIMBS = slice(5, 23)
@@ -50,8 +50,8 @@ def find_occluder(sightings: Sightings, outlines: list[Outline]) -> np.ndarray |
     shown = np.any([outline.mask for outline in outlines], axis=0)
     scale, height = outlines[0].scale, _height(outlines)
     depth = _depth(shown) * scale
-    deep = _at(depth, sightings.xy[:, TRUNK_AND_LIMBS], scale) > DEEP * height
-    deep &= sightings.seen[:, TRUNK_AND_LIMBS]
+    points, seen = sightings.xy[:, TRUNK_AND_LIMBS], sightings.seen[:, TRUNK_AND_LIMBS]
+    deep = seen & (_at(depth, points, scale) > DEEP * height)
     if deep.any(1).sum() < max(3, LEAST_FRAMES * len(deep)):
         return None
     crossed = np.sum([_draw_limbs(xy, seen, shown.shape, scale, LIMB * height)

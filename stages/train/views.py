@@ -22,6 +22,8 @@ FAINT = 25
 """Value of the mask, 0..255, up to which a pixel shows nobody."""
 NEAR = 0.02
 """Share of the person's height within which something that stands there hides the person, rather than stands beside them."""
+KEPT = 0.8
+"""Least share of the person's pixels that a cut may keep: a pole hides less than a cut beside it would take."""
 LEAST_SHARE = 2e-4
 """A mask that covers less of the frame counts as empty."""
 
@@ -171,7 +173,7 @@ def cut_to_seen(view: View, occluder: np.ndarray | None) -> View:
     """The view cut to that side of what stands before the person (above, below, left or right of it) which shows most of them.
 
     occluder: (h, w) of the whole frame at any size, above 0.5 where something hides the person, or None. The view as it is where
-    nothing does.
+    nothing does, or the cut would take more than it hides.
     """
     if occluder is None:
         return view
@@ -190,4 +192,4 @@ def cut_to_seen(view: View, occluder: np.ndarray | None) -> View:
              (0, 0, columns[0] - edge, h), (columns[-1] + 1 + edge, 0, w, h)]
     shown = [mask[max(y0, 0):max(y1, 0), max(x0, 0):max(x1, 0)].sum() for x0, y0, x1, y1 in sides]
     best = int(np.argmax(shown))
-    return view.crop(*map(int, sides[best])) if shown[best] else view
+    return view.crop(*map(int, sides[best])) if shown[best] >= KEPT * mask.sum() else view
