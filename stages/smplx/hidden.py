@@ -37,6 +37,7 @@ LIMBS = [[INDEX[name] for name in pair.split()] for pair in (
     "left_shoulder right_hip", "right_shoulder left_hip", "left_hip left_knee", "right_hip right_knee",
     "left_knee left_ankle", "right_knee right_ankle", "left_ankle left_big_toe", "right_ankle right_big_toe",
     "left_shoulder left_elbow", "right_shoulder right_elbow", "left_elbow left_wrist", "right_elbow right_wrist")]
+NECK = [INDEX[name] for name in ("nose", "left_shoulder", "right_shoulder")]
 TRUNK_AND_LIMBS = slice(5, 23)
 PARTS = {"the head": [*range(5), *range(FACE.start, FACE.stop)], "the shoulders": [5, 6], "the elbows": [7, 8],
          "the left hand": [9, *range(HANDS["left"].start, HANDS["left"].stop)],
@@ -117,12 +118,13 @@ def _at(image: np.ndarray, xy: np.ndarray, scale: float) -> np.ndarray:
 
 
 def _draw_limbs(xy: np.ndarray, seen: np.ndarray, shape: tuple[int, int], scale: float, radius: float) -> np.ndarray:
-    """(h, w) uint8, 1 where limbs between seen points lie. xy: (133, 2) px; seen: (133,); radius: px."""
+    """(h, w) uint8, 1 where limbs between seen points lie, and the neck. xy: (133, 2) px; seen: (133,); radius: px."""
     out = np.zeros(shape, np.uint8)
-    for a, b in LIMBS:
-        if seen[a] and seen[b]:
-            ends = [tuple(int(v) for v in np.clip(xy[i] / scale, -1e4, 1e4)) for i in (a, b)]
-            cv2.line(out, ends[0], ends[1], 1, max(1, round(2 * radius / scale)))
+    ends = [(xy[a], xy[b]) for a, b in LIMBS if seen[a] and seen[b]]
+    if seen[NECK].all():
+        ends.append((xy[NECK[0]], xy[NECK[1:]].mean(0)))
+    for start, end in np.clip(np.array(ends) / scale, -1e4, 1e4).astype(int).tolist():
+        cv2.line(out, start, end, 1, max(1, round(2 * radius / scale)))
     return out
 
 

@@ -78,7 +78,7 @@ def test_a_pole_does_not_count_against_a_body_behind_it(body, person, tmp_path):
     occluder = find_occluder(seen, outlines)
     iou = sample_outlines(body, person, WIDTH, HEIGHT, outlines)[1]
     judged = sample_outlines(body, person, WIDTH, HEIGHT, [replace(o, hidden=occluder) for o in outlines])[1]
-    assert iou.max() < 0.85 and judged.min() > 0.95
+    assert iou.max() < 0.8 and judged.min() > 0.93
 
 
 def test_a_person_in_full_view_is_left_as_seen(body, person, tmp_path):
