@@ -1,6 +1,7 @@
-"""What no frame shows of the person: what lies outside the picture, and what stands still before them, furniture or a pole.
+"""What no frame shows of the person, for something stands still before them: furniture or a pole.
 
-A thing before the person is where the mask never is although the person's limbs are. Points there are guesses of the detector.
+It is where the mask never is although the person's limbs are. Points there are guesses of the detector. Points outside the picture
+are guesses as well, but better than none: without them knees are further off.
 """
 
 from __future__ import annotations
@@ -27,9 +28,6 @@ OFTEN = 0.1
 """Share of the frames in which a limb must cross a pixel."""
 GUESS = 0.03
 """Depth, as a share of the height, from which on a point is a guess that counts for nothing; before that its sigma grows."""
-RIM, EDGE = 0.05, 2
-"""Width of the picture's rim, as a share of the height, inside which points of a person who is cut off there are guesses; pixels of
-the outline's picture in which the mask reaches its end."""
 GROWTH = 2.0
 """Growth of sigma, per px of depth."""
 LIMBS = [[INDEX[name] for name in pair.split()] for pair in (
@@ -49,6 +47,8 @@ PARTS = {"the head": [*range(5), *range(FACE.start, FACE.stop)], "the shoulders"
 def find_occluder(sightings: Sightings, outlines: list[Outline]) -> np.ndarray | None:
     """(h, w) bool, where something that stands still hides the person, at the size of the outlines; None where nothing does."""
     shown = np.any([outline.mask for outline in outlines], axis=0)
+    if not shown.any():
+        return None
     scale, height = outlines[0].scale, _height(outlines)
     depth = _depth(shown) * scale
     points, seen = sightings.xy[:, TRUNK_AND_LIMBS], sightings.seen[:, TRUNK_AND_LIMBS]
@@ -63,32 +63,16 @@ def find_occluder(sightings: Sightings, outlines: list[Outline]) -> np.ndarray |
     return _grow(kept, ~shown, round(REACH * height / scale)) if kept.any() else None
 
 
-def hide(sightings: Sightings, occluder: np.ndarray | None, outlines: list[Outline]) -> tuple[Sightings, np.ndarray]:
-    """Sightings in which a point that cannot be seen counts less or not at all, and (T, 133) bool, points behind the occluder.
+def hide(sightings: Sightings, occluder: np.ndarray, scale: float) -> tuple[Sightings, np.ndarray]:
+    """Sightings in which a point behind the occluder counts less or not at all, and (T, 133) bool, those points.
 
-    occluder: (h, w) bool, as `find_occluder` has it.
+    occluder: (h, w) bool, as `find_occluder` has it; scale: px of the frame per pixel of it.
     """
-    height = _height(outlines)
-    depth = np.zeros(sightings.score.shape)
-    if occluder is not None:
-        depth = _at(_depth(~occluder) * outlines[0].scale, sightings.xy, outlines[0].scale)
-    away = np.maximum(depth, _outside(sightings, outlines, RIM * height))
-    score = np.where(away > GUESS * height, 0, sightings.score)
-    sigma = np.hypot(sightings.sigma, GROWTH * away).astype(sightings.sigma.dtype)
+    height = sightings.person_height
+    depth = _at(_depth(~occluder) * scale, sightings.xy, scale)
+    score = np.where(depth > GUESS * height, 0, sightings.score)
+    sigma = np.hypot(sightings.sigma, GROWTH * depth)
     return replace(sightings, score=score, sigma=sigma), (sightings.score > 0) & (depth > DEEP * height)
-
-
-def _outside(sightings: Sightings, outlines: list[Outline], rim: float) -> np.ndarray:
-    """(T, 133) px, depth of each point outside the picture.
-
-    rim: px by which the picture counts as smaller on a side where it cuts the person off, for the detector puts there what lies
-    outside just inside of it.
-    """
-    x, y = np.moveaxis(np.nan_to_num(sightings.xy, nan=0), -1, 0)
-    beyond = -x, x - sightings.width, -y, y - sightings.height
-    ends = np.s_[:, :EDGE], np.s_[:, -EDGE:], np.s_[:EDGE], np.s_[-EDGE:]
-    cut = np.array([[outline.mask[end].any() for end in ends] for outline in outlines])  # (T, 4)
-    return np.max([side + rim * cut[:, i, None] for i, side in enumerate(beyond)], axis=0).clip(0)
 
 
 def describe_hidden(behind: np.ndarray) -> list[Finding]:

@@ -50,9 +50,11 @@ def run(job: Job) -> None:
     outlines = read_outlines(frame_paths(job.inputs["segment/alpha"]))
     if len(outlines) != len(sightings.xy):
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
-    occluder = find_occluder(sightings, outlines)
-    outlines = [replace(outline, hidden=occluder) for outline in outlines]
-    sightings, behind = hide(sightings, occluder, outlines)
+    occluder, hidden = find_occluder(sightings, outlines), []
+    if occluder is not None:
+        outlines = [replace(outline, hidden=occluder) for outline in outlines]
+        sightings, behind = hide(sightings, occluder, outlines[0].scale)
+        hidden = describe_hidden(behind)
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
     expression, jaw, silent = translate_expression(body, face)
@@ -65,7 +67,7 @@ def run(job: Job) -> None:
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = find_lost_frames(fit, seen, sightings.person_height)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
-    for finding in (*fit.notes, *describe_hidden(behind), *describe_lost_frames(lost, fit.iou)):
+    for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit.iou)):
         job.warn(finding)
     if guesses := describe_guesses(job.config, params, clip):
         job.note(guesses)
