@@ -225,6 +225,8 @@ FLAME_SHAPES: Shapes = {"flame_expression": ("T", "X"), "flame_jaw": ("T", 3)}
 """Of face.npz where a FLAME file was given: how FLAME's face moves."""
 REST_SHAPE: Shapes = {"rest_expression": ("E",)}
 """Of face.npz where a face was seen, and of body.npz where the body acts the facial actions: the person's face at rest."""
+OCCLUDER_SHAPE: Shapes = {"occluder": ("Y", "X")}
+"""Of body.npz where something stands before the person in all frames: where, in the frame at a smaller size."""
 BODY_SHAPES: Shapes = {
     "betas": ("B",), "expression": ("T", "E"), "global_orient": ("T", 3), "body_pose": ("T", 63),
     "left_hand_pose": ("T", 45), "right_hand_pose": ("T", 45), "jaw_pose": ("T", 3), "leye_pose": ("T", 3),
@@ -265,8 +267,8 @@ def check_face(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_body(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3), and `REST_SHAPE` or not."""
-    arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE)
+    """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3); `REST_SHAPE` and `OCCLUDER_SHAPE` or not."""
+    arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE, OCCLUDER_SHAPE)
     for name, a in arrays.items():
         if not _finite(a):
             raise ArtifactError(f"{path}: array {name} is not finite")

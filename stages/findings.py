@@ -79,6 +79,8 @@ class Code(Enum):
     PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "
                             "are off", severity=Severity.NEWS)
     NOT_FITTED = Wording("Not fitted, and not learned from: {frames}; {reason}.", severity=Severity.WRONG)
+    PART_HIDDEN = Wording("Something that stands before the person hides {parts}; what is behind it is not fitted to the pictures.",
+                          "Film where nothing stands between the person and the camera.")
     POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
                              "frames: wide clothes, or a mask that holds more than the person.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")

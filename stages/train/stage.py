@@ -78,7 +78,8 @@ def run(job: Job) -> None:
     body = load_body(job, "train", params.model)
     camera = params.camera(clip.width, clip.height)
     views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height,
-                              mixed=config.recipe == "paper")  # as published
+                              mixed=config.recipe == "paper",  # as published
+                              occluder=params.occluder)
     if len(empty) == count:
         raise StageError("segment/alpha: every mask is empty, there is no person to train on; look at segment")
     usable = np.ones(count, bool)
@@ -184,7 +185,8 @@ class Run:
 
     def read(self, frames: np.ndarray) -> dict[int, View]:
         """`read_whole` of frames, (n,) indices."""
-        return read_whole(self.job.inputs["split/frames"], self.job.inputs["segment/alpha"], self.camera, frames)
+        return read_whole(self.job.inputs["split/frames"], self.job.inputs["segment/alpha"], self.camera, frames,
+                          self.poses.params.occluder)
 
     def fit(self) -> None:
         """Runs the recipe, from a checkpoint where there is one."""

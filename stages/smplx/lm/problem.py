@@ -46,6 +46,7 @@ class Problem:
         speed, acceleration = prior.motion_prior(active)
         self.speed_spread, self.acceleration_spread = speed, acceleration
         self.smoothness, self.outline_weight, self.limit = smoothness, 0.0, ROBUST
+        self.transl_spread = np.full(3, prior.TRANSL_ACCELERATION)
         self.stance = Stance(active)
         self.ground: Ground | None = None
         self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
@@ -245,7 +246,7 @@ class Problem:
         scale = np.sqrt(self.smoothness)
         return [scale * turn / self.speed_spread[:, None],
                 scale * np.diff(turn, axis=0) / span / self.acceleration_spread[:, None],
-                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / prior.TRANSL_ACCELERATION]
+                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / self.transl_spread]
 
     def _add_temporal(self, system: System, state: State) -> None:
         """Adds speeds and accelerations."""
@@ -268,7 +269,7 @@ class Problem:
             first, second = w / gap[:-1, None, None], w / gap[1:, None, None]
             self._couple(system, block, n, [-back[:-1, i] * first, back[1:, i] * second - slope[:-1, i] * first,
                                             slope[1:, i] * second], acceleration[:, i])
-        eye = np.eye(3)[None] * (scale / prior.TRANSL_ACCELERATION / span[:, None, None])
+        eye = np.eye(3)[None] * (scale / self.transl_spread / span[:, None, None])
         first, second = eye / gap[:-1, None, None], eye / gap[1:, None, None]
         self._couple(system, slice(n - 3, n), n, [first, -first - second, second], transl)
 
