@@ -75,6 +75,8 @@ class Code(Enum):
     NOT_FITTED = Wording("Not fitted, and not learned from: {frames}; {reason}.", severity=Severity.WRONG)
     POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
                              "frames: wide clothes, or a mask that holds more than the person.")
+    HAND_HIDDEN = Wording("The {side} hand is hidden in {frames}, behind the body as the camera sees it; where it lies is a guess.",
+                          "Keep the hands beside the body.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
     NOT_MEASURED = Wording("No frame is held out ({figure} usable frames, train.holdout is {holdout}): the quality of this avatar "
