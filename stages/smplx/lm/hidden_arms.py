@@ -27,8 +27,8 @@ SIDES = ("left", "right")
 HANDS = (LEFT_HAND, RIGHT_HAND)
 ARM_JOINTS = np.array([[INDEX[f"{side}_{name}"] for name in ("collar", "shoulder", "elbow", "wrist")] for side in SIDES])
 TRUNK_JOINTS = [INDEX[name] for name in ("pelvis", "spine1", "spine2", "spine3")]
-ELBOW, WRIST = ([int(np.flatnonzero(BODY_POINTS == POINT[f"{side}_{name}"])[0]) for side in SIDES] for name in ("elbow", "wrist"))
-HAND = [np.flatnonzero((BODY_POINTS >= first) & (BODY_POINTS < first + 21)) for first in (91, 112)]
+ELBOW, WRIST = ([int(np.flatnonzero(POINT[f"{side}_{name}"] == BODY_POINTS)[0]) for side in SIDES] for name in ("elbow", "wrist"))
+HAND = [np.flatnonzero((first <= BODY_POINTS) & (first + 21 > BODY_POINTS)) for first in (91, 112)]
 """Rows of `BODY_POINTS`."""
 HIDES = (((52, 15, -85), (28, -71, 0)), ((20, -12, -88), (16, -67, 0)))
 """Rotation vectors, degrees, of the left shoulder and elbow when the hand lies on the small of the back, and on the belly."""
@@ -42,8 +42,10 @@ SKIN, BEHIND_SPREAD = 0.03, 0.05
 """m: a hidden wrist's depth behind the trunk's far surface, and its spread."""
 OUTSIDE, OUTSIDE_SHARE = 0.02, 0.35
 """An arm is outside the mask if this share of its points lies farther out than this share of the person's height."""
-LEAST = 3
+LEAST = 4
 """Frames in plain view, at least, that contradict a hand which was not detected."""
+TRUSTED = 0.6
+"""Share of frames with the hand beside the trunk in which it must be detected: a detector that misses it there proves nothing."""
 BRIDGED = 2
 """Frames between two stays that belong to them."""
 AROUND_S = 1.2
@@ -58,7 +60,7 @@ FAR_OFF = 5.0
 """Factor on the robust limit in the search."""
 STEPS = 12
 """Steps of each search, at most."""
-SIGMA = {"elbow": 0.03, "wrist": 0.06}
+SIGMA = {"elbow": 0.05, "wrist": 0.1}
 """m, added to the standard deviation of a hidden arm's joints; a hand's joints have the wrist's."""
 
 
@@ -103,6 +105,8 @@ class HiddenArms:
             return
         chain = problem.skeleton.pose(state.local, state.shape)
         for side in (0, 1):
+            if not self.is_detected(state, chain, missing[:, side], side):
+                continue
             plain = np.zeros(len(missing), bool)
             for t in np.flatnonzero(missing[:, side]):
                 plain[t] = self.is_in_plain_view(problem, state, chain.frame(t), t, side)
@@ -110,6 +114,12 @@ class HiddenArms:
                 if plain[first:last].sum() >= LEAST:
                     near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
                     self.stays.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
+
+    def is_detected(self, state: State, chain: Chain, missing: np.ndarray, side: int) -> bool:
+        """Whether the detector mostly finds this hand where nothing of the body can hide it. missing: (T,) bool."""
+        wrist = chain.place[:, ARM_JOINTS[side, 3]] + state.transl
+        beside = [np.isinf(self.measure_trunk(state, chain.frame(t), t, wrist[t])[0]) for t in range(len(missing))]
+        return bool(missing.any()) and bool((~missing[beside]).mean() > TRUSTED if any(beside) else True)
 
     def is_in_plain_view(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> bool:
         """Whether the fitted hand lies before the trunk, or the forearm beside the mask. chain: of frame t alone."""
@@ -135,9 +145,8 @@ class HiddenArms:
         state = replace(state, local=state.local.copy())
         for stay in self.stays:
             frames, arm = slice(stay.first, stay.last), ARM_JOINTS[stay.side]
-            own = [ELBOW[stay.side], WRIST[stay.side], *HAND[stay.side]]
-            problem.seen.spread[frames, own] = np.hypot(problem.seen.spread[frames, own], GUESSED * self.height)
-            problem.seen.depth[frames, own] = np.nan
+            for point, guessed in ((ELBOW[stay.side], GUESSED / 2), (WRIST[stay.side], GUESSED)):
+                problem.seen.spread[frames, point] = np.hypot(problem.seen.spread[frames, point], guessed * self.height)
             problem.loose[stay.around, np.isin(problem.active, arm)] = QUICK
             problem.spread[stay.around, np.isin(problem.active, arm)] *= FREE
             found = [self.fit_arm(problem, state, stay, start) for start in self.list_starts(state, stay)]
@@ -183,7 +192,7 @@ class HiddenArms:
         return alone.cost(trial), trial.local
 
     def hold(self, problem: Problem, state: State) -> None:
-        """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight in the state."""
+        """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight."""
         problem.inside = [(t, self.forearm[stay.side]) for stay in self.stays for t in range(stay.first, stay.last)]
         if not self.stays:
             return
@@ -191,7 +200,7 @@ class HiddenArms:
         chain = problem.skeleton.pose(state.local, state.shape)
         hips = problem.locate_points(chain, state)[:, list(problem.hips), 2].mean(1)
         for stay in self.stays:
-            spread[stay.around, [ELBOW[stay.side]]] = spread[stay.around, [WRIST[stay.side]]] = ROUGH_DEPTH
+            spread[stay.around, ELBOW[stay.side]] = spread[stay.around, WRIST[stay.side]] = ROUGH_DEPTH
             for t in range(stay.first, stay.last):
                 own = chain.frame(t)
                 wrist = own.place[0, ARM_JOINTS[stay.side, 3]] + state.transl[t]
@@ -201,12 +210,14 @@ class HiddenArms:
         problem.seen.depth_spread = spread
 
     def widen(self, sigma: np.ndarray) -> None:
-        """Adds to the standard deviations (T, 55) m of the hidden arms what nothing in their frames tells."""
+        """Adds to the standard deviations (T, 55) m of the hidden arms what nothing in their frames tells; less on the way there."""
         for stay in self.stays:
-            side = SIDES[stay.side]
+            frame = np.arange(stay.start, stay.stop)
+            before, after = stay.first - stay.start + 1, stay.stop - stay.last + 1
+            share = np.minimum(1, np.minimum((frame - stay.start + 1) / before, (stay.stop - frame) / after))[:, None]
             for name, more in SIGMA.items():
-                own = [INDEX[f"{side}_{name}"], *(np.arange(J)[HANDS[stay.side]] if name == "wrist" else ())]
-                sigma[stay.first:stay.last, own] = np.hypot(sigma[stay.first:stay.last, own], more)
+                own = [INDEX[f"{SIDES[stay.side]}_{name}"], *(np.arange(J)[HANDS[stay.side]] if name == "wrist" else ())]
+                sigma[stay.start:stay.stop, own] = np.hypot(sigma[stay.start:stay.stop, own], more * share)
 
     def describe(self, frames: int) -> list[Finding]:
         """What the user should know. frames: T."""
@@ -235,4 +246,5 @@ def hiding_pose(side: int, pose: tuple) -> np.ndarray:
 def bridge(missing: np.ndarray) -> list[tuple[int, int]]:
     """First and last frame, exclusive, of each run of missing (T,) bool; gaps of up to `BRIDGED` frames are part of it."""
     index = np.flatnonzero(missing)
-    return [(int(run[0]), int(run[-1]) + 1) for run in np.split(index, np.flatnonzero(np.diff(index) > BRIDGED + 1) + 1) if len(run)]
+    parts = np.split(index, np.flatnonzero(np.diff(index) > BRIDGED + 1) + 1)
+    return [(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]

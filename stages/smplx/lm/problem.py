@@ -29,7 +29,7 @@ CLOTHES = 0.003
 """Distance, m, of the silhouette from a body model without clothes (an official SMPL-X file)."""
 OUTLINE_SIGHTINGS = 60
 """Weight of one frame's outline, in independent points."""
-INSIDE_ROBUST, INSIDE_SIGHTINGS = 15.0, 12.0
+INSIDE_ROBUST, INSIDE_SIGHTINGS = 15.0, 30.0
 """Robust limit, in spreads, and weight, in independent points, of one arm's points that lie inside the outline or cost."""
 
 
@@ -219,7 +219,7 @@ class Problem:
         return np.where(out, distance / self.seen.outline_spread, 0), direction
 
     def _add_inside(self, system: System, state: State, chain: Chain, t: int, pairs: Pairs) -> None:
-        """Adds one frame's points that lie inside the outline or cost: one row a point. The focal length does not answer to them."""
+        """Adds one frame's points that lie inside the outline or cost: one row a point. They leave the focal length alone."""
         x = self._place(chain, state, t, pairs)
         residual, direction = self._outside(t, state, x)
         weight = robust(residual, INSIDE_ROBUST)[1] * np.sqrt(INSIDE_SIGHTINGS / len(x))
