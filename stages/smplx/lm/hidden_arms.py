@@ -98,10 +98,13 @@ class HiddenArms:
         left, right = (sample_surface(body, weights[:, arm[2:]].sum(1) > 0.5, ARM_SAMPLES) for arm in ARM_JOINTS)
         return cls(sample_surface(body, weights[:, TRUNK_JOINTS].sum(1) > 0.8, TRUNK_SAMPLES), (left, right), height, [])
 
-    def find(self, problem: Problem, state: State, missing: np.ndarray) -> None:
-        """Finds the stays: hands that were not detected where the fit has them in plain view. missing: (T, 2) bool."""
+    def find(self, problem: Problem, state: State, missing: np.ndarray | None) -> None:
+        """Finds the stays: hands that were not detected where the fit has them in plain view.
+
+        missing: (T, 2) bool, hands that were not detected; None: all were.
+        """
         seconds = problem.seen.seconds
-        if seconds is None or not missing.any():
+        if seconds is None or missing is None:
             return
         chain = problem.skeleton.pose(state.local, state.shape)
         for side in (0, 1):
@@ -210,7 +213,7 @@ class HiddenArms:
         problem.seen.depth_spread = spread
 
     def widen(self, sigma: np.ndarray) -> None:
-        """Adds to the standard deviations (T, 55) m of the hidden arms what nothing in their frames tells; less on the way there."""
+        """Adds to the standard deviations (T, 55) m of hidden arms what nothing in their frames tells; less on the way there."""
         for stay in self.stays:
             frame = np.arange(stay.start, stay.stop)
             before, after = stay.first - stay.start + 1, stay.stop - stay.last + 1
