@@ -108,21 +108,21 @@ class HiddenArms:
             return
         chain = problem.skeleton.pose(state.local, state.shape)
         for side in (0, 1):
-            if not self.is_detected(state, chain, missing[:, side], side):
-                continue
-            plain = np.zeros(len(missing), bool)
-            for t in np.flatnonzero(missing[:, side]):
-                plain[t] = self.is_in_plain_view(problem, state, chain.frame(t), t, side)
+            found = []
             for first, last in bridge(missing[:, side]):
-                if plain[first:last].sum() >= LEAST:
+                lost = first + np.flatnonzero(missing[first:last, side])
+                plain = sum(self.is_in_plain_view(problem, state, chain.frame(t), t, side) for t in lost if len(lost) >= LEAST)
+                if plain >= LEAST:
                     near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
-                    self.stays.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
+                    found.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
+            if found and self.is_detected(state, chain, missing[:, side], side):
+                self.stays += found
 
     def is_detected(self, state: State, chain: Chain, missing: np.ndarray, side: int) -> bool:
         """Whether the detector mostly finds this hand where nothing of the body can hide it. missing: (T,) bool."""
         wrist = chain.place[:, ARM_JOINTS[side, 3]] + state.transl
         beside = [np.isinf(self.measure_trunk(state, chain.frame(t), t, wrist[t])[0]) for t in range(len(missing))]
-        return bool(missing.any()) and bool((~missing[beside]).mean() > TRUSTED if any(beside) else True)
+        return not any(beside) or bool((~missing[beside]).mean() > TRUSTED)
 
     def is_in_plain_view(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> bool:
         """Whether the fitted hand lies before the trunk, or the forearm beside the mask. chain: of frame t alone."""
@@ -175,7 +175,10 @@ class HiddenArms:
         return out
 
     def fit_arm(self, problem: Problem, state: State, stay: Stay, start: np.ndarray) -> tuple[float, np.ndarray]:
-        """Cost and joint rotations (F, J, 3, 3) of the stay's frames after a search in which only this arm moves."""
+        """Cost and joint rotations (F, J, 3, 3) of the stay's frames after a search in which only this arm moves.
+
+        start: (F, J, 3, 3) joint rotations.
+        """
         around, arm = stay.around, ARM_JOINTS[stay.side]
         seen = replace(problem.seen, xy=problem.seen.xy[around], spread=problem.seen.spread[around],
                        depth=problem.seen.depth[around].copy(), seconds=problem.seen.seconds[around],
@@ -213,7 +216,10 @@ class HiddenArms:
         problem.seen.depth_spread = spread
 
     def widen(self, sigma: np.ndarray) -> None:
-        """Adds to the standard deviations (T, 55) m of hidden arms what nothing in their frames tells; less on the way there."""
+        """Adds to the standard deviations of hidden arms what nothing in their frames tells; less on the way there.
+
+        sigma: (T, 55) m, changed in place.
+        """
         for stay in self.stays:
             frame = np.arange(stay.start, stay.stop)
             before, after = stay.first - stay.start + 1, stay.stop - stay.last + 1
