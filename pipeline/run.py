@@ -312,7 +312,7 @@ class ClipRun:
 
 def refuse_hopeless(record: Record) -> None:
     """BadInput where the stage has found that nothing can come of the clip."""
-    for message, finding in zip(record.info.warnings, record.info.findings, strict=True):
+    for message, finding in zip(record.info.warnings, record.info.findings, strict=False):  # old records have none
         if finding["severity"] == HOPELESS:
             raise BadInput(f"{message} (--anyway goes on)")
 

@@ -18,10 +18,10 @@ class Severity(StrEnum):
     """Nothing that is seen, or a figure that is not measured."""
     POORER = "poorer"
     """Detail, or a part that the clip does not show: it is made up."""
-    HOPELESS = "hopeless"
-    """Nothing can come of the clip: a run stops here, unless it is told to go on."""
     WRONG = "wrong"
     """The frames contradict each other or the body: without them, or filmed again, the avatar is better."""
+    HOPELESS = "hopeless"
+    """Nothing can come of the clip: a run stops here, unless it is told to go on."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,8 @@ class Code(Enum):
                           "Film where nothing stands between the person and the camera.")
     POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
                              "frames: wide clothes, or a mask that holds more than the person.")
+    HAND_HIDDEN = Wording("The {side} hand is hidden in {frames}, behind the body as the camera sees it; where it lies is a guess.",
+                          "Keep the hands beside the body.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
     NOT_MEASURED = Wording("No frame is held out ({figure} usable frames, train.holdout is {holdout}): the quality of this avatar "

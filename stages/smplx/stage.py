@@ -43,7 +43,7 @@ def run(job: Job) -> None:
     body = load_body(job, "smplx")
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px, str(points["detector"]), face, clip.principal_point, clip.longer_side)
+                          clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
