@@ -56,11 +56,19 @@ class Clip:
     """None: the frames show the whole footage."""
     center: tuple[float, float] | None = None
     """Principal point, px; None: the frame's middle."""
+    repeated: list[int] = field(default_factory=list)
+    """Frames whose picture shows an earlier one's moment: no stage learns from them."""
 
     @property
     def principal_point(self) -> tuple[float, float]:
         """px."""
         return self.center or (self.width / 2, self.height / 2)
+
+    def shows_own_moment(self, frames: int) -> np.ndarray:
+        """(T,) bool: all but the repeated ones of so many frames."""
+        import numpy as np
+
+        return ~np.isin(np.arange(frames), self.repeated)
 
     @property
     def longer_side(self) -> float:
@@ -72,6 +80,7 @@ class Clip:
 
     def write(self, path: Path) -> None:
         cut = {"crop", "center"} if self.crop is None and self.center is None else set()
+        cut |= set() if self.repeated else {"repeated"}
         values = {name: value for name, value in asdict(self).items() if name not in cut}
         write_file(path, (json.dumps(values, indent=1, sort_keys=True) + "\n").encode())
 

@@ -43,13 +43,15 @@ def run(job: Job) -> None:
     body = load_body(job, "smplx")
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px, str(points["detector"]), face, clip.principal_point, clip.longer_side)
+                          clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
     outlines = read_outlines(frame_paths(job.inputs["segment/alpha"]))
     if len(outlines) != len(sightings.xy):
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
+    own = clip.shows_own_moment(len(outlines))
+    outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
     occluder, hidden = find_occluder(sightings, outlines), []
     if occluder is not None:
         outlines = [replace(outline, hidden=occluder) for outline in outlines]
@@ -65,7 +67,7 @@ def run(job: Job) -> None:
     params.occluder = occluder
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
-    lost = find_lost_frames(fit, seen, sightings.person_height)
+    lost = find_lost_frames(fit, seen, sightings.person_height, own)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
     for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit.iou)):
         job.warn(finding)

@@ -26,6 +26,7 @@ from gsac.avatar.yaw import turn_seen
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.findings import Code, Finding
+from gsac.stages.first_look import LEAST_TURN
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.choose_heldout import hold_out, hold_out_for_choosing
 from gsac.stages.train.config import NETWORKS, TrainConfig
@@ -47,8 +48,6 @@ LOSS_ROWS = 20
 """Rows of the curve that have the loss."""
 TIMES = ("seconds", "cpu_seconds", "gpu_seconds")
 """What a row of the curve holds that another run would not repeat: it goes to the engine, not into metrics.json."""
-LEAST_TURN = 270
-"""Degrees of the person's turn below which the user is warned."""
 LEAST_SEEN = 0.8
 """Share of the body's surface in view below which the user is warned."""
 TRAIN_SAMPLE = 8
@@ -87,9 +86,9 @@ def run(job: Job) -> None:
     usable[empty] = False
     if empty:
         job.warn(Finding.of(Code.MASK_NOT_TRAINED, ~usable))
-    if params.lost.any():
-        job.warn(Finding.of(Code.POSE_NOT_TRAINED, params.lost))
-        usable &= ~params.lost
+    usable &= ~params.lost
+    if (failed := params.lost & clip.shows_own_moment(count)).any():
+        job.warn(Finding.of(Code.POSE_NOT_TRAINED, failed))
     if not usable.any():
         raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
     held = hold_out(params.global_orient, usable, config.holdout)
@@ -332,7 +331,7 @@ class Run:
             "lpips_in_loss": self.in_loss is not None,
             "levels": judge_levels(gaussians, self.result.coarser, poses,
                                    {t: view.reduced(trained.height) for t, view in self.filmed.items()}),
-            "likeness": judge_likeness(gaussians, aligned, held, self.filmed),
+            "likeness": judge_likeness(gaussians, aligned, held, small, self.camera.height),
             "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),
