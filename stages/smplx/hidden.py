@@ -77,9 +77,10 @@ def hide(sightings: Sightings, occluder: np.ndarray, scale: float) -> tuple[Sigh
 
 def describe_hidden(behind: np.ndarray) -> list[Finding]:
     """behind: (T, 133) bool, points behind something."""
-    parts = {part: behind[:, points].any(1) for part, points in PARTS.items()}
+    parts = {part: np.any(behind[:, points], axis=1) for part, points in PARTS.items()}
     named = ", ".join(f"{part} in {name_frames(frames)}" for part, frames in parts.items() if frames.any())
-    return [Finding.of(Code.PART_HIDDEN, behind.any(1), figure=behind.any(1).sum(), parts=named)] if named else []
+    frames = np.any(behind, axis=1)
+    return [Finding.of(Code.PART_HIDDEN, frames, figure=int(frames.sum()), parts=named)] if named else []
 
 
 def _height(outlines: list[Outline]) -> float:

@@ -25,7 +25,7 @@ SIGMA = 0.6745
 def transl_acceleration(sightings: Sightings) -> np.ndarray:
     """(3,) m/s^2, spread of the acceleration of transl: the prior's, or across the picture what the trunk's points move."""
     out = np.full(3, prior.TRANSL_ACCELERATION)
-    seen = sightings.seen[:, TRUNK].all(1)
+    seen = np.all(sightings.seen[:, TRUNK], axis=1)
     known = seen[:-2] & seen[1:-1] & seen[2:]
     if sightings.seconds is None or not known.any():
         return out
