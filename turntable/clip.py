@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import wholebody
@@ -161,7 +161,7 @@ def joint_depths(person: Person) -> np.ndarray:
     """(55,) m by which each joint may lie below the drawn surface and still count as seen: its limb's thickness with clothes."""
     drawn = person.rest[person.pair[:, 0]]
     drawn = (drawn + (person.rest[person.pair[:, 1]] - drawn) * person.share[:, None])[np.unique(person.faces)]
-    out = cKDTree(drawn).query(person.joints, k=60)[0].mean(1) * 1.6
+    out = KDTree(drawn).query(person.joints, k=60)[0].mean(1) * 1.6
     for joint in TRUNK:
         away = drawn - person.joints[joint]
         level = (np.abs(away[:, 1]) < 0.03) & (np.abs(away[:, 0]) < 0.12)
@@ -171,7 +171,7 @@ def joint_depths(person: Person) -> np.ndarray:
 
 def skin_is_seen(points: np.ndarray, skin: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """(n,) bool: whether any of the eight points of skin (k, 3) nearest to each point (n, 3) is seen (k,) bool."""
-    return np.any(seen[cKDTree(skin).query(points, k=8)[1]], axis=1)
+    return np.any(seen[KDTree(skin).query(points, k=8)[1]], axis=1)
 
 
 class TruthRecorder:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, WRISTS, J
 from gsac.turntable.person import MATERIALS, Person
@@ -28,7 +28,7 @@ def cover_hands(person: Person, bare: np.ndarray, drawn: np.ndarray, joints: np.
         hip, knee = joints[INDEX[f"{side}_hip"]], joints[INDEX[f"{side}_knee"]]
         thigh = Axis(hip, knee)
         hand = bare[person.body.weights[:, [wrist, *range(J)[fingers]]].sum(1) > 0.6]
-        tree = cKDTree(hand)
+        tree = KDTree(hand)
         for name, over in CLOTH.items():
             here = np.unique(person.faces[person.material == MATERIALS.index(name)])
             here = here[tree.query(out[here], distance_upper_bound=REACH)[0] < REACH]

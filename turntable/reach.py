@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, J
@@ -142,7 +142,7 @@ class Solid:
 
     def __init__(self, points: np.ndarray, normals: np.ndarray):
         """points: (M, 3) m; normals: (M, 3), outward."""
-        self.points, self.normals, self.tree = points, normals, cKDTree(points)
+        self.points, self.normals, self.tree = points, normals, KDTree(points)
 
     @classmethod
     def around(cls, person: Person, pose: np.ndarray, side: str, under: bool = False) -> Solid:
@@ -162,7 +162,7 @@ class Solid:
         """(K,) m by which points (K, 3) lie deeper than `TOUCH` below the surface, 0 outside."""
         distance, nearest = self.tree.query(points, distance_upper_bound=FAR)
         near = np.isfinite(distance)
-        at = nearest[near]
+        at = np.asarray(nearest)[near]
         out = np.zeros(len(points))
         out[near] = np.clip(-((points[near] - self.points[at]) * self.normals[at]).sum(1) - TOUCH, 0, None)
         return out

@@ -6,7 +6,7 @@ Places are m in the T-pose: +x to the person's left, +y up, +z forward.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from gsac.avatar.joints import INDEX
 from gsac.avatar.mesh import vertex_normals
@@ -81,7 +81,7 @@ def hood(skin: np.ndarray, faces: np.ndarray, joints: np.ndarray, thick: float) 
     turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     ring = 0.034 * np.cos(turn)[None, :, None] * out[:, None] + 0.058 * np.sin(turn)[None, :, None] * [0, 1.0, 0]
     points = (centre[:, None] + size * ring).reshape(-1, 3)
-    nearest = cKDTree(skin).query(points)[1]
+    nearest = KDTree(skin).query(points)[1]
     outward = vertex_normals(skin, faces)[nearest]
     points += outward * np.maximum(0.004 - ((points - skin[nearest]) * outward).sum(1), 0)[:, None]
     return piece("shirt", points, grid_faces(len(along), len(turn), True), ("spine3",), np.ones((len(points), 1)))

@@ -6,7 +6,7 @@ from typing import get_args
 import cv2
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.joints import INDEX
@@ -125,7 +125,7 @@ def test_what_is_worn_or_held_is_drawn_outside_the_body_and_moves_with_it(person
     worn = surface(dressed)
     assert len(worn) > len(surface(person)) or look == "top"
     bare = dressed.rest[:len(person.body.v_template)]
-    assert cKDTree(bare).query(worn)[0].max() < 0.25
+    assert KDTree(bare).query(worn)[0].max() < 0.25
     skin = Solid(bare, vertex_normals(bare, person.body.faces))
     assert np.percentile(skin.depth(worn), 98) < 0.015
     assert np.isfinite(dressed.skin_weight).all()
