@@ -26,6 +26,7 @@ from gsac.stages.smplx.lm.hidden_arms import HiddenArms
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
+from gsac.stages.smplx.lm.shake import transl_acceleration
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -83,6 +84,7 @@ def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: 
     pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS], moves[BODY_POINTS])
     seen = observe(sightings, detector, BODY_POINTS, center, focal, config, outlines)
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, person_offsets)
+    problem.transl_spread = transl_acceleration(sightings)
     state = replace(estimate_start(body, sightings, focal[0], center), own=np.zeros(len(person_offsets.spread)))
     seen.depth *= measure_world_scale(problem, state, sightings)
     seen.repeats = count_repeats(state.local[:, 0])

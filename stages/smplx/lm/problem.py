@@ -49,6 +49,7 @@ class Problem:
         speed, acceleration = prior.motion_prior(active)
         self.speed_spread, self.acceleration_spread = speed, acceleration
         self.smoothness, self.outline_weight, self.limit = smoothness, 0.0, ROBUST
+        self.transl_spread = np.full(3, prior.TRANSL_ACCELERATION)
         self.stance = Stance(active)
         self.ground: Ground | None = None
         self.inside: list[tuple[int, Pairs]] = []
@@ -278,7 +279,7 @@ class Problem:
         speed_spread, acceleration_spread = self._motion_spreads()
         return [scale * turn / speed_spread[..., None],
                 scale * np.diff(turn, axis=0) / span / acceleration_spread[..., None],
-                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / prior.TRANSL_ACCELERATION]
+                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / self.transl_spread]
 
     def _motion_spreads(self) -> tuple[np.ndarray, np.ndarray]:
         """Spreads of the joints' speed (T - 1, A) and acceleration (T - 2, A)."""
@@ -307,7 +308,7 @@ class Problem:
             first, second = w / gap[:-1, None, None], w / gap[1:, None, None]
             self._couple(system, block, n, [-back[:-1, i] * first, back[1:, i] * second - slope[:-1, i] * first,
                                             slope[1:, i] * second], acceleration[:, i])
-        eye = np.eye(3)[None] * (scale / prior.TRANSL_ACCELERATION / span[:, None, None])
+        eye = np.eye(3)[None] * (scale / self.transl_spread / span[:, None, None])
         first, second = eye / gap[:-1, None, None], eye / gap[1:, None, None]
         self._couple(system, slice(n - 3, n), n, [first, -first - second, second], transl)
 
