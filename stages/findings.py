@@ -99,6 +99,8 @@ class Code(Enum):
     CHECKPOINT_UNREADABLE = Wording("The checkpoint {path} cannot be read ({error}); training starts anew.", severity=Severity.NEWS)
     FROZEN = Wording("The picture stands still in {frames} while time goes on; these frames are not used.",
                      "Film without pausing, with no other program open on the phone.", Severity.WRONG)
+    MIRRORED = Wording("The picture is mirrored in {frames}; these frames are {treated}.",
+                       "Give one recording, without cuts and effects.", Severity.NEWS)
     REPEATED = Wording("Pictures repeat in {frames}; these frames are not used.",
                        "Send the file as the phone recorded it, not a copy with another frame rate.", Severity.NEWS)
     SCENE_CUT = Wording("Another scene begins in {frames}.", "Give one shot, from one stand.", Severity.WRONG)

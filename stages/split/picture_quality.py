@@ -5,7 +5,7 @@ Each picture is looked at small and forgotten; what is kept of it are the means 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -53,6 +53,10 @@ class Look:
     """(h, w, 3) float32 means, 0..255."""
     sharpness: np.ndarray
     """(3,) as `measure_sharpness`."""
+
+    def turned(self) -> Look:
+        """Of the mirrored picture."""
+        return replace(self, blocks=self.blocks[:, ::-1])
 
 
 def look_at(picture: np.ndarray) -> Look:

@@ -22,6 +22,7 @@ from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_point, sides_near
 from gsac.stages.split.keyframes import read_key_frames
+from gsac.stages.split.mirrored import find_mirrored, turn_back
 from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
 from gsac.stages.split.picture_quality import HEIGHT, Look, judge_pictures, look_at
@@ -84,7 +85,16 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     elif errors:
         warn(Finding.of(Code.VIDEO_BROKEN, name=path.name, error=errors[0]))
 
+    mirrored = find_mirrored(np.stack([look.blocks for look in looks]))
+    if mirrored.any():
+        if crop is None:
+            turn_back(frames, mirrored)
+            looks = [look.turned() if odd else look for look, odd in zip(looks, mirrored, strict=True)]
+        warn(Finding.of(Code.MIRRORED, mirrored, figure=mirrored.sum(),
+                        treated="turned back" if crop is None else "not used: they were cut to the person's place"))
     repeated, findings = judge_pictures(looks, timed=True)
+    if crop is not None:
+        repeated |= mirrored
     for finding in findings:
         warn(finding)
     notes = []

@@ -111,7 +111,8 @@ class HiddenArms:
             found = []
             for first, last in bridge(missing[:, side]):
                 lost = first + np.flatnonzero(missing[first:last, side])
-                plain = sum(self.is_in_plain_view(problem, state, chain.frame(t), t, side) for t in lost.tolist() if len(lost) >= LEAST)
+                plain = sum(self.is_in_plain_view(problem, state, chain.frame(t), t, side)
+                            for t in lost.tolist() if len(lost) >= LEAST)
                 if plain >= LEAST:
                     near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
                     found.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
