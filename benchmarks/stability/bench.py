@@ -11,6 +11,11 @@ import argparse
 import sys
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gsac.benchmarks.stability.trial import Task
+    from gsac.pipeline.reporter import PlainReporter
 
 TINY = {"frames": 10, "height": 320}
 """Of the clip of --quick."""
@@ -62,7 +67,7 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def measure(options: argparse.Namespace, lines: Path, say) -> None:
+def measure(options: argparse.Namespace, lines: Path, say: PlainReporter) -> None:
     """Runs the tasks that are not in the file of lines yet, and appends each as it ends."""
     from gsac.benchmarks.stability import table, workers
     from gsac.benchmarks.stability.trial import Trial
@@ -81,7 +86,7 @@ def measure(options: argparse.Namespace, lines: Path, say) -> None:
     workers.run_all(tasks, options.jobs, options.limit, tell, options.until_s)
 
 
-def list_tasks(options: argparse.Namespace, say) -> list:
+def list_tasks(options: argparse.Namespace, say: PlainReporter) -> list[Task]:
     """Tasks in the order in which they should be done: methods, clean clips before faults, seeds, then severities 3, 5, 1, 4, 2."""
     from gsac.benchmarks.clip_runs import render_clip
     from gsac.benchmarks.stability.fault import Origin
@@ -96,10 +101,11 @@ def list_tasks(options: argparse.Namespace, say) -> list:
         clips = options.clip
     elif quick:
         from gsac.turntable.clip import make_clip
+        from gsac.turntable.options import TurntableOptions
 
         clips = [options.out / "clips" / "seed31"]
         if not (clips[0] / "truth.npz").is_file():
-            make_clip(clips[0], seed=31, supersample=1, **TINY)
+            make_clip(clips[0], TurntableOptions(seed=31, supersample=1, frames=TINY["frames"], height=TINY["height"]))
     else:
         clips = [render_clip(options.out / "clips" / f"seed{seed}", say, seed=seed) for seed in (31, 32, 33)]
     seeds = [0] if quick else options.seeds
@@ -107,7 +113,8 @@ def list_tasks(options: argparse.Namespace, say) -> list:
     sizes = TINY if quick else {"frames": options.frames, "height": options.height}
 
     def task(fault: str, severity: int, seed: int, method: str) -> Task:
-        return Task(clips[seed % len(clips)].resolve(), fault, severity, seed, method, options.out.resolve(), until=options.until, **sizes)
+        return Task(clips[seed % len(clips)].resolve(), fault, severity, seed, method, options.out.resolve(), **sizes,
+                    until=options.until)
 
     return [each for method in options.methods or ([DEFAULT] if quick else METHODS)
             for each in ([task(CLEAN, 0, seed, method) for seed in seeds[:len(clips)]]

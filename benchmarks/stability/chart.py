@@ -21,9 +21,10 @@ NAMED = 4
 
 
 def draw(curves: list[Curve], folder: Path) -> list[Path]:
-    """Writes stability.png and stability.svg and returns their paths. Both panels show the faults that each method was tried with."""
+    """Writes stability.png and stability.svg and returns their paths. A panel shows the faults that its method was tried with."""
     methods = [m for m in COLOURS if any(c.method == m for c in curves)]
-    figure, panels = plt.subplots(1, len(methods), figsize=(5.6 * len(methods), 4.6), layout="constrained", squeeze=False, sharey=True)
+    size = 5.6 * len(methods), 4.6
+    figure, panels = plt.subplots(1, len(methods), figsize=size, layout="constrained", squeeze=False, sharey=True)
     for axes, method in zip(panels[0], methods, strict=True):
         some = sorted((c for c in curves if c.method == method), key=lambda c: c.area)
         lines = np.array([np.interp(SEVERITIES, c.severities, c.retained) for c in some])
@@ -32,9 +33,10 @@ def draw(curves: list[Curve], folder: Path) -> list[Path]:
         axes.plot(SEVERITIES, np.median(lines, axis=0), color=COLOURS[method], lw=3.2)
         axes.axhline(BREAKDOWN, color="0.6", lw=0.8, ls=":")
         for curve, line in zip(some[:NAMED], lines, strict=False):
-            axes.annotate(curve.fault, (5, line[-1]), xytext=(3, 0), textcoords="offset points", fontsize=7, color="0.35", va="center")
+            axes.annotate(curve.fault, (5, line[-1]), xytext=(3, 0), textcoords="offset points", fontsize=7, color="0.35",
+                          va="center")
         areas = [c.area for c in some]
-        axes.set(title=f"{TITLES[method]}: {len(some)} faults, area {np.median(areas):.2f} in the median, {min(areas):.2f} at worst",
+        axes.set(title=f"{TITLES[method]}: {len(some)} faults, area: median {np.median(areas):.2f}, worst {min(areas):.2f}",
                  xlabel="severity", xlim=(0, 5.9), ylim=(-0.02, 1.02), xticks=list(SEVERITIES))
         axes.title.set_fontsize(9)
         axes.grid(alpha=0.25, lw=0.5)

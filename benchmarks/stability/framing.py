@@ -40,7 +40,7 @@ def leave(take: Take, share: float, rng: np.random.Generator) -> Touched:
 def step_back(take: Take, factor: float, rng: np.random.Generator) -> Touched:
     """factor: on the person's size; the scene's edge goes on to the picture's."""
     height, width = take.size
-    zoom = np.float32([[factor, 0, (1 - factor) * width / 2], [0, factor, (1 - factor) * height / 2]])
+    zoom = np.array([[factor, 0, (1 - factor) * width / 2], [0, factor, (1 - factor) * height / 2]])
     frames = [cv2.warpAffine(f, zoom, (width, height), flags=cv2.INTER_AREA, borderMode=cv2.BORDER_REPLICATE) for f in take.frames]
     masks = [cv2.warpAffine(m.astype(np.uint8), zoom, (width, height)) > 0 for m in take.masks]
     return replace(take, frames=np.stack(frames), masks=np.stack(masks)), np.ones(len(frames), bool)
@@ -73,7 +73,7 @@ def paint_scene(take: Take) -> np.ndarray:
 def _move(take: Take, by: np.ndarray) -> Touched:
     """The take with each picture moved. by: (T, 2) px."""
     size = take.size[::-1]
-    ways = [np.float32([[1, 0, x], [0, 1, y]]) for x, y in by]
+    ways = [np.array([[1, 0, x], [0, 1, y]]) for x, y in by]
     frames = [cv2.warpAffine(f, m, size, borderMode=cv2.BORDER_REPLICATE) for f, m in zip(take.frames, ways, strict=True)]
     masks = [cv2.warpAffine(f.astype(np.uint8), m, size) > 0 for f, m in zip(take.masks, ways, strict=True)]
     return replace(take, frames=np.stack(frames), masks=np.stack(masks), points=take.points + by[:, None]), (by != 0).any(1)

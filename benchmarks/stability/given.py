@@ -23,7 +23,7 @@ def disturb_poses(body: dict[str, np.ndarray], degrees: float, rng: np.random.Ge
 
 
 def slide(body: dict[str, np.ndarray], metres: float, rng: np.random.Generator) -> tuple[dict, np.ndarray]:
-    """metres: standard deviation of the body's place in each frame. body: arrays (T, ...) by name. Returns it and frames (T,) bool."""
+    """metres: standard deviation of the body's place. body: arrays (T, ...) by name. Returns it and frames (T,) bool."""
     place = body["transl"]
     return body | {"transl": place + rng.normal(0, metres, place.shape).astype(place.dtype)}, np.ones(len(place), bool)
 
@@ -44,5 +44,6 @@ FAULTS = (
     Fault("focal-short", "given focal length over the true one", (0.8, 0.65, 0.5, 0.33, 0.2), give_focal),
     Fault("focal-long", "given focal length over the true one", (1.25, 1.5, 2.0, 3.0, 5.0), give_focal),
     Fault("pose-noise", "standard deviation of each joint, degrees; training only", (0.5, 1, 2, 4, 8), disturb_poses, Origin.BODY),
-    Fault("sliding", "standard deviation of the body's place, m; training only", (0.002, 0.005, 0.01, 0.02, 0.05), slide, Origin.BODY),
+    Fault("sliding", "standard deviation of the body's place, m; training only", (0.002, 0.005, 0.01, 0.02, 0.05), slide,
+          Origin.BODY),
 )

@@ -74,7 +74,7 @@ def _cover(take: Take, rows: slice, columns: slice, colour: tuple[int, int, int]
     frames = take.frames.copy()
     shape = frames[0, rows, columns].shape
     frames[:, rows, columns] = np.clip(np.array(colour) + rng.normal(0, 5, shape), 0, 255).astype(np.uint8)
-    return replace(take, frames=frames), take.masks[:, rows, columns].any((1, 2))
+    return replace(take, frames=frames), np.any(take.masks[:, rows, columns], axis=(1, 2))
 
 
 def _paste(take: Take, some: np.ndarray, by: np.ndarray, factor: float, opacity: float, before: bool = False,
@@ -88,7 +88,7 @@ def _paste(take: Take, some: np.ndarray, by: np.ndarray, factor: float, opacity:
     source = (np.arange(count) + count // 2) % count if source is None else source
     feet, frames = take.boxes()[:, 3].max(initial=0), take.frames.copy()
     for t in np.flatnonzero(some):
-        turn = np.float32([[-factor, 0, width / 2 * (1 + factor) + by[t]], [0, factor, feet * (1 - factor)]])
+        turn = np.array([[-factor, 0, width / 2 * (1 + factor) + by[t]], [0, factor, feet * (1 - factor)]])
         other = cv2.warpAffine(take.frames[source[t]], turn, (width, height))
         seen = cv2.warpAffine(take.masks[source[t]].astype(np.uint8), turn, (width, height)) > 0
         seen &= before | ~take.masks[t]

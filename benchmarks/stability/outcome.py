@@ -64,7 +64,10 @@ def retain(trial: Trial, clean: Trial) -> float:
 
 
 def find_codes(trial: Trial, clean: Trial, off: set[int]) -> tuple[str, ...]:
-    """Codes, beyond those of the clean clip and mere news, that name a frame that is off or touched by the fault, or the whole clip."""
+    """Codes, beyond those of the clean clip and mere news, that name the whole clip or a frame that is off or touched by the fault.
+
+    off: frames in which a joint is off.
+    """
     wrong = off | set(trial.touched)
     known: dict[str, set[int]] = {}
     for finding in clean.findings:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -61,7 +63,7 @@ def _disc(alpha: np.ndarray, px: float) -> np.ndarray:
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
 
 
-def _each(alpha: np.ndarray, change) -> Touched:
+def _each(alpha: np.ndarray, change: Callable[[np.ndarray], np.ndarray]) -> Touched:
     return np.stack([change(a) for a in alpha]), np.ones(len(alpha), bool)
 
 

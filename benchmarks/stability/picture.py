@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
@@ -27,7 +28,10 @@ def darken(take: Take, gain: float, rng: np.random.Generator) -> Touched:
 
 def compress(take: Take, quality: float, rng: np.random.Generator) -> Touched:
     """quality: of JPEG."""
-    return _each(take, lambda f, t: cv2.imdecode(cv2.imencode(".jpg", f, [cv2.IMWRITE_JPEG_QUALITY, int(quality)])[1], 1))
+    def through_jpeg(frame: np.ndarray, t: int) -> np.ndarray:
+        return np.asarray(cv2.imdecode(cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, int(quality)])[1], cv2.IMREAD_COLOR))
+
+    return _each(take, through_jpeg)
 
 
 def blur(take: Take, length: float, rng: np.random.Generator) -> Touched:
@@ -82,7 +86,7 @@ def roll_camera(take: Take, degrees: float, rng: np.random.Generator) -> Touched
 def shake(take: Take, px: float, rng: np.random.Generator) -> Touched:
     """px: standard deviation of each picture's place, of a clip 1280 px high."""
     moves = rng.normal(0, px * take.scale, (len(take.frames), 2))
-    return _each(take, lambda f, t: cv2.warpAffine(f, np.float32([[1, 0, moves[t, 0]], [0, 1, moves[t, 1]]]), f.shape[1::-1],
+    return _each(take, lambda f, t: cv2.warpAffine(f, np.array([[1, 0, moves[t, 0]], [0, 1, moves[t, 1]]]), f.shape[1::-1],
                                                    borderMode=cv2.BORDER_REPLICATE))
 
 
@@ -93,7 +97,7 @@ def black_out(take: Take, share: float, rng: np.random.Generator) -> Touched:
     return replace(out, asked=take.asked & ~black), black
 
 
-def _each(take: Take, change, some: np.ndarray | None = None) -> Touched:
+def _each(take: Take, change: Callable[[np.ndarray, int], np.ndarray], some: np.ndarray | None = None) -> Touched:
     """The take with change(frame, t) applied to its pictures, or to those of some, (T,) bool."""
     some = _all(take) if some is None else some
     frames = [np.clip(change(f, t), 0, 255).round().astype(np.uint8) if some[t] else f for t, f in enumerate(take.frames)]

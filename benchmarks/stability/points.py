@@ -20,7 +20,7 @@ ACROSS = 0.08
 def hide_hand(points: Points, count: float, rng: np.random.Generator) -> Touched:
     """count: frames in which the left elbow, wrist and hand are not found. points: (T, 133, ...) by name."""
     out, some = _copy(points), pick_run(len(points["xy"]), count / len(points["xy"]), rng)
-    gone = np.ix_(some, [*range(133)[HANDS["left"]], *ARM["left"][1:3]])
+    gone = np.ix_(some, np.array([*range(133)[HANDS["left"]], *ARM["left"][1:3]]))
     out["xy"][gone], out["score"][gone], out["world"][gone] = 0, 0, np.nan
     return out, some
 
@@ -70,9 +70,9 @@ def jitter(points: Points, share: float, rng: np.random.Generator) -> Touched:
 def spoil_numbers(points: Points, share: float, rng: np.random.Generator) -> Touched:
     """share: of the points whose place is no number or infinite. points: (T, 133, ...) by name."""
     out = _copy(points)
-    bad = rng.random(out["score"].shape) < share
+    bad = np.less(rng.random(out["score"].shape), share)
     out["xy"][bad] = rng.choice([np.nan, np.inf], (bad.sum(), 1))
-    return out, bad.any(1)
+    return out, np.any(bad, axis=1)
 
 
 def lose_person(points: Points, share: float, rng: np.random.Generator) -> Touched:
@@ -91,7 +91,8 @@ def _copy(points: Points) -> Points:
 
 FAULTS = (
     Fault("hand-not-found", "frames without left elbow, wrist and hand", (1, 2, 4, 8, 16), hide_hand, Origin.POINTS),
-    Fault("hand-on-other", "frames in which the left hand is found on the right one", (1, 2, 4, 8, 16), misplace_hand, Origin.POINTS),
+    Fault("hand-on-other", "frames in which the left hand is found on the right one", (1, 2, 4, 8, 16), misplace_hand,
+          Origin.POINTS),
     Fault("sides-swapped", "share of frames, facing away, with left and right swapped", (0.04, 0.1, 0.2, 0.3, 0.4), swap_sides,
           Origin.POINTS),
     Fault("flicker", "share of single frames whose points lie elsewhere", (0.04, 0.08, 0.12, 0.2, 0.35), flicker, Origin.POINTS),

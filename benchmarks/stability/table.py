@@ -12,8 +12,8 @@ from gsac.benchmarks.stability.outcome import Curve, Outcome
 from gsac.benchmarks.stability.trial import End, Trial
 
 HEAD = ("fault", "method", "area", "breaks at", "retained at 1 to 5", "silent", "crashed", "refused", "trials")
-SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "mean_mm", "worst_mm", "kept",
-         "frames", "psnr", "seconds", "message")
+SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "mean_mm", "worst_mm",
+         "kept", "frames", "psnr", "seconds", "message")
 """Columns of the CSV."""
 
 
@@ -31,11 +31,12 @@ def sum_up(curves: list[Curve]) -> list[str]:
     out, areas = [], {}
     for method in dict.fromkeys(c.method for c in curves):
         some = [c for c in curves if c.method == method]
-        areas[method] = {c.fault: c.area for c in some}
         worst = min(some, key=lambda c: c.area)
-        out.append(f"{method}: area under the curve, median fault {np.median([c.area for c in some]):.2f}, worst "
-                   f"{worst.area:.2f} ({worst.fault}); {sum(c.silent for c in some)} of {sum(c.trials for c in some)} trials failed "
-                   f"silently, {sum(c.crashed for c in some)} crashed or hung, {sum(c.refused for c in some)} ended with a sentence")
+        areas[method] = {c.fault: c.area for c in some}
+        trials, silent, crashed, refused = np.sum([(c.trials, c.silent, c.crashed, c.refused) for c in some], axis=0)
+        out.append(f"{method}: area under the curve, median fault {np.median([c.area for c in some]):.2f}, worst {worst.area:.2f} "
+                   f"({worst.fault}); of {trials} trials {silent} failed silently, {crashed} crashed or hung, {refused} ended with "
+                   f"a sentence")
     if len(areas) == 2:
         (first, ours), (second, theirs) = areas.items()
         more = [ours[fault] - theirs[fault] for fault in ours if fault in theirs]

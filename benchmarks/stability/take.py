@@ -45,7 +45,8 @@ class Take:
 
     def at(self, order: np.ndarray) -> Take:
         """The take of pictures order, (N,) int, at their own times."""
-        each = {name: getattr(self, name)[order] for name in ("frames", "masks", "points", "times", "yaw", "number", "asked", "rotation")}
+        names = ("frames", "masks", "points", "times", "yaw", "number", "asked", "rotation")
+        each = {name: getattr(self, name)[order] for name in names}
         return replace(self, **each)
 
     def boxes(self) -> np.ndarray:

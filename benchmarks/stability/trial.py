@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import sys
+import tempfile
 import time
 import traceback
 from dataclasses import asdict, dataclass, field, replace
@@ -20,6 +25,7 @@ from gsac.benchmarks.stability.fault import Fault, Origin
 from gsac.benchmarks.stability.faults import FAULTS
 from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
 from gsac.benchmarks.stability.take import Take, read_take
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
 
 CLEAN = "clean"
@@ -120,38 +126,31 @@ class Trial:
 
 def run_trial(task: Task) -> Trial:
     """Puts the fault in, runs the stages and judges. A stage's failure is the trial's end, never this function's."""
-    began, trial, ports = time.perf_counter(), Trial.of(task), {}
-    take = _take_of(task)
-    truth = take
+    fault, trial = FAULTS[task.fault] if task.severity else None, Trial.of(task)
+    take = read_take(task.clip, task.frames, task.height)
+    trial.still_mm = _error_of_still_body(take)
+    if fault and fault.origin is Origin.PERSON:
+        take = read_take(render_person(task, fault), task.frames, task.height)
+    if fault and fault.origin is Origin.TAKE:
+        take, touched = fault.inject(take, task.severity, task.seed)
+        trial.touched = take.number[touched].tolist()
+    began = time.perf_counter()
     try:
-        take, numbers = _run(task, take, ports, trial)
-        trial.end = End.DONE
+        ports = _run(task, fault, take, trial)
     except (StageError, ArtifactError) as error:
-        trial.end, trial.message, numbers = End.REFUSED, str(error), None
+        trial.end, trial.message = End.REFUSED, str(error)
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(last.filename).name}:{last.lineno}"
-        trial.end, trial.message, numbers = End.CRASHED, f"{type(error).__name__}: {error} ({place})", None
+        trial.end, trial.message = End.CRASHED, f"{type(error).__name__}: {error} ({place})"
+    else:
+        _judge(trial, take, ports)
     trial.seconds = time.perf_counter() - began
-    trial.still_mm = _error_of_still_body(truth)
-    if trial.end is End.DONE:
-        _judge(trial, take, ports, numbers)
     return trial
-
-
-def _take_of(task: Task) -> Take:
-    fault = FAULTS.get(task.fault)
-    if not (fault and fault.origin is Origin.PERSON and task.severity):
-        return read_take(task.clip, task.frames, task.height)
-    return read_take(render_person(task, fault), task.frames, task.height)
 
 
 def render_person(task: Task, fault: Fault) -> Path:
     """Folder of the clip of the same person who behaves otherwise; rendered unless it is there."""
-    import sys
-
-    from gsac.pipeline.reporter import PlainReporter
-
     seed = _seed_of(task.clip)
     options, _ = fault.inject({"seed": seed}, task.severity, task.seed)
     return render_clip(task.out / "clips" / f"{task.clip.name}_{fault.name}_{task.severity}", PlainReporter(sys.stderr), **options)
@@ -165,37 +164,27 @@ def _seed_of(clip: Path) -> int:
     return int(digits)
 
 
-def _run(task: Task, take: Take, ports: dict[str, Path], trial: Trial) -> tuple[Take, np.ndarray]:
-    """Runs all stages; returns the take that they saw, and the pictures' numbers (T,)."""
-    fault = FAULTS[task.fault] if task.severity else None
-    origin = fault.origin if fault else None
-    if origin is Origin.TAKE:
-        take, touched = fault.inject(take, task.severity, task.seed)
-        trial.touched = take.number[touched].tolist()
-    changed = origin in (Origin.TAKE, Origin.PERSON)
-    home = task.folder if changed else task.clean.folder
-    if not (home / "split" / "clip.json").is_file():
-        _write_take(take, home / "split")
-    ports |= {"split/frames": home / "split" / "frames", "split/clip.json": home / "split" / "clip.json"}
+def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> dict[str, Path]:
+    """Runs all stages on a take; faults of artifacts are put in on the way. Returns ports -> files and folders."""
+    folder = task.folder if fault and fault.origin in (Origin.TAKE, Origin.PERSON) else task.clean.folder
+    if not (folder / "split").is_dir():
+        _write_take(take, folder / "split")
+    ports = {"split/frames": folder / "split" / "frames", "split/clip.json": folder / "split" / "clip.json"}
     for name in (*BEFORE, "handgap", "smplx", *(["train"] if task.until == "train" else [])):
-        folder = task.folder if changed else task.clean.folder
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
         found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
         trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in found]
-        if origin and origin.value.split("/")[0] == name and origin is not Origin.TAKE:
-            spoiled = task.folder / "spoiled" / task.method / origin.value
-            value, touched = fault.inject(read_artifact(origin, ports[origin.value]), task.severity, task.seed)
-            write_artifact(origin, value, spoiled)
-            trial.touched, ports[origin.value], changed = take.number[touched].tolist(), spoiled, True
-    return take, take.number
+        if fault and fault.origin.startswith(f"{name}/"):
+            port, folder = fault.origin.value, task.folder
+            value, touched = fault.inject(read_artifact(fault.origin, ports[port]), task.severity, task.seed)
+            ports[port] = folder / "spoiled" / task.method / port
+            write_artifact(fault.origin, value, ports[port])
+            trial.touched = take.number[touched].tolist()
+    return ports
 
 
 def _write_take(take: Take, folder: Path) -> None:
     """Writes what split gives, whole or not at all."""
-    import os
-    import shutil
-    import tempfile
-
     folder.parent.mkdir(parents=True, exist_ok=True)
     half = Path(tempfile.mkdtemp(dir=folder.parent, prefix=".half-"))
     try:
@@ -211,22 +200,20 @@ def _numbers(runs: list[list[int]], number: np.ndarray) -> list[int]:
     return sorted({int(number[t]) for first, last in runs for t in range(first, min(last, len(number) - 1) + 1)})
 
 
-def _judge(trial: Trial, take: Take, ports: dict[str, Path], numbers: np.ndarray) -> None:
+def _judge(trial: Trial, take: Take, ports: dict[str, Path]) -> None:
     """Fills in the errors of the fit, and the quality of the training where there was one."""
     params, body = BodyParams.read(ports["smplx/body.npz"]), Body.load()
     good = take.asked & ~params.lost
     trial.frames, trial.kept = int(take.asked.sum()), int(good.sum())
     if trial.kept:
-        true = np.einsum("tab,tjb->tja", take.rotation, take.truth.joints[numbers])
+        true = np.einsum("tab,tjb->tja", take.rotation, take.truth.joints[take.number])
         off = align_joints(body.posed(params)[1][good][:, take.truth.joint], true[good])
         trial.mean_mm = float(off[:, 1:].mean())
         trial.worst_mm = float(np.sort(off, axis=0)[-WORST:].mean(0).max())
         joints = [NAMES[j] for j in take.truth.joint]
-        trial.off = {name: numbers[good][column > OFF_MM].tolist() for name, column in zip(joints, off.T, strict=True)
+        trial.off = {name: take.number[good][column > OFF_MM].tolist() for name, column in zip(joints, off.T, strict=True)
                      if (column > OFF_MM).any()}
     if "train/metrics.json" in ports:
-        import json
-
         trial.psnr = json.loads(ports["train/metrics.json"].read_text())["psnr_fg"]
         colours = take.frames[take.masks].astype(float)
         trial.flat_psnr = float(10 * np.log10(255**2 / np.square(colours - colours.mean(0)).mean()))
