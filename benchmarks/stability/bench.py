@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gsac.benchmarks.stability.trial import Task
     from gsac.pipeline.reporter import PlainReporter
 
-TINY = {"frames": 10, "height": 320}
+TINY = {"frames": 8, "height": 320}
 """Of the clip of --quick."""
 
 
@@ -25,7 +25,7 @@ def parser() -> argparse.ArgumentParser:
     from gsac.benchmarks.stability.faults import FAULTS
     from gsac.benchmarks.stability.trial import DEFAULT, METHODS
 
-    out = argparse.ArgumentParser(prog="gsac bench stability", description=__doc__.splitlines()[0])
+    out = argparse.ArgumentParser(prog="gsac bench stability", description=(__doc__ or "").partition("\n")[0])
     out.add_argument("--fault", nargs="+", default=None, choices=list(FAULTS), metavar="NAME", help=f"of {', '.join(FAULTS)}")
     out.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], metavar="N", help="default: 0 1 2")
     out.add_argument("--severities", type=int, nargs="+", default=None, choices=range(1, 6), metavar="N", help="default: 1 to 5")
