@@ -19,6 +19,8 @@ class Origin(StrEnum):
 
     TAKE = "split"
     """A `Take`: pictures, times and focal length."""
+    FILM = "clip"
+    """A `Film`: how the take becomes a video file."""
     POINTS = "keypoints/keypoints.npz"
     """Its arrays by name."""
     ALPHA = "segment/alpha"

@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.artifacts import ArtifactError, Clip
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.joints import NAMES
 from gsac.benchmarks.clip_runs import render_clip
 from gsac.benchmarks.fit.score import align_joints
 from gsac.benchmarks.stability.fault import Fault, Origin
 from gsac.benchmarks.stability.faults import FAULTS
+from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
 from gsac.benchmarks.stability.take import Take, read_take
 from gsac.pipeline.reporter import PlainReporter
@@ -136,7 +137,7 @@ def run_trial(task: Task) -> Trial:
         trial.touched = take.number[touched].tolist()
     began = time.perf_counter()
     try:
-        ports = _run(task, fault, take, trial)
+        ports, take = _run(task, fault, take, trial)
     except (StageError, ArtifactError) as error:
         trial.end, trial.message = End.REFUSED, str(error)
     except Exception as error:
@@ -164,9 +165,18 @@ def _seed_of(clip: Path) -> int:
     return int(digits)
 
 
-def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> dict[str, Path]:
-    """Runs all stages on a take; faults of artifacts are put in on the way. Returns ports -> files and folders."""
-    folder = task.folder if fault and fault.origin in (Origin.TAKE, Origin.PERSON) else task.clean.folder
+def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dict[str, Path], Take]:
+    """Runs all stages on a take; faults of the file and of artifacts are put in on the way.
+
+    Returns ports -> files and folders, and the take that the stages after `split` saw.
+    """
+    folder = task.folder if fault and fault.origin in (Origin.TAKE, Origin.PERSON, Origin.FILM) else task.clean.folder
+    if fault and fault.origin is Origin.FILM:
+        film, touched = fault.inject(Film(take), task.severity, task.seed)
+        trial.touched = take.number[touched].tolist()
+        film.write(folder / "clip.mp4")
+        trial.findings += run_stage("split", {"count": len(take.frames)}, {"clip": folder / "clip.mp4"}, folder / "split")
+        take = take.at(film.number(np.array(Clip.read(folder / "split" / "clip.json").timestamps_s)))
     if not (folder / "split").is_dir():
         _write_take(take, folder / "split")
     ports = {"split/frames": folder / "split" / "frames", "split/clip.json": folder / "split" / "clip.json"}
@@ -180,7 +190,7 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> dict[str,
             ports[port] = folder / "spoiled" / task.method / port
             write_artifact(fault.origin, value, ports[port])
             trial.touched = take.number[touched].tolist()
-    return ports
+    return ports, take
 
 
 def _write_take(take: Take, folder: Path) -> None:

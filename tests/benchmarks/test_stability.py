@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_frame
 from gsac.benchmarks.fit.truth import Truth
-from gsac.benchmarks.stability import bench, chart, outcome, table, trial, workers
+from gsac.benchmarks.stability import bench, chart, outcome, stages, table, trial, workers
 from gsac.benchmarks.stability.fault import Origin
 from gsac.benchmarks.stability.faults import FAULTS, QUICK
+from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.take import Take
 from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, PAPER, End, Task, Trial
 from gsac.stages.contract import StageError
@@ -39,6 +40,8 @@ def make_clean(origin):
     rng = np.random.default_rng(2)
     if origin is Origin.TAKE:
         return make_take()
+    if origin is Origin.FILM:
+        return Film(make_take())
     if origin is Origin.ALPHA:
         return make_take().masks.astype(np.float32)
     if origin is Origin.POINTS:
@@ -52,6 +55,8 @@ def make_clean(origin):
 def same(a, b):
     if a is None or b is None:
         return a is b
+    if isinstance(a, Film):
+        return same(a.take, b.take) and replace(a, take=None) == replace(b, take=None)
     if isinstance(a, Take):
         return all(same(getattr(a, name), getattr(b, name)) for name in ("frames", "times", "asked", "number", "rotation", "focal"))
     if isinstance(a, dict):
@@ -110,6 +115,20 @@ def test_the_truth_rolls_with_the_camera():
     turned, _ = FAULTS["roll"].inject(replace(make_take(), masks=np.tile(corner, (FRAMES, 1, 1))), 4, 0)
     row = np.argwhere(turned.masks[0]).mean(0)[0]
     assert np.sign(row - HEIGHT / 2) == np.sign((quarter.rotation[0] @ [1, 0, 0])[1])
+
+
+@pytest.mark.parametrize("name", ["rotation-tag", "uneven-rate", "long-clip"])
+def test_a_film_gives_upright_pictures_at_the_times_of_the_take(tmp_path, name):
+    take = make_take()
+    film, _ = FAULTS[name].inject(Film(take), 1, 0)
+    film.write(tmp_path / "clip.mp4")
+    stages.run_stage("split", {"count": 400, "crop": False}, {"clip": tmp_path / "clip.mp4"}, tmp_path / "split")
+    number = film.number(np.array(Clip.read(tmp_path / "split" / "clip.json").timestamps_s))
+    seen = [read_frame(path).astype(int) for path in frame_paths(tmp_path / "split" / "frames")]
+    assert len(seen) == {"rotation-tag": FRAMES, "uneven-rate": FRAMES - 2, "long-clip": 100}[name]
+    grey = [np.mean(pictures, axis=-1)[take.masks[number]] for pictures in (seen, take.frames[number])]
+    assert np.corrcoef(grey)[0, 1] > 0.7, "the same pictures, upright"
+    assert number[0] == 0 and (np.diff(number) != 0).all()
 
 
 def finding(code, frames, severity="poorer"):
