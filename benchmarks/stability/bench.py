@@ -8,6 +8,7 @@ command goes on from there.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import threading
 from pathlib import Path
@@ -52,6 +53,7 @@ def main(argv: list[str] | None = None) -> int:
 
     say = PlainReporter(sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)
+    keep_settings(options)
     lines = options.out / "trials.jsonl"
     measure(options, lines, say)
     outcomes = find_outcomes(table.read_lines(lines))
@@ -65,6 +67,16 @@ def main(argv: list[str] | None = None) -> int:
     (options.out / "stability.txt").write_text(words + "\n")
     chart.draw(curves, options.out)
     return 0
+
+
+def keep_settings(options: argparse.Namespace) -> None:
+    """Notes in OUT/settings.json what its trials share. Raises BadInput where OUT holds trials of other settings."""
+    from gsac.stages.contract import BadInput
+
+    path, own = options.out / "settings.json", {name: getattr(options, name) for name in ("frames", "height", "until", "quick")}
+    if path.is_file() and (kept := json.loads(path.read_text())) != own:
+        raise BadInput(f"{options.out} holds trials of other settings ({kept}, not {own}); give another --out")
+    path.write_text(json.dumps(own) + "\n")
 
 
 def measure(options: argparse.Namespace, lines: Path, say: PlainReporter) -> None:

@@ -15,7 +15,7 @@ from gsac.benchmarks.stability.faults import FAULTS, QUICK
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.take import Take
 from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, PAPER, End, Task, Trial
-from gsac.stages.contract import StageError
+from gsac.stages.contract import BadInput, StageError
 
 FRAMES, HEIGHT, WIDTH = 20, 64, 36
 
@@ -232,6 +232,16 @@ def test_default_methods_come_first_and_every_fault_is_tried(tmp_path):
     assert [t.method for t in tasks] == sorted(t.method for t in tasks)
     assert {t.fault for t in tasks} == {CLEAN, *(f.name for f in FAULTS.values() if f.origin is not Origin.BODY)}
     assert {FAULTS[name].origin for name in QUICK} >= {Origin.TAKE, Origin.POINTS, Origin.ALPHA}
+
+
+def test_trials_of_other_settings_are_not_mixed(tmp_path):
+    def options(*more):
+        return bench.parser().parse_args(["--out", str(tmp_path), *more])
+
+    bench.keep_settings(options())
+    bench.keep_settings(options("--seeds", "1"))
+    with pytest.raises(BadInput, match="give another --out"):
+        bench.keep_settings(options("--frames", "60"))
 
 
 @pytest.mark.slow
