@@ -13,6 +13,8 @@ from gsac.stages.findings import Severity
 
 BREAKDOWN = 0.8
 """Retained quality below which a clip has failed: over a fifth is lost."""
+TWICE = 2.0
+"""Times the clean clip's error from which on a fault breaks the fit, whatever is retained."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,8 @@ class Outcome:
     """A trial beside the clean clip's of the same method."""
 
     trial: Trial
+    error_ratio: float | None
+    """Mean joint error over the clean clip's; None without a fit."""
     retained: float
     """1: as the clean clip; 0: a body that stands still, a person in one colour, or no result."""
     failed: bool
@@ -44,7 +48,8 @@ def find_outcome(trial: Trial, clean: Trial) -> Outcome:
     """A trial beside the same clip and method without a fault."""
     share = retain(trial, clean)
     off = {n for name, frames in trial.off.items() if len(own := {*frames} - {*clean.off.get(name, ())}) >= WORST for n in own}
-    return Outcome(trial, share, share < BREAKDOWN or bool(off), find_codes(trial, clean, off))
+    ratio = trial.mean_mm / clean.mean_mm if trial.mean_mm and clean.mean_mm else None
+    return Outcome(trial, ratio, share, share < BREAKDOWN or bool(off), find_codes(trial, clean, off))
 
 
 def retain(trial: Trial, clean: Trial) -> float:
@@ -90,6 +95,8 @@ class Curve:
     severities: tuple[int, ...]
     retained: tuple[float, ...]
     """Mean of all clips and seeds at each of severities; 1 at severity 0."""
+    errors: tuple[float, ...]
+    """Likewise the joint error over the clean clip's, of trials that gave a fit; infinite without one."""
     silent: int
     """Trials."""
     crashed: int
@@ -103,8 +110,9 @@ class Curve:
 
     @property
     def breakdown(self) -> int | None:
-        """The first severity at which over a fifth is lost."""
-        return next((s for s, share in zip(self.severities, self.retained, strict=True) if share < BREAKDOWN), None)
+        """The first severity at which over a fifth is lost or the joint error is over twice the clean clip's."""
+        rows = zip(self.severities, self.retained, self.errors, strict=True)
+        return next((s for s, share, error in rows if share < BREAKDOWN or error > TWICE), None)
 
 
 def draw_curves(outcomes: list[Outcome]) -> list[Curve]:
@@ -118,6 +126,12 @@ def draw_curves(outcomes: list[Outcome]) -> list[Curve]:
 def _curve(fault: str, method: str, some: list[Outcome]) -> Curve:
     tried = sorted({o.trial.severity for o in some})
     means = [float(np.mean([o.retained for o in some if o.trial.severity == severity])) for severity in tried]
+    errors = [_mean_ratio([o for o in some if o.trial.severity == severity]) for severity in tried]
     crashes = sum(o.trial.end in (End.CRASHED, End.HUNG) for o in some)
-    return Curve(fault, method, (0, *tried), (1.0, *means), sum(o.silent for o in some), crashes,
+    return Curve(fault, method, (0, *tried), (1.0, *means), (1.0, *errors), sum(o.silent for o in some), crashes,
                  sum(o.trial.end is End.REFUSED for o in some), len(some))
+
+
+def _mean_ratio(some: list[Outcome]) -> float:
+    known = [o.error_ratio for o in some if o.error_ratio is not None]
+    return float(np.mean(known)) if known else np.inf

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.benchmarks.stability.fault import SEVERITIES
 from gsac.benchmarks.stability.outcome import Curve, Outcome
 from gsac.benchmarks.stability.trial import End, Trial
 
-HEAD = ("fault", "method", "area", "breaks at", "retained at 1 to 5", "silent", "crashed", "refused", "trials")
+HEAD = ("fault", "method", "area", "breaks at", "retained at 1 to 5", "error over clean's", "silent", "crashed", "refused",
+        "trials")
 SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "mean_mm", "worst_mm",
          "kept", "frames", "psnr", "seconds", "message")
 """Columns of the CSV."""
@@ -74,8 +76,10 @@ def read_lines(path: Path) -> list[Trial]:
 
 def _row(curve: Curve) -> tuple[str, ...]:
     shares = dict(zip(curve.severities, curve.retained, strict=True))
+    errors = dict(zip(curve.severities, curve.errors, strict=True))
     return (curve.fault, curve.method, f"{curve.area:.2f}", "-" if curve.breakdown is None else str(curve.breakdown),
-            " ".join(f"{shares[s]:.2f}" if s in shares else "  - " for s in range(1, 6)), str(curve.silent), str(curve.crashed),
+            " ".join(f"{shares[s]:.2f}" if s in shares else "  - " for s in SEVERITIES[1:]),
+            " ".join(f"{errors[s]:4.1f}" if s in errors else "  - " for s in SEVERITIES[1:]), str(curve.silent), str(curve.crashed),
             str(curve.refused), str(curve.trials))
 
 

@@ -179,7 +179,8 @@ def test_the_area_runs_straight_between_severities_and_the_breakdown_is_the_firs
     assert pole.severities == (0, 3, 5) and pole.retained == (1.0, 0.5, 0.0)
     assert pole.area == pytest.approx((3 * 0.75 + 2 * 0.25) / 5)
     assert (pole.breakdown, pole.crashed, pole.silent) == (3, 1, 1)
-    assert curves["blur", DEFAULT].breakdown is None
+    assert curves["blur", DEFAULT].breakdown is None and curves["blur", DEFAULT].errors == (1.0, pytest.approx(25 / 15))
+    assert curves["blur", PAPER].retained[1] == pytest.approx(0.9) and curves["blur", PAPER].breakdown == 5, "over twice the error"
 
 
 def test_table_csv_and_chart_hold_every_fault(tmp_path):
