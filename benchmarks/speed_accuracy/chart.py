@@ -13,6 +13,8 @@ from gsac.benchmarks.speed_accuracy.trial import Trial
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
 
 COLOURS = ("#0b6e4f", "#b5532a", "#33508a", "#8a6d33", "#6a3d7a")
 MARKERS = {"draft": "^", "standard": "o", "fine": "s", "paper": "X"}
@@ -31,7 +33,7 @@ def draw(trials: list[Trial], folder: Path) -> list[Path]:
     devices = [device for device in SECONDS if any(t.device == device for t in trials)]
     figure, panels = plt.subplots(len(QUALITIES), len(devices), figsize=(6.4 * len(devices), 8.6), layout="constrained",
                                   squeeze=False)
-    colours = dict(zip(dict.fromkeys(t.clip for t in trials), COLOURS * len(trials), strict=False))
+    colours: dict[str, str] = dict(zip(dict.fromkeys(t.clip for t in trials), COLOURS * len(trials), strict=False))
     for column, device in enumerate(devices):
         for row, (name, words) in enumerate(QUALITIES.items()):
             axes = panels[row, column]
@@ -60,7 +62,7 @@ def draw(trials: list[Trial], folder: Path) -> list[Path]:
     return paths
 
 
-def _draw_way(axes: plt.Axes, some: list[Trial], name: str, colour: str, marker: str) -> None:
+def _draw_way(axes: Axes, some: list[Trial], name: str, colour: str, marker: str) -> None:
     """The mean of one way's seeds, with bars of a standard deviation in seconds and quality."""
     times, values = ([x for x in found if x is not None] for found in ([t.seconds for t in some], [getattr(t, name) for t in some]))
     if times and values:
@@ -68,7 +70,7 @@ def _draw_way(axes: plt.Axes, some: list[Trial], name: str, colour: str, marker:
         axes.errorbar(np.mean(times), np.mean(values), spread[1], spread[0], fmt=marker, color=colour, ms=7, capsize=3, lw=1)
 
 
-def _draw_published(axes: plt.Axes) -> None:
+def _draw_published(axes: Axes) -> None:
     """Hollow markers of other systems, and what sets them apart."""
     for point in POINTS:
         axes.plot(point.seconds, point.psnr, "D", mfc="none", color="0.45", ms=6)
@@ -80,9 +82,9 @@ def _draw_published(axes: plt.Axes) -> None:
     axes.set(xlim=(15, 1e6), ylim=(axes.get_ylim()[0], axes.get_ylim()[1] + 3))
 
 
-def _draw_legend(axes: plt.Axes, colours: dict[str, str], ways: list[str]) -> None:
+def _draw_legend(axes: Axes, colours: dict[str, str], ways: list[str]) -> None:
     """Colours are clips, markers are ways."""
-    marks = [plt.Line2D([], [], color=colour, lw=3, label=clip) for clip, colour in colours.items()]
-    marks += [plt.Line2D([], [], color="0.3", marker=MARKERS[way], lw=0, label=way if way != "paper" else "recipe paper")
+    marks = [Line2D([], [], color=colour, lw=3, label=clip) for clip, colour in colours.items()]
+    marks += [Line2D([], [], color="0.3", marker=MARKERS[way], lw=0, label=way if way != "paper" else "recipe paper")
               for way in ways]
     axes.legend(handles=marks, fontsize=7, frameon=False, ncols=2)

@@ -49,7 +49,7 @@ def compare_with_paper(trials: list[Trial]) -> list[str]:
             some = by.get((clip, device, way))
             if not paper or not some:
                 continue
-            goal, cost = np.mean([t.psnr_fg for t in paper]), _mean_seconds(paper)
+            goal, cost = float(np.mean([t.psnr_fg for t in paper])), _mean_seconds(paper)
             reached = [s for t in some if t.seconds is not None and (s := seconds_to(t, goal)) is not None]
             first = (f"reaches paper's {goal:.2f} dB after {min(reached):.1f} s, {cost / min(reached):.1f}x sooner than paper "
                      f"({cost:.0f} s)" if reached else f"never reaches paper's {goal:.2f} dB")

@@ -20,6 +20,7 @@ from gsac.pipeline.report.results import Results
 from gsac.pipeline.report.verdict import Grade
 from gsac.pipeline.run_folder import LOGS, REPORT, RUN, write_text
 from gsac.stages.contract import BadInput
+from gsac.stages.findings import Severity
 
 if TYPE_CHECKING:
     from gsac.pipeline.report.pictures import Picture
@@ -49,6 +50,8 @@ class Card:
     views: int = 0
     links: tuple[tuple[str, str], ...] = ()
     """Name and address, relative to the page, of what there is to open."""
+    found: tuple[str, ...] = ()
+    """What contradicts itself in the clip: codes of findings, as words."""
 
     def address(self, name: str) -> str:
         """Of the link of that name; empty without it."""
@@ -128,7 +131,15 @@ def make_card(folder: Path) -> Card:
         return Card(results.clip_name, folder.name, Outcome.RAN, words, links=links)
     strip, views = cut_strip(page)
     grade = Grade.__members__.get(origin.grade)
-    return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, views, links)
+    return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, views, links, name_findings(results))
+
+
+def name_findings(results: Results) -> tuple[str, ...]:
+    """Codes of the findings that are wrong in the clip, each once, as words: `camera moves`."""
+    rows = [results.result(name) or row for name, row in results.rows.items()]
+    codes = [str(finding.get("code")) for row in rows for finding in row.get("findings") or []
+             if finding.get("severity") == Severity.WRONG]
+    return tuple(code.replace("_", " ") for code in dict.fromkeys(codes))
 
 
 def cut_strip(page: Path) -> tuple[Picture | None, int]:

@@ -7,10 +7,11 @@ import functools
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from gsac.pipeline.quality import describe_quality
@@ -20,6 +21,7 @@ from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
 from gsac.pipeline.report.tables import parameters, provenance, stage_rows, totals
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run_folder import REPORT, RUN, RunFolder
+from gsac.stages.findings import Severity
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -29,6 +31,7 @@ AVATAR = "avatar"
 """The section that stands at the top of the page, without a heading."""
 TRAINING = "training"
 """The section of the curves over seconds."""
+GRAVEST = [severity.value for severity in reversed(Severity)]
 
 
 @dataclass
@@ -221,11 +224,24 @@ def describe_person(results: Results, facts: dict[str, float]) -> str:
     return ", ".join(words)
 
 
-def list_warnings(results: Results) -> dict[str, list[tuple[str, str]]]:
-    """Heading -> stage and sentence of all warnings, and of the notes, which a person has nothing to mend about."""
+class Warned(NamedTuple):
+    """A warning or note on the page."""
+
+    stage: str
+    text: str
+    severity: str = ""
+    """Of the finding; empty for notes, and for warnings of runs that knew no codes."""
+
+
+def list_warnings(results: Results) -> dict[str, list[Warned]]:
+    """Heading -> all warnings, the gravest first, and the notes, which a person has nothing to mend about."""
     rows = {name: results.result(name) or row for name, row in results.rows.items()}
-    return {heading: [(name, str(text).removeprefix(f"{name}: ")) for name, row in rows.items() for text in row.get(kind) or []]
-            for heading, kind in (("Warnings", "warnings"), ("Notes", "notes"))}
+    warnings = [Warned(name, str(text).removeprefix(f"{name}: "), str(finding.get("severity", "")))
+                for name, row in rows.items()
+                for text, finding in zip_longest(row.get("warnings") or [], row.get("findings") or [], fillvalue={}) if text]
+    notes = [Warned(name, str(text).removeprefix(f"{name}: ")) for name, row in rows.items() for text in row.get("notes") or []]
+    return {"Warnings": sorted(warnings, key=lambda one: GRAVEST.index(one.severity) if one.severity in GRAVEST else len(GRAVEST)),
+            "Notes": notes}
 
 
 def explain_partial_run(results: Results) -> str:

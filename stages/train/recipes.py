@@ -13,6 +13,7 @@ from gsac.stages.train.fast.cuda import Cuda
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians.joint_faces import hold_at_joints
+from gsac.stages.train.gaussians.joint_strays import shrink_strays
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.poses import bone_drift
@@ -27,7 +28,8 @@ def fit_fast(backend: Backend, task: Task) -> Fit:
     require_finite("after the last step", named_values(fit.gaussians))
     levels = [fit.gaussians, *lod.fit_levels(task, backend, fit)]
     levels = bone_drift.remove_drift(levels, task.poses, task.trained)
-    fit.gaussians, *fit.coarser = side_by_side(lambda level, _: hold_at_joints(level, task.poses, task.trained), levels)
+    levels = side_by_side(lambda level, _: hold_at_joints(level, task.poses, task.trained), levels)
+    fit.gaussians, *fit.coarser = [shrink_strays(level, task.poses, task.trained) for level in levels]
     return fit
 
 

@@ -94,7 +94,8 @@ def test_every_reader_of_npz_files_says_what_is_wrong_with_a_hostile_one(hostile
         check_model("mine", path)
     path.rename(tmp_path / "checkpoint.npz")
     warnings = []
-    assert Checkpoints(tmp_path, warnings.append).read() is None and "training starts anew" in warnings[0]
+    kept = Checkpoints(tmp_path, lambda finding: warnings.append(finding.message))
+    assert kept.read() is None and "training starts anew" in warnings[0]
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):

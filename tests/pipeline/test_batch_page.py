@@ -18,6 +18,7 @@ from gsac.stages.contract import BadInput
 FACES = {"ada": 0.97, "bob": 0.92}
 """Clip -> likeness of the avatar's face: good, fair."""
 LIKE = {"psnr": 31.0, "structure": 0.95, "worst": 0.92, "px": 420}
+FOUND = [{"code": "camera_moves", "severity": "wrong"}, {"code": "face_at_rest", "severity": "poorer"}]
 AXE = "axe-core@4.10.3"
 
 
@@ -30,7 +31,7 @@ def write_avatar(folder, clip, face):
     """The folder of a run with a report; the views of the avatar are grey, the front one red."""
     for name in ("train/heldout", "export"):
         (folder / name).mkdir(parents=True)
-    write_run(folder, clip, {"name": "train", "status": "ran"}, {"name": "export", "status": "ran"})
+    write_run(folder, clip, {"name": "train", "status": "ran", "findings": FOUND}, {"name": "export", "status": "ran"})
     (folder / "train/metrics.json").write_text(json.dumps({
         "likeness": {"body": LIKE, "face": LIKE | {"worst": face}, "hands": LIKE}, "seen_area": 0.97, "stray_alpha": 0.0,
         "torn_alpha": 0.0}))
@@ -76,6 +77,7 @@ def test_each_clip_has_a_card_with_the_verdict_of_its_report_failures_first(out)
     assert list(cards) == ["eva.mp4", "gone.mp4", "ada.mp4", "bob.mp4", "late.mp4", "earlier & <i>.mp4"]
     assert "✓ Good Body good, face good, hands good, seen from all sides good" in cards["ada.mp4"][0]
     assert "~ Fair Body good, face fair" in cards["bob.mp4"][0]
+    assert "Found: camera moves Report" in cards["ada.mp4"][0] and "face at rest" not in cards["ada.mp4"][0]
     assert "✕ Failed Stage keypoints failed: no person in any frame; record again" in cards["eva.mp4"][0]
     assert "✕ Failed stage split failed: gone.mp4: no video in it" in cards["gone.mp4"][0]
     assert "Not done yet" in cards["late.mp4"][0]

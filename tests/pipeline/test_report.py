@@ -27,6 +27,7 @@ from gsac.pipeline.report.page import draw_sections, seconds, size, write_report
 from gsac.pipeline.report.pictures import MOST_BYTES, make_picture
 from gsac.pipeline.report.quality import weaknesses
 from gsac.pipeline.report.verdict import Grade, give_verdict
+from gsac.stages.findings import Code, Finding
 
 T, WIDTH, HEIGHT = 6, 90, 160
 STAGES = ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")
@@ -512,6 +513,17 @@ def test_what_stands_under_every_clip_is_a_note_and_no_warning(copied):
     write_run(copied, rows)
     text = page_of(copied).text("warnings")
     assert text.startswith("Warnings smplx Frame 3 is odd. Notes: true of every clip of one camera smplx The clip carries no focal")
+
+
+def test_what_is_wrong_in_the_clip_stands_before_what_is_only_poorer(copied):
+    rows = [stage_row(name) for name in STAGES]
+    rows[1] |= {"warnings": ["A hand is unseen.", "An old warning."],
+                "findings": [Finding.of(Code.HAND_NEVER_DETECTED, side="left").to_json()]}
+    rows[3] |= {"warnings": ["The camera moves."], "findings": [Finding.of(Code.CAMERA_MOVES, np.ones(6, bool), 9.0).to_json()]}
+    write_run(copied, rows)
+    page = page_of(copied)
+    assert page.text("warnings").startswith("Warnings segment The camera moves. keypoints A hand is unseen. keypoints An old")
+    assert '<li class="wrong">' in page.html and '<li class="poorer">' in page.html
 
 
 def test_the_avatar_stands_first_beside_the_verdict(whole):

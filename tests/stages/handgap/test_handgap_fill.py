@@ -138,8 +138,8 @@ def test_what_is_too_long_stays_missing(synthetic, tmp_path):
     assert out["missing"][30:45, 0].all() and not out["filled"][:, HANDS["left"]].any()
     assert (out["score"][30:45, HANDS["left"]] == 0).all()
     assert np.flatnonzero(out["filled"][:, PALM["right"]]).tolist() == [15, 16, 17, 18, 19]
-    assert any("left hand is missing from frame 30 to 44" in w for w in warnings)
-    assert any("right hand is missing from frame 0 to 14" in w for w in warnings)
+    assert any("left hand is missing in 15 of 100 frames (30-44)" in w for w in warnings)
+    assert any("right hand is missing in 15 of 100 frames (0-14)" in w for w in warnings)
 
 
 def test_sigma_grows_inside_a_gap_and_says_how_large_the_errors_are(synthetic, tmp_path):

@@ -1,0 +1,83 @@
+"""What a bent joint throws off the body shrinks; what stands off it anyway stays."""
+
+import numpy as np
+import pytest
+
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import INDEX, turn_joints
+from gsac.avatar.threads import Workspace
+from gsac.stages.train.gaussians import joint_strays
+from gsac.stages.train.gaussians.joint_faces import BENDS, bind_anew
+from gsac.stages.train.poses.poses import Poses
+
+FRAMES = np.arange(1)
+
+
+@pytest.fixture(scope="module")
+def poses():
+    """A frame with hanging arms."""
+    body = Body.load()
+    pose = turn_joints(np.zeros((55, 3)), {"shoulder": (0, 0, -60)})[None]
+    return Poses(body, BodyParams.from_pose(pose, np.zeros((1, 3)), np.zeros(4), np.zeros((1, body.exprdirs.shape[2])), 300.0,
+                                            (64.0, 64.0)))
+
+
+@pytest.fixture(scope="module")
+def plain(poses):
+    return Gaussians.area(poses.rest(0)[0], poses.body.faces, 6000)
+
+
+def joint_at(poses, name):
+    """(3,) m in the frame."""
+    return poses.transforms(0)[INDEX[name]] @ np.append(poses.rest(0)[1][INDEX[name]], 1)
+
+
+def carried_by_the_forearm(poses, gaussians):
+    """The gaussians, those of the left upper arm near the elbow bound to a face of the forearm; and which these are."""
+    at = face_frames(poses.vertices(0), poses.body.faces)
+    bound = bind(at, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    shoulder, elbow, wrist = (joint_at(poses, f"left_{name}") for name in ("shoulder", "elbow", "wrist"))
+    which = np.flatnonzero(np.linalg.norm(bound.means - (0.6 * elbow + 0.4 * shoulder), axis=1) < 0.07)
+    face = gaussians.face.copy()
+    face[which] = np.argmin(np.linalg.norm(at.T - (elbow + wrist) / 2, axis=1))
+    return bind_anew(gaussians, face, bound, at), which
+
+
+def stray_elbow(poses, gaussians):
+    """(N,) stray alpha of gaussians where elbows bend."""
+    posed = joint_strays.put_in_pose(poses, 0, turn_joints(poses.pose[0], BENDS[0]))
+    return joint_strays.find_stray(gaussians, posed, poses.body.faces, Workspace())
+
+
+def test_what_a_bent_elbow_throws_off_the_body_shrinks_and_nothing_else_changes(poses, plain):
+    thrown, which = carried_by_the_forearm(poses, plain)
+    held = joint_strays.shrink_strays(thrown, poses, FRAMES)
+    before, after = stray_elbow(poses, thrown), stray_elbow(poses, held)
+    assert before[which].sum() > 2e-3
+    assert after[which].sum() < 0.5 * before[which].sum()
+    shrunk = np.flatnonzero((held.log_scale < thrown.log_scale).all(1))
+    assert len(shrunk) > 5 and set(shrunk) <= set(which)
+    rest = np.setdiff1d(np.arange(len(plain)), shrunk)
+    np.testing.assert_array_equal(held.log_scale[rest], thrown.log_scale[rest])
+    for name in ("face", "mu", "quat", "rgb", "opacity"):
+        np.testing.assert_array_equal(getattr(held, name), getattr(thrown, name))
+
+
+def test_hair_that_stands_off_the_head_in_the_clip_stays(poses, plain):
+    at = face_frames(poses.vertices(0), poses.body.faces)
+    bound = bind(at, plain.face, plain.mu, plain.quat, plain.log_scale)
+    hair = np.linalg.norm(bound.means - joint_at(poses, "head") - [0, 0.1, 0], axis=1) < 0.12
+    lifted = plain[np.arange(len(plain))]
+    lifted.mu[hair, 1] += 0.08 / at.k[plain.face[hair]]
+    usual = joint_strays.find_stray(lifted, joint_strays.put_in_pose(poses, 0, poses.pose[0]), poses.body.faces, Workspace())
+    assert usual[hair].max() > 2 * joint_strays.LEAST
+    held = joint_strays.shrink_strays(lifted, poses, FRAMES)
+    assert (held.log_scale[hair] == lifted.log_scale[hair]).all(1).mean() > 0.95
+
+
+def test_fewer_gaussians_which_are_wider_are_left_in_peace(poses):
+    few = Gaussians.area(poses.rest(0)[0], poses.body.faces, 700)
+    held = joint_strays.shrink_strays(few, poses, FRAMES)
+    assert (held.log_scale != few.log_scale).any(1).mean() < 0.02
