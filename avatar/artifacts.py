@@ -56,11 +56,19 @@ class Clip:
     """None: the frames show the whole footage."""
     center: tuple[float, float] | None = None
     """Principal point, px; None: the frame's middle."""
+    repeated: list[int] = field(default_factory=list)
+    """Frames whose picture shows an earlier one's moment: no stage learns from them."""
 
     @property
     def principal_point(self) -> tuple[float, float]:
         """px."""
         return self.center or (self.width / 2, self.height / 2)
+
+    def shows_own_moment(self, frames: int) -> np.ndarray:
+        """(T,) bool: all but the repeated ones of so many frames."""
+        import numpy as np
+
+        return ~np.isin(np.arange(frames), self.repeated)
 
     @property
     def longer_side(self) -> float:
@@ -72,6 +80,7 @@ class Clip:
 
     def write(self, path: Path) -> None:
         cut = {"crop", "center"} if self.crop is None and self.center is None else set()
+        cut |= set() if self.repeated else {"repeated"}
         values = {name: value for name, value in asdict(self).items() if name not in cut}
         write_file(path, (json.dumps(values, indent=1, sort_keys=True) + "\n").encode())
 
@@ -216,6 +225,8 @@ FLAME_SHAPES: Shapes = {"flame_expression": ("T", "X"), "flame_jaw": ("T", 3)}
 """Of face.npz where a FLAME file was given: how FLAME's face moves."""
 REST_SHAPE: Shapes = {"rest_expression": ("E",)}
 """Of face.npz where a face was seen, and of body.npz where the body acts the facial actions: the person's face at rest."""
+OCCLUDER_SHAPE: Shapes = {"occluder": ("Y", "X")}
+"""Of body.npz where something stands before the person in all frames: where, in the frame at a smaller size."""
 BODY_SHAPES: Shapes = {
     "betas": ("B",), "expression": ("T", "E"), "global_orient": ("T", 3), "body_pose": ("T", 63),
     "left_hand_pose": ("T", 45), "right_hand_pose": ("T", 45), "jaw_pose": ("T", 3), "leye_pose": ("T", 3),
@@ -258,8 +269,8 @@ def check_face(path: Path) -> dict[str, np.ndarray]:
 
 
 def check_body(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3), and `REST_SHAPE` or not."""
-    arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE)
+    """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3); `REST_SHAPE` and `OCCLUDER_SHAPE` or not."""
+    arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE, OCCLUDER_SHAPE)
     for name, a in arrays.items():
         if not _finite(a):
             raise ArtifactError(f"{path}: array {name} is not finite")

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from gsac.avatar.artifacts import BODY_SHAPES, REST_SHAPE, ArtifactError, check_arrays, write_arrays
+from gsac.avatar.artifacts import BODY_SHAPES, OCCLUDER_SHAPE, REST_SHAPE, ArtifactError, check_arrays, write_arrays
 from gsac.avatar.body_file import read_body_file
 from gsac.avatar.camera import Camera
 from gsac.avatar.joints import POSE_PARTS, J
@@ -48,11 +48,12 @@ class BodyParams:
     sigma_joints: np.ndarray  # (T, 55) m
     model: str  # digest of the body file
     rest_expression: np.ndarray | None = None  # (E,) 0..1, the person's face at rest; None: the body's neutral face
+    occluder: np.ndarray | None = None  # (h, w) 0 or 1, where in the frame something hides the person all along; None: nowhere
 
     @classmethod
     def read(cls, path: Path) -> BodyParams:
         """From body.npz; raises `ArtifactError` where an array is missing or has another shape."""
-        arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE)
+        arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE, OCCLUDER_SHAPE)
         there = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays and f.name != "model"}
         return cls(**there, model=str(arrays["model"]))
 

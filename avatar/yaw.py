@@ -17,6 +17,16 @@ def yaw(turns: np.ndarray) -> np.ndarray:
 
 
 def turn_seen(turns: np.ndarray) -> float:
-    """turns: (T, 3, 3) as in `yaw`. How many of the 360 degrees of yaw the frames cover: all but the widest gap between them."""
-    at = np.sort(np.degrees(yaw(turns)))
+    """turns: (T, 3, 3) as in `yaw`. How many of the 360 degrees of yaw the frames cover, as `degrees_covered`."""
+    return degrees_covered(yaw(turns))
+
+
+def degrees_covered(yaws: np.ndarray) -> float:
+    """yaws: (T,) rad. How many of 360 degrees they cover: all but the widest gap between them."""
+    at = np.sort(np.degrees(yaws) % 360)
     return 360 - float(np.diff(at, append=at[0] + 360).max()) if len(at) else 0.0
+
+
+def name_side(yaw: float) -> str:
+    """The side of a body that the camera sees, in words: front, right side, back, left side. yaw: rad, as `yaw` gives it."""
+    return ("front", "right side", "back", "left side")[round(yaw / (np.pi / 2)) % 4]

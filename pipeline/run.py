@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 AHEAD = 2
 """Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
 
+HOPELESS = "hopeless"
+"""`stages.findings.Severity` of a clip that nothing can come of; importing it would load numpy for a run with nothing to do."""
 RECALLED = 110
 """Characters of a cached stage's warning at most."""
 
@@ -101,6 +103,8 @@ class Options:
     """Stages that run whether their result is there or not."""
     quality: str = STANDARD
     """Preset that the parameters were made with."""
+    anyway: bool = False
+    """Whether the run goes on where nothing can come of the clip."""
 
 
 class ClipRun:
@@ -214,6 +218,8 @@ class ClipRun:
                 digests |= _ports(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
                 at += 1
+                if at < len(steps) and not options.anyway:
+                    refuse_hopeless(record)
 
     def foretell(self, clip: Path, plans: list[StagePlan], options: Options) -> Forecast:
         """How long the stages that are not up to date will take; says it, too."""
@@ -302,6 +308,13 @@ class ClipRun:
             "metrics": self.metrics,
             **self.entries,
         }
+
+
+def refuse_hopeless(record: Record) -> None:
+    """BadInput where the stage has found that nothing can come of the clip."""
+    for message, finding in zip(record.info.warnings, record.info.findings, strict=False):  # old records have none
+        if finding["severity"] == HOPELESS:
+            raise BadInput(f"{message} (--anyway goes on)")
 
 
 def first_sentence(message: str) -> str:

@@ -20,6 +20,8 @@ class Severity(StrEnum):
     """Detail, or a part that the clip does not show: it is made up."""
     WRONG = "wrong"
     """The frames contradict each other or the body: without them, or filmed again, the avatar is better."""
+    HOPELESS = "hopeless"
+    """Nothing can come of the clip: a run stops here, unless it is told to go on."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,10 @@ class Code(Enum):
     VIDEO_BROKEN = Wording("{name}: ffmpeg met errors while decoding, so some frames may look broken: {error}",
                            severity=Severity.WRONG)
     NO_PERSON = Wording("No person was found in {frames}; these frames carry no points.")
+    HARDLY_ANY_PERSON = Wording("A person shows in {figure:.0f} of the clip's {given} frames only: no avatar can come of that.",
+                                "Film one whole person from head to feet, in the picture all the time.", Severity.HOPELESS)
+    SMALL_PERSON = Wording("The person is only {figure:.0f} px tall in the picture: the avatar will be coarse.",
+                           "Go closer, or turn the phone upright, until the person fills most of the picture's height.")
     SECOND_PERSON = Wording("A second person was seen in {frames}; only the first one is followed.",
                             "Keep others out of the picture or cut these frames.")
     CUT_OFF = Wording("The edge of the picture cuts off {parts}; what lies outside is guessed.",
@@ -73,8 +79,12 @@ class Code(Enum):
     PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "
                             "are off", severity=Severity.NEWS)
     NOT_FITTED = Wording("Not fitted, and not learned from: {frames}; {reason}.", severity=Severity.WRONG)
+    PART_HIDDEN = Wording("Something that stands before the person hides {parts}; what is behind it is not fitted to the pictures.",
+                          "Film where nothing stands between the person and the camera.")
     POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
                              "frames: wide clothes, or a mask that holds more than the person.")
+    HAND_HIDDEN = Wording("The {side} hand is hidden in {frames}, behind the body as the camera sees it; where it lies is a guess.",
+                          "Keep the hands beside the body.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
     NOT_MEASURED = Wording("No frame is held out ({figure} usable frames, train.holdout is {holdout}): the quality of this avatar "
@@ -87,6 +97,15 @@ class Code(Enum):
     NO_CHECKPOINT = Wording("No checkpoint can be written to {folder} ({error}); should this run be stopped, the next one starts "
                             "anew.", severity=Severity.NEWS)
     CHECKPOINT_UNREADABLE = Wording("The checkpoint {path} cannot be read ({error}); training starts anew.", severity=Severity.NEWS)
+    FROZEN = Wording("The picture stands still in {frames} while time goes on; these frames are not used.",
+                     "Film without pausing, with no other program open on the phone.", Severity.WRONG)
+    REPEATED = Wording("Pictures repeat in {frames}; these frames are not used.",
+                       "Send the file as the phone recorded it, not a copy with another frame rate.", Severity.NEWS)
+    SCENE_CUT = Wording("Another scene begins in {frames}.", "Give one shot, from one stand.", Severity.WRONG)
+    EXPOSURE_STEPS = Wording("Exposure or white balance is off by up to {figure:.0%} in {frames}.",
+                             "Lock exposure and focus before the turn: hold a finger on the person in the picture.")
+    BLURRED = Wording("The picture is blurred in {frames}.",
+                      "Clean the lens, let the phone focus on the person, film in more light and turn slower.")
     OTHER = Wording("{what}")
     """Of a stage that is not of this package."""
 

@@ -18,6 +18,7 @@ IRISES = ((88, 60, 36), (78, 100, 116), (84, 104, 72), (60, 40, 28))
 SHIRTS = ((168, 52, 48), (46, 96, 150), (60, 120, 88), (206, 170, 84), (120, 76, 140), (200, 200, 196))
 TROUSERS = ((48, 62, 92), (92, 82, 70), (58, 58, 62), (112, 118, 108))
 SHOES = ((60, 60, 64), (150, 46, 44), (208, 204, 196), (40, 60, 90))
+FRAMES = ((24, 22, 22), (70, 40, 24), (110, 112, 118))
 PATTERNS = ("stripes", "checks", "print", "raglan")
 EYE_CENTRES = np.array([[0.0311, 0.8867, 0.1315], [-0.0311, 0.8867, 0.1315]], np.float32)
 EYE_RADIUS = 0.0165
@@ -44,9 +45,12 @@ class Appearance:
     shoes: np.ndarray  # (3,)
     pattern: str
     """One of `PATTERNS`."""
+    worn: dict[str, np.ndarray]
+    """Material of what else is worn -> colour (3,)."""
     bump: dict[str, tuple] = field(default_factory=lambda: {
         "shirt": (26.0, 0.16), "trousers": (22.0, 0.18), "hair": ((240.0, 30.0, 240.0), 0.25), "skin": (300.0, 0.02),
-        "shoes": (60.0, 0.05), "eye": (1.0, 0.0)})
+        "shoes": (60.0, 0.05), "eye": (1.0, 0.0), "skirt": (22.0, 0.14), "glasses": (1.0, 0.0), "hat": (180.0, 0.12),
+        "phone": (1.0, 0.0)})
     """Material -> frequency (cells a metre) and strength of the noise on its normals."""
 
     def paint(self, material: np.ndarray, paint: np.ndarray, region: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -160,6 +164,21 @@ class Appearance:
         n = sample_noise(self.noise, strand, 420)[:, :1] * 0.3 + sample_noise(self.noise, strand, 1300)[:, :1] * 0.3
         return self.hair * (1 + n + 0.2 * sample_noise(self.noise, p, 40)[:, :1]), np.full(len(p), 0.16, np.float32)
 
+    def _skirt(self, p, region):
+        weave = 1 + 0.05 * sample_noise(self.noise, p, 300)[:, :1] + 0.08 * sample_noise(self.noise, p, 20)[:, 1:2]
+        return self.worn["skirt"] * weave, np.full(len(p), 0.05, np.float32)
+
+    def _glasses(self, p, region):
+        return np.broadcast_to(self.worn["glasses"], p.shape), np.full(len(p), 0.7, np.float32)
+
+    def _hat(self, p, region):
+        knit = 1 + 0.10 * np.sin(p[:, 1:2] * 2 * np.pi / 0.007) + 0.08 * sample_noise(self.noise, p, 90)[:, :1]
+        return self.worn["hat"] * knit, np.full(len(p), 0.04, np.float32)
+
+    def _phone(self, p, region):
+        screen = (np.abs(p[:, :2]).max(1) < 0.92) & (p[:, 2] > 0.5)
+        return np.where(screen[:, None], to_linear((120, 150, 190)), to_linear((28, 28, 32))), np.full(len(p), 0.6, np.float32)
+
 
 def make_appearance(person: Person, rng: np.random.Generator) -> Appearance:
     """Draws the colours of skin, hair, eyes and clothes."""
@@ -171,8 +190,9 @@ def make_appearance(person: Person, rng: np.random.Generator) -> Appearance:
     second = to_linear((232, 228, 218)) if shirt.mean() < 0.35 else to_linear((40, 48, 70))
     tone = int(rng.integers(len(SKIN_TONES)))
     hair = pick(HAIR_TONES[:4] if tone < 3 else HAIR_TONES[3:4])
-    return Appearance(person, noise, to_linear(SKIN_TONES[tone]), hair, pick(IRISES if tone < 3 else IRISES[3:]),
-                      (shirt, second), pick(TROUSERS), pick(SHOES), str(rng.choice(PATTERNS)))
+    known = (pick(IRISES if tone < 3 else IRISES[3:]), (shirt, second), pick(TROUSERS), pick(SHOES), str(rng.choice(PATTERNS)))
+    worn = {"skirt": pick(SHIRTS) * 0.7, "hat": pick(SHOES), "glasses": pick(FRAMES)}
+    return Appearance(person, noise, to_linear(SKIN_TONES[tone]), hair, *known, worn)
 
 
 def _mix(a, b, share):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import wholebody
@@ -20,9 +21,11 @@ from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, WRISTS, J
 from gsac.avatar.skinning import joint_transforms
 from gsac.avatar.zbuffer import visible_points
 from gsac.turntable.appearance import make_appearance
+from gsac.turntable.behaviour import behave
 from gsac.turntable.motion import Motion, make_motion
 from gsac.turntable.options import TurntableOptions
 from gsac.turntable.person import Person, make_person
+from gsac.turntable.pocket import cover_hands
 from gsac.turntable.render import SHADOW, Picture, Studio
 from gsac.turntable.room import make_lighting, make_room
 from gsac.turntable.viewpoint import Viewpoint, look_at
@@ -31,6 +34,13 @@ FEET = [INDEX["left_ankle"], INDEX["right_ankle"], INDEX["left_foot"], INDEX["ri
 """Joints of ankles and balls of the feet."""
 HIDDEN_SHARE = 0.10
 """A hand counts as hidden when a smaller share of its vertices is visible."""
+TRUNK = [INDEX[name] for name in ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "neck", "left_collar",
+                                  "right_collar", "head", "jaw")]
+"""Joints that lie deep, unlike those of limbs; the trunk is as thick as it is at their height."""
+DEEPEST = 0.18
+"""m, the most that a joint of the trunk lies below the surface."""
+JOINT_SLACK = 0.015
+"""m, likewise for joints, beyond the thickness of their limb."""
 SLACK = np.full(133, 0.025)
 """(133,) m by which a key point may lie below the drawn surface and still count as visible: inside a limb, under cloth."""
 SLACK[wholebody.BODY] = 0.14
@@ -44,11 +54,12 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
 
     Options are a TurntableOptions or keywords: `make_clip(out, seed=3, frames=40)`. A wrong one raises ValueError.
 
-    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m, camera frame; vertices (T, V, 3) m, bare body (option
-    `vertices`); keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad; hidden (T, 2)
-    bool, left and right hand; height_m; rotation (3, 3) and eye (3,), world -> camera; shift (V, 3) m of the bare T-pose
-    from the shape basis; and the arrays of `BodyParams`, whose posed body is the truth up to that shift.
-    mask: coverage of each pixel by the person; above 127 is the silhouette.
+    truth.npz: focal (2,), center (2,) px; joints (T, 55, 3) m, camera frame, joints_visible (T, 55) bool; vertices (T, V, 3) m,
+    bare body (option `vertices`); keypoints (T, 133, 2) px, keypoints_visible (T, 133) bool; expression (T, 52); yaw (T,) rad;
+    hidden (T, 2) bool, left and right hand; height_m; rotation (3, 3) and eye (3,), world -> camera; shift (V, 3) m of the bare
+    T-pose from the shape basis; with option `drawn` the surface as drawn, drawn (T, N, 3) m, drawn_faces (F, 3), drawn_material
+    (F,) into `person.MATERIALS`; and the arrays of `BodyParams`, whose posed body is the truth up to that shift.
+    mask: coverage of each pixel by the person with all that is worn or held; above 127 is the silhouette.
     """
     options = options or TurntableOptions(**changes)
     options.check()
@@ -60,13 +71,14 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
         folder.mkdir(parents=True)
     person = make_person(options, np.random.default_rng([options.seed, 1]))
     motion = make_motion(person.body, person.joints, options, np.random.default_rng([options.seed, 2]))
+    behave(motion, person, options, np.random.default_rng([options.seed, 6]))
     studio = make_studio(person, options)
     params = place_person(person, motion, studio.view)
-    truth = TruthRecorder(person, motion, params, studio.view)
+    truth = TruthRecorder(person, motion, params, studio.view, options.drawn)
     video = VideoWriter(out / "clip.mp4", options) if turn else None
     try:
         for t in range(options.frames):
-            bare, drawn, joints = pose_person(person, params, t)
+            bare, drawn, joints = pose_person(person, params, t, motion.covered[t])
             picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
             frame = develop(picture, options, t, noise=turn)
             write_image(out / "mask" / f"{t:06d}.png", picture.mask)
@@ -74,7 +86,7 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
                 video.add(frame)
             if not turn or options.lossless:
                 write_frame(out / "frames" / f"{t:06d}.png", frame)
-            truth.add(t, bare, joints, picture)
+            truth.add(t, bare, drawn, joints, picture)
             progress(t + 1, options.frames, "frames")
     finally:
         if video:
@@ -124,11 +136,14 @@ def place_person(person: Person, motion: Motion, view: Viewpoint) -> BodyParams:
                                 person.joint_offset, person.body.digest)
 
 
-def pose_person(person: Person, params: BodyParams, t: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bare body (V, 3), drawn mesh (N, 3) and joints (55, 3) of frame t, m, camera frame."""
+def pose_person(person: Person, params: BodyParams, t: int,
+                covered: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bare body (V, 3), drawn mesh (N, 3) and joints (55, 3) of frame t, m, camera frame. covered: (2,) bool, hands in pockets."""
     transforms = joint_transforms(params.pose[t][None], person.joints, person.body.parents)[0]
     bare, drawn = person.pose(transforms, params.expression[t])
     joints = np.einsum("jab,jb->ja", transforms[..., :3], person.joints) + transforms[..., 3]
+    if covered is not None and covered.any():
+        drawn = cover_hands(person, bare, drawn, joints, covered)
     return bare + params.transl[t], drawn + params.transl[t], joints + params.transl[t]
 
 
@@ -142,21 +157,41 @@ def develop(picture: Picture, options: TurntableOptions, t: int, noise: bool) ->
     return np.clip(np.round(colour), 0, 255).astype(np.uint8)
 
 
+def joint_depths(person: Person) -> np.ndarray:
+    """(55,) m by which each joint may lie below the drawn surface and still count as seen: its limb's thickness with clothes."""
+    drawn = person.rest[person.pair[:, 0]]
+    drawn = (drawn + (person.rest[person.pair[:, 1]] - drawn) * person.share[:, None])[np.unique(person.faces)]
+    out = KDTree(drawn).query(person.joints, k=60)[0].mean(1) * 1.6
+    for joint in TRUNK:
+        away = drawn - person.joints[joint]
+        level = (np.abs(away[:, 1]) < 0.03) & (np.abs(away[:, 0]) < 0.12)
+        out[joint] = min(np.percentile(np.hypot(away[level, 0], away[level, 2]), 90), DEEPEST)
+    return out + JOINT_SLACK
+
+
+def skin_is_seen(points: np.ndarray, skin: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether any of the eight points of skin (k, 3) nearest to each point (n, 3) is seen (k,) bool."""
+    return np.any(seen[KDTree(skin).query(points, k=8)[1]], axis=1)
+
+
 class TruthRecorder:
     """Collects the arrays of truth.npz, frame by frame."""
 
-    def __init__(self, person: Person, motion: Motion, params: BodyParams, view: Viewpoint):
+    def __init__(self, person: Person, motion: Motion, params: BodyParams, view: Viewpoint, drawn: bool):
         self.person, self.motion, self.params, self.view = person, motion, params, view
         frames = params.frames
         self.vertices = np.empty((frames, len(person.body.v_template), 3), np.float32)
         self.keypoints = np.empty((frames, 133, 2), np.float32)
         self.visible = np.zeros((frames, 133), bool)
         self.hidden = np.zeros((frames, 2), bool)
+        self.joints_visible = np.zeros((frames, J), bool)
+        self.drawn = np.empty((frames, len(person.share), 3), np.float32) if drawn else None
+        self.deep = joint_depths(person)
         self.hands = [np.flatnonzero(person.body.weights[:, [wrist, *range(J)[fingers]]].sum(1) > 0.6)
                       for wrist, fingers in zip(WRISTS, (LEFT_HAND, RIGHT_HAND), strict=True)]
 
-    def add(self, t: int, bare: np.ndarray, joints: np.ndarray, picture: Picture) -> None:
-        """Records frame t. bare: (V, 3) m, bare body; joints: (55, 3) m; both in the camera frame."""
+    def add(self, t: int, bare: np.ndarray, drawn: np.ndarray, joints: np.ndarray, picture: Picture) -> None:
+        """Records frame t. bare: (V, 3) m, bare body; drawn: (N, 3) m, with clothes; joints: (55, 3) m; all in the camera frame."""
         camera = self.view.camera
         big = camera.scaled(picture.depth.shape[1], picture.depth.shape[0])
         points = self.person.body.keypoints(bare)
@@ -165,8 +200,17 @@ class TruthRecorder:
         self.keypoints[t] = camera.project(points)
         near = points * (1 - SLACK / np.linalg.norm(points, axis=1))[:, None]
         self.visible[t] = visible_points(near, picture.depth, big, 0.0) & self.person.body.known_keypoints
-        for side, hand in enumerate(self.hands):
-            self.hidden[t, side] = visible_points(bare[hand], picture.depth, big, 0.004).mean() < HIDDEN_SHARE
+        nearer = joints * (1 - self.deep / np.linalg.norm(joints, axis=1))[:, None]
+        self.joints_visible[t] = visible_points(nearer, picture.depth, big, 0.0)
+        parts = zip(self.hands, wholebody.HANDS.values(), (LEFT_HAND, RIGHT_HAND), strict=True)
+        for side, (hand, keys, fingers) in enumerate(parts):
+            seen = visible_points(bare[hand], picture.depth, big, 0.004)
+            self.hidden[t, side] = seen.mean() < HIDDEN_SHARE
+            if self.motion.covered[t, side]:
+                self.visible[t, keys] &= skin_is_seen(points[keys], bare[hand], seen)
+                self.joints_visible[t, fingers] &= skin_is_seen(joints[fingers], bare[hand], seen)
+        if self.drawn is not None:
+            self.drawn[t] = drawn
 
     def arrays(self, options: TurntableOptions) -> dict[str, np.ndarray]:
         """The arrays of truth.npz by name, shapes (T, ...) as `make_clip` lists them."""
@@ -174,10 +218,12 @@ class TruthRecorder:
         shaped, _ = self.person.body.rest(p.betas)
         out = {name: getattr(p, name) for name in BODY_SHAPES if name not in ("model", "sigma_joints")}
         out |= {"model": np.array(p.model), "keypoints": self.keypoints, "keypoints_visible": self.visible,
-                "hidden": self.hidden, "yaw": self.motion.yaw.astype(np.float32),
+                "joints_visible": self.joints_visible, "hidden": self.hidden, "yaw": self.motion.yaw.astype(np.float32),
                 "height_m": np.float32(self.person.height_m), "rotation": self.view.rotation, "eye": self.view.eye,
                 "shift": self.person.rest[: len(shaped)] - shaped, "fps": np.float32(options.fps)}
-        return out | ({"vertices": self.vertices} if options.vertices else {})
+        out |= {"vertices": self.vertices} if options.vertices else {}
+        surface = {"drawn": self.drawn, "drawn_faces": self.person.faces.astype(np.int32), "drawn_material": self.person.material}
+        return out | (surface if self.drawn is not None else {})
 
 
 class VideoWriter:

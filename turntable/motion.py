@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -30,6 +30,11 @@ class Motion:
     """(T,) rad, 0 faces the camera, growing to the person's left."""
     expression: np.ndarray
     """(T, 52) in 0..1."""
+    covered: np.ndarray = field(init=False)
+    """(T, 2) bool, left and right hand: under the cloth of a pocket."""
+
+    def __post_init__(self) -> None:
+        self.covered = np.zeros((len(self.pose), 2), bool)
 
 
 def make_motion(body: Body, joints: np.ndarray, options: TurntableOptions, rng: np.random.Generator) -> Motion:
@@ -66,7 +71,7 @@ def _make_novel(body: Body, joints: np.ndarray, options: TurntableOptions, rng: 
     keys = [turn_joints(rest, change) for change in NOVEL_POSES]
     at = np.linspace(0, len(keys), T, endpoint=False)
     first = at.astype(int)
-    blend = _smooth(np.clip((at - first - 0.35) / 0.65, 0, 1))[:, None, None]
+    blend = smoothstep(np.clip((at - first - 0.35) / 0.65, 0, 1))[:, None, None]
     keys = np.stack(keys)
     pose = keys[first] * (1 - blend) + keys[(first + 1) % len(keys)] * blend
     stir(pose, options.arm_swing, rng)
@@ -167,7 +172,7 @@ def hide_hand(pose: np.ndarray, parents: np.ndarray, joints: np.ndarray, options
     s = np.arange(len(pose)) / len(pose)
     ramp = 0.10
     arrive, leave = options.hidden
-    gone = _smooth(np.clip((s - arrive + ramp) / ramp, 0, 1)) * _smooth(np.clip((leave + ramp - s) / ramp, 0, 1))
+    gone = smoothstep(np.clip((s - arrive + ramp) / ramp, 0, 1)) * smoothstep(np.clip((leave + ramp - s) / ramp, 0, 1))
     pose[:, chain] += gone[:, None, None] * (goal - start[chain])
 
 
@@ -211,8 +216,8 @@ def smooth_noise(rng: np.random.Generator, frames: int, scale: float, cycles: in
     return scale * np.sum(waves, 0) * 0.9
 
 
-def _smooth(x: np.ndarray) -> np.ndarray:
-    """Smoothstep of x in 0..1."""
+def smoothstep(x: np.ndarray) -> np.ndarray:
+    """Smoothstep (n,) of x (n,) in 0..1."""
     return x * x * (3 - 2 * x)
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args, get_origin, get_type_hints
 
 HiddenHand = Literal["none", "left_back", "right_back", "left_front", "right_front"]
+Behaviour = Literal["none", "left_pocket", "right_pocket", "pockets", "left_hip", "right_hip", "hips", "left_hair", "right_hair",
+                    "crossed", "left_phone", "right_phone", "looking_down", "talking"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,24 @@ class TurntableOptions:
     """Time of the hand's arrival, as a share of the clip; None: when the body covers it."""
     hidden_to: float | None = None
     """Time at which the hand leaves, as a share of the clip; None: as for hidden_from."""
+    behaviour: Behaviour = "none"
+    """What the person does for part of a turn: hands in pockets, on the hips, in the hair, arms crossed, a phone, a talk."""
+    behaviour_from: float = 0.2
+    """Time of the behaviour's beginning, as a share of the clip."""
+    behaviour_to: float = 0.8
+    """Time of its end, as a share of the clip."""
+    behaviour_amount: float = 1.0
+    """Share of the way that it goes; 1: all of it, 0: none."""
+    top: Literal["shirt", "hoodie"] = "shirt"
+    """`hoodie`: long, far too wide, with a hood on the back."""
+    legs: Literal["trousers", "skirt"] = "trousers"
+    """`skirt`: down to the knees, open at the bottom."""
+    hair: Literal["drawn", "long"] = "drawn"
+    """`drawn`: short or a bob, as the seed has it. `long`: down the back."""
+    glasses: bool = False
+    """Whether the person wears glasses."""
+    hat: Literal["none", "beanie", "cap"] = "none"
+    """What the person wears on the head."""
     expression: bool = True
     """Whether mouth, smile, brows and blinks move; otherwise the face stays neutral."""
     arm_swing: float = 1.0
@@ -55,6 +75,8 @@ class TurntableOptions:
     """Samples a pixel along each axis."""
     vertices: bool = True
     """Whether truth.npz holds the bare body's vertices (0.16 MB a frame)."""
+    drawn: bool = False
+    """Whether truth.npz holds the surface with clothes, hair and what is held, too."""
     lossless: bool = False
     """Whether the frames before coding are kept, as frames/%06d.png."""
 
@@ -74,6 +96,14 @@ class TurntableOptions:
         for name, kind in get_type_hints(type(self)).items():
             if get_origin(kind) is Literal and getattr(self, name) not in get_args(kind):
                 raise ValueError(f"{name} is {getattr(self, name)!r}, expected one of {', '.join(get_args(kind))}")
+        if self.behaviour != "none" and (self.poses != "turn" or self.hidden_hand != "none"):
+            raise ValueError(f"behaviour is {self.behaviour}, expected none with poses {self.poses} and hidden_hand "
+                             f"{self.hidden_hand}; it goes with a turn and no hidden hand")
+        if not 0 <= self.behaviour_amount <= 1:
+            raise ValueError(f"behaviour_amount is {self.behaviour_amount}, expected 0..1")
+        if not 0 <= self.behaviour_from <= self.behaviour_to <= 1:
+            raise ValueError(f"behaviour_from is {self.behaviour_from}, behaviour_to {self.behaviour_to}; "
+                             "expected 0 <= from <= to <= 1")
         start, stop = self.hidden
         if not 0 <= start <= stop <= 1:
             raise ValueError(f"hidden_from is {start}, hidden_to {stop}; expected 0 <= from <= to <= 1")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gsac.avatar.body import Body
 from gsac.avatar.skinning import skin
 from gsac.turntable.options import TurntableOptions
-from gsac.turntable.shell import Shell, cut_mesh, drape, pull_to_hull, raise_surface
+from gsac.turntable.shell import Piece, Shell, cut_mesh, drape, pull_to_hull, raise_surface
+from gsac.turntable.wear import brim, glasses, hood, long_hair, phone, skirt
 
 REGIONS = Path(__file__).with_name("regions.npz")
 """`share` (6, V) uint8 at each vertex, in 255ths: lips, ears, eyelids, nails, inner mouth, face;
@@ -19,7 +21,7 @@ OUTSIDE = Path(__file__).with_name("outside.npz")
 """Effect of single local shape sliders: `vertices` (S, V, 3) and `joints` (S, 55, 3), m; baked by `tools/open_body/bake.py`."""
 EYES = slice(13574, 13718)
 """Vertices of both eyeballs in the open body."""
-MATERIALS = ("skin", "eye", "shirt", "trousers", "shoes", "hair")
+MATERIALS = ("skin", "eye", "shirt", "trousers", "shoes", "hair", "skirt", "glasses", "hat", "phone")
 
 
 @dataclass
@@ -36,6 +38,10 @@ class Outfit:
     """`short` or `bob`."""
     neckline: float
     """Slope of the neckline, m of height a metre of depth."""
+    wide: float = 0.0
+    """m by which the shirt is wider than one that fits: a hoodie."""
+    hat: bool = False
+    """Whether a hat covers the top of the head."""
 
 
 @dataclass
@@ -97,8 +103,48 @@ def make_person(options: TurntableOptions, rng: np.random.Generator) -> Person:
                     cuff=float(rng.choice([-0.755, -0.755, -0.755, -0.24])), hair=str(rng.choice(["short", "bob"])),
                     neckline=float(rng.uniform(0.5, 0.9)))
     region = np.load(REGIONS)["share"].T.astype(np.float32) / 255
+    outfit = choose(outfit, options)
     shells, hidden = dress(body, rest, region, outfit, options.clothing, rng)
-    return assemble(body, outfit, betas, rest, joints, joint_offset, region, shells, hidden)
+    pieces = accessories(body, rest, joints, shells, outfit, options)
+    return assemble(body, outfit, betas, rest, joints, joint_offset, region, shells, hidden, pieces)
+
+
+def choose(outfit: Outfit, options: TurntableOptions) -> Outfit:
+    """The outfit as the options want it; what they leave open is as drawn."""
+    changes: dict[str, Any] = {"hat": options.hat != "none"}
+    if options.top == "hoodie":
+        changes |= {"sleeve": 0.72, "hem": 0.08, "neckline": 0.45, "wide": 0.034}
+    if options.legs == "skirt":
+        changes |= {"cuff": -0.08}
+    if options.hair == "long":
+        changes |= {"hair": "bob"}
+    return replace(outfit, **changes)
+
+
+def accessories(body: Body, rest: np.ndarray, joints: np.ndarray, shells: list[Shell], outfit: Outfit,
+                options: TurntableOptions) -> list[Piece]:
+    """What the options want beside shells. rest: (V, 3) m; joints: (55, 3) m."""
+    template = body.v_template
+    worn = {shell.material: shell for shell in shells}
+    surface = {name: shell.rest[np.unique(shell.pair)] for name, shell in worn.items()}
+    out = []
+    if options.legs == "skirt":
+        used = np.unique(worn["shirt"].pair)
+        used = used[np.abs(template[used, 0]) < 0.2]
+        tucked = worn["shirt"].rest[used] if not outfit.wide else rest[used]
+        out.append(skirt(np.concatenate([rest[np.abs(template[:, 0]) < 0.3], tucked]), joints, outfit.hem, options.clothing))
+    if options.top == "hoodie":
+        out.append(hood(rest[:EYES.start], body.faces[(body.faces < EYES.start).all(1)], joints, options.clothing))
+    if options.hair == "long":
+        around = np.concatenate([rest, surface["shirt"], *(piece.rest for piece in out)])
+        out.append(long_hair(surface["hair"], around, joints, options.clothing))
+    if options.glasses:
+        out += glasses(rest, joints)
+    if options.hat == "cap":
+        out.append(brim(worn["hat"], template, joints))
+    if options.behaviour.endswith("phone"):
+        out.append(phone(joints, options.behaviour.split("_")[0]))
+    return out
 
 
 def leave_basis(body: Body, amount: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -144,13 +190,19 @@ def dress(body: Body, rest: np.ndarray, region: np.ndarray, outfit: Outfit, thic
         "shoes": np.full(len(template), 0.010),
         "hair": hair_thickness(template, fields["hair"], outfit, rng),
     }
+    if outfit.wide:
+        thickness["shirt"] = thickness["shirt"] + outfit.wide * (0.35 + 0.65 * np.clip((0.62 - y) / 0.1, 0, 1)
+                                                                 ) * (1 + 0.3 * fold) * np.clip((0.74 - arm) / 0.06, 0.2, 1)
+    if outfit.hat:
+        fields["hat"] = hat_field(template, region)
+        thickness["hat"] = thickness["hair"] + 0.009
     shells = []
     hidden = np.zeros(len(template), bool)
     for name, field in fields.items():
         field = np.where(skin_only, field, -1.0)
         member = field > -0.06
         lift = raise_surface(rest, faces, member, np.maximum(thickness[name], 0.003) * thick,
-                             {"shirt": 16, "trousers": 12, "shoes": 6, "hair": 6}[name])
+                             {"shirt": 16, "trousers": 12, "shoes": 6, "hair": 6, "hat": 6}[name])
         if name == "shirt":
             lift = drape(lift, np.clip((0.52 - y) / 0.08, 0, 1) * (arm < 0.3) * member)
         paint = template
@@ -165,7 +217,7 @@ def dress(body: Body, rest: np.ndarray, region: np.ndarray, outfit: Outfit, thic
             lift = lengthen_hair(lift, template, field, thick)
         pair, share, cut_faces = cut_mesh(faces, field)
         shells.append(Shell(name, lift.astype(np.float32), pair, share, cut_faces, paint.astype(np.float32)))
-        hidden |= field > {"shirt": 0.03, "trousers": 0.02, "shoes": 0.02, "hair": 0.03}[name]
+        hidden |= field > {"shirt": 0.03, "trousers": 0.02, "shoes": 0.02, "hair": 0.03, "hat": 0.03}[name]
     return shells, hidden
 
 
@@ -179,6 +231,13 @@ def hair_field(template: np.ndarray, region: np.ndarray, outfit: Outfit) -> np.n
     line = np.interp(around, [0, 0.55, 0.9, 1.25, 1.75, 2.3, np.pi],
                      [0.967, 0.962, 0.940, 0.885, 0.860, 0.812, 0.800])
     return np.where((y > 0.77) & (np.abs(x) < 0.13), np.minimum(y - line, 0.03 - 0.08 * region[:, 1]), -1.0)
+
+
+def hat_field(template: np.ndarray, region: np.ndarray) -> np.ndarray:
+    """(N,) m, positive under a hat: from the forehead over the ears to the nape. template: (N, 3) m; region: (N, 6)."""
+    x, y, z = template.T
+    line = np.interp(np.arctan2(np.abs(x), z - 0.045), [0, 0.9, 1.5, np.pi], [0.945, 0.935, 0.905, 0.870])
+    return np.where((y > 0.77) & (np.abs(x) < 0.13), np.minimum(y - line, 0.04 - 0.10 * region[:, 1]), -1.0)
 
 
 def hair_thickness(template: np.ndarray, field: np.ndarray, outfit: Outfit, rng: np.random.Generator) -> np.ndarray:
@@ -215,8 +274,8 @@ def make_folds(template: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def assemble(body: Body, outfit: Outfit, betas: np.ndarray, rest: np.ndarray, joints: np.ndarray, joint_offset: np.ndarray,
-             region: np.ndarray, shells: list[Shell], hidden: np.ndarray) -> Person:
-    """Joins body and shells into one control mesh and one drawn mesh.
+             region: np.ndarray, shells: list[Shell], hidden: np.ndarray, pieces: list[Piece]) -> Person:
+    """Joins body, shells and pieces into one control mesh and one drawn mesh.
 
     betas: (B,); rest: (V, 3) m; joints, joint_offset: (55, 3) m; region: (V, 6); hidden: (V,) bool, skin that is left out.
     """
@@ -239,12 +298,26 @@ def assemble(body: Body, outfit: Outfit, betas: np.ndarray, rest: np.ndarray, jo
         materials.append(np.full(len(shell.faces), MATERIALS.index(shell.material)))
         at_control += len(used)
         at_drawn += len(shell.share)
-    source, pair, share = np.concatenate(source), np.concatenate(pairs), np.concatenate(shares).astype(np.float32)
+    index, weight = body.skin_index[np.concatenate(source)], body.skin_weight[np.concatenate(source)]
+    regions = region[np.concatenate(source)]
+    for piece in pieces:
+        own = np.arange(len(piece.rest)) + at_control
+        control.append(piece.rest)
+        paints.append(piece.paint)
+        index, weight = np.concatenate([index, piece.skin_index]), np.concatenate([weight, piece.skin_weight])
+        regions = np.concatenate([regions, np.zeros((len(own), regions.shape[1]), regions.dtype)])
+        pairs.append(np.stack([own, own], 1))
+        shares.append(np.zeros(len(own)))
+        faces.append(piece.faces + at_drawn)
+        materials.append(np.full(len(piece.faces), MATERIALS.index(piece.material)))
+        at_control += len(own)
+        at_drawn += len(own)
+    pair, share = np.concatenate(pairs), np.concatenate(shares).astype(np.float32)
 
     def interpolate(values: np.ndarray) -> np.ndarray:
         a, b = values[pair[:, 0]], values[pair[:, 1]]
         return (a + (b - a) * share[:, None]).astype(np.float32)
 
     return Person(body, outfit, betas, np.concatenate(control).astype(np.float32), joints, joint_offset,
-                  body.skin_index[source], body.skin_weight[source], pair, share, np.concatenate(faces),
-                  np.concatenate(materials).astype(np.uint8), interpolate(np.concatenate(paints)), interpolate(region[source]))
+                  index, weight, pair, share, np.concatenate(faces),
+                  np.concatenate(materials).astype(np.uint8), interpolate(np.concatenate(paints)), interpolate(regions))

@@ -29,6 +29,24 @@ class Shell:
     """(V, 3) m, texture coordinates."""
 
 
+@dataclass
+class Piece:
+    """A mesh of its own, of M vertices that follow joints."""
+
+    material: str
+    """One of `person.MATERIALS`."""
+    rest: np.ndarray
+    """(M, 3) m, T-pose."""
+    faces: np.ndarray
+    """(F, 3) into M."""
+    paint: np.ndarray
+    """(M, 3), texture coordinates."""
+    skin_index: np.ndarray
+    """(M, 4) joints of the skinning weights."""
+    skin_weight: np.ndarray
+    """(M, 4)."""
+
+
 def cut_mesh(faces: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Keeps the part of a mesh with a positive field, cut at the zero line.
 

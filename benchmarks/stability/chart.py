@@ -18,6 +18,8 @@ COLOURS = {PAPER: "#b5532a", DEFAULT: "#0b6e4f"}
 TITLES = {PAPER: "the paper's method", DEFAULT: "ours"}
 NAMED = 4
 """Faults that are named, the worst ones."""
+LINE = 0.035
+"""Least distance of two names."""
 
 
 def draw(curves: list[Curve], folder: Path) -> list[Path]:
@@ -32,9 +34,10 @@ def draw(curves: list[Curve], folder: Path) -> list[Path]:
         axes.plot(SEVERITIES, lines.T, color=COLOURS[method], lw=0.7, alpha=0.45)
         axes.plot(SEVERITIES, np.median(lines, axis=0), color=COLOURS[method], lw=3.2)
         axes.axhline(BREAKDOWN, color="0.6", lw=0.8, ls=":")
-        for curve, line in zip(some[:NAMED], lines, strict=False):
-            axes.annotate(curve.fault, (5, line[-1]), xytext=(3, 0), textcoords="offset points", fontsize=7, color="0.35",
-                          va="center")
+        height = -np.inf
+        for name, end in sorted(zip((c.fault for c in some[:NAMED]), lines[:, -1], strict=False), key=lambda named: named[1]):
+            height = max(end, height + LINE)
+            axes.text(5.06, height, name, fontsize=7, color="0.35", va="center")
         areas = [c.area for c in some]
         axes.set(title=f"{TITLES[method]}: {len(some)} faults, area: median {np.median(areas):.2f}, worst {min(areas):.2f}",
                  xlabel="severity", xlim=(0, 5.9), ylim=(-0.02, 1.02), xticks=list(SEVERITIES))

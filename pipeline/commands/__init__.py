@@ -15,6 +15,7 @@ from gsac.stages.contract import BadInput, did_you_mean
 
 COMMANDS = {
     "run": "run a clip through the stages",
+    "check": "look at a clip for seconds: what would come of it, and what to film again",
     "demo": "make a truth clip and run the whole job on it",
     "status": "what is up to date in the folder of a run",
     "explain": "what changed in the key of a stage",

@@ -42,6 +42,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--force", action="append", default=[], metavar="STAGE",
                          help="run this stage again; may be repeated")
     command.add_argument("--replace", action="store_true", help="put this clip's avatar in place of another clip's in DIR")
+    command.add_argument("--anyway", action="store_true", help="go on where nothing can come of the clip, as without a person")
     add_quality(command)
     add_person(command)
     add_params(command)
@@ -55,7 +56,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
     clip = find_clip(arguments.clip)
     run_folder = RunFolder(arguments.out or default_out(clip))
-    options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality)
+    options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
     with progress_reporter(arguments) as reporter:
         store = open_store(reporter)
         clip_run = ClipRun(project, configs, store, run_folder, reporter)

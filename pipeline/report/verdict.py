@@ -84,7 +84,7 @@ def give_verdict(metrics: dict[str, Any], facts: dict[str, float]) -> Verdict:
     grades = {part: grade_likeness(part, metrics, facts) for part in LIKENESS}
     grades |= {"seen": grade_seen(metrics), "moves": grade_moves(metrics)}
     whole = grade_whole(grades)
-    parts = tuple(Part(NAMES[part], grade, say_seen(metrics) if part == "seen" else SENTENCES[part][grade])
+    parts = tuple(Part(NAMES[part], grade, say_seen(metrics) if part == "seen" else say_part(part, grade, metrics))
                   for part, grade in grades.items())
     return Verdict(whole, say_in_one_line(grades), parts)
 
@@ -129,6 +129,13 @@ def grade_whole(grades: dict[str, Grade]) -> Grade:
     if face is poor and body is Grade.FAIR:
         return poor
     return Grade.FAIR if face is Grade.FAIR or poor in grades.values() else body
+
+
+def say_part(part: str, grade: Grade, metrics: dict[str, Any]) -> str:
+    """What the grade of a part means, and from where it is least alike if it is not good."""
+    view = ((metrics.get("likeness") or {}).get(part) or {}).get("worst_view")
+    where = f" Least alike where the {view} is seen." if isinstance(view, str) and grade in (Grade.FAIR, Grade.POOR) else ""
+    return SENTENCES[part][grade] + where
 
 
 def say_seen(metrics: dict[str, Any]) -> str:

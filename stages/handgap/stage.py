@@ -30,7 +30,8 @@ def run(job: Job) -> None:
         raise StageError(f"keypoints.npz holds {len(xy)} frames and clip.json {len(times)} timestamps; "
                          "run both stages again")
 
-    score = np.where(np.isfinite(xy).all(axis=2), score, 0)
+    own = clip.shows_own_moment(len(xy))
+    score = np.where(np.isfinite(xy).all(axis=2) & own[:, None], score, 0)
     xy = np.nan_to_num(xy)
     found = leave_all(len(xy)) if job.config.method == "none" else RULES[job.config.rule](xy, score, times, job.config)
     filled, drift = np.zeros(score.shape, bool), np.zeros(score.shape)
@@ -46,14 +47,15 @@ def run(job: Job) -> None:
     sigma = np.where(filled, np.hypot(full, drift), detection_sigma(score, person_height(xy, score)))
     score = np.where(filled, FILLED_SCORE * full / sigma, score)
     world = np.where(unseen[..., None], np.nan, keypoints["world"])
-    _report(job, found, filled)
+    _report(job, found, filled, own)
     write_arrays(job.out / "keypoints.npz", xy=xy.astype(np.float32), score=score.astype(np.float32),
                  world=world.astype(np.float32), detector=keypoints["detector"], missing=found.hand, filled=filled,
                  sigma=sigma.astype(np.float32))
 
 
-def _report(job: Job, found: MissingHands, filled: np.ndarray) -> None:
-    """Warns of what the user should know: hands never seen, taken for the other one, or left missing."""
+def _report(job: Job, found: MissingHands, filled: np.ndarray, own: np.ndarray) -> None:
+    """Warns of what the user should know: hands never seen, taken for the other one, or left missing. own: (T,) bool, frames that
+    repeat no other."""
     for i, side in enumerate(SIDES):
         missing = found.hand[:, i]
         if missing.all():
@@ -61,7 +63,7 @@ def _report(job: Job, found: MissingHands, filled: np.ndarray) -> None:
             continue
         if found.misplaced[:, i].any():
             job.warn(Finding.of(Code.HAND_MISPLACED, found.misplaced[:, i], side=side))
-        left = missing & ~filled[:, HANDS[side]].all(axis=1)
+        left = missing & own & ~filled[:, HANDS[side]].all(axis=1)
         for start, end in runs(left):
             if end - start == 1:
                 left[start] = False  # the fit bridges one frame

@@ -15,6 +15,7 @@ from gsac.avatar.threads import available_cores, prefetch
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.findings import Code, Finding
+from gsac.stages.first_look import FirstLook
 from gsac.stages.frame_names import name_frames
 from gsac.stages.keypoints.config import DetectorName
 from gsac.stages.keypoints.cut_off import Cut, find_cuts, name_cuts
@@ -29,6 +30,10 @@ MOST_THREADS = 8
 """Each holds networks of its own, some 40 MB."""
 FLICKER = 0.25
 """Share of the frames below which what looks like a person, but shows neither face nor hand in any of them, is none."""
+HARDLY = 0.1
+"""Share of the frames below which a person in them makes no avatar."""
+LEAST_TALL = 300
+"""px, of a person from whom an avatar has a face."""
 ADVICE = "film one whole person from head to feet, upright, at least a third of the frame high, in good light"
 
 
@@ -43,8 +48,9 @@ def run(job: Job) -> None:
             frames.append(frame)
             cuts.append(cut)
             job.progress(len(frames), len(paths), "frames")
-    report(job, frames, cuts)
     arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in KEYPOINT_SHAPES if name != "detector"}
+    report(job, frames, cuts)
+    judge_size(job, FirstLook.of(arrays))
     write_arrays(job.out / "keypoints.npz", detector=np.array(job.config.detector), **arrays)
 
 
@@ -63,7 +69,9 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
     if seen.mean() < FLICKER and not any(f.score[points].any() for f in frames for points in (FACE, *HANDS.values())):
         raise BadInput(f"No person was found: something like one shows in {name_frames(seen)} only, and never a face or a hand; "
                        f"{ADVICE}")
-    if not seen.all():
+    if seen.mean() < HARDLY:
+        job.warn(Finding.of(Code.HARDLY_ANY_PERSON, ~seen, figure=seen.sum(), given=len(seen)))
+    elif not seen.all():
         job.warn(Finding.of(Code.NO_PERSON, ~seen))
     second = np.array([f.second_person for f in frames])
     if second.any():
@@ -75,3 +83,10 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
             job.warn(Finding.of(Code.HAND_NEVER_DETECTED, side=side))
     if not any(f.score[FACE].any() for f in frames):
         job.warn(Finding.of(Code.FACE_NEVER_DETECTED))
+
+
+def judge_size(job: Job, look: FirstLook) -> None:
+    """Tells what was seen, and warns of a person who is too small for detail."""
+    job.note(look.sentence)
+    if look.height_px < LEAST_TALL:
+        job.warn(Finding.of(Code.SMALL_PERSON, figure=look.height_px))

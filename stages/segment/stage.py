@@ -66,7 +66,7 @@ def run(job: Job) -> None:
         plate = Plate(image, np.ones(image.shape[:2], bool))
     elif job.config.use_plate and is_video:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
-    absent, fits = np.zeros((2, len(paths)), bool)
+    absent, unfound, fits = np.zeros((3, len(paths)), bool)
     cutouts: dict[int, Cutout] = {}
 
     def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
@@ -83,8 +83,7 @@ def run(job: Job) -> None:
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
         cutouts[t], fits[t] = cut_frame(image, probability, xy, score, plate, job.config.iterations)
         if not cutouts[t].outline.any():
-            raise StageError(f"frame {t} ({paths[t].name}): the mask is empty although a person was found there; "
-                             "look at the frame, and remove it or try segment.method=selfie")
+            absent[t] = unfound[t] = True
         return make_view(image, cutouts[t].on_frame(image.shape).astype(np.float32))
 
     def counted(views: Iterable[View]) -> Iterator[View]:
@@ -102,12 +101,12 @@ def run(job: Job) -> None:
 
     with ThreadPoolExecutor(available_cores()) as pool:
         sway = measure_sway(counted(prefetch(pool, cut, masks(pool), available_cores())))
+        if absent.all():
+            raise StageError(describe_nobody(paths, unfound))
         if plate is not None and not given:
             plate = relearn_plate(paths, ~absent, outline) if fits[~absent].mean() >= MOSTLY else None
         (job.out / "alpha").mkdir()
         deque(pool.map(soft, range(len(paths))), maxlen=0)
-    if absent.all():
-        raise StageError(f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty")
     if absent.any():
         job.warn(Finding.of(Code.EMPTY_MASK, absent))
     other_scene = ~fits & ~absent
@@ -116,6 +115,15 @@ def run(job: Job) -> None:
     moved = find_moved(sway, max(clip.width, clip.height))
     if is_video and moved.any():
         job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
+
+
+def describe_nobody(paths: list[Path], unfound: np.ndarray) -> str:
+    """What to say where every mask is empty. unfound: (T,) bool, frames in which there were points of a person, yet no mask."""
+    if not unfound.any():
+        return f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty"
+    first = int(np.flatnonzero(unfound)[0])
+    return (f"frame {first} ({paths[first].name}): the mask is empty although a person was found there, and no other of the "
+            f"{len(paths)} frames has one; look at the frames, and film one whole person or try segment.method=selfie")
 
 
 def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,

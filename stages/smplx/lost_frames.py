@@ -10,20 +10,23 @@ from gsac.stages.smplx.state import Fit
 POOR_IOU = 0.7
 FALL = 0.12
 """A frame's IoU is lost this far below the clip's median: a wide coat lowers it in every frame, a wrong pose in one."""
+REPEATED = "the picture is an earlier frame's"
 FAR = 0.05
 """Median reprojection error of a lost frame, as a share of the person's height; a good fit has a tenth of it."""
 
 
-def find_lost_frames(fit: Fit, seen: np.ndarray, height: float) -> dict[str, np.ndarray]:
+def find_lost_frames(fit: Fit, seen: np.ndarray, height: float, own: np.ndarray) -> dict[str, np.ndarray]:
     """Reason -> frames (T,) bool; a frame has at most one reason.
 
-    seen: (T,) bool, frames with a person; height: px, of the person.
+    seen: (T,) bool, frames with a person; height: px, of the person; own: (T,) bool, frames that repeat no other.
     """
     iou, off = np.nan_to_num(fit.iou, nan=1.0), np.nan_to_num(fit.reprojection, nan=0.0)
+    seen = seen & own
     usual = np.median(iou[seen]) if seen.any() else 1.0
     uncovered = seen & (iou < min(POOR_IOU, usual - FALL))
     away = seen & ~uncovered & (off > FAR * height)
-    return {"no person is seen": ~seen, f"the body covers the silhouette badly (IoU below {POOR_IOU})": uncovered,
+    return {REPEATED: ~own, "no person is seen": own & ~seen,
+            f"the body covers the silhouette badly (IoU below {POOR_IOU})": uncovered,
             f"the body lies more than {FAR:.0%} of its height off the seen points": away}
 
 
@@ -32,7 +35,8 @@ def describe_lost_frames(lost: dict[str, np.ndarray], iou: np.ndarray) -> list[F
 
     lost: reason -> frames (T,) bool; iou: (T,), NaN without alpha.
     """
-    out = [Finding.of(Code.NOT_FITTED, mask, reason=reason) for reason, mask in lost.items() if mask.any()]
+    out = [Finding.of(Code.NOT_FITTED, mask, reason=reason) for reason, mask in lost.items()
+           if mask.any() and reason != REPEATED]  # `split` has said so
     poor = (np.nan_to_num(iou, nan=1.0) < POOR_IOU) & ~np.any(list(lost.values()), axis=0)
     if poor.any():
         out.append(Finding.of(Code.POORLY_COVERED, poor, figure=POOR_IOU))

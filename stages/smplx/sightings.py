@@ -34,6 +34,8 @@ class Sightings:
     detector: str = ""
     face: dict[str, np.ndarray] | None = None
     """Arrays of face.npz: `valid` (T,), `expression` (T, E), `jaw` (T, 3) and, where a head was fitted, its mesh."""
+    missing: np.ndarray | None = None
+    """(T, 2) bool, hands that were not seen, or in a wrong place; None: all were."""
     principal_point: tuple[float, float] | None = None
     """px; None: the frame's middle."""
     longer_side: float | None = None

@@ -44,12 +44,18 @@ class Outline:
     area: float
     """Share of the frame that the person covers; 0 without a person."""
     mask: np.ndarray  # (h, w) bool
+    hidden: np.ndarray | None = None
+    """(h, w) bool, where something stands before the person; None: nowhere."""
 
     def at(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Signed distance (P,) px, its gradient (P, 2), and whether the point lies in the image (P,) bool. xy: (P, 2) px."""
+        """Signed distance (P,) px, its gradient (P, 2), and whether the point can be judged (P,) bool: it lies in the
+        image, and nothing stands before it. xy: (P, 2) px."""
         h, w = self.field.shape
         at = (xy / self.scale - 0.5).astype(np.float32)
         inside = (at[:, 0] > 1) & (at[:, 0] < w - 2) & (at[:, 1] > 1) & (at[:, 1] < h - 2)
+        if self.hidden is not None:
+            column, row = np.clip(np.round(at), 0, (w - 1, h - 1)).astype(int).T
+            inside &= ~self.hidden[row, column]
         x, y = at[:, 0].reshape(-1, 1), at[:, 1].reshape(-1, 1)
         sample = lambda image: cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0]  # noqa: E731
         return sample(self.field), np.stack([sample(self.slope[..., c]) for c in (0, 1)], 1), inside
@@ -99,8 +105,9 @@ def sample_outline(body: Body, vertices: np.ndarray, camera: Camera, outline: Ou
     h, w = outline.field.shape
     face, bary, _ = rasterise(vertices, body.faces, camera.scaled(w, h))
     covered = face >= 0
-    union = (covered | outline.mask).sum()
-    overlap = (covered & outline.mask).sum() / union if union else 0.0
+    judged = covered if outline.hidden is None else covered & ~outline.hidden
+    union = (judged | outline.mask).sum()
+    overlap = (judged & outline.mask).sum() / union if union else 0.0
     edge = covered & ~cv2.erode(covered.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)
     edge[[0, -1]] = edge[:, [0, -1]] = False
     y, x = np.nonzero(edge)

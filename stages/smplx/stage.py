@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,6 +14,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.expression import translate_expression, translate_rest
+from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
@@ -41,13 +43,20 @@ def run(job: Job) -> None:
     body = load_body(job, "smplx")
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px, str(points["detector"]), face, clip.principal_point, clip.longer_side)
+                          clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
     outlines = read_outlines(frame_paths(job.inputs["segment/alpha"]))
     if len(outlines) != len(sightings.xy):
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
+    own = clip.shows_own_moment(len(outlines))
+    outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
+    occluder, hidden = find_occluder(sightings, outlines), []
+    if occluder is not None:
+        outlines = [replace(outline, hidden=occluder) for outline in outlines]
+        sightings, behind = hide(sightings, occluder, outlines[0].scale)
+        hidden = describe_hidden(behind)
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
     expression, jaw, silent = translate_expression(body, face)
@@ -55,11 +64,12 @@ def run(job: Job) -> None:
         job.warn(silent)
     params = to_params(body, fit.state, sightings.center, expression, fit.joint_offset)
     params.jaw_pose, params.rest_expression = jaw, translate_rest(body, face)
+    params.occluder = occluder
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
-    lost = find_lost_frames(fit, seen, sightings.person_height)
+    lost = find_lost_frames(fit, seen, sightings.person_height, own)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
-    for finding in (*fit.notes, *describe_lost_frames(lost, fit.iou)):
+    for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit.iou)):
         job.warn(finding)
     if guesses := describe_guesses(job.config, params, clip):
         job.note(guesses)

@@ -19,6 +19,7 @@ from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import plan_crop, principal_point
 from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_evenly
+from gsac.stages.split.picture_quality import HEIGHT, judge_pictures, look_at
 
 HEIC = {".heic", ".heif"}
 """As iPhones write them."""
@@ -75,7 +76,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         part = shown[crop.y: crop.y + crop.height, crop.x: crop.x + crop.width]
         return _resize(part, width, height), None if focal_px is None else focal_px * crop.scale
 
-    focals, notes, other, unread = [], set(), [], []
+    focals, looks, notes, other, unread = [], [], set(), [], []
     for done, path in enumerate(picks):
         try:
             rgb, exif, had_alpha = read_photo(path)
@@ -90,6 +91,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         del rgb  # before the next one is read
         write_frame(frames / f"{len(focals):06d}.png", shown)
         focals.append(focal_px)
+        looks.append(look_at(_resize(shown, *fit_size(width, height, HEIGHT))))
         progress(done + 1, len(picks), "frames")
     if not focals:
         raise unread[0]
@@ -103,6 +105,8 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         if had_alpha:
             notes.add(COMPOSITED)
         write_frame(frames / "plate.png", fit(rgb, Image.Exif())[0])
+    for finding in judge_pictures(looks, timed=False)[1]:
+        warn(finding)
     known = [f for f in focals if f is not None]
     if known and max(known) > 1.02 * min(known):
         warn(Finding.of(Code.PHOTO_ZOOM, least=min(known), most=max(known)))

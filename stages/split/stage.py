@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 from gsac.avatar.artifacts import Clip, frame_paths
 from gsac.stages.contract import BadInput, Job, StageError
@@ -29,7 +30,7 @@ def run(job: Job) -> None:
         photos, plate = ([source], None) if source.suffix.lower() in SUFFIXES else ([], None)
     people = People(job.models) if job.config.crop and all(name in job.models for name in NETWORKS) else None
     if photos:
-        fields = {"fps": None, "timestamps_s": None}
+        fields: dict[str, Any] = {"fps": None, "timestamps_s": None}
         fields |= split_photos(photos, plate, frames, job.config, people, job.warn, job.progress)
     else:
         fields = split_video(source, frames, job.config, people, job.warn, job.progress)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import re
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -21,6 +24,7 @@ from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_po
 from gsac.stages.split.keyframes import read_key_frames
 from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
+from gsac.stages.split.picture_quality import HEIGHT, Look, judge_pictures, look_at
 from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, LIMITS, PQ, UNSPECIFIED, Video, file_url, probe
 
 TRANSFER_NAMES = {HLG: "arib-std-b67", PQ: "smpte2084"}
@@ -35,11 +39,11 @@ LOOKS, CHECKS, TRIES = 12, 30, 3
 def split_video(path: Path, frames: Path, config: SplitConfig, people: People | None, warn: Callable[[Finding], None],
                 progress: Callable[[int, int, str], None]) -> dict:
     """Writes frames/%06d.png. people: who finds the person, None: the frames stay whole. Returns the Clip fields fps, timestamps_s,
-    width, height, focal_px, notes, crop, center."""
+    width, height, focal_px, notes, crop, center, repeated."""
     video = probe(path)
     base = video.time_base
     if not len(video.ticks):
-        shown, base, _ = _run(path, video, ["-vf", "showinfo=checksum=0", "-f", "null", "-"], None, None)
+        shown, base, _ = _run(path, video, ["-map", f"0:{video.stream}", "-vf", "showinfo=checksum=0", "-f", "null", "-"], None)
         video.ticks = np.unique(np.array(shown, np.int64))
     if not len(video.ticks):
         raise BadInput(f"{path.name}: holds no frame; record the clip again.")
@@ -52,12 +56,20 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
                        "Copy the file from the phone again, or cut the clip.")
     picks = pick_by_time(times, config.fps, config.count)
 
-    def write(crop: Crop | None) -> tuple[list[int], Fraction, list[str]]:
+    looks: list[Look] = []
+
+    def write(crop: Crop | None) -> Written:
         width, height = frame_size(video, config, crop)
+        small = fit_size(width, height, HEIGHT)
         graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, crop, width, height))
-        output = ["-vf", graph, "-pix_fmt", "rgb24", "-compression_level", "4", "-pred", "up", "-flags", "+bitexact",
-                  "-start_number", "0", "-f", "image2", "%06d.png"]
-        return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"))
+        output = ["-filter_complex", f"[0:{video.stream}]{graph},format=rgb24,split[whole][fine];"
+                                     f"[fine]scale={small[0]}:{small[1]}:flags=area+bitexact,format=rgb24[small]",
+                  "-map", "[whole]", "-pix_fmt", "rgb24", "-compression_level", "4", "-pred", "up", "-flags", "+bitexact",
+                  "-start_number", "0", "-fps_mode", "passthrough", "-f", "image2", "%06d.png",
+                  "-map", "[small]", "-fps_mode", "passthrough", "-f", "rawvideo", "pipe:1"]
+        looks.clear()
+        return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"),
+                    lambda pictures: looks.extend(map(look_at, _read_pictures(pictures, *small))))
 
     crop, (shown, base, errors) = write_about_person(path, video, frames, config, people, write)
 
@@ -65,13 +77,16 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     if written == 0:
         raise BadInput(f"{path.name}: none of its frames decodes ({errors[0] if errors else 'no reason given'}). "
                        "Copy the file from the phone again.")
-    if written != len(shown):
+    if not written == len(shown) == len(looks):
         raise StageError(f"{path.name}: ffmpeg decoded {len(shown)} frames and wrote {written}; is the disk full?")
     if written < len(picks):
         warn(Finding.of(Code.VIDEO_DAMAGED, figure=len(picks) - written, name=path.name, given=len(picks)))
     elif errors:
         warn(Finding.of(Code.VIDEO_BROKEN, name=path.name, error=errors[0]))
 
+    repeated, findings = judge_pictures(looks, timed=True)
+    for finding in findings:
+        warn(finding)
     notes = []
     if video.transfer in TRANSFER_NAMES:
         notes.append(f"tone-mapped from {TRANSFER_NAMES[video.transfer]} to SDR BT.709")
@@ -86,6 +101,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         "width": width, "height": height, "focal_px": focal.from_video_tags(video.tags, whole_width, whole_height),
         "notes": notes, "crop": crop,
         "center": None if crop is None else principal_point(crop, (width, height), video.width, video.height),
+        "repeated": np.flatnonzero(repeated).tolist(),
     }
 
 
@@ -166,29 +182,31 @@ def _picture_filters(video: Video, crop: Crop | None, width: int, height: int) -
     return [scale]
 
 
-def _run(path: Path, video: Video, output: list[str], folder: Path | None,
-         on_frame: Callable[[int], None] | None) -> tuple[list[int], Fraction, list[str]]:
-    """Runs ffmpeg. Returns the ticks of the frames that passed `showinfo`, their time base, and its error lines."""
+def _run(path: Path, video: Video, output: list[str], folder: Path | None, on_frame: Callable[[int], None] = lambda done: None,
+         read: Callable[[IO[bytes]], None] = lambda pictures: None) -> Written:
+    """Runs ffmpeg. read: reads what it writes to its output, to the end. Returns the ticks of the frames that passed `showinfo`,
+    their time base, and its error lines."""
     decoder = ["-c:v", video.decoder] if video.decoder else []
     limits = [word for name, value in LIMITS.items() for word in (f"-{name}", value)]
     command = [ffmpeg_program(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
-               "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, "-i", file_url(path),
-               "-map", f"0:{video.stream}", "-fps_mode", "passthrough", *output]
+               "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, "-i", file_url(path), *output]
     ticks: list[int] = []
     base, errors = video.time_base, []
     # The output pattern is relative to `folder`: a % in the folder's own name is no pattern.
-    with subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                          stderr=subprocess.PIPE, text=True, errors="replace") as process:
+    with (ThreadPoolExecutor(1) as reader, subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                                            stderr=subprocess.PIPE) as process):
+        assert process.stdout is not None and process.stderr is not None
+        reading = reader.submit(read, process.stdout)
         try:
-            for line in process.stderr:
+            for line in io.TextIOWrapper(process.stderr, errors="replace"):
                 if found := SHOWN.search(line):
                     ticks.append(int(found[1]))
-                    if on_frame:
-                        on_frame(len(ticks))
+                    on_frame(len(ticks))
                 elif found := TIME_BASE.search(line):
                     base = Fraction(int(found[1]), int(found[2]))
                 elif "[error]" in line or "[fatal]" in line:
                     errors.append(line.strip())
+            reading.result()
         except BaseException:
             process.kill()
             raise
@@ -202,4 +220,8 @@ def _run(path: Path, video: Video, output: list[str], folder: Path | None,
     return ticks, base, errors
 
 
-
+def _read_pictures(stream: IO[bytes], width: int, height: int) -> Iterator[np.ndarray]:
+    """Yields (height, width, 3) uint8, to the stream's end."""
+    size = 3 * width * height
+    while len(data := stream.read(size)) == size:
+        yield np.frombuffer(data, np.uint8).reshape(height, width, 3)

@@ -26,6 +26,7 @@ from gsac.avatar.yaw import turn_seen
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.findings import Code, Finding
+from gsac.stages.first_look import LEAST_TURN
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.choose_heldout import hold_out, hold_out_for_choosing
 from gsac.stages.train.config import NETWORKS, TrainConfig
@@ -47,8 +48,6 @@ LOSS_ROWS = 20
 """Rows of the curve that have the loss."""
 TIMES = ("seconds", "cpu_seconds", "gpu_seconds")
 """What a row of the curve holds that another run would not repeat: it goes to the engine, not into metrics.json."""
-LEAST_TURN = 270
-"""Degrees of the person's turn below which the user is warned."""
 LEAST_SEEN = 0.8
 """Share of the body's surface in view below which the user is warned."""
 TRAIN_SAMPLE = 8
@@ -79,16 +78,17 @@ def run(job: Job) -> None:
     body = load_body(job, "train", params.model)
     camera = params.camera(clip.width, clip.height)
     views, empty = read_views(frames, job.inputs["segment/alpha"], camera, config.height,
-                              mixed=config.recipe == "paper")  # as published
+                              mixed=config.recipe == "paper",  # as published
+                              occluder=params.occluder)
     if len(empty) == count:
         raise StageError("segment/alpha: every mask is empty, there is no person to train on; look at segment")
     usable = np.ones(count, bool)
     usable[empty] = False
     if empty:
         job.warn(Finding.of(Code.MASK_NOT_TRAINED, ~usable))
-    if params.lost.any():
-        job.warn(Finding.of(Code.POSE_NOT_TRAINED, params.lost))
-        usable &= ~params.lost
+    usable &= ~params.lost
+    if (failed := params.lost & clip.shows_own_moment(count)).any():
+        job.warn(Finding.of(Code.POSE_NOT_TRAINED, failed))
     if not usable.any():
         raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
     held = hold_out(params.global_orient, usable, config.holdout)
@@ -185,7 +185,8 @@ class Run:
 
     def read(self, frames: np.ndarray) -> dict[int, View]:
         """`read_whole` of frames, (n,) indices."""
-        return read_whole(self.job.inputs["split/frames"], self.job.inputs["segment/alpha"], self.camera, frames)
+        return read_whole(self.job.inputs["split/frames"], self.job.inputs["segment/alpha"], self.camera, frames,
+                          self.poses.params.occluder)
 
     def fit(self) -> None:
         """Runs the recipe, from a checkpoint where there is one."""
@@ -330,7 +331,7 @@ class Run:
             "lpips_in_loss": self.in_loss is not None,
             "levels": judge_levels(gaussians, self.result.coarser, poses,
                                    {t: view.reduced(trained.height) for t, view in self.filmed.items()}),
-            "likeness": judge_likeness(gaussians, aligned, held, self.filmed),
+            "likeness": judge_likeness(gaussians, aligned, held, small, self.camera.height),
             "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **judge_novel(gaussians, poses),

@@ -20,6 +20,10 @@ MARGIN = 0.06
 """Margin round the mask's box, in units of its height: limbs may move there while poses are refined."""
 FAINT = 25
 """Value of the mask, 0..255, up to which a pixel shows nobody."""
+NEAR = 0.02
+"""Share of the person's height within which something that stands there hides the person, rather than stands beside them."""
+KEPT = 0.8
+"""Least share of the person's pixels that a cut may keep: a pole hides less than a cut beside it would take."""
 LEAST_SHARE = 2e-4
 """A mask that covers less of the frame counts as empty."""
 
@@ -72,11 +76,12 @@ Views = Mapping[int, View] | list[View]
 """Views by frame."""
 
 
-def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None,
-               mixed: bool = False) -> tuple[list[View], list[int]]:
+def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None, mixed: bool = False,
+               occluder: np.ndarray | None = None) -> tuple[list[View], list[int]]:
     """All T frames, at most `height` px high (None: as they are), each cropped to its person.
 
-    camera: of the frames on disk; mixed: whether the soft edge keeps what it has of the background's colour.
+    camera: of the frames on disk; mixed: whether the soft edge keeps what it has of the background's colour; occluder: (h, w) of
+    the whole frame, above 0.5 where something stands before the person.
 
     Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not fit the frames.
     """
@@ -86,15 +91,17 @@ def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None,
         view, share = _read_view(*pair, camera, height, mixed)
         if share < LEAST_SHARE or not (view.pixels[..., 3] > FAINT).any():
             return view.crop(0, 0, 1, 1), False
-        return person_crop(view), True
+        return cut_to_seen(person_crop(view), occluder), True
 
     with ThreadPoolExecutor(available_cores()) as pool:
         found = list(pool.map(read, paths))
     return [view for view, _ in found], [t for t, (_, shown) in enumerate(found) if not shown]
 
 
-def read_whole(frames: Path, alphas: Path, camera: Camera, chosen: Iterable[int]) -> dict[int, View]:
-    """Frame -> its view, whole and as large as its file, of the chosen frames. camera: of the frames on disk.
+def read_whole(frames: Path, alphas: Path, camera: Camera, chosen: Iterable[int],
+               occluder: np.ndarray | None = None) -> dict[int, View]:
+    """Frame -> its view, whole but for what `occluder` (h, w) hides, and as large as its file, of the chosen frames. camera: of the
+    frames on disk.
 
     Raises StageError for masks that do not fit the frames.
     """
@@ -102,7 +109,7 @@ def read_whole(frames: Path, alphas: Path, camera: Camera, chosen: Iterable[int]
     wanted = [int(t) for t in chosen]
 
     def read(t: int) -> View:
-        return _read_view(*paths[t], camera)[0]
+        return cut_to_seen(_read_view(*paths[t], camera)[0], occluder)
 
     with ThreadPoolExecutor(available_cores()) as pool:
         return dict(zip(wanted, pool.map(read, wanted), strict=True))
@@ -160,3 +167,29 @@ def person_crop(view: View) -> View:
     margin = int(np.ceil(MARGIN * (rows[-1] - rows[0]))) + 4
     return view.crop(max(columns[0] - margin, 0), max(rows[0] - margin, 0),
                      min(columns[-1] + 1 + margin, view.camera.width), min(rows[-1] + 1 + margin, view.camera.height))
+
+
+def cut_to_seen(view: View, occluder: np.ndarray | None) -> View:
+    """The view cut to that side of what stands before the person (above, below, left or right of it) which shows most of them.
+
+    occluder: (h, w) of the whole frame at any size, above 0.5 where something hides the person, or None. The view as it is where
+    nothing does, or the cut would take more than it hides.
+    """
+    if occluder is None:
+        return view
+    mask = (view.pixels[..., 3] > 127).astype(np.uint8)
+    if not mask.any():
+        return view
+    (x, y), (h, w) = view.corner, mask.shape
+    whole = cv2.resize(occluder.astype(np.float32), (view.frame.width, view.frame.height), interpolation=cv2.INTER_LINEAR)
+    reach = 2 * int(np.ceil(NEAR * np.ptp(np.flatnonzero(mask.any(1))))) + 1
+    hides = (whole[y:y + h, x:x + w] > 0.5) & (cv2.dilate(mask, np.ones((reach, reach), np.uint8)) > 0)
+    if not hides.any():
+        return view
+    rows, columns = np.flatnonzero(hides.any(1)), np.flatnonzero(hides.any(0))
+    edge = reach // 4 + 1  # the mask's soft edge beside it is no outline
+    sides = [(0, 0, w, rows[0] - edge), (0, rows[-1] + 1 + edge, w, h),
+             (0, 0, columns[0] - edge, h), (columns[-1] + 1 + edge, 0, w, h)]
+    shown = [mask[max(y0, 0):max(y1, 0), max(x0, 0):max(x1, 0)].sum() for x0, y0, x1, y1 in sides]
+    best = int(np.argmax(shown))
+    return view.crop(*map(int, sides[best])) if shown[best] >= KEPT * mask.sum() else view

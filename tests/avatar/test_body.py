@@ -132,6 +132,16 @@ def test_a_resting_face_is_kept_and_files_without_one_are_read_and_written_as_be
             check_body(tmp_path / "body.npz")
 
 
+def test_where_something_hides_the_person_is_kept_and_files_of_clear_views_stay_as_they_were(tmp_path, body):
+    params = BodyParams.from_pose(np.zeros((2, 55, 3)), np.zeros((2, 3)), np.zeros(4), np.zeros((2, 52)), 900, (1, 2))
+    params.write(tmp_path / "body.npz")
+    assert "occluder" not in check_body(tmp_path / "body.npz") and BodyParams.read(tmp_path / "body.npz").occluder is None
+    params.occluder = np.eye(5, 3, dtype=bool)
+    params.write(tmp_path / "body.npz")
+    check_body(tmp_path / "body.npz")
+    np.testing.assert_array_equal(BodyParams.read(tmp_path / "body.npz").occluder, params.occluder)
+
+
 def test_a_file_of_the_official_keys_drops_in(tmp_path):
     body = Body.load(official_file(tmp_path / "SMPLX_NEUTRAL.npz", directions=400))
     assert (body.num_betas, body.exprdirs.shape[2]) == (20, 10) and body.parents[0] == -1 and body.clothes == ()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gsac.avatar.yaw import turn_seen, yaw
+from gsac.avatar.yaw import name_side, turn_seen, yaw
 
 
 def turning(degrees):
@@ -23,3 +23,9 @@ def test_the_turn_seen_is_all_but_the_widest_gap_also_across_the_back(degrees, s
 
 def test_no_frame_shows_no_turn():
     assert turn_seen(np.zeros((0, 3, 3))) == 0
+
+
+def test_the_side_that_the_camera_sees_has_a_name():
+    """Turned to the own left, a body shows its right side."""
+    seen = [name_side(angle) for angle in yaw(turning([0, 40, 90, 179, -179, -90, -40]))]
+    assert seen == ["front", "front", "right side", "back", "back", "left side", "front"]

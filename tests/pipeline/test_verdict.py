@@ -9,7 +9,7 @@ from gsac.pipeline.report.verdict import NAMES, Grade, give_verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = json.loads((ROOT / "docs/lab/verdict.json").read_text())
-FITTED, UNSEEN = ([row for row in TABLE if row["set"] == name] for name in ("fitted", "unseen"))
+FITTED, UNSEEN, LARGE = ([row for row in TABLE if row["set"] == name] for name in ("fitted", "unseen", "large"))
 RANK = {grade.word: grade.rank for grade in Grade}
 
 
@@ -37,9 +37,27 @@ def test_no_whole_is_two_grades_off_in_avatars_that_it_never_saw():
     assert len(UNSEEN) >= 12 and count(UNSEEN)[2] <= 1
 
 
+def test_avatars_of_footage_filmed_large_are_called_as_they_look():
+    wholes, parts, worst = count(LARGE)
+    assert len(LARGE) >= 9 and wholes >= len(LARGE) - 1 and worst <= 1
+    poor = [row["what"] for row in LARGE if ranks(row)["whole"][0] == Grade.POOR.rank]
+    assert poor == [row["what"] for row in LARGE if row["judged"]["whole"] == "poor"]  # none that looks right is called poor
+    assert parts >= 0.7 * 5 * len(LARGE)
+
+
+def test_a_part_that_is_not_good_is_told_with_the_side_from_which_it_is_least_alike():
+    metrics = json.loads(json.dumps(UNSEEN[0]["metrics"]))
+    for figures in metrics["likeness"].values():
+        figures |= {"structure": 0.85, "psnr": 30.0, "worst": 0.9, "worst_view": "left side"}
+    told = {part.name: part.sentence for part in give_verdict(metrics, {}).parts}
+    assert "Least alike where the left side is seen." in told[NAMES["body"]] and "left side" in told[NAMES["face"]]
+    metrics["likeness"]["body"] |= {"structure": 0.95}
+    assert "left side" not in next(p.sentence for p in give_verdict(metrics, {}).parts if p.name == NAMES["body"])
+
+
 def test_the_notebook_says_how_often_the_verdict_is_right():
     told = (ROOT / "docs/lab/verdict.md").read_text()
-    for name, rows in (("fitted", FITTED), ("unseen", UNSEEN)):
+    for name, rows in (("fitted", FITTED), ("unseen", UNSEEN), ("large", LARGE)):
         wholes, parts, _ = count(rows)
         line = next(line for line in told.splitlines() if line.startswith(f"| `{name}`")).replace("*", "")
         assert line.endswith(f"| {len(rows)} | {wholes} | {parts} of {5 * len(rows)} | 0 wholes |")

@@ -111,6 +111,8 @@ def begin(job, name):
         os.kill(os.getpid(), signal.SIGKILL)
     if trouble == "warning":
         job.warn(Finding.of(Code.OTHER, what=f"{name}: word 2 is short"))
+    if trouble == "hopeless":
+        job.warn(Finding.of(Code.HARDLY_ANY_PERSON, figure=1, given=40))
     if trouble == "note":
         job.note("words are taken as they come")
     return trouble

@@ -22,9 +22,11 @@ from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.ground import Ground
+from gsac.stages.smplx.lm.hidden_arms import HiddenArms
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
+from gsac.stages.smplx.lm.shake import transl_acceleration
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -49,6 +51,9 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     detector = Detector.load(sightings.detector, body)
     problem, state = set_up(body, sightings, outlines, detector, config)
     state, steps = fit_points(problem, state, sightings, detector, 3 * config.iterations)
+    hidden = problem.hidden = HiddenArms.of(body, sightings.person_height)
+    hidden.find(problem, state, sightings.missing)
+    state = hidden.search(problem, state)
     iou = np.full(len(sightings.xy), np.nan)
     problem.outline_weight, problem.limit, problem.seen.depth_spread = config.silhouette, ROBUST, ROUNDS_DEPTH_SPREAD
     for r in range(config.rounds):
@@ -56,6 +61,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
         if config.silhouette > 0:
             iou = renew_outlines(problem, state, sightings)
+        hidden.hold(problem, state)
         state.stance = problem.stance.learn(state.local[:, problem.active], state.stance)
         if problem.ground is None and config.contact > 0:
             stand_on_ground(problem, state, sightings, config.contact)
@@ -63,8 +69,10 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         steps += more
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
-    return Fit(state, estimate_joint_sigma(problem, state), iou, measure_reprojection(problem, state), steps + more,
-               problem.person_offsets.joint_offset(state.own))
+    sigma = estimate_joint_sigma(problem, state)
+    hidden.widen(sigma)
+    return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
+               problem.person_offsets.joint_offset(state.own), tuple(hidden.describe(len(sigma))))
 
 
 def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
@@ -76,6 +84,7 @@ def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: 
     pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS], moves[BODY_POINTS])
     seen = observe(sightings, detector, BODY_POINTS, center, focal, config, outlines)
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, person_offsets)
+    problem.transl_spread = transl_acceleration(sightings)
     state = replace(estimate_start(body, sightings, focal[0], center), own=np.zeros(len(person_offsets.spread)))
     seen.depth *= measure_world_scale(problem, state, sightings)
     seen.repeats = count_repeats(state.local[:, 0])

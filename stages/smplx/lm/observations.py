@@ -36,7 +36,7 @@ class Observations:
     xy: np.ndarray  # (T, P, 2) px
     spread: np.ndarray  # (T, P) px; infinite where a point was not seen
     depth: np.ndarray  # (T, P) m, depth of the point against the hips; NaN where unknown
-    depth_spread: float  # m
+    depth_spread: float | np.ndarray  # m, or (T, P) m
     center: np.ndarray  # (2,) px
     seconds: np.ndarray | None  # (T,) time; None for photos
     focal_prior: tuple[float, float]

@@ -29,6 +29,8 @@ CLOTHES = 0.003
 """Distance, m, of the silhouette from a body model without clothes (an official SMPL-X file)."""
 OUTLINE_SIGHTINGS = 60
 """Weight of one frame's outline, in independent points."""
+INSIDE_ROBUST, INSIDE_SIGHTINGS = 15.0, 30.0
+"""Robust limit, in spreads, and weight, in independent points, of one arm's points that lie inside the outline or cost."""
 
 
 class Problem:
@@ -42,12 +44,18 @@ class Problem:
         self.skeleton = Skeleton(body, active, person_offsets.joints if person_offsets else None)
         self.own_spread = person_offsets.spread if person_offsets else np.zeros(0)
         self.active = active
-        self.mean, self.spread = prior.pose_prior(active)
+        self.mean, spread = prior.pose_prior(active)
+        self.spread = np.tile(spread, (len(seen.xy), 1, 1))  # (T, A, 3)
         speed, acceleration = prior.motion_prior(active)
         self.speed_spread, self.acceleration_spread = speed, acceleration
         self.smoothness, self.outline_weight, self.limit = smoothness, 0.0, ROBUST
+        self.transl_spread = np.full(3, prior.TRANSL_ACCELERATION)
         self.stance = Stance(active)
         self.ground: Ground | None = None
+        self.inside: list[tuple[int, Pairs]] = []
+        """Frames, and points of the surface that lie inside the outline or cost: of an arm that is not seen."""
+        self.loose = np.ones((len(seen.xy), len(active)))
+        """(T, A) factors on the spreads of speed and acceleration, 1 but where an arm makes a gesture."""
         self.outline_pairs: list[Pairs | None] = [None] * len(seen.xy)
         self.size = 3 * len(active) + 3
         top, sole = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
@@ -95,6 +103,9 @@ class Problem:
         total += (self._prior_residual(vector) ** 2).sum() + (self._limit_residual(vector)[0] ** 2).sum()
         if len(state.stance):
             total += (self.stance.residual(state.local[:, self.active], vector, state.stance) ** 2).sum()
+        for t, pairs in self.inside:
+            residual, _ = self._outside(t, state, self._place(chain, state, t, pairs))
+            total += INSIDE_SIGHTINGS / len(residual) * robust(residual, INSIDE_ROBUST)[0].sum()
         if len(state.level):
             total += self.ground.cost(chain, state.shape, state.transl, state.stance, state.level)
         total += sum((r**2).sum() for r in self._temporal_residuals(state, self._turns(state)[0]))
@@ -120,6 +131,8 @@ class Problem:
         self._add_points(system, state, chain)
         for t, x in self.locate_outlines(chain, state):
             self._add_outline(system, state, chain, t, x)
+        for t, pairs in self.inside:
+            self._add_inside(system, state, chain, t, pairs)
         self._add_prior(system, state)
         return system
 
@@ -132,7 +145,11 @@ class Problem:
         if self.outline_weight > 0:
             for t, pairs in enumerate(self.outline_pairs):
                 if pairs is not None:
-                    yield t, place_points(chain.frame(t), pairs, state.shape)[0] + state.transl[t]
+                    yield t, self._place(chain, state, t, pairs)
+
+    def _place(self, chain: Chain, state: State, t: int, pairs: Pairs) -> np.ndarray:
+        """(P, 3) m, the pairs' points in one frame, camera frame."""
+        return place_points(chain.frame(t), pairs, state.shape)[0] + state.transl[t]
 
     def _add_points(self, system: System, state: State, chain: Chain) -> None:
         """Adds points and their depths: two rows and one row a point."""
@@ -196,6 +213,22 @@ class Problem:
         focal = (((uv - self.seen.center) * direction).sum(1) + clothes) * weight
         system.add(slice(t, t + 1), np.insert(rows, self.size, focal, 1)[None], (residual * shrink)[None])
 
+    def _outside(self, t: int, state: State, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance (P,) of points x (P, 3) m outside the outline, in spreads, 0 inside, and its direction (P, 2) in the image."""
+        distance, direction, inside = self.seen.outlines[t].at(self.project(state, x))
+        out = inside & (distance > 0) & (self.seen.outlines[t].area > 0)
+        return np.where(out, distance / self.seen.outline_spread, 0), direction
+
+    def _add_inside(self, system: System, state: State, chain: Chain, t: int, pairs: Pairs) -> None:
+        """Adds one frame's points that lie inside the outline or cost: one row a point. They leave the focal length alone."""
+        x = self._place(chain, state, t, pairs)
+        residual, direction = self._outside(t, state, x)
+        weight = robust(residual, INSIDE_ROBUST)[1] * np.sqrt(INSIDE_SIGHTINGS / len(x))
+        slope = np.where(residual > 0, weight / self.seen.outline_spread, 0)
+        along = np.einsum("pc,pcd->pd", direction, self._projection_slope(state, x)) * slope[:, None]
+        rows = pull_back(self.skeleton, chain.frame(t), pairs, state.shape, along[None, :, None])[0, :, 0]
+        system.add(slice(t, t + 1), np.insert(rows, self.size, 0.0, 1)[None], (residual * weight)[None])
+
     def _prior_residual(self, vector: np.ndarray) -> np.ndarray:
         """(T, A, 3) in spreads. vector: (T, A, 3) rotation vectors of the active joints."""
         return (vector - self.mean) / self.spread
@@ -211,7 +244,7 @@ class Problem:
     def _add_prior(self, system: System, state: State) -> None:
         """Adds pose prior and hinge limits."""
         vector = rotation.log(state.local[:, self.active])
-        slope = rotation.log_derivative(vector) / self.spread[:, :, None]  # (T, A, 3, 3)
+        slope = rotation.log_derivative(vector) / self.spread[..., None]  # (T, A, 3, 3)
         residual = self._prior_residual(vector)
         for i in range(len(self.active)):
             block = slice(3 * i, 3 * i + 3)
@@ -243,9 +276,15 @@ class Problem:
         span = 0.5 * (gap[1:] + gap[:-1])
         moved = np.diff(state.transl, axis=0)[:, None] / gap
         scale = np.sqrt(self.smoothness)
-        return [scale * turn / self.speed_spread[:, None],
-                scale * np.diff(turn, axis=0) / span / self.acceleration_spread[:, None],
-                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / prior.TRANSL_ACCELERATION]
+        speed_spread, acceleration_spread = self._motion_spreads()
+        return [scale * turn / speed_spread[..., None],
+                scale * np.diff(turn, axis=0) / span / acceleration_spread[..., None],
+                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / self.transl_spread]
+
+    def _motion_spreads(self) -> tuple[np.ndarray, np.ndarray]:
+        """Spreads of the joints' speed (T - 1, A) and acceleration (T - 2, A)."""
+        pairs = np.maximum(self.loose[:-1], self.loose[1:])
+        return self.speed_spread * pairs, self.acceleration_spread * np.maximum(pairs[:-1], pairs[1:])
 
     def _add_temporal(self, system: System, state: State) -> None:
         """Adds speeds and accelerations."""
@@ -254,6 +293,7 @@ class Problem:
         if not residuals:
             return
         speed, acceleration, transl = residuals
+        speed_spread, acceleration_spread = (spread[..., None, None] for spread in self._motion_spreads())
         n, scale = self.size, np.sqrt(self.smoothness)
         gap = np.diff(self.seen.seconds)
         span = 0.5 * (gap[1:] + gap[:-1])
@@ -262,13 +302,13 @@ class Problem:
         for i in range(len(self.active)):
             block = slice(3 * i, 3 * i + 3)
             if np.isfinite(self.speed_spread[i]):
-                w = scale / self.speed_spread[i] / gap[:, None, None]
+                w = scale / speed_spread[:, i] / gap[:, None, None]
                 self._couple(system, block, n, [back[:, i] * w, slope[:, i] * w], speed[:, i])
-            w = scale / self.acceleration_spread[i] / span[:, None, None]
+            w = scale / acceleration_spread[:, i] / span[:, None, None]
             first, second = w / gap[:-1, None, None], w / gap[1:, None, None]
             self._couple(system, block, n, [-back[:-1, i] * first, back[1:, i] * second - slope[:-1, i] * first,
                                             slope[1:, i] * second], acceleration[:, i])
-        eye = np.eye(3)[None] * (scale / prior.TRANSL_ACCELERATION / span[:, None, None])
+        eye = np.eye(3)[None] * (scale / self.transl_spread / span[:, None, None])
         first, second = eye / gap[:-1, None, None], eye / gap[1:, None, None]
         self._couple(system, slice(n - 3, n), n, [first, -first - second, second], transl)
 

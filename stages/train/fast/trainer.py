@@ -36,6 +36,7 @@ from gsac.stages.train.gaussians.cloth_offsets import Offsets, fold
 from gsac.stages.train.gaussians.first_colours import fill_unseen
 from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.gaussians.unseen import find_seen, flatten_unseen, front_pixels, level_heights
+from gsac.stages.train.poses.guessed_limbs import find_guessed_faces
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
 
@@ -78,6 +79,8 @@ class Trainer:
         self.gains: dict[int, np.ndarray] = {}
         self.seen: np.ndarray | None = None
         """(N,) bool, whether frames show the gaussian, once that is decided; the others no longer move."""
+        self.guessed = find_guessed_faces(task.poses.body, task.poses.params.sigma_joints)
+        """Frame -> (F,) bool, faces on limbs that are not where the frame shows them."""
         self.workspace, self.losses = Workspace(), Workspace()
 
     @property
@@ -115,7 +118,10 @@ class Trainer:
         """One step on frame t. done: share of the steps so far; background: (3,) in 0..1; number: of the step. Returns the loss."""
         config = self.config
         loss, grads, opacity, grad_gain = self.gradients(t, view, background, number)
-        self.workspace.share(self._advance, t, self._by_name(grads, opacity), grads.vertices, done)
+        by_name = self._by_name(grads, opacity)
+        if t in self.guessed:
+            self._forget_guessed(t, by_name, grads.vertices)
+        self.workspace.share(self._advance, t, by_name, grads.vertices, done)
         if config.exposure:
             gain = self.gains.get(t, np.ones(3))
             self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
@@ -243,6 +249,13 @@ class Trainer:
             for grad in by_name.values():
                 grad[~self.seen] = 0
         return by_name
+
+    def _forget_guessed(self, t: int, grads: dict[str, np.ndarray], grad_vertices: np.ndarray) -> None:
+        """Zeroes what frame t would teach limbs that are not where it shows them. grads: (N, ...); grad_vertices: (V, 3)."""
+        rows = self.guessed[t][self.face]
+        for grad in grads.values():
+            grad[rows] = 0
+        grad_vertices[np.unique(self.faces[self.guessed[t]])] = 0
 
     def _move(self, worker: int, workers: int, grads: dict[str, np.ndarray], done: float) -> None:
         """One Adam step of a worker's share of the gaussians, then their limits. grads: (N, ...)."""

@@ -90,7 +90,7 @@ def put_on_other(person: Person, side: str, first: int, last: int, wrist=True, s
     return person
 
 
-def through_stage(person: Person, folder, photos=False, **config):
+def through_stage(person: Person, folder, photos=False, repeated=(), **config):
     """Returns the stage's arrays and warnings."""
     folder.mkdir(exist_ok=True)
     source, out = folder / "keypoints.npz", folder / "out"
@@ -99,7 +99,7 @@ def through_stage(person: Person, folder, photos=False, **config):
         "xy": person.xy.astype(np.float32), "score": person.score.astype(np.float32), "world": person.world.astype(np.float32),
         "detector": np.array("synthetic")})
     times = None if photos else person.times.tolist()
-    Clip(None if photos else 10.0, times, 720, 1280, None, "0").write(folder / "clip.json")
+    Clip(None if photos else 10.0, times, 720, 1280, None, "0", repeated=list(repeated)).write(folder / "clip.json")
     warnings = []
     run(Job({"keypoints/keypoints.npz": source, "split/clip.json": folder / "clip.json"}, out,
             HandgapConfig(**config), warn=lambda finding: warnings.append(finding.message)))

@@ -200,3 +200,10 @@ def test_nothing_breaks_when_little_is_seen(synthetic, method):
         missing, world = MissingHands(hand, hand, hand, nothing), np.full((4, 133, 3), np.nan)
         xy, filled, drift = fill_gaps(person.xy, person.score, world, missing, person.times, config)
         assert np.isfinite(xy).all() and np.isfinite(drift).all() and filled.any() == bool(seen)
+
+
+def test_frames_that_repeat_others_carry_no_points_and_their_hands_are_not_called_missing(synthetic, tmp_path):
+    out, warnings = synthetic.through_stage(synthetic.turning(), tmp_path, repeated=range(20, 50))
+    trunk = [5, 6, 11, 12]
+    assert not out["score"][20:50, trunk].any() and (out["score"][50:, trunk] > 0.2).all()
+    assert warnings == []

@@ -11,6 +11,7 @@ from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.benchmarks.perception import run_keypoints, run_stage, score_squats, score_truth, video_frames, write_split
 from gsac.stages.contract import BadInput, Job, make_config
+from gsac.stages.findings import Code
 from gsac.stages.keypoints import STAGE
 from gsac.stages.keypoints.config import MODELS, DetectorName, KeypointsConfig
 from gsac.stages.keypoints.cut_off import Cut, find_cuts
@@ -79,6 +80,14 @@ def warnings_of(frames: list[Frame], cuts: list[set[Cut]] | None = None) -> list
     warnings: list[str] = []
     report(Job({}, Path(), None, warn=lambda finding: warnings.append(finding.message)), frames, cuts or [set()] * len(frames))
     return warnings
+
+
+def test_hardly_any_frame_with_a_person_is_told_as_hopeless_at_once():
+    found = []
+    job = Job({}, Path(), None, warn=found.append)
+    report(job, [seen(**HANDS, face=FACE)] + [Frame()] * 19, [set()] * 20)
+    assert found[0].code is Code.HARDLY_ANY_PERSON and found[0].figure == 1 and "1 of the clip's 20 frames" in found[0].message
+    assert found[0].to_json()["severity"] == "hopeless"
 
 
 def test_warnings_name_the_frames_without_a_person_and_with_two():

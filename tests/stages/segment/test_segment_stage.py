@@ -80,6 +80,15 @@ def test_an_empty_mask_is_an_error_that_names_the_frame(folder, monkeypatch):
         segment(path, xy, score)
 
 
+def test_one_empty_mask_costs_its_frame_and_not_the_run(folder, monkeypatch):
+    path, xy, score = folder
+    masks = iter([disc(), 0 * disc(), disc()])
+    monkeypatch.setitem(stage.METHODS, "pose", lambda models: lambda image, region: next(masks))
+    alphas, warnings = segment(path, xy, score)
+    assert not alphas[1].any() and alphas[0].any() and alphas[2].any()
+    assert "No person is in frame 1;" in warnings[0]
+
+
 def test_keypoints_of_another_clip_are_refused(folder):
     path, xy, score = folder
     with pytest.raises(StageError, match="3 frames and keypoints of 2"):

@@ -19,8 +19,8 @@ def good() -> Fit:
     return Fit(None, np.full((10, 55), 0.01), np.full(10, 0.88), np.full(10, 6.0), 20)
 
 
-def said(fit: Fit, seen: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
-    lost = find_lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT)
+def said(fit: Fit, seen: np.ndarray | None = None, own: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
+    lost = find_lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT, np.ones(10, bool) if own is None else own)
     assert np.sum(list(lost.values()), axis=0).max() <= 1  # one reason a frame
     return np.any(list(lost.values()), axis=0), [finding.message for finding in describe_lost_frames(lost, fit.iou)]
 
@@ -53,6 +53,13 @@ def test_frames_without_a_person_are_lost_whatever_their_numbers(good):
     iou[0] = np.nan
     lost, words = said(replace(good, iou=iou, reprojection=np.where(seen, 6, np.nan)), seen)
     assert np.flatnonzero(lost).tolist() == [0] and "no person is seen" in words[0]
+
+
+def test_frames_that_repeat_others_are_lost_without_a_word_for_split_has_named_them(good):
+    own = np.ones(10, bool)
+    own[3:6] = False
+    lost, words = said(good, own, own)
+    assert np.flatnonzero(lost).tolist() == [3, 4, 5] and words == []
 
 
 def test_wide_clothes_in_every_frame_are_told_but_nothing_is_lost(good):

@@ -54,6 +54,22 @@ def test_frames_to_judge_by_are_whole_and_as_large_as_their_files_and_no_others_
     assert (views[1].pixels[40:120, 30:60, 3] == 255).all() and (views[1].pixels[..., 3] > 0).sum() == 80 * 30
 
 
+@pytest.mark.parametrize(("thing", "kept"), [
+    (np.s_[100:, :], np.s_[40:99, 20:50]),  # furniture
+    (np.s_[:, 34:38], np.s_[40:120, [*range(20, 34), *range(38, 50)]]),  # a pole takes less than a cut beside it would
+    (np.s_[:, 60:80], np.s_[40:120, 20:50])])  # it stands beside the person
+def test_pixels_of_furniture_before_the_person_are_not_trained_on(folders, thing, kept):
+    occluder, alpha = np.zeros((HEIGHT, WIDTH)), read_alpha(folders[1] / "000000.exr")
+    occluder[thing] = 1
+    write_alpha(folders[1] / "000000.exr", np.where(occluder > 0, 0, alpha))
+    shown = np.zeros((HEIGHT, WIDTH), bool)
+    shown[kept] = True
+    for view in (read_views(*folders, CAMERA, None, occluder=occluder)[0][0], read_whole(*folders, CAMERA, [0], occluder)[0]):
+        assert (view.pixels[..., 3] > 0).sum() == pytest.approx(shown.sum(), rel=0.05)
+        assert view.corner[1] + len(view.pixels) <= 100 or thing != np.s_[100:, :]
+        assert view.corner[0] + view.camera.center[0] == pytest.approx(WIDTH / 2) and view.frame == CAMERA
+
+
 @pytest.mark.parametrize("mixed", [False, True])
 def test_a_cut_out_is_that_of_the_whole_frame_wherever_the_person_stands(folders, mixed):
     soft = np.zeros((HEIGHT, WIDTH), np.float32)

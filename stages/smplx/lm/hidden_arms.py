@@ -1,0 +1,259 @@
+"""Arms whose hand goes where the camera does not see it: behind the back, or before the belly of a person who faces away.
+
+Points alone leave open whether a forearm goes to the front or to the back, and a hand that is not detected leaves even more. But a
+hand that lies before the trunk, or beside the body outside the mask, would be seen. Where the fit has it there for several
+frames, the arm is searched again from the poses in which a hand hides, with a motion as quick as a gesture; skin outside the mask
+costs, and the wrist belongs behind the trunk.
+T frames, P points, A active joints; sides are 0 left, 1 right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.avatar.body import Body
+from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, J
+from gsac.avatar.wholebody import INDEX as POINT
+from gsac.stages.findings import Code, Finding
+from gsac.stages.smplx.jacobians import Chain, Pairs, make_surface_pairs, place_points
+from gsac.stages.smplx.lm.problem import ROBUST, Problem
+from gsac.stages.smplx.sightings import BODY_POINTS
+from gsac.stages.smplx.state import State
+
+SIDES = ("left", "right")
+HANDS = (LEFT_HAND, RIGHT_HAND)
+ARM_JOINTS = np.array([[INDEX[f"{side}_{name}"] for name in ("collar", "shoulder", "elbow", "wrist")] for side in SIDES])
+TRUNK_JOINTS = [INDEX[name] for name in ("pelvis", "spine1", "spine2", "spine3")]
+ELBOW, WRIST = ([int(np.flatnonzero(POINT[f"{side}_{name}"] == BODY_POINTS)[0]) for side in SIDES] for name in ("elbow", "wrist"))
+HAND = [np.flatnonzero((first <= BODY_POINTS) & (first + 21 > BODY_POINTS)) for first in (91, 112)]
+"""Rows of `BODY_POINTS`."""
+HIDES = (((52, 15, -85), (28, -71, 0)), ((20, -12, -88), (16, -67, 0)))
+"""Rotation vectors, degrees, of the left shoulder and elbow when the hand lies on the small of the back, and on the belly."""
+ARM_SAMPLES, TRUNK_SAMPLES = 48, 500
+"""Points of the surface of a forearm with its hand, and of the trunk, at most."""
+OVER = 0.06
+"""m, sideways, within which points of the trunk lie on a wrist's line of sight."""
+BEFORE = 0.02
+"""m before the trunk's near surface from which on a wrist is in plain view."""
+SKIN, BEHIND_SPREAD = 0.03, 0.05
+"""m: a hidden wrist's depth behind the trunk's far surface, and its spread."""
+OUTSIDE, OUTSIDE_SHARE = 0.02, 0.35
+"""An arm is outside the mask if this share of its points lies farther out than this share of the person's height."""
+LEAST = 4
+"""Frames in plain view, at least, that contradict a hand which was not detected."""
+TRUSTED = 0.6
+"""Share of frames with the hand beside the trunk in which it must be detected: a detector that misses it there proves nothing."""
+BRIDGED = 2
+"""Frames between two stays that belong to them."""
+AROUND_S = 1.2
+"""Seconds before and after in which the arm is searched again too: it comes and goes."""
+QUICK, FREE = 4.0, 2.0
+"""Factors there on the spreads of the arm's speed and acceleration, and of its pose."""
+ROUGH_DEPTH = 0.2
+"""m, spread of the detector's depths of the arm there: it mistakes a hand behind the back for one before the belly."""
+GUESSED = 0.03
+"""Spread, as a share of the person's height, that is added to elbow and wrist of a hidden hand: networks make them up."""
+FAR_OFF = 5.0
+"""Factor on the robust limit in the search."""
+STEPS = 12
+"""Steps of each search, at most."""
+SIGMA = {"elbow": 0.05, "wrist": 0.1}
+"""m, added to the standard deviation of a hidden arm's joints; a hand's joints have the wrist's."""
+
+
+@dataclass
+class Stay:
+    """A hand out of sight from `first` to `last`, exclusive; the arm is searched again from `start` to `stop`, exclusive."""
+
+    side: int
+    first: int
+    last: int
+    start: int
+    stop: int
+
+    @property
+    def around(self) -> slice:
+        """The frames that are searched again."""
+        return slice(self.start, self.stop)
+
+
+@dataclass
+class HiddenArms:
+    """The term of one clip's hidden arms; no stays where every hand lies where it can."""
+
+    trunk: Pairs
+    forearm: tuple[Pairs, Pairs]
+    """With the hand, left and right."""
+    height: float
+    """px, of the person."""
+    stays: list[Stay]
+
+    @classmethod
+    def of(cls, body: Body, height: float) -> HiddenArms:
+        """The surfaces, and no stays yet. height: px, of the person."""
+        weights = np.asarray(body.weights)
+        left, right = (sample_surface(body, weights[:, arm[2:]].sum(1) > 0.5, ARM_SAMPLES) for arm in ARM_JOINTS)
+        return cls(sample_surface(body, weights[:, TRUNK_JOINTS].sum(1) > 0.8, TRUNK_SAMPLES), (left, right), height, [])
+
+    def find(self, problem: Problem, state: State, missing: np.ndarray | None) -> None:
+        """Finds the stays: hands that were not detected where the fit has them in plain view.
+
+        missing: (T, 2) bool, hands that were not detected; None: all were.
+        """
+        seconds = problem.seen.seconds
+        if seconds is None or missing is None:
+            return
+        chain = problem.skeleton.pose(state.local, state.shape)
+        for side in (0, 1):
+            found = []
+            for first, last in bridge(missing[:, side]):
+                lost = first + np.flatnonzero(missing[first:last, side])
+                plain = sum(self.is_in_plain_view(problem, state, chain.frame(t), t, side) for t in lost if len(lost) >= LEAST)
+                if plain >= LEAST:
+                    near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
+                    found.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
+            if found and self.is_detected(state, chain, missing[:, side], side):
+                self.stays += found
+
+    def is_detected(self, state: State, chain: Chain, missing: np.ndarray, side: int) -> bool:
+        """Whether the detector mostly finds this hand where nothing of the body can hide it. missing: (T,) bool."""
+        wrist = chain.place[:, ARM_JOINTS[side, 3]] + state.transl
+        beside = [np.isinf(self.measure_trunk(state, chain.frame(t), t, wrist[t])[0]) for t in range(len(missing))]
+        return not any(beside) or bool((~missing[beside]).mean() > TRUSTED)
+
+    def is_in_plain_view(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> bool:
+        """Whether the fitted hand lies before the trunk, or the forearm beside the mask. chain: of frame t alone."""
+        wrist = chain.place[0, ARM_JOINTS[side, 3]] + state.transl[t]
+        near, _ = self.measure_trunk(state, chain, t, wrist)
+        if wrist[2] < near - BEFORE:
+            return True
+        x = place_points(chain, self.forearm[side], state.shape)[0] + state.transl[t]
+        distance, _, inside = problem.seen.outlines[t].at(problem.project(state, x))
+        return problem.seen.outlines[t].area > 0 and bool((inside & (distance > OUTSIDE * self.height)).mean() > OUTSIDE_SHARE)
+
+    def measure_trunk(self, state: State, chain: Chain, t: int, place: np.ndarray) -> tuple[float, float]:
+        """Depths, m, of the trunk's near and far surface on the line of sight to a place (3,) m; -inf and nan where there is none.
+
+        chain: of frame t alone.
+        """
+        x = place_points(chain, self.trunk, state.shape)[0] + state.transl[t]
+        on = np.linalg.norm(x[:, :2] / x[:, 2:] - place[:2] / place[2], axis=1) * place[2] < OVER
+        return (float(x[on, 2].min()), float(x[on, 2].max())) if on.any() else (-np.inf, np.nan)
+
+    def search(self, problem: Problem, state: State) -> State:
+        """The state with the arms of all stays as they fit best; also loosens their motion and distrusts what was made up."""
+        state = replace(state, local=state.local.copy())
+        for stay in self.stays:
+            frames, arm = slice(stay.first, stay.last), ARM_JOINTS[stay.side]
+            for point, guessed in ((ELBOW[stay.side], GUESSED / 2), (WRIST[stay.side], GUESSED)):
+                problem.seen.spread[frames, point] = np.hypot(problem.seen.spread[frames, point], guessed * self.height)
+            problem.loose[stay.around, np.isin(problem.active, arm)] = QUICK
+            problem.spread[stay.around, np.isin(problem.active, arm)] *= FREE
+            found = [self.fit_arm(problem, state, stay, start) for start in self.list_starts(state, stay)]
+            cost, local = min(found, key=lambda entry: entry[0])
+            state.local[stay.around] = local
+        return state
+
+    def list_starts(self, state: State, stay: Stay) -> list[np.ndarray]:
+        """Joint rotations (F, J, 3, 3) to search from: as they are, and each hiding pose, alone or with the way to it."""
+        asis = state.local[stay.around]
+        out = [asis]
+        frame = np.arange(stay.start, stay.stop)
+        away = np.maximum(np.maximum(stay.first - frame, frame - stay.last + 1), 0)
+        ramp = np.clip(1 - away / max(away.max(), 1), 0, 1)[:, None, None]
+        joints = ARM_JOINTS[stay.side, 1:3]
+        vector = rotation.log(asis[:, joints])
+        for pose in HIDES:
+            goal = hiding_pose(stay.side, pose)
+            for share in (ramp, np.ones_like(ramp)):
+                start = asis.copy()
+                start[:, joints] = rotation.exp((1 - share) * vector + share * goal)
+                out.append(start)
+        return out
+
+    def fit_arm(self, problem: Problem, state: State, stay: Stay, start: np.ndarray) -> tuple[float, np.ndarray]:
+        """Cost and joint rotations (F, J, 3, 3) of the stay's frames after a search in which only this arm moves.
+
+        start: (F, J, 3, 3) joint rotations.
+        """
+        around, arm = stay.around, ARM_JOINTS[stay.side]
+        seen = replace(problem.seen, xy=problem.seen.xy[around], spread=problem.seen.spread[around],
+                       depth=problem.seen.depth[around].copy(), seconds=problem.seen.seconds[around],
+                       outlines=problem.seen.outlines[around])
+        alone = Problem(problem.body, problem.pairs, problem.hips, seen, arm, problem.smoothness, problem.person_offsets)
+        alone.loose[:], alone.limit = QUICK, FAR_OFF * ROBUST
+        alone.spread *= FREE
+        inner = replace(stay, first=stay.first - stay.start, last=stay.last - stay.start, start=0, stop=stay.stop - stay.start)
+        hidden = replace(self, stays=[inner])
+        trial = State(start, state.transl[around], state.betas, state.log_focal, np.zeros(0), state.own)
+        place = np.zeros(alone.size, bool)
+        place[-3:] = True
+        for _ in range(2):
+            hidden.hold(alone, trial)
+            trial, _ = alone.minimise(trial, STEPS, place, np.ones(trial.shared, bool))
+        hidden.hold(alone, trial)
+        return alone.cost(trial), trial.local
+
+    def hold(self, problem: Problem, state: State) -> None:
+        """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight."""
+        problem.inside = [(t, self.forearm[stay.side]) for stay in self.stays for t in range(stay.first, stay.last)]
+        if not self.stays:
+            return
+        spread = np.broadcast_to(problem.seen.depth_spread, problem.seen.depth.shape).copy()
+        chain = problem.skeleton.pose(state.local, state.shape)
+        hips = problem.locate_points(chain, state)[:, list(problem.hips), 2].mean(1)
+        for stay in self.stays:
+            spread[stay.around, ELBOW[stay.side]] = spread[stay.around, WRIST[stay.side]] = ROUGH_DEPTH
+            for t in range(stay.first, stay.last):
+                own = chain.frame(t)
+                wrist = own.place[0, ARM_JOINTS[stay.side, 3]] + state.transl[t]
+                far = self.measure_trunk(state, own, t, wrist)[1]
+                problem.seen.depth[t, WRIST[stay.side]] = far + SKIN - hips[t]
+                spread[t, WRIST[stay.side]] = BEHIND_SPREAD
+        problem.seen.depth_spread = spread
+
+    def widen(self, sigma: np.ndarray) -> None:
+        """Adds to the standard deviations of hidden arms what nothing in their frames tells; less on the way there.
+
+        sigma: (T, 55) m, changed in place.
+        """
+        for stay in self.stays:
+            frame = np.arange(stay.start, stay.stop)
+            before, after = stay.first - stay.start + 1, stay.stop - stay.last + 1
+            share = np.minimum(1, np.minimum((frame - stay.start + 1) / before, (stay.stop - frame) / after))[:, None]
+            for name, more in SIGMA.items():
+                own = [INDEX[f"{SIDES[stay.side]}_{name}"], *(np.arange(J)[HANDS[stay.side]] if name == "wrist" else ())]
+                sigma[stay.start:stay.stop, own] = np.hypot(sigma[stay.start:stay.stop, own], more * share)
+
+    def describe(self, frames: int) -> list[Finding]:
+        """What the user should know. frames: T."""
+        out = []
+        for side in (0, 1):
+            hidden = np.zeros(frames, bool)
+            for stay in self.stays:
+                hidden[stay.first:stay.last] |= stay.side == side
+            if hidden.any():
+                out.append(Finding.of(Code.HAND_HIDDEN, hidden, figure=hidden.sum(), side=SIDES[side]))
+        return out
+
+
+def sample_surface(body: Body, part: np.ndarray, most: int) -> Pairs:
+    """Middles of faces, spread over a part of the surface, at most so many. part: (V,) bool."""
+    face = np.flatnonzero(part[body.faces].all(1))
+    face = face[:: -(-len(face) // most)]
+    return make_surface_pairs(body, face, np.full((len(face), 3), 1 / 3))
+
+
+def hiding_pose(side: int, pose: tuple) -> np.ndarray:
+    """Rotation vectors (2, 3) of shoulder and elbow. pose: one of `HIDES`."""
+    return np.radians(np.array(pose, float)) * ([1, 1, 1] if side == 0 else [1, -1, -1])
+
+
+def bridge(missing: np.ndarray) -> list[tuple[int, int]]:
+    """First and last frame, exclusive, of each run of missing (T,) bool; gaps of up to `BRIDGED` frames are part of it."""
+    index = np.flatnonzero(missing)
+    parts = np.split(index, np.flatnonzero(np.diff(index) > BRIDGED + 1) + 1)
+    return [(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]

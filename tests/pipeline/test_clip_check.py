@@ -1,0 +1,57 @@
+"""gsac check says what would come of a clip, and gsac run stops where nothing can."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gsac.pipeline.clip_check import ClipCheck, Prospect
+from gsac.pipeline.outcomes import ExitCode
+from gsac.stages.findings import Code, Finding
+from gsac.stages.first_look import FirstLook
+
+FOOTAGE = Path(__file__).resolve().parents[3] / "shared" / "footage"
+LOOK = FirstLook(4, 4, 500.0, 350.0, 60.0, 70.0)
+
+
+def checked(*findings: Finding) -> ClipCheck:
+    return ClipCheck(LOOK, [0.0, 0.5, 1.0, 1.5], [(finding.message, finding.to_json()) for finding in findings])
+
+
+def test_news_leave_a_clip_good_and_the_worst_finding_decides():
+    repeated = Finding.of(Code.REPEATED, np.array([0, 1, 0, 0], bool))
+    dark, hopeless = Finding.of(Code.FACE_NEVER_DETECTED), Finding.of(Code.HARDLY_ANY_PERSON, figure=1, given=40)
+    assert checked().prospect is checked(repeated).prospect is Prospect.GOOD
+    assert checked(repeated, dark).prospect is Prospect.POORER and checked(dark, hopeless).prospect is Prospect.HOPELESS
+    assert [prospect.exit_code for prospect in Prospect] == [ExitCode.OK, ExitCode.FAILED, ExitCode.USAGE]
+
+
+def test_what_to_film_again_is_said_with_the_times_at_which_it_went_wrong():
+    lines = checked(Finding.of(Code.BLURRED, np.array([1, 0, 1, 1], bool), figure=0.5)).lines
+    assert lines[0] == Prospect.POORER.sentence and "The clip lasts 1.5 s." in lines[1]
+    assert lines[2].startswith("- The picture is blurred") and "turn slower. (at 0.0, 1.0 to 1.5 s)" in lines[2]
+
+
+def test_a_run_stops_where_nothing_can_come_of_the_clip_and_goes_on_anyway(toy):
+    done = toy.run("--set", "cut.trouble=hopeless")
+    assert done.code == ExitCode.USAGE and "1 of the clip's 40 frames only" in done.err and "--anyway goes on" in done.err
+    assert [stage["name"] for stage in done.json["stages"]] == ["cut"] and "Traceback" not in done.err
+    assert toy.run("--set", "cut.trouble=hopeless").code == ExitCode.USAGE  # from the cache as well
+    assert toy.run("--set", "cut.trouble=hopeless", "--anyway").code == ExitCode.OK
+
+
+@pytest.mark.slow
+@pytest.mark.footage
+@pytest.mark.parametrize(("clip", "code", "words"), [("truth-a/clip.mp4", 0, []), ("squats/pose_squats.mp4", 1, ["part_of_turn"])])
+def test_check_finds_nothing_wrong_with_a_turn_and_names_what_a_clip_lacks(tmp_path, clip, code, words):
+    if not (FOOTAGE / clip).exists():
+        pytest.skip(f"footage {clip} is not here")
+    done = subprocess.run([sys.executable, "-m", "gsac.pipeline.cli", "check", FOOTAGE / clip, "--json"], cwd=tmp_path,
+                          capture_output=True, text=True, env=os.environ)
+    said = json.loads(done.stdout.splitlines()[-1])
+    assert done.returncode == code and [finding["code"] for finding in said["findings"]] == words
+    assert not list(tmp_path.iterdir())

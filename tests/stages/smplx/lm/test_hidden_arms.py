@@ -1,0 +1,93 @@
+"""A hand behind the back, and hands that are not detected for other reasons."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from threadpoolctl import threadpool_limits
+
+from gsac.avatar.joints import INDEX
+from gsac.avatar.wholebody import INDEX as POINT
+from gsac.avatar.wholebody import LEFT_HAND
+from gsac.stages.findings import Code
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector_errors import Detector
+from gsac.stages.smplx.lm.fit import fit_clip, fit_points, set_up
+from gsac.stages.smplx.lm.hidden_arms import HiddenArms, bridge
+from gsac.stages.smplx.state import to_params
+from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
+
+FRAMES, HIDDEN, MISREAD = 16, slice(0, 7), slice(0, 11)
+ELBOW, WRIST = INDEX["left_elbow"], INDEX["left_wrist"]
+
+
+def hide_left_hand(truth):
+    """Swings the left hand behind the back for the first frames, and out again in 0.4 s."""
+    pose = truth.body_pose.reshape(FRAMES, 21, 3).copy()
+    yaw = np.linspace(-0.5, 1.2, FRAMES)
+    turn = Rotation.from_euler("x", np.pi) * Rotation.from_euler("y", yaw[:, None])
+    truth.global_orient = turn.as_rotvec().reshape(FRAMES, 3).astype(np.float32)
+    share = np.clip((HIDDEN.stop + 4 - np.arange(FRAMES)) / 5, 0, 1)[:, None]
+    for joint, goal in ((15, (0.8, 0.3, -1.4)), (17, (0.5, -1.25, 0.0))):
+        pose[:, joint] += share * (np.array(goal) - pose[:, joint])
+    truth.body_pose = pose.reshape(FRAMES, 63)
+    return truth
+
+
+@pytest.fixture(scope="module")
+def fitted(body, tmp_path_factory):
+    truth = hide_left_hand(turning_person(body, FRAMES))
+    seen = sightings_of(body, truth)
+    seen.missing = np.zeros((FRAMES, 2), bool)
+    seen.missing[HIDDEN, 0] = True
+    seen.score[HIDDEN, LEFT_HAND] = 0
+    for point, nearer in (("left_elbow", 0.2), ("left_wrist", 0.45)):  # networks know hands before the body
+        seen.world[MISREAD, POINT[point], 2] -= nearer
+    outlines = outlines_of(body, truth, tmp_path_factory.mktemp("alpha"))
+    with threadpool_limits(1, "blas"):
+        fit = fit_clip(body, seen, outlines, SmplxConfig(height_m=height_of(body, truth)), lambda *a: None)
+    return truth, fit, joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), truth)
+
+
+def test_a_hand_behind_the_back_lies_behind_the_back(fitted):
+    _, _, error = fitted
+    assert np.median(error[HIDDEN, WRIST]) < 80 and np.median(error[HIDDEN, ELBOW]) < 40
+
+
+def test_a_hidden_hand_is_named_with_side_and_frames(fitted):
+    _, fit, _ = fitted
+    assert [(n.code, n.frames) for n in fit.notes] == [(Code.HAND_HIDDEN, [[0, 6]])]
+    assert "left hand" in fit.notes[0].message
+
+
+def test_the_sigma_of_a_hidden_arm_tells_how_far_off_it_may_be(fitted):
+    _, fit, error = fitted
+    for joint in (ELBOW, WRIST):
+        assert (error[HIDDEN, joint] < 2e3 * fit.sigma_joints[HIDDEN, joint]).mean() >= 0.9
+    assert fit.sigma_joints[HIDDEN, WRIST].min() >= 0.1 > fit.sigma_joints[:, INDEX["right_wrist"]].max()
+
+
+def test_a_hand_that_the_body_covers_is_not_searched_again(body, tmp_path):
+    truth = turning_person(body, 16)
+    seen = sightings_of(body, truth)
+    missing = np.zeros((16, 2), bool)
+    missing[3:7, 0] = missing[9:12, 1] = True  # the far arm of either side view
+    problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
+    arms = HiddenArms.of(body, seen.person_height)
+    arms.find(problem, state, missing)
+    assert not arms.stays
+
+
+def start_of(body, seen, outlines, config):
+    """Problem and state after the fit of the points."""
+    detector = Detector.load(seen.detector, body)
+    problem, state = set_up(body, seen, outlines, detector, config)
+    with threadpool_limits(1, "blas"):
+        return problem, fit_points(problem, state, seen, detector, 8)[0]
+
+
+def test_runs_of_missing_hands_bridge_short_sightings():
+    missing = np.zeros(12, bool)
+    missing[[1, 2, 5, 9]] = True
+    assert bridge(missing) == [(1, 6), (9, 10)]
