@@ -10,7 +10,7 @@ import numpy as np
 
 from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.benchmarks.stability.fault import Fault, Origin, pick_some
-from gsac.benchmarks.stability.take import Take
+from gsac.benchmarks.stability.take import FPS, Take
 from gsac.turntable.clip import VideoWriter
 from gsac.turntable.options import TurntableOptions
 
@@ -30,9 +30,14 @@ class Film:
     """Of the file's bytes, from its beginning."""
 
     @property
+    def plain(self) -> bool:
+        """Whether the file itself has no fault."""
+        return (self.rotation, self.gone, self.frames, self.share) == (0, (), 0, 1.0)
+
+    @property
     def rate(self) -> float:
         """Frames a second."""
-        return (len(self.take.times) - 1) / float(self.take.times[-1] - self.take.times[0])
+        return (len(self.take.times) - 1) / float(np.ptp(self.take.times)) if len(self.take.times) > 1 else FPS
 
     def write(self, path: Path) -> None:
         """Writes an H.264 file of high quality."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_frame
+from gsac.avatar.artifacts import frame_paths, read_arrays, read_frame
 from gsac.benchmarks.fit.truth import Truth, read_truth
 from gsac.stages.contract import BadInput
 
@@ -57,15 +57,6 @@ class Take:
             if len(rows):
                 out[t] = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
         return out
-
-    def write(self, folder: Path) -> None:
-        """Writes frames/ and clip.json as `split` does, into folder."""
-        (folder / "frames").mkdir(parents=True)
-        for t, frame in enumerate(self.frames):
-            write_frame(folder / "frames" / f"{t:06d}.png", frame)
-        height, width = self.size
-        times = [float(t) for t in self.times]
-        Clip(FPS, times, width, height, self.focal, "0" * 64).write(folder / "clip.json")
 
 
 @lru_cache(maxsize=3)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import sys
-import tempfile
 import time
 import traceback
 from dataclasses import asdict, dataclass, field, replace
@@ -171,15 +169,12 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
     Returns ports -> files and folders, and the take that the stages after `split` saw.
     """
     folder = task.folder if fault and fault.origin in (Origin.TAKE, Origin.PERSON, Origin.FILM) else task.clean.folder
+    film = Film(take)
     if fault and fault.origin is Origin.FILM:
-        film, touched = fault.inject(Film(take), task.severity, task.seed)
+        film, touched = fault.inject(film, task.severity, task.seed)
         trial.touched = take.number[touched].tolist()
-        film.write(folder / "clip.mp4")
-        trial.findings += run_stage("split", {"count": len(take.frames)}, {"clip": folder / "clip.mp4"}, folder / "split")
-        take = take.at(film.number(np.array(Clip.read(folder / "split" / "clip.json").timestamps_s)))
-    if not (folder / "split").is_dir():
-        _write_take(take, folder / "split")
-    ports = {"split/frames": folder / "split" / "frames", "split/clip.json": folder / "split" / "clip.json"}
+    ports, said, take = _split(film, folder)
+    trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in said]
     for name in (*BEFORE, "handgap", "smplx", *(["train"] if task.until == "train" else [])):
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
         found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
@@ -193,16 +188,21 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
     return ports, take
 
 
-def _write_take(take: Take, folder: Path) -> None:
-    """Writes what split gives, whole or not at all."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    half = Path(tempfile.mkdtemp(dir=folder.parent, prefix=".half-"))
-    try:
-        take.write(half)
-        if not folder.exists():
-            os.rename(half, folder)
-    finally:
-        shutil.rmtree(half, ignore_errors=True)
+def _split(film: Film, folder: Path) -> tuple[dict[str, Path], list[Finding], Take]:
+    """Runs `split` on the film and gives its pictures their own times.
+
+    Returns its ports, what it said, and the take that it kept.
+    """
+    ports = {"clip": folder / f"clip-{os.getpid()}.mp4"}
+    film.write(ports["clip"])
+    said = run_stage("split", {"count": len(film.take.frames)}, ports, folder / "split")
+    ports["clip"].unlink()
+    clip = Clip.read(ports["split/clip.json"])
+    take = film.take.at(film.number(np.array(clip.timestamps_s)))
+    if film.plain:  # the file's own fault is in its times
+        ports["split/clip.json"] = folder / "clip.json"
+        replace(clip, timestamps_s=take.times.tolist(), focal_px=take.focal).write(ports["split/clip.json"])
+    return ports, said, take
 
 
 def _numbers(runs: list[list[int]], number: np.ndarray) -> list[int]:
