@@ -162,7 +162,7 @@ class Solid:
         """(K,) m by which points (K, 3) lie deeper than `TOUCH` below the surface, 0 outside."""
         distance, nearest = self.tree.query(points, distance_upper_bound=FAR)
         near = np.isfinite(distance)
-        at = nearest[near]
+        at = np.asarray(nearest)[near]
         out = np.zeros(len(points))
         out[near] = np.clip(-((points[near] - self.points[at]) * self.normals[at]).sum(1) - TOUCH, 0, None)
         return out

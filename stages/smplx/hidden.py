@@ -117,5 +117,5 @@ def _grow(mask: np.ndarray, free: np.ndarray, steps: int) -> np.ndarray:
     """(h, w) bool, what of `free` (h, w) can be reached from the mask (h, w) in so many steps of a pixel, without leaving it."""
     out, within = mask.astype(np.uint8), free.astype(np.uint8)
     for _ in range(steps):
-        out = cv2.dilate(out, np.ones((3, 3), np.uint8)) & within
+        out = np.minimum(cv2.dilate(out, np.ones((3, 3), np.uint8)), within)
     return out > 0

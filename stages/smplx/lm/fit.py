@@ -51,7 +51,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     detector = Detector.load(sightings.detector, body)
     problem, state = set_up(body, sightings, outlines, detector, config)
     state, steps = fit_points(problem, state, sightings, detector, 3 * config.iterations)
-    hidden = problem.hidden = HiddenArms.of(body, sightings.person_height)
+    hidden = HiddenArms.of(body, sightings.person_height)
     hidden.find(problem, state, sightings.missing)
     state = hidden.search(problem, state)
     iou = np.full(len(sightings.xy), np.nan)

@@ -111,7 +111,7 @@ class HiddenArms:
             found = []
             for first, last in bridge(missing[:, side]):
                 lost = first + np.flatnonzero(missing[first:last, side])
-                plain = sum(self.is_in_plain_view(problem, state, chain.frame(t), t, side) for t in lost if len(lost) >= LEAST)
+                plain = sum(self.is_in_plain_view(problem, state, chain.frame(t), t, side) for t in lost.tolist() if len(lost) >= LEAST)
                 if plain >= LEAST:
                     near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
                     found.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
@@ -180,6 +180,7 @@ class HiddenArms:
         start: (F, J, 3, 3) joint rotations.
         """
         around, arm = stay.around, ARM_JOINTS[stay.side]
+        assert problem.seen.seconds is not None  # without times `find` finds no stay
         seen = replace(problem.seen, xy=problem.seen.xy[around], spread=problem.seen.spread[around],
                        depth=problem.seen.depth[around].copy(), seconds=problem.seen.seconds[around],
                        outlines=problem.seen.outlines[around])
