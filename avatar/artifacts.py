@@ -251,6 +251,8 @@ def check_keypoints(path: Path) -> dict[str, np.ndarray]:
     score = arrays["score"]
     if not (_finite(score) and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
         raise ArtifactError(f"{path}: score must lie in 0..1")
+    if not _finite(arrays["xy"][score > 0]):
+        raise ArtifactError(f"{path}: xy must be finite where score is above 0")
     return arrays
 
 

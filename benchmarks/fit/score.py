@@ -56,7 +56,12 @@ def score(body: Body, params: BodyParams, truth: Truth) -> dict[str, float]:
 
 def joint_distances(body: Body, params: BodyParams, truth: Truth) -> np.ndarray:
     """Distance (T, n) mm between fitted and true joints, aligned as in `score`."""
-    fitted, true = _subtract_root(body.posed(params)[1][:, truth.joint]), _subtract_root(truth.joints)
+    return align_joints(body.posed(params)[1][:, truth.joint], truth.joints)
+
+
+def align_joints(fitted: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Distance (T, n) mm between fitted and true joints (T, n, 3) m: pelvis aligned, one scale for all frames."""
+    fitted, true = _subtract_root(fitted), _subtract_root(true)
     return np.linalg.norm(_scale(fitted, true) * fitted - true, axis=-1) * 1e3
 
 

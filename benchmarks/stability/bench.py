@@ -1,0 +1,133 @@
+"""gsac bench stability: faults put into truth clips at severities 1 to 5, what is left of the fit, and what failed without a word.
+
+Each fault acts where it is born: on the person, the pictures, the points, the masks or the fit. Both methods get the same input.
+A seed is a clip and a place of the fault in it: seed k takes the k-th clip. What is finished is in OUT/trials.jsonl; the same
+command goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gsac.benchmarks.stability.trial import Task
+    from gsac.pipeline.reporter import PlainReporter
+
+TINY = {"frames": 8, "height": 320}
+"""Of the clip of --quick."""
+
+
+def parser() -> argparse.ArgumentParser:
+    from gsac.benchmarks.stability.faults import FAULTS
+    from gsac.benchmarks.stability.trial import DEFAULT, METHODS
+
+    out = argparse.ArgumentParser(prog="gsac bench stability", description=(__doc__ or "").partition("\n")[0])
+    out.add_argument("--fault", nargs="+", default=None, choices=list(FAULTS), metavar="NAME", help=f"of {', '.join(FAULTS)}")
+    out.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], metavar="N", help="default: 0 1 2")
+    out.add_argument("--severities", type=int, nargs="+", default=None, choices=range(1, 6), metavar="N", help="default: 1 to 5")
+    out.add_argument("--methods", nargs="+", default=None, choices=list(METHODS),
+                     help=f"default: all, {DEFAULT} first; --quick: {DEFAULT}")
+    out.add_argument("--until", default="smplx", choices=["smplx", "train"], help="train: also a short training (default: smplx)")
+    out.add_argument("--clip", type=Path, action="append", default=[], metavar="DIR",
+                     help="a truth clip: a folder with clip.mp4, mask/ and truth.npz; may be repeated (default: seeds 31 to 33)")
+    out.add_argument("--frames", type=int, default=30, help="kept of each clip, evenly (default: 30)")
+    out.add_argument("--height", type=int, default=640, help="px (default: 640)")
+    out.add_argument("--jobs", type=int, default=1, metavar="N", help="trials side by side (default: 1)")
+    out.add_argument("--limit", type=float, default=600, metavar="S", help="seconds after which a trial hangs (default: 600)")
+    out.add_argument("--until-s", type=float, default=None, metavar="S", help="begin no trial after so many seconds")
+    out.add_argument("--quick", action="store_true", help="a few faults at severity 3 on a tiny clip")
+    out.add_argument("--out", type=Path, default=Path("bench-stability"), metavar="DIR", help="default: ./bench-stability")
+    return out
+
+
+def main(argv: list[str] | None = None) -> int:
+    options = parser().parse_args(argv)
+    from gsac.benchmarks.stability import chart, table
+    from gsac.benchmarks.stability.outcome import draw_curves, find_outcomes
+    from gsac.pipeline.reporter import PlainReporter
+
+    say = PlainReporter(sys.stderr)
+    options.out.mkdir(parents=True, exist_ok=True)
+    keep_settings(options)
+    lines = options.out / "trials.jsonl"
+    measure(options, lines, say)
+    outcomes = find_outcomes(table.read_lines(lines))
+    curves = draw_curves(outcomes)
+    if not curves:
+        say.note("no trial with a fault was finished")
+        return 0
+    table.write_csv(outcomes, options.out / "stability.csv")
+    words = table.text(curves)
+    print(words)
+    (options.out / "stability.txt").write_text(words + "\n")
+    chart.draw(curves, options.out)
+    return 0
+
+
+def keep_settings(options: argparse.Namespace) -> None:
+    """Notes in OUT/settings.json what its trials share. Raises BadInput where OUT holds trials of other settings."""
+    from gsac.stages.contract import BadInput
+
+    path, own = options.out / "settings.json", {name: getattr(options, name) for name in ("frames", "height", "until", "quick")}
+    if path.is_file() and (kept := json.loads(path.read_text())) != own:
+        raise BadInput(f"{options.out} holds trials of other settings ({kept}, not {own}); give another --out")
+    path.write_text(json.dumps(own) + "\n")
+
+
+def measure(options: argparse.Namespace, lines: Path, say: PlainReporter) -> None:
+    """Runs the tasks that are not in the file of lines yet, and appends each as it ends."""
+    from gsac.benchmarks.stability import table, workers
+    from gsac.benchmarks.stability.trial import Trial
+
+    done = {(t.clip, t.fault, t.severity, t.seed, t.method) for t in table.read_lines(lines)}
+    tasks = [t for t in list_tasks(options, say) if (t.clip.name, t.fault, t.severity, t.seed, t.method) not in done]
+    lock = threading.Lock()
+
+    def tell(trial: Trial) -> None:
+        with lock:
+            table.add_line(trial, lines)
+            figure = "-" if trial.mean_mm is None else f"{trial.mean_mm:.0f} mm"
+            say.note(f"{trial.clip} {trial.fault} {trial.severity} {trial.method}: {trial.end} {trial.message} {figure}, "
+                     f"{trial.seconds:.0f} s")
+
+    workers.run_all(tasks, options.jobs, options.limit, tell, options.until_s)
+
+
+def list_tasks(options: argparse.Namespace, say: PlainReporter) -> list[Task]:
+    """Tasks in the order in which they should be done: methods, clean clips before faults, seeds, then severities 3, 5, 1, 4, 2."""
+    from gsac.benchmarks.clip_runs import render_clip
+    from gsac.benchmarks.stability.fault import Origin
+    from gsac.benchmarks.stability.faults import FAULTS, QUICK
+    from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, METHODS, Task
+
+    quick = options.quick
+    faults = [FAULTS[name] for name in options.fault or (QUICK if quick else FAULTS)]
+    if options.until != "train":
+        faults = [fault for fault in faults if fault.origin is not Origin.BODY]
+    if options.clip:
+        clips = options.clip
+    elif quick:
+        from gsac.turntable.clip import make_clip
+        from gsac.turntable.options import TurntableOptions
+
+        clips = [options.out / "clips" / "seed31"]
+        if not (clips[0] / "truth.npz").is_file():
+            make_clip(clips[0], TurntableOptions(seed=31, supersample=1, frames=TINY["frames"], height=TINY["height"]))
+    else:
+        clips = [render_clip(options.out / "clips" / f"seed{seed}", say, seed=seed) for seed in (31, 32, 33)]
+    seeds = [0] if quick else options.seeds
+    severities = [s for s in (3, 5, 1, 4, 2) if s in (options.severities or ([3] if quick else range(1, 6)))]
+    sizes = TINY if quick else {"frames": options.frames, "height": options.height}
+
+    def task(fault: str, severity: int, seed: int, method: str) -> Task:
+        return Task(clips[seed % len(clips)].resolve(), fault, severity, seed, method, options.out.resolve(), **sizes,
+                    until=options.until)
+
+    return [each for method in options.methods or ([DEFAULT] if quick else METHODS)
+            for each in ([task(CLEAN, 0, seed, method) for seed in seeds[:len(clips)]]
+                         + [task(f.name, severity, seed, method) for seed in seeds for severity in severities for f in faults])]

@@ -1,0 +1,235 @@
+"""One trial: a clip with a fault of one severity, fitted by one method, judged by the truth."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+import traceback
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsac.avatar.artifacts import ArtifactError, Clip
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.joints import NAMES
+from gsac.benchmarks.clip_runs import render_clip
+from gsac.benchmarks.fit.score import align_joints
+from gsac.benchmarks.stability.fault import Fault, Origin
+from gsac.benchmarks.stability.faults import FAULTS
+from gsac.benchmarks.stability.footage import Film
+from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
+from gsac.benchmarks.stability.take import Take, read_take
+from gsac.pipeline.reporter import PlainReporter
+from gsac.stages.contract import BadInput, StageError
+
+CLEAN = "clean"
+"""The fault of severity 0."""
+DEFAULT, PAPER = "default", "paper"
+METHODS: dict[str, dict[str, dict[str, Any]]] = {
+    DEFAULT: {}, PAPER: {"handgap": {"method": "paper"}, "smplx": {"method": "paper"}},
+}
+"""Method -> stage -> parameters."""
+TRAIN = {"steps": 300, "gaussians": 3000}
+"""Of the short trainings of `--until train`."""
+OFF_MM = 100.0
+"""A joint farther than this from the truth is off."""
+WORST = 5
+"""A joint's worst frames."""
+
+
+class End(StrEnum):
+    """How a trial ended."""
+
+    DONE = "done"
+    REFUSED = "refused"
+    """One sentence to the user, exit code 1 or 2."""
+    CRASHED = "crashed"
+    HUNG = "hung"
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to run."""
+
+    clip: Path
+    """Folder of the clean truth clip."""
+    fault: str
+    severity: int
+    seed: int
+    method: str
+    out: Path
+    """Folder for all results."""
+    frames: int
+    height: int
+    until: str = "smplx"
+
+    @property
+    def folder(self) -> Path:
+        """Results of this fault, severity and seed, of both methods."""
+        name = f"{self.fault}_{self.severity}_{self.seed}" if self.severity else CLEAN
+        return self.out / "runs" / self.clip.name / name
+
+    @property
+    def clean(self) -> Task:
+        """The same without a fault."""
+        return replace(self, fault=CLEAN, severity=0)
+
+
+@dataclass
+class Trial:
+    """How a task ended: a line of trials.jsonl. Frames are numbers of pictures of the clean clip."""
+
+    clip: str
+    fault: str
+    severity: int
+    seed: int
+    method: str
+    end: End = End.DONE
+    message: str = ""
+    seconds: float = 0.0
+    frames: int = 0
+    """That are judged."""
+    kept: int = 0
+    """Of those, the ones that the fit did not give up."""
+    mean_mm: float | None = None
+    """Error of the joints of kept frames; pelvis aligned, one scale."""
+    worst_mm: float | None = None
+    """The mean of the worst five frames of the worst joint."""
+    still_mm: float | None = None
+    """Error of a body that stands still at the mean of the true joints: nothing retained."""
+    psnr: float | None = None
+    """Held out, on the person, dB; of a short training."""
+    flat_psnr: float | None = None
+    """Of a person in one colour, dB: nothing retained."""
+    off: dict[str, list[int]] = field(default_factory=dict)
+    """Joint -> kept frames in which it is off."""
+    touched: list[int] = field(default_factory=list)
+    """Frames that the fault touches."""
+    findings: list[Finding] = field(default_factory=list)
+    """What was said: code, severity, frames (empty: the whole clip), figure."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As a line of trials.jsonl has it."""
+        return asdict(self)
+
+    @classmethod
+    def of(cls, task: Task, **values: Any) -> Trial:
+        """The trial of a task."""
+        return cls(task.clip.name, task.fault, task.severity, task.seed, task.method, **values)
+
+
+def run_trial(task: Task) -> Trial:
+    """Puts the fault in, runs the stages and judges. A stage's failure is the trial's end, never this function's."""
+    fault, trial = FAULTS[task.fault] if task.severity else None, Trial.of(task)
+    take = read_take(task.clip, task.frames, task.height)
+    trial.still_mm = _error_of_still_body(take)
+    if fault and fault.origin is Origin.PERSON:
+        take = read_take(render_person(task, fault), task.frames, task.height)
+    if fault and fault.origin is Origin.TAKE:
+        take, touched = fault.inject(take, task.severity, task.seed)
+        trial.touched = take.number[touched].tolist()
+    began = time.perf_counter()
+    try:
+        ports, take = _run(task, fault, take, trial)
+    except (StageError, ArtifactError) as error:
+        trial.end, trial.message = End.REFUSED, str(error)
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{Path(last.filename).name}:{last.lineno}"
+        trial.end, trial.message = End.CRASHED, f"{type(error).__name__}: {error} ({place})"
+    else:
+        _judge(trial, take, ports)
+    trial.seconds = time.perf_counter() - began
+    return trial
+
+
+def render_person(task: Task, fault: Fault) -> Path:
+    """Folder of the clip of the same person who behaves otherwise; rendered unless it is there."""
+    seed = _seed_of(task.clip)
+    options, _ = fault.inject({"seed": seed}, task.severity, task.seed)
+    return render_clip(task.out / "clips" / f"{task.clip.name}_{fault.name}_{task.severity}", PlainReporter(sys.stderr), **options)
+
+
+def _seed_of(clip: Path) -> int:
+    """Of a clip that this benchmark names, seedN or seedN_FRAMES."""
+    digits = clip.name.removeprefix("seed").split("_")[0]
+    if not digits.isdigit():
+        raise BadInput(f"{clip}: a person who behaves otherwise is rendered from the clip's seed; expected a folder named seedN")
+    return int(digits)
+
+
+def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dict[str, Path], Take]:
+    """Runs all stages on a take; faults of the file and of artifacts are put in on the way.
+
+    Returns ports -> files and folders, and the take that the stages after `split` saw.
+    """
+    folder = task.folder if fault and fault.origin in (Origin.TAKE, Origin.PERSON, Origin.FILM) else task.clean.folder
+    film = Film(take)
+    if fault and fault.origin is Origin.FILM:
+        film, touched = fault.inject(film, task.severity, task.seed)
+        trial.touched = take.number[touched].tolist()
+    ports, said, take = _split(film, folder)
+    trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in said]
+    for name in (*BEFORE, "handgap", "smplx", *(["train"] if task.until == "train" else [])):
+        values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
+        found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
+        trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in found]
+        if fault and fault.origin.startswith(f"{name}/"):
+            port, folder = fault.origin.value, task.folder
+            value, touched = fault.inject(read_artifact(fault.origin, ports[port]), task.severity, task.seed)
+            ports[port] = folder / "spoiled" / task.method / port
+            write_artifact(fault.origin, value, ports[port])
+            trial.touched = take.number[touched].tolist()
+    return ports, take
+
+
+def _split(film: Film, folder: Path) -> tuple[dict[str, Path], list[Finding], Take]:
+    """Runs `split` on the film and gives its pictures their own times.
+
+    Returns its ports, what it said, and the take that it kept.
+    """
+    ports = {"clip": folder / f"clip-{os.getpid()}.mp4"}
+    film.write(ports["clip"])
+    said = run_stage("split", {"count": len(film.take.frames)}, ports, folder / "split")
+    ports["clip"].unlink()
+    clip = Clip.read(ports["split/clip.json"])
+    take = film.take.at(film.number(np.array(clip.timestamps_s)))
+    if film.plain:  # the file's own fault is in its times
+        ports["split/clip.json"] = folder / "clip.json"
+        replace(clip, timestamps_s=take.times.tolist(), focal_px=take.focal).write(ports["split/clip.json"])
+    return ports, said, take
+
+
+def _numbers(runs: list[list[int]], number: np.ndarray) -> list[int]:
+    """Pictures' numbers of runs of frames [first, last]."""
+    return sorted({int(number[t]) for first, last in runs for t in range(first, min(last, len(number) - 1) + 1)})
+
+
+def _judge(trial: Trial, take: Take, ports: dict[str, Path]) -> None:
+    """Fills in the errors of the fit, and the quality of the training where there was one."""
+    params, body = BodyParams.read(ports["smplx/body.npz"]), Body.load()
+    good = take.asked & ~params.lost
+    trial.frames, trial.kept = int(take.asked.sum()), int(good.sum())
+    if trial.kept:
+        true = np.einsum("tab,tjb->tja", take.rotation, take.truth.joints[take.number])
+        off = align_joints(body.posed(params)[1][good][:, take.truth.joint], true[good])
+        trial.mean_mm = float(off[:, 1:].mean())
+        trial.worst_mm = float(np.sort(off, axis=0)[-WORST:].mean(0).max())
+        joints = [NAMES[j] for j in take.truth.joint]
+        trial.off = {name: take.number[good][column > OFF_MM].tolist() for name, column in zip(joints, off.T, strict=True)
+                     if (column > OFF_MM).any()}
+    if "train/metrics.json" in ports:
+        trial.psnr = json.loads(ports["train/metrics.json"].read_text())["psnr_fg"]
+        colours = take.frames[take.masks].astype(float)
+        trial.flat_psnr = float(10 * np.log10(255**2 / np.square(colours - colours.mean(0)).mean()))
+
+
+def _error_of_still_body(take: Take) -> float:
+    """Mean error, mm, of a body that stands still at the mean of the true joints."""
+    true = take.truth.joints[:, 1:] - take.truth.joints[:, :1]
+    return float(np.linalg.norm(true - true.mean(0), axis=-1).mean() * 1e3)
