@@ -33,6 +33,7 @@ from gsac.pipeline.sources import Source, source_digest
 from gsac.pipeline.stage_runner import StageRunner
 from gsac.pipeline.timings import add_timings
 from gsac.stages.contract import BadInput, StageError
+from gsac.stages.severity import Severity
 
 if TYPE_CHECKING:
     from gsac.pipeline.cost_forecast import Forecast
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
 AHEAD = 2
 """Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
 
-HOPELESS = "hopeless"
-"""`stages.findings.Severity` of a clip that nothing can come of; importing it would load numpy for a run with nothing to do."""
 RECALLED = 110
 """Characters of a cached stage's warning at most."""
 
@@ -313,7 +312,7 @@ class ClipRun:
 def refuse_hopeless(record: Record) -> None:
     """BadInput where the stage has found that nothing can come of the clip."""
     for message, finding in zip(record.info.warnings, record.info.findings, strict=False):  # old records have none
-        if finding["severity"] == HOPELESS:
+        if finding["severity"] == Severity.HOPELESS:
             raise BadInput(f"{message} (--anyway goes on)")
 
 

@@ -3,25 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum, StrEnum
+from enum import Enum
 from typing import Any
 
 import numpy as np
 
 from gsac.stages.frame_names import name_frames
-
-
-class Severity(StrEnum):
-    """How much a finding takes from the avatar."""
-
-    NEWS = "news"
-    """Nothing that is seen, or a figure that is not measured."""
-    POORER = "poorer"
-    """Detail, or a part that the clip does not show: it is made up."""
-    WRONG = "wrong"
-    """The frames contradict each other or the body: without them, or filmed again, the avatar is better."""
-    HOPELESS = "hopeless"
-    """Nothing can come of the clip: a run stops here, unless it is told to go on."""
+from gsac.stages.severity import Severity
 
 
 @dataclass(frozen=True)

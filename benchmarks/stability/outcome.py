@@ -9,7 +9,7 @@ import numpy as np
 
 from gsac.benchmarks.stability.fault import SEVERITIES
 from gsac.benchmarks.stability.trial import CLEAN, WORST, End, Trial
-from gsac.stages.findings import Severity
+from gsac.stages.severity import Severity
 
 BREAKDOWN = 0.8
 """Retained quality below which a clip has failed: over a fifth is lost."""

@@ -20,7 +20,7 @@ from gsac.pipeline.report.results import Results
 from gsac.pipeline.report.verdict import Grade
 from gsac.pipeline.run_folder import LOGS, REPORT, RUN, write_text
 from gsac.stages.contract import BadInput
-from gsac.stages.findings import Severity
+from gsac.stages.severity import Severity
 
 if TYPE_CHECKING:
     from gsac.pipeline.report.pictures import Picture

@@ -21,7 +21,7 @@ from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
 from gsac.pipeline.report.tables import parameters, provenance, stage_rows, totals
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run_folder import REPORT, RUN, RunFolder
-from gsac.stages.findings import Severity
+from gsac.stages.severity import Severity
 
 if TYPE_CHECKING:
     from jinja2 import Template

@@ -65,7 +65,7 @@ def test_quiet_and_verbose_exclude_each_other(toy):
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (["rnu", "clip.mp4"], "unknown command rnu (did you mean run?); known: run, demo"),
+    (["rnu", "clip.mp4"], "unknown command rnu (did you mean run?); known: run, check, demo"),
     (["statsu"], "(did you mean status?)"),
     (["run", "CLIP", "--set", "left.wrod=last"], "--set left.wrod=last: unknown parameter left.wrod (did you mean left.word?)"),
     (["run", "CLIP", "--set", "rihgt.word=last"], "unknown section 'rihgt' (did you mean right?)"),

@@ -5,7 +5,8 @@ import string
 import numpy as np
 import pytest
 
-from gsac.stages.findings import Code, Finding, Severity
+from gsac.stages.findings import Code, Finding
+from gsac.stages.severity import Severity
 
 
 @pytest.mark.parametrize("code", Code)
