@@ -62,6 +62,8 @@ class Code(Enum):
     FACE_AT_REST = Wording("The face was never seen from the front; the avatar's face stays at rest.")
     JAW_ALONE = Wording("This body model has no named facial actions: of the face only the jaw is carried over; a FLAME head "
                         "(face.flame) would bring the rest.")
+    ODD_FOCAL = Wording("The focal length given, {given:.0f} px, is {figure:.2f} times the picture's longer side, as hardly any "
+                        "phone's is: if it is wrong, so is the body.", "Leave it out, and it is found from the person.")
     PAPER_START = Wording("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's "
                           "regression", severity=Severity.NEWS)
     PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "

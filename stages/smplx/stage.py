@@ -12,6 +12,7 @@ from gsac.avatar.artifacts import Clip, check_face, check_filled_keypoints, fram
 from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
+from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.expression import translate_expression, translate_rest
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide
@@ -31,6 +32,8 @@ def fit_as_published(body: Body, sightings: Sightings, outlines: list[Outline], 
     return fit.fit_clip(body, sightings, outlines, config, progress)
 
 
+FOCAL = 0.6, 3.0
+"""Focal lengths of phones' lenses over the longer side of the picture; the main ones' are 0.8 to 1.1, of three times zoom 3."""
 METHODS = {"lm": fit_clip, "paper": fit_as_published}
 """smplx.method -> fit; config.METHODS are the same names."""
 
@@ -71,6 +74,8 @@ def run(job: Job) -> None:
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
     for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit.iou)):
         job.warn(finding)
+    if (doubt := doubt_focal(job.config, clip)) is not None:
+        job.warn(doubt)
     if guesses := describe_guesses(job.config, params, clip):
         job.note(guesses)
     params.write(job.out / "body.npz")
@@ -79,6 +84,13 @@ def run(job: Job) -> None:
 def warm(device: str) -> None:
     """Compiles and imports what a run needs, while an earlier stage is at work."""
     rehearse(run)
+
+
+def doubt_focal(config: SmplxConfig, clip: Clip) -> Finding | None:
+    """A given focal length that no phone's lens has; None where it is plausible, or not given."""
+    given = config.focal_px or clip.focal_px
+    ratio = given / clip.longer_side if given else 1.0
+    return None if FOCAL[0] <= ratio <= FOCAL[1] else Finding.of(Code.ODD_FOCAL, figure=ratio, given=given)
 
 
 def describe_guesses(config: SmplxConfig, params: BodyParams, clip: Clip) -> str:

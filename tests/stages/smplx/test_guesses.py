@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.stage import describe_guesses
+from gsac.stages.smplx.stage import describe_guesses, doubt_focal
 
 PARAMS = SimpleNamespace(focal=np.array([1234.4, 1234.4]))
 
@@ -22,3 +23,14 @@ def test_guessed_height_and_focal_length_are_one_sentence_that_says_how_to_fix_t
 def test_nothing_is_said_where_height_and_focal_length_are_known():
     assert describe_guesses(SmplxConfig(height_m=1.7), PARAMS, SimpleNamespace(focal_px=900.0)) == ""
     assert describe_guesses(SmplxConfig(height_m=1.7, focal_px=900.0), PARAMS, SimpleNamespace(focal_px=None)) == ""
+
+
+@pytest.mark.parametrize("ratio, said", [(0.3, True), (0.5, True), (0.8, False), (1.05, False), (2.0, False), (5.0, True)])
+def test_a_focal_length_that_no_phone_has_is_doubted(ratio, said):
+    doubt = doubt_focal(SmplxConfig(), SimpleNamespace(focal_px=1280 * ratio, longer_side=1280))
+    assert (doubt is not None) == said
+    assert doubt is None or doubt.code is Code.ODD_FOCAL and doubt.figure == pytest.approx(ratio)
+
+
+def test_no_focal_length_is_no_doubt():
+    assert doubt_focal(SmplxConfig(), SimpleNamespace(focal_px=None, longer_side=1280)) is None
