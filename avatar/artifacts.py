@@ -248,7 +248,7 @@ MORE_AVATAR_SHAPES = LIGHT_SHAPE, LOW_PASS_SHAPE, LEVEL_SHAPES, LEVEL_HEIGHT_SHA
 def check_keypoints(path: Path) -> dict[str, np.ndarray]:
     """The arrays of `keypoints/keypoints.npz` by name: `KEYPOINT_SHAPES`, as xy (T, 133, 2).
 
-    A point that is nowhere, NaN or infinite, counts as unseen: its score is 0.
+    A point that is nowhere, NaN or infinite, counts as unseen: NaN with score 0.
     """
     import numpy as np
 
@@ -257,7 +257,8 @@ def check_keypoints(path: Path) -> dict[str, np.ndarray]:
     if not (_finite(score) and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
         raise ArtifactError(f"{path}: score must lie in 0..1")
     placed = np.asarray(np.isfinite(arrays["xy"]).all(-1))
-    return arrays if placed[score > 0].all() else arrays | {"score": np.where(placed, score, 0).astype(score.dtype)}
+    return arrays if placed.all() else arrays | {"score": np.where(placed, score, 0).astype(score.dtype),
+                                                 "xy": np.where(placed[..., None], arrays["xy"], np.float32(np.nan))}
 
 
 def check_filled_keypoints(path: Path) -> dict[str, np.ndarray]:
