@@ -15,7 +15,7 @@ from gsac.stages.train.views import Views
 
 
 def judge_likeness(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: Views,
-                     height: int) -> dict[str, dict | None]:
+                   height: int) -> dict[str, dict | None]:
     """body, face and hands: `average` of `compare_parts` over the frames that show the part, and `worst_view`, the side of the body
     that the camera sees where it is least alike; None where none does.
 
