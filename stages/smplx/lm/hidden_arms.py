@@ -41,8 +41,9 @@ BEFORE = 0.02
 SKIN, BEHIND_SPREAD = 0.03, 0.05
 """m: a hidden wrist's depth behind the trunk's far surface, and its spread."""
 OUTSIDE, OUTSIDE_SHARE, OUTSIDE_COUNTS = 0.01, 0.1, 0.5
-"""An arm is outside the mask if this share of its points lies farther out than this share of the person's height, and counts so much
-of a frame in which the hand is before the trunk: masks miss arms. Of hands that the body covers at most 0.09 of the points do."""
+"""An arm is outside the mask if the second, a share of its points, lies farther out than the first, a share of the person's height;
+then it counts so much of a frame with the hand before the trunk: masks miss arms. On three turns and a real one at most 0.09 of an
+arm that the body covers lies outside."""
 LEAST_S = 0.25
 """Time in plain view, at least, that contradicts a hand which was not detected; one frame where frames are farther apart."""
 TRUSTED = 0.6
@@ -127,8 +128,8 @@ class HiddenArms:
         return not any(beside) or bool((~missing[beside]).mean() > TRUSTED)
 
     def contradict(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> float:
-        """How much it contradicts the fit that the hand is not detected: 1 where it lies before the trunk, `OUTSIDE_COUNTS` where the
-        arm is outside the mask, else 0. chain: of frame t alone."""
+        """How much it contradicts the fit that the hand is not detected: 1 where it lies before the trunk, less where the arm is
+        outside the mask, else 0. chain: of frame t alone."""
         wrist = chain.place[0, ARM_JOINTS[side, 3]] + state.transl[t]
         near, _ = self.measure_trunk(state, chain, t, wrist)
         if wrist[2] < near - BEFORE:
