@@ -18,7 +18,7 @@ def fit_given(body, focal, factor):
     """Focal length, px, that a fit believes of a clip taken with `focal`, px, and given `factor` times that."""
     truth = turning_person(body, 8)
     truth.focal = np.array([focal, focal], np.float32)
-    truth.transl = truth.transl * np.float32([1, 1, focal / FOCAL])
+    truth.transl = truth.transl * np.array([1, 1, focal / FOCAL], np.float32)
     sightings = replace(sightings_of(body, truth, noise=1.0), focal_px=focal * factor)
     config = SmplxConfig(height_m=height_of(body, truth), silhouette=0.0, rounds=1)
     with threadpool_limits(1, "blas"):
