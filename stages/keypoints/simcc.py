@@ -12,6 +12,7 @@ import numpy as np
 
 from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face
+from gsac.avatar.onnx_network import NetworkError, open_network
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
@@ -29,13 +30,10 @@ class SimccNetwork:
     """path: the ONNX file; raises `BadInput` where it is no such network."""
 
     def __init__(self, path: Path):
-        import onnxruntime
-
         try:
-            self._session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
-        except Exception as e:  # onnxruntime's own classes share no narrower base
-            raise BadInput(f"model file onnx-wholebody cannot be read as ONNX ({e}); bring it again with "
-                           "`gsac models add onnx-wholebody FILE`") from e
+            self._session = open_network(path, "onnx-wholebody")
+        except NetworkError as e:
+            raise BadInput(str(e)) from e
         self._input = self._session.get_inputs()[0]
         shape, outputs = self._input.shape, self._session.get_outputs()
         if len(shape) != 4 or not all(isinstance(n, int) for n in shape[2:]) or len(outputs) != 2:
