@@ -57,7 +57,7 @@ class Sightings:
 
     @property
     def person_height(self) -> float:
-        """Median height of the person, px, from the body points; where half the frames lack the head or the feet, from the trunk."""
+        """Median height of the person, px, from the body points; where half the frames lack head or feet, from the trunk."""
         seen, y = self.seen[:, :23], self.xy[:, :23, 1]
         whole = seen[:, HEAD].any(1) & seen[:, FEET].any(1)
         trunk = seen[:, TRUNK].all(1)
