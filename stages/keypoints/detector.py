@@ -45,7 +45,7 @@ class Detector(ABC):
         return lambda: frame if pose is None else self._finish(frame, image, pose)
 
     def look(self, image: np.ndarray, region: Region) -> Frame | None:
-        """What is found of a person in that region of a frame, (H, W, 3) uint8 RGB; None where none is."""
+        """image: (H, W, 3) uint8 RGB. What is found of a person in that region of it; None where none is."""
         pose = self._tracker.look(image, region)
         return None if pose is None else self._finish(Frame(), image, pose)
 
