@@ -15,7 +15,7 @@ from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.expression import translate_expression, translate_rest
-from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide
+from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.doubted_focal import fit_with_doubt
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
@@ -57,6 +57,7 @@ def run(job: Job) -> None:
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     own = clip.shows_own_moment(len(outlines))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
+    sightings = leave_out_outside(sightings)
     occluder, hidden = find_occluder(sightings, outlines), []
     if occluder is not None:
         outlines = [replace(outline, hidden=occluder) for outline in outlines]

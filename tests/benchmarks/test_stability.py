@@ -115,6 +115,17 @@ def test_the_truth_rolls_with_the_camera():
     assert np.sign(row - HEIGHT / 2) == np.sign((quarter.rotation[0] @ [1, 0, 0])[1])
 
 
+@pytest.mark.parametrize("name", ["head-cut", "feet-cut", "leaves"])
+def test_a_camera_aimed_elsewhere_takes_the_truth_with_it(name):
+    clean = make_take()
+    true = np.array([[-0.2, -0.6, 3.0], [0.1, 0.5, 2.5]])
+    project = lambda x: (x @ clean.camera.T)[..., :2] / (x @ clean.camera.T)[..., 2:]  # noqa: E731
+    clean = replace(clean, points=np.tile(project(true), (FRAMES, 1, 1)))
+    changed, _ = FAULTS[name].inject(clean, 3, 0)
+    assert np.abs(changed.points - clean.points).max() > 3, "px"
+    assert np.allclose(changed.points, project(np.einsum("tab,pb->tpa", changed.rotation, true)), atol=1e-3)
+
+
 @pytest.mark.parametrize("name", ["rotation-tag", "uneven-rate", "long-clip"])
 def test_a_film_gives_upright_pictures_at_the_times_of_the_take(tmp_path, name):
     take = make_take()
