@@ -15,7 +15,7 @@ from gsac.benchmarks.stability.trial import End, Trial
 HEAD = ("fault", "method", "area", "breaks at", "retained at 1 to 5", "error over clean's", "silent", "crashed", "refused",
         "trials")
 SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "mean_mm", "worst_mm",
-         "kept", "frames", "psnr", "seconds", "message")
+         "kept", "frames", "psnr", "seconds", "cpu_seconds", "code", "message")
 """Columns of the CSV."""
 
 
@@ -65,7 +65,7 @@ def add_line(trial: Trial, path: Path) -> None:
 
 
 def read_lines(path: Path) -> list[Trial]:
-    """The trials of such a file; none without one."""
+    """The trials of such a file, of whatever code; none without one."""
     if not path.is_file():
         return []
     found = [Trial(**json.loads(line)) for line in path.read_text().splitlines() if line.endswith("}")]

@@ -17,8 +17,9 @@ import numpy as np
 from gsac.avatar.artifacts import ArtifactError, Clip
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.joints import NAMES
-from gsac.benchmarks.clip_runs import render_clip
+from gsac.benchmarks.clip_runs import HEIGHT, render_clip
 from gsac.benchmarks.fit.score import align_joints
+from gsac.benchmarks.stability.code import hash_code
 from gsac.benchmarks.stability.fault import Fault, Origin
 from gsac.benchmarks.stability.faults import FAULTS
 from gsac.benchmarks.stability.footage import Film
@@ -26,6 +27,7 @@ from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run
 from gsac.benchmarks.stability.take import Take, read_take
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
+from gsac.turntable.options import TurntableOptions
 
 CLEAN = "clean"
 """The fault of severity 0."""
@@ -40,6 +42,8 @@ OFF_MM = 100.0
 """A joint farther than this from the truth is off."""
 WORST = 5
 """A joint's worst frames."""
+CRF = 4
+"""Of persons who are rendered anew; their file is read once more before it is a clip."""
 
 
 class End(StrEnum):
@@ -69,10 +73,15 @@ class Task:
     until: str = "smplx"
 
     @property
+    def code(self) -> str:
+        """Digest of the sources that make its results."""
+        return hash_results(self.until)
+
+    @property
     def folder(self) -> Path:
         """Results of this fault, severity and seed, of both methods."""
         name = f"{self.fault}_{self.severity}_{self.seed}" if self.severity else CLEAN
-        return self.out / "runs" / self.clip.name / name
+        return self.out / "runs" / self.code / self.clip.name / name
 
     @property
     def clean(self) -> Task:
@@ -92,6 +101,10 @@ class Trial:
     end: End = End.DONE
     message: str = ""
     seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    """Of all cores, with programs that the stages started."""
+    code: str = ""
+    """Digest of the sources that made it."""
     frames: int = 0
     """That are judged."""
     kept: int = 0
@@ -120,7 +133,17 @@ class Trial:
     @classmethod
     def of(cls, task: Task, **values: Any) -> Trial:
         """The trial of a task."""
-        return cls(task.clip.name, task.fault, task.severity, task.seed, task.method, **values)
+        return cls(task.clip.name, task.fault, task.severity, task.seed, task.method, code=task.code, **values)
+
+
+def stages_until(last: str) -> tuple[str, ...]:
+    """Stages that follow `split`, up to the last."""
+    return *BEFORE, "handgap", "smplx", *(["train"] if last == "train" else [])
+
+
+def hash_results(last: str) -> str:
+    """Digest of the sources that make the results of trials up to the stage `last`."""
+    return hash_code(__name__, *(f"gsac.stages.{name}.stage" for name in ("split", *stages_until(last))))
 
 
 def run_trial(task: Task) -> Trial:
@@ -133,7 +156,7 @@ def run_trial(task: Task) -> Trial:
     if fault and fault.origin is Origin.TAKE:
         take, touched = fault.inject(take, task.severity, task.seed)
         trial.touched = take.number[touched].tolist()
-    began = time.perf_counter()
+    began, cpu_began = time.perf_counter(), sum(os.times()[:4])
     try:
         ports, take = _run(task, fault, take, trial)
     except (StageError, ArtifactError) as error:
@@ -144,15 +167,21 @@ def run_trial(task: Task) -> Trial:
         trial.end, trial.message = End.CRASHED, f"{type(error).__name__}: {error} ({place})"
     else:
         _judge(trial, take, ports)
-    trial.seconds = time.perf_counter() - began
+    trial.seconds, trial.cpu_seconds = time.perf_counter() - began, sum(os.times()[:4]) - cpu_began
     return trial
 
 
 def render_person(task: Task, fault: Fault) -> Path:
-    """Folder of the clip of the same person who behaves otherwise; rendered unless it is there."""
-    seed = _seed_of(task.clip)
+    """Folder of the clip of the same person who behaves otherwise; rendered unless it is there.
+
+    It has no more frames and rows than the trial looks at, at the clean clip's times and with the noise of its scaled frames.
+    """
+    seed, rate = _seed_of(task.clip), Film(read_take(task.clip, task.frames, task.height)).rate
     options, _ = fault.inject({"seed": seed}, task.severity, task.seed)
-    return render_clip(task.out / "clips" / f"{task.clip.name}_{fault.name}_{task.severity}", PlainReporter(sys.stderr), **options)
+    options |= {"frames": task.frames, "height": task.height, "fps": rate, "crf": CRF,
+                "noise": TurntableOptions.noise * task.height / HEIGHT}
+    folder = task.out / "clips" / hash_code("gsac.turntable.clip")
+    return render_clip(folder / f"{task.clip.name}_{fault.name}_{task.severity}", PlainReporter(sys.stderr), **options)
 
 
 def _seed_of(clip: Path) -> int:
@@ -175,7 +204,7 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
         trial.touched = take.number[touched].tolist()
     ports, said, take = _split(film, folder)
     trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in said]
-    for name in (*BEFORE, "handgap", "smplx", *(["train"] if task.until == "train" else [])):
+    for name in stages_until(task.until):
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
         found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
         trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in found]

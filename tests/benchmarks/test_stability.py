@@ -1,6 +1,7 @@
 """The faults of the stability benchmark, what counts as said, and what a trial's end is."""
 
 import csv
+import sys
 import time
 from dataclasses import replace
 
@@ -10,11 +11,14 @@ import pytest
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_frame
 from gsac.benchmarks.fit.truth import Truth
 from gsac.benchmarks.stability import bench, chart, outcome, stages, table, trial, workers
+from gsac.benchmarks.stability.code import hash_code
 from gsac.benchmarks.stability.fault import Origin
 from gsac.benchmarks.stability.faults import FAULTS, QUICK
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.take import Take
 from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, PAPER, End, Task, Trial
+from gsac.cache.code import code_parts
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
 
 FRAMES, HEIGHT, WIDTH = 20, 64, 36
@@ -241,6 +245,43 @@ def test_trials_of_other_settings_are_not_mixed(tmp_path):
     bench.keep_settings(options("--seeds", "1"))
     with pytest.raises(BadInput, match="give another --out"):
         bench.keep_settings(options("--frames", "60"))
+
+
+def test_trials_of_other_code_do_not_count_and_run_again(tmp_path, capsys):
+    lines = tmp_path / "trials.jsonl"
+    options = bench.parser().parse_args(["--clip", str(tmp_path), "--fault", "blur", "--seeds", "0", "--severities", "3",
+                                         "--methods", DEFAULT, "--out", str(tmp_path)])
+    say = PlainReporter(sys.stderr)
+    clean, blurred = bench.list_open(options, lines, say)
+    table.add_line(Trial.of(clean), lines)
+    table.add_line(replace(Trial.of(blurred), code="0" * 12), lines)
+    assert bench.list_open(options, lines, say) == [blurred]
+    assert "holds 1 trials of other code" in capsys.readouterr().err
+    assert blurred.code in blurred.folder.parts, "what stages made by other code is not taken up either"
+
+
+def test_the_digest_covers_what_makes_results_and_nothing_else():
+    parts = code_parts("gsac.benchmarks.stability.trial", ("gsac.stages.smplx.stage",))
+    assert {"gsac.benchmarks.stability.trial", "gsac.stages.smplx.stage", "gsac.avatar.body"} < parts.keys()
+    assert hash_code("gsac.benchmarks.stability.trial") != hash_code("gsac.turntable.clip")
+
+
+def test_a_dry_run_says_what_a_sweep_takes_and_runs_nothing(tmp_path, capsys):
+    assert bench.main(["--clip", str(tmp_path), "--fault", "blur", "pole", "--seeds", "0", "--dry-run", "--frames", "20",
+                       "--out", str(tmp_path / "out")]) == 0
+    assert "22 trials, about 7 CPU minutes" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "trials.jsonl").exists()
+
+
+def test_seed_k_is_the_kth_person(tmp_path):
+    clips = [tmp_path / name for name in ("seed1", "seed2", "seed3")]
+    options = bench.parser().parse_args([part for clip in clips for part in ("--clip", str(clip))] + ["--out", str(tmp_path)])
+    assert {(t.seed, t.clip.name) for t in bench.list_tasks(options, None)} == {(0, "seed1"), (1, "seed2"), (2, "seed3")}
+
+
+def test_an_early_end_of_the_sweep_has_all_persons_at_severity_3(tmp_path):
+    options = bench.parser().parse_args(["--clip", str(tmp_path), "--fault", "blur", "--methods", DEFAULT, "--out", str(tmp_path)])
+    assert [(t.severity, t.seed) for t in bench.list_tasks(options, None)][1:5] == [(3, 0), (3, 1), (3, 2), (5, 0)]
 
 
 @pytest.mark.slow
