@@ -20,6 +20,7 @@ from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, PAPER, End, Task, Tr
 from gsac.cache.code import code_parts
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
+from gsac.turntable.options import TurntableOptions
 
 FRAMES, HEIGHT, WIDTH = 20, 64, 36
 
@@ -119,7 +120,7 @@ def test_the_truth_rolls_with_the_camera():
     assert np.sign(row - HEIGHT / 2) == np.sign((quarter.rotation[0] @ [1, 0, 0])[1])
 
 
-@pytest.mark.parametrize("name", ["rotation-tag", "uneven-rate", "long-clip"])
+@pytest.mark.parametrize("name", ["rotation-tag", "uneven-rate", "long-clip", "ten-bit"])
 def test_a_film_gives_upright_pictures_at_the_times_of_the_take(tmp_path, name):
     take = make_take()
     film, _ = FAULTS[name].inject(Film(take), 1, 0)
@@ -127,10 +128,33 @@ def test_a_film_gives_upright_pictures_at_the_times_of_the_take(tmp_path, name):
     stages.run_stage("split", {"count": 400, "crop": False}, {"clip": tmp_path / "clip.mp4"}, tmp_path / "split")
     number = film.number(np.array(Clip.read(tmp_path / "split" / "clip.json").timestamps_s))
     seen = [read_frame(path).astype(int) for path in frame_paths(tmp_path / "split" / "frames")]
-    assert len(seen) == {"rotation-tag": FRAMES, "uneven-rate": FRAMES - 2, "long-clip": 100}[name]
+    assert len(seen) == {"rotation-tag": FRAMES, "uneven-rate": FRAMES - 2, "long-clip": 100, "ten-bit": FRAMES}[name]
     grey = [np.mean(pictures, axis=-1)[take.masks[number]] for pictures in (seen, take.frames[number])]
     assert np.corrcoef(grey)[0, 1] > 0.7, "the same pictures, upright"
     assert number[0] == 0 and (np.diff(number) != 0).all()
+
+
+@pytest.mark.parametrize("severity", range(1, 6))
+def test_a_person_who_behaves_otherwise_is_one_that_the_turntable_can_render(severity):
+    people = [fault for fault in FAULTS.values() if fault.origin is Origin.PERSON]
+    for fault in people:
+        TurntableOptions(**fault.inject({"seed": 7}, severity, 0)[0]).check()
+    assert len(people) > 10
+
+
+def test_a_person_who_behaves_otherwise_is_rendered_at_the_size_and_times_of_the_trial(tmp_path, monkeypatch):
+    asked = {}
+    monkeypatch.setattr(trial, "read_take", lambda *_: make_take())
+    monkeypatch.setattr(trial, "render_clip", lambda folder, say, **options: asked.update(options) or folder)
+    trial.render_person(replace(make_task(tmp_path / "seed7_60", "hoodie"), frames=FRAMES, height=HEIGHT), FAULTS["hoodie"])
+    assert (asked["seed"], asked["top"], asked["frames"], asked["height"]) == (7, "hoodie", FRAMES, HEIGHT)
+    assert asked["fps"] == pytest.approx(10), "as many frames a second as the clean take has"
+
+
+@pytest.mark.parametrize("name", ["points-missing", "masks-missing"])
+def test_at_severity_5_nothing_is_left_of_a_missing_artifact(name):
+    changed, touched = FAULTS[name].inject(make_clean(FAULTS[name].origin), 5, 0)
+    assert not len(changed["xy"] if name == "points-missing" else changed) and touched.sum() == FRAMES
 
 
 def finding(code, frames, severity="poorer"):
