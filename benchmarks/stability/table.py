@@ -14,8 +14,8 @@ from gsac.benchmarks.stability.trial import End, Trial
 
 HEAD = ("fault", "method", "area", "breaks at", "retained at 1 to 5", "error over clean's", "silent", "crashed", "refused",
         "trials")
-SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "mean_mm", "worst_mm",
-         "kept", "frames", "psnr", "seconds", "cpu_seconds", "code", "message")
+SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "warned", "mean_mm",
+         "worst_mm", "kept", "frames", "psnr", "seconds", "cpu_seconds", "code", "message")
 """Columns of the CSV."""
 
 
@@ -35,10 +35,11 @@ def sum_up(curves: list[Curve]) -> list[str]:
         some = [c for c in curves if c.method == method]
         worst = min(some, key=lambda c: c.area)
         areas[method] = {c.fault: c.area for c in some}
-        trials, silent, crashed, refused = np.sum([(c.trials, c.silent, c.crashed, c.refused) for c in some], axis=0)
+        trials, silent, crashed, refused, checked, foretold = np.sum(
+            [(c.trials, c.silent, c.crashed, c.refused, c.checked, c.foretold) for c in some], axis=0)
         out.append(f"{method}: area under the curve, median fault {np.median([c.area for c in some]):.2f}, worst {worst.area:.2f} "
                    f"({worst.fault}); of {trials} trials {silent} failed silently, {crashed} crashed or hung, {refused} ended with "
-                   f"a sentence")
+                   f"a sentence; gsac check agrees on {foretold} of {checked} clips")
     if len(areas) == 2:
         (first, ours), (second, theirs) = areas.items()
         more = [ours[fault] - theirs[fault] for fault in ours if fault in theirs]
@@ -54,7 +55,8 @@ def write_csv(outcomes: list[Outcome], path: Path) -> None:
         sheet = csv.writer(f)
         sheet.writerow(SHEET)
         for o in outcomes:
-            own = {"retained": f"{o.retained:.4f}", "failed": int(o.failed), "silent": int(o.silent), "said": " ".join(o.said)}
+            own = {"retained": f"{o.retained:.4f}", "failed": int(o.failed), "silent": int(o.silent), "said": " ".join(o.said),
+                   "warned": None if o.warned is None else int(o.warned)}
             sheet.writerow([_cell(own[name] if name in own else getattr(o.trial, name)) for name in SHEET])
 
 

@@ -25,8 +25,10 @@ from gsac.benchmarks.stability.faults import FAULTS
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
 from gsac.benchmarks.stability.take import Take, read_take
+from gsac.pipeline.clip_check import check_clip
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
+from gsac.stages.severity import Severity
 from gsac.turntable.options import TurntableOptions
 
 CLEAN = "clean"
@@ -42,6 +44,10 @@ OFF_MM = 100.0
 """A joint farther than this from the truth is off."""
 WORST = 5
 """A joint's worst frames."""
+CLIP = (Origin.TAKE, Origin.FILM, Origin.PERSON)
+"""Origins of faults that are in the clip's file, as `gsac check` gets it."""
+CHECKED = "keypoints"
+"""The stage after which `gsac check` judges."""
 CRF = 4
 """Of persons who are rendered anew; their file is read once more before it is a clip."""
 
@@ -123,6 +129,8 @@ class Trial:
     """Joint -> kept frames in which it is off."""
     touched: list[int] = field(default_factory=list)
     """Frames that the fault touches."""
+    checked: list[str] | None = None
+    """Codes, mere news left out, that `gsac check` would give; [REFUSED] where it would end; None for faults of artifacts."""
     findings: list[Finding] = field(default_factory=list)
     """What was said: code, severity, frames (empty: the whole clip), figure."""
 
@@ -156,6 +164,7 @@ def run_trial(task: Task) -> Trial:
     if fault and fault.origin is Origin.TAKE:
         take, touched = fault.inject(take, task.severity, task.seed)
         trial.touched = take.number[touched].tolist()
+    trial.checked = [End.REFUSED.value] if fault is None or fault.origin in CLIP else None
     began, cpu_began = time.perf_counter(), sum(os.times()[:4])
     try:
         ports, take = _run(task, fault, take, trial)
@@ -197,7 +206,7 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
 
     Returns ports -> files and folders, and the take that the stages after `split` saw.
     """
-    folder = task.folder if fault and fault.origin in (Origin.TAKE, Origin.PERSON, Origin.FILM) else task.clean.folder
+    folder = task.folder if fault and fault.origin in CLIP else task.clean.folder
     film = Film(take)
     if fault and fault.origin is Origin.FILM:
         film, touched = fault.inject(film, task.severity, task.seed)
@@ -208,6 +217,8 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
         found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
         trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in found]
+        if name == CHECKED and trial.checked is not None:
+            trial.checked = _check(ports, [*said, *found])
         if fault and fault.origin.startswith(f"{name}/"):
             port, folder = fault.origin.value, task.folder
             value, touched = fault.inject(read_artifact(fault.origin, ports[port]), task.severity, task.seed)
@@ -232,6 +243,13 @@ def _split(film: Film, folder: Path) -> tuple[dict[str, Path], list[Finding], Ta
         ports["split/clip.json"] = folder / "clip.json"
         replace(clip, timestamps_s=take.times.tolist(), focal_px=take.focal).write(ports["split/clip.json"])
     return ports, said, take
+
+
+def _check(ports: dict[str, Path], said: list[Finding]) -> list[str]:
+    """Codes of `gsac check`, mere news left out, by all of the trial's frames; said: by split and keypoints."""
+    check = check_clip(ports["split/frames"], ports["split/clip.json"], ports["keypoints/keypoints.npz"],
+                       [(finding["message"], finding) for finding in said])
+    return sorted({entry["code"] for _, entry in check.findings if entry["severity"] != Severity.NEWS})
 
 
 def _numbers(runs: list[list[int]], number: np.ndarray) -> list[int]:

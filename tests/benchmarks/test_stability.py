@@ -195,6 +195,16 @@ def test_a_joint_that_is_off_in_fewer_than_five_frames_or_in_the_clean_clip_too_
     assert outcome.find_outcome(one("pole", 3, off=five), one(off={"right_wrist": [8]})).failed
 
 
+def test_the_check_agrees_where_it_and_the_run_find_something_or_neither_does():
+    def foretold(checked, mm=15.0, **more):
+        return outcome.find_outcome(one("pole", 3, mm=mm, checked=checked, **more), one(checked=["far_away"])).foretold
+
+    assert foretold(["far_away"]) and not foretold(["cut_off"])
+    assert foretold(["cut_off"], mm=115.0) and not foretold(["far_away"], mm=115.0)
+    assert foretold([End.REFUSED.value], end=End.REFUSED)
+    assert foretold(None) is None and foretold(["cut_off"], end=End.CRASHED) is None
+
+
 TRIALS = [one(), one("pole", 3, mm=115.0), one("pole", 5, end=End.CRASHED, message="ValueError"), one("blur", 3, mm=25.0),
           one(method=PAPER), one("pole", 3, PAPER, mm=215.0), one("blur", 5, PAPER, mm=35.0)]
 
