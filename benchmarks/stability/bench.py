@@ -73,6 +73,7 @@ def main(argv: list[str] | None = None) -> int:
     words = table.text(curves)
     print(words)
     (options.out / "stability.txt").write_text(words + "\n")
+    (options.out / "stability.md").write_text(table.markdown(curves))
     chart.draw(curves, options.out)
     return 0
 

@@ -49,6 +49,18 @@ def sum_up(curves: list[Curve]) -> list[str]:
     return out
 
 
+def markdown(curves: list[Curve]) -> str:
+    """The table of docs/lab/stability.md: a row for each fault, the worst first, three columns for each method; then the sums."""
+    methods = list(dict.fromkeys(c.method for c in curves))
+    by_fault: dict[str, dict[str, Curve]] = {}
+    for curve in sorted(curves, key=lambda c: (methods.index(c.method), c.area)):
+        by_fault.setdefault(curve.fault, {})[curve.method] = curve
+    lines = [f"| fault | {' | '.join(f'{m}: area | breaks at | silent' for m in methods)} |",
+             "| --- " * (1 + 3 * len(methods)) + "|"]
+    lines += [f"| {fault} | {' | '.join(_brief(own.get(m)) for m in methods)} |" for fault, own in by_fault.items()]
+    return "\n".join([*lines, "", *(f"- {sentence}" for sentence in sum_up(curves))]) + "\n"
+
+
 def write_csv(outcomes: list[Outcome], path: Path) -> None:
     """Writes a row for each trial with a fault."""
     with open(path, "w", newline="") as f:
@@ -83,6 +95,13 @@ def _row(curve: Curve) -> tuple[str, ...]:
             " ".join(f"{shares[s]:.2f}" if s in shares else "  - " for s in SEVERITIES[1:]),
             " ".join(f"{errors[s]:4.1f}" if s in errors else "  - " for s in SEVERITIES[1:]), str(curve.silent), str(curve.crashed),
             str(curve.refused), str(curve.trials))
+
+
+def _brief(curve: Curve | None) -> str:
+    """Area, severity of breakdown and silent failures of a curve, as three cells."""
+    if curve is None:
+        return " | ".join("-" * 3)
+    return f"{curve.area:.2f} | {curve.breakdown or '-'} | {f'{curve.silent} of {curve.trials}' if curve.silent else '-'}"
 
 
 def _cell(value: object) -> object:

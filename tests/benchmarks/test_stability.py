@@ -224,6 +224,7 @@ def test_table_csv_and_chart_hold_every_fault(tmp_path):
     curves = outcome.draw_curves(outcomes)
     words = table.text(curves)
     assert words.splitlines()[2].startswith("pole   paper") and "default less paper, 2 faults that both have" in words
+    assert "| pole | 0.55 | 3 | 1 of 2 | 0.30 | 3 | 1 of 1 |" in table.markdown(curves).splitlines()
     table.write_csv(outcomes, tmp_path / "stability.csv")
     rows = list(csv.DictReader((tmp_path / "stability.csv").read_text().splitlines()))
     assert [(r["fault"], r["severity"], r["silent"]) for r in rows][:2] == [("pole", "3", "1"), ("pole", "5", "0")]
