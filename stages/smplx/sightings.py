@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gsac.avatar.wholebody import INDEX
+from gsac.avatar.wholebody import INDEX, OTHER_SIDE
 from gsac.stages.smplx.config import SmplxConfig
 
 HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
@@ -56,6 +56,16 @@ class Sightings:
         """Median height of the person, px, from the body points."""
         extents = [np.ptp(self.xy[t, :23, 1][seen]) for t, seen in enumerate(self.seen[:, :23]) if seen.sum() > 1]
         return float(np.median(extents)) * 1.08 if extents else self.height * 0.8
+
+    def exchange_sides(self, frames: np.ndarray) -> Sightings:
+        """The same with left and right exchanged in some frames, (T,) bool."""
+        def exchange(of_points: np.ndarray, order: tuple[int, ...]) -> np.ndarray:
+            out = of_points.copy()
+            out[frames] = out[frames][:, order]
+            return out
+
+        points = {name: exchange(getattr(self, name), OTHER_SIDE) for name in ("xy", "score", "sigma", "world")}
+        return replace(self, **points, missing=None if self.missing is None else exchange(self.missing, (1, 0)))
 
 
 def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
