@@ -28,7 +28,7 @@ from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.lm.shake import transl_acceleration
-from gsac.stages.smplx.lm.swapped_sides import propose_swapped
+from gsac.stages.smplx.lm.swapped_sides import MARGIN, propose_swapped
 from gsac.stages.smplx.lm.turn_jumps import JUMP_COST, find_jumps
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
@@ -79,7 +79,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
 
 def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
                     config: SmplxConfig) -> tuple[Sightings, Problem, State, int, list[Finding]]:
-    """Fits the key points, with left and right exchanged in the frames that the turn accuses if that costs less.
+    """Fits the key points, with left and right exchanged in the frames that the turn accuses if that costs much less.
 
     Returns the sightings that were fitted, problem, state, number of steps and what the user should know.
     """
@@ -89,7 +89,7 @@ def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], d
         problem, state = set_up(body, seen, outlines, detector, config)
         state, steps = fit_points(problem, state, seen, detector, 3 * config.iterations)
         fits.append((problem.cost(state) + JUMP_COST * problem.jumps.sum(), seen, problem, state, steps))
-    best = min(range(len(fits)), key=lambda i: fits[i][0])
+    best = int(len(fits) == 2 and fits[1][0] < fits[0][0] - MARGIN * swapped.sum())
     said = [Finding.of(Code.SIDES_EXCHANGED, swapped)] if best else []
     jumps = fits[best][2].jumps
     if jumps.any():

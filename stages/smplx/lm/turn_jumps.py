@@ -10,10 +10,10 @@ import numpy as np
 from gsac.avatar import rotation
 
 JUMP = np.radians(45)
-"""Change of the step from frame to frame. On five clean clips of 60 frames it is 15 degrees at most, of 20 frames 40; pictures out of
-order change it by twice their distance in the turn."""
+"""Change of the step from frame to frame. On five clean clips of 60 frames it is 15 degrees at most, of 20 frames 40; pictures out
+of order change it by twice their distance in the turn."""
 WIDEST = np.radians(120)
-"""A step that may as well have gone the other way round: four frames of a turn, the fewest to learn from, make steps of 90 degrees."""
+"""A step that may as well have gone the other way round: four frames of a turn, few as they are, make steps of 90."""
 JUMP_COST = 100.0
 """Cost of a jump in the fit's cost, as of ten spreads: of two readings of the points, the one without jumps is likelier."""
 
