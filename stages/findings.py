@@ -64,6 +64,8 @@ class Code(Enum):
                         "(face.flame) would bring the rest.")
     ODD_FOCAL = Wording("The focal length given, {given:.0f} px, is {figure:.2f} times the picture's longer side, as hardly any "
                         "phone's is: if it is wrong, so is the body.", "Leave it out, and it is found from the person.")
+    FOCAL_NOT_BELIEVED = Wording("The focal length given, {given:.0f} px, contradicts the pictures; {figure:.0f} px, as the person "
+                                 "shows it, is used.", "Leave it out.", Severity.NEWS)
     PAPER_START = Wording("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's "
                           "regression", severity=Severity.NEWS)
     PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "

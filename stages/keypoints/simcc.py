@@ -12,6 +12,7 @@ import numpy as np
 
 from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face
+from gsac.avatar.onnx_network import NetworkError, open_network
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
@@ -29,13 +30,10 @@ class SimccNetwork:
     """path: the ONNX file; raises `BadInput` where it is no such network."""
 
     def __init__(self, path: Path):
-        import onnxruntime
-
         try:
-            self._session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
-        except Exception as e:  # onnxruntime's own classes share no narrower base
-            raise BadInput(f"model file onnx-wholebody cannot be read as ONNX ({e}); bring it again with "
-                           "`gsac models add onnx-wholebody FILE`") from e
+            self._session = open_network(path, "onnx-wholebody")
+        except NetworkError as e:
+            raise BadInput(str(e)) from e
         self._input = self._session.get_inputs()[0]
         shape, outputs = self._input.shape, self._session.get_outputs()
         if len(shape) != 4 or not all(isinstance(n, int) for n in shape[2:]) or len(outputs) != 2:
@@ -53,7 +51,7 @@ class SimccNetwork:
         centres[:, 2] += to_frame[:, :2] @ [0.5, 0.5] - 0.5
         crop = cv2.warpAffine(image, centres, (self.width, self.height), flags=cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR)
         ready = ((crop - MEAN) / DEVIATION).transpose(2, 0, 1)[None].astype(np.float32)
-        x, y = self._session.run(None, {self._input.name: ready})
+        x, y = map(np.asarray, self._session.run(None, {self._input.name: ready}))
         if x.shape[1] != POINTS:
             raise BadInput(f"model file onnx-wholebody gives {x.shape[1]} points; expected COCO-WholeBody's {POINTS}")
         xy, score = decode(x[0], y[0], self.width, self.height)

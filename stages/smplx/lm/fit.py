@@ -69,12 +69,13 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
             stand_on_ground(problem, state, sightings, config.contact)
         state, more = problem.minimise(state, config.iterations)
         steps += more
+    cost = problem.cost(state)
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     sigma = estimate_joint_sigma(problem, state)
     hidden.widen(sigma)
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
-               problem.person_offsets.joint_offset(state.own), (*said, *hidden.describe(len(sigma))))
+               problem.person_offsets.joint_offset(state.own), (*said, *hidden.describe(len(sigma))), cost)
 
 
 def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
