@@ -100,6 +100,9 @@ class Code(Enum):
                              "Lock exposure and focus before the turn: hold a finger on the person in the picture.")
     BLURRED = Wording("The picture is blurred in {frames}.",
                       "Clean the lens, let the phone focus on the person, film in more light and turn slower.")
+    SIDES_EXCHANGED = Wording("Left was taken for right in {frames}; the sides are exchanged there.", severity=Severity.NEWS)
+    TURN_JUMPS = Wording("The turn jumps in {frames}, by pictures out of order or a fast turn; each is fitted alone there.",
+                         "Give one recording without cuts, and turn evenly and slowly.", Severity.NEWS)
     OTHER = Wording("{what}")
     """Of a stage that is not of this package."""
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gsac.avatar.wholebody import INDEX
+from gsac.avatar.wholebody import INDEX, OTHER_SIDE
 from gsac.stages.smplx.config import SmplxConfig
 
 HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
@@ -65,6 +65,16 @@ class Sightings:
             return float(np.median(y[trunk][:, TRUNK[2:]].mean(1) - y[trunk][:, TRUNK[:2]].mean(1))) * TRUNKS
         extents = [np.ptp(own[known]) for own, known in zip(y, seen, strict=True) if known.sum() > 1]
         return float(np.median(extents)) * 1.08 if extents else self.height * 0.8
+
+    def exchange_sides(self, frames: np.ndarray) -> Sightings:
+        """The same with left and right exchanged in some frames, (T,) bool."""
+        def exchange(of_points: np.ndarray, order: tuple[int, ...]) -> np.ndarray:
+            out = of_points.copy()
+            out[frames] = out[frames][:, order]
+            return out
+
+        points = {name: exchange(getattr(self, name), OTHER_SIDE) for name in ("xy", "score", "sigma", "world")}
+        return replace(self, **points, missing=None if self.missing is None else exchange(self.missing, (1, 0)))
 
 
 def focal_prior(sightings: Sightings, config: SmplxConfig) -> tuple[float, float]:
