@@ -205,7 +205,8 @@ class HiddenArms:
 
     def hold(self, problem: Problem, state: State) -> None:
         """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight."""
-        problem.inside = [(t, self.forearm[stay.side]) for stay in self.stays for t in range(stay.first, stay.last)]
+        problem.inside = [(t, self.forearm[stay.side]) for stay in self.stays for t in range(stay.first, stay.last)
+                          if problem.seen.outlines[t].area > 0]
         if not self.stays:
             return
         spread = np.broadcast_to(problem.seen.depth_spread, problem.seen.depth.shape).copy()
