@@ -62,6 +62,8 @@ class Code(Enum):
     FACE_AT_REST = Wording("The face was never seen from the front; the avatar's face stays at rest.")
     JAW_ALONE = Wording("This body model has no named facial actions: of the face only the jaw is carried over; a FLAME head "
                         "(face.flame) would bring the rest.")
+    FLAME_LEFT_OUT = Wording("FLAME's expression goes into this body by the vertices that both share, and these were not given; "
+                             "of the face only the jaw is carried over.", "Give smplx.flame and smplx.flame_ids.")
     ODD_FOCAL = Wording("The focal length given, {given:.0f} px, is {figure:.2f} times the picture's longer side, as hardly any "
                         "phone's is: if it is wrong, so is the body.", "Leave it out, and it is found from the person.")
     FOCAL_NOT_BELIEVED = Wording("The focal length given, {given:.0f} px, contradicts the pictures; {figure:.0f} px, as the person "

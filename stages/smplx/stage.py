@@ -15,6 +15,7 @@ from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.expression import translate_expression, translate_rest
+from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.doubted_focal import fit_with_doubt
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
@@ -46,6 +47,7 @@ def run(job: Job) -> None:
     points = check_filled_keypoints(job.inputs["handgap/keypoints.npz"])
     face = check_face(job.inputs["face/face.npz"])
     body = load_body(job, "smplx")
+    shared = read_shared(job, body)
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
                           clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side)
@@ -65,7 +67,7 @@ def run(job: Job) -> None:
         hidden = describe_hidden(behind)
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
-    expression, jaw, silent = translate_expression(body, face)
+    expression, jaw, silent = translate_expression(body, fit.state.betas, face, shared)
     if silent is not None:
         job.warn(silent)
     params = to_params(body, fit.state, sightings.center, expression, fit.joint_offset)
