@@ -113,8 +113,8 @@ def read_shared(job: Job, body: Body) -> tuple[Flame, np.ndarray] | None:
     if job.config.flame == NONE:
         return None
     if job.config.body_model == OPEN:
-        raise BadInput("smplx.flame is given, but smplx.body_model is open, whose face acts the facial actions; leave it out, or give "
-                       "an SMPL-X body")
+        raise BadInput("smplx.flame is given, but smplx.body_model is open, whose face acts the facial actions; leave it out, or "
+                       "give an SMPL-X body")
     flame = read_brought(job, "smplx", "flame", read_flame)
     ids = read_brought(job, "smplx", "flame_ids", read_flame_ids)
     if ids.max() >= len(body.v_template):
