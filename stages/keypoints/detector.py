@@ -61,6 +61,9 @@ class Detector(ABC):
     def write_points(self, frame: Frame, image: np.ndarray, pose: Pose, face: Face | None) -> None:
         """Writes the points that this detector finds. image: (H, W, 3) uint8 RGB; the frame holds the body's points already."""
 
+    def settle(self, frames: list[Frame]) -> None:  # noqa: B027, most detectors have nothing to settle
+        """Writes what is known only once all frames of the clip were looked at."""
+
 
 def write_body(frame: Frame, pose: Pose) -> None:
     frame.xy[BODY133] = pose.points[BODY33]

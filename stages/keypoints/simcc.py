@@ -1,7 +1,8 @@
 """A whole-body network with SimCC outputs (RTMPose, RTMW, DWPose; 133 points), brought by the user as an ONNX file.
 
-Its input is 3 x H x W, RGB normalised by ImageNet's mean and deviation; its outputs are a score for each half pixel along x and
-along y. BlazePose finds the person and gives the points in metres; the face mesh network gives what `face` reads.
+Its input is 3 x H x W (384 x 288 or 256 x 192), RGB normalised by ImageNet's mean and deviation; its outputs, simcc_x and simcc_y,
+are a height for each half pixel along x and along y, (1, 133, 2 W) and (1, 133, 2 H). These are the shapes of mmpose's published
+configurations. BlazePose finds the person and gives the points in metres; the face mesh network gives what `face` reads.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
+from gsac.stages.keypoints.simcc_scores import calibrate
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)
 DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)
@@ -43,7 +45,7 @@ class SimccNetwork:
 
     def read(self, image: np.ndarray, to_frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """image: (H, W, 3) uint8 RGB; to_frame: (2, 3), crop pixels to frame pixels. Returns xy (133, 2) px of the frame
-        and score (133,) in 0..1."""
+        and peaks (133,), whose scale is the network's own."""
         import cv2
 
         # OpenCV counts from pixel centres at 0, we from their corners.
@@ -54,8 +56,8 @@ class SimccNetwork:
         x, y = map(np.asarray, self._session.run(None, {self._input.name: ready}))
         if x.shape[1] != POINTS:
             raise BadInput(f"model file onnx-wholebody gives {x.shape[1]} points; expected COCO-WholeBody's {POINTS}")
-        xy, score = decode(x[0], y[0], self.width, self.height)
-        return xy @ to_frame[:, :2].T + to_frame[:, 2], np.clip(score, 0, 1)
+        xy, peaks = decode(x[0], y[0], self.width, self.height)
+        return xy @ to_frame[:, :2].T + to_frame[:, 2], peaks
 
 
 class Wholebody(Detector):
@@ -64,10 +66,14 @@ class Wholebody(Detector):
         super().__init__(models, config)
 
     def write_points(self, frame: Frame, image: np.ndarray, pose: Pose, face: Face | None) -> None:
-        """image: (H, W, 3) uint8 RGB. All 133 points; those in metres stay BlazePose's."""
+        """image: (H, W, 3) uint8 RGB. All 133 points, scored by their peaks; those in metres stay BlazePose's."""
         network = self._network
         frame.xy[:], frame.score[:] = network.read(image, crop_matrix(pose.points, network.width, network.height))
         drop_doubled_hand(frame)
+
+    def settle(self, frames: list[Frame]) -> None:
+        for frame, score in zip(frames, calibrate(np.array([frame.score for frame in frames])), strict=True):
+            frame.score[:] = score
 
 
 def crop_matrix(points: np.ndarray, width: int, height: int) -> np.ndarray:
@@ -80,8 +86,9 @@ def crop_matrix(points: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def decode(x: np.ndarray, y: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """x: (n, bins), y: (n, bins) scores along the axes of a width x height crop. Returns places (n, 2) px of the crop and scores
-    (n,), the lesser of both axes' peaks (Li et al. 2022)."""
+    """x: (n, bins), y: (n, bins) heights along the axes of a width x height crop. Returns places (n, 2) px of the crop and peaks
+    (n,), the lesser of both axes' (Li et al. 2022). A place is its bin's: the official decoder refines no further for these
+    networks, which were trained on half pixels."""
     at = np.stack([x.argmax(axis=1) * width / x.shape[1], y.argmax(axis=1) * height / y.shape[1]], axis=1)
     return at + 0.5, np.minimum(x.max(axis=1), y.max(axis=1))
 

@@ -51,6 +51,7 @@ def run(job: Job) -> None:
             cuts.append(cut)
             job.progress(len(frames), len(paths), "frames")
     look_again(frames, cuts, lambda t, region: _look(detector, read_frame(paths[t]), region))
+    detector.settle(frames)
     arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in KEYPOINT_SHAPES if name != "detector"}
     report(job, frames, cuts)
     judge_size(job, FirstLook.of(arrays))
