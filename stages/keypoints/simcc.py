@@ -14,12 +14,12 @@ import numpy as np
 from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face
 from gsac.avatar.onnx_network import NetworkError, open_network
+from gsac.avatar.simcc_scores import calibrate
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
-from gsac.stages.keypoints.simcc_scores import calibrate
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)
 DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)
@@ -72,7 +72,11 @@ class Wholebody(Detector):
         drop_doubled_hand(frame)
 
     def settle(self, frames: list[Frame]) -> None:
-        for frame, score in zip(frames, calibrate(np.array([frame.score for frame in frames])), strict=True):
+        try:
+            scores = calibrate(np.array([frame.score for frame in frames]))
+        except NetworkError as e:
+            raise BadInput(str(e)) from e
+        for frame, score in zip(frames, scores, strict=True):
             frame.score[:] = score
 
 

@@ -29,35 +29,37 @@ SIGMA = np.sqrt([288 / 8, 384 / 8])
 """Of mmpose's labels for 288 x 384 px along x and y, bins of half a pixel."""
 
 
-def write_brightest(path: Path, top: float, width: int = 288, height: int = 384) -> Path:
-    """A whole-body network of the official shapes: point i peaks where the red, green or blue (i modulo 3) of the crop is highest, as
-    high as top times that colour's share of 255; heights are read off the input by undoing mmpose's own normalisation."""
+def write_wholebody(path: Path, nodes: list, constants: dict[str, np.ndarray]) -> Path:
+    """A whole-body network of the official shapes, 288 x 384 px."""
+    return write_network(path, (1, 3, 384, 288), {"simcc_x": (1, POINTS, 576), "simcc_y": (1, POINTS, 768)}, nodes, constants)
+
+
+def write_brightest(path: Path, top: float) -> Path:
+    """A whole-body network: point i peaks where the red, green or blue (i modulo 3) of the crop is highest, as high as top times that
+    colour's share of 255; heights are read off the input by undoing mmpose's own normalisation."""
     constants = {"deviation": np.array([58.395, 57.12, 57.375], np.float32).reshape(1, 3, 1, 1) * np.float32(top / 255),
                  "mean": np.array([123.675, 116.28, 103.53], np.float32).reshape(1, 3, 1, 1) * np.float32(top / 255),
                  "colour": np.arange(POINTS) % 3, "last": np.array([3]), "halves": np.array([1, 0.9], np.float32)}
     nodes = [helper.make_node("Mul", ["image", "deviation"], ["scaled"]), helper.make_node("Add", ["scaled", "mean"], ["rgb"])]
-    for name, across, size in (("x", 2, width), ("y", 3, height)):
+    for name, across, size in (("x", 2, 288), ("y", 3, 384)):
         constants[f"shape_{name}"] = np.array([1, POINTS, 2 * size])
         nodes += [helper.make_node("ReduceMax", ["rgb"], [f"line_{name}"], axes=[across], keepdims=0),
                   helper.make_node("Gather", [f"line_{name}", "colour"], [f"points_{name}"], axis=1),
                   helper.make_node("Unsqueeze", [f"points_{name}", "last"], [f"column_{name}"]),
                   helper.make_node("Mul", [f"column_{name}", "halves"], [f"bins_{name}"]),
                   helper.make_node("Reshape", [f"bins_{name}", f"shape_{name}"], [f"simcc_{name}"])]
-    return write_network(path, (1, 3, height, width), {"simcc_x": (1, POINTS, 2 * width), "simcc_y": (1, POINTS, 2 * height)}, nodes,
-                         constants)
+    return write_wholebody(path, nodes, constants)
 
 
-def write_figure(path: Path, at: np.ndarray, high: np.ndarray, low: np.ndarray, width: int = 288, height: int = 384) -> Path:
-    """A whole-body network of the official shapes whose points (133, 2) px of the crop stay in place. Its peaks (133,) have the form
-    of mmpose's labels; they are high where the crop has blue, low where it has none."""
-    heights = {name: np.exp(-((np.arange(2 * size) - 2 * at[:, i, None] + 1) / SIGMA[i]) ** 2 / 2)[None]
-               for i, (name, size) in enumerate((("x", width), ("y", height)))}
+def write_figure(path: Path, at: np.ndarray, high: np.ndarray, low: np.ndarray) -> Path:
+    """A whole-body network whose points (133, 2) px of the crop stay in place. Its peaks (133,) have the form of mmpose's labels; they
+    are high where the crop has blue, low where it has none."""
     constants = {"blue": np.array([2]), "none": np.array([-103.53 / 57.375 + 1], np.float32)}
     nodes = [helper.make_node("Gather", ["image", "blue"], ["channel"], axis=1),
              helper.make_node("ReduceMax", ["channel"], ["most"], keepdims=0),
              helper.make_node("Greater", ["most", "none"], ["is_blue"])]
-    for name, shape in heights.items():
-        constants |= {f"high_{name}": (shape * high[:, None]).astype(np.float32), f"low_{name}": (shape * low[:, None]).astype(np.float32)}
+    for i, (name, size) in enumerate((("x", 288), ("y", 384))):
+        form = np.exp(-((np.arange(2 * size) - 2 * at[:, i, None] + 1) / SIGMA[i]) ** 2 / 2)[None]
+        constants |= {f"{kind}_{name}": (form * peaks[:, None]).astype(np.float32) for kind, peaks in (("high", high), ("low", low))}
         nodes.append(helper.make_node("Where", ["is_blue", f"high_{name}", f"low_{name}"], [f"simcc_{name}"]))
-    return write_network(path, (1, 3, height, width), {"simcc_x": (1, POINTS, 2 * width), "simcc_y": (1, POINTS, 2 * height)}, nodes,
-                         constants)
+    return write_wholebody(path, nodes, constants)

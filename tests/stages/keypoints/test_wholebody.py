@@ -17,7 +17,6 @@ from gsac.stages.keypoints import detector, tracking
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detector import POSE33
 from gsac.stages.keypoints.simcc import SimccNetwork, crop_matrix
-from gsac.stages.keypoints.simcc_scores import calibrate
 from gsac.stages.keypoints.stage import run
 from support.onnx_files import write_brightest, write_figure
 
@@ -30,7 +29,8 @@ def stand() -> np.ndarray:
     """Points (133, 2) px of somebody who stands in the frame, arms away from the body, tilted a little."""
     at = np.tile([180.0, 100.0], (133, 1))
     places = {"nose": (0, 0), "eye": (4, -5), "ear": (9, -2), "shoulder": (28, 40), "elbow": (55, 75), "wrist": (75, 110),
-              "hip": (18, 120), "knee": (20, 180), "ankle": (20, 240), "heel": (20, 248), "big_toe": (26, 252), "small_toe": (30, 252)}
+              "hip": (18, 120), "knee": (20, 180), "ankle": (20, 240), "heel": (20, 248), "big_toe": (26, 252),
+              "small_toe": (30, 252)}
     for name, index in INDEX.items():
         side, _, part = name.partition("_")
         across, down = places.get(part if side in ("left", "right") else name, (0, 5))
@@ -130,15 +130,7 @@ def test_a_hidden_hand_is_found_whatever_the_scale_of_the_networks_peaks(tmp_pat
     assert missing[:, 0].tolist() == [False] * 5 + [True] * 4 + [False] * 5 and not missing[:, 1].any()
 
 
-@pytest.mark.parametrize("peaks", [0.19, 40.0, -2.0, np.nan])
-def test_peaks_of_no_known_kind_are_refused(peaks):
-    with pytest.raises(BadInput, match="onnx-wholebody gives peaks whose strongest tenth begins at"):
-        calibrate(np.full((3, 133), peaks))
-
-
-def test_a_higher_peak_never_scores_lower_and_frames_without_a_person_stay_empty():
-    for top in (1.05, 8.0):
-        peaks = np.zeros((2, 133))
-        peaks[0] = np.linspace(-0.5, top, 133)
-        score = calibrate(peaks)
-        assert not score[1].any() and score.min() == 0 and score.max() <= 1 and (np.diff(score[0]) >= 0).all()
+def test_a_network_whose_scores_cannot_be_told_is_refused(tmp_path):
+    network = write_figure(tmp_path / "net.onnx", np.full((133, 2), 100.0), np.full(133, 60.0), np.zeros(133))
+    with pytest.raises(BadInput, match="onnx-wholebody gives peaks whose strongest tenth begins at 60; expected 0.25 to 1.5"):
+        detect([np.full((HEIGHT, WIDTH, 3), 120, np.uint8)] * 2, network, tmp_path)

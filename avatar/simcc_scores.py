@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.stages.contract import BadInput
+from gsac.avatar.onnx_network import NetworkError
 
 STRONG = 90
 """Percentile of a clip's peaks that stands for what is plainly seen."""
@@ -23,14 +23,14 @@ def calibrate(peaks: np.ndarray) -> np.ndarray:
     """peaks: (T, 133), zeros in frames without a person. Returns scores (T, 133) in 0..1.
 
     A logit is a score by the odds of its bin against an indifferent one: 0 where they are even, tanh of half the logit. Raises
-    BadInput where the peaks are of no known kind.
+    NetworkError where the peaks are of no known kind.
     """
     seen = peaks[peaks.any(axis=1)]
     if not len(seen):
         return np.zeros_like(peaks)
     strong = float(np.percentile(seen, STRONG))
     if not LEAST <= strong <= MOST:  # NaN too
-        raise BadInput(f"model file onnx-wholebody gives peaks whose strongest tenth begins at {strong:.3g}; expected {LEAST} to "
+        raise NetworkError(f"model file onnx-wholebody gives peaks whose strongest tenth begins at {strong:.3g}; expected {LEAST} to "
                        f"{LOGITS} (DWPose, RTMPose) or up to {MOST:g} (RTMW): export the network without a softmax, or choose "
                        "another; its scores would not tell a seen hand from a hidden one")
     return np.clip(peaks if strong < LOGITS else np.tanh(peaks / 2), 0, 1)
