@@ -19,8 +19,8 @@ LEAST, LOGITS, MOST = 0.25, 1.5, 20.0
 the official labels ask for is 0.2), scores exceed 1 slightly, and the official labels ask for logits of 10."""
 
 
-def calibrate(peaks: np.ndarray) -> np.ndarray:
-    """peaks: (T, 133), zeros in frames without a person. Returns scores (T, 133) in 0..1.
+def calibrate(peaks: np.ndarray, source: str) -> np.ndarray:
+    """peaks: (T, 133), zeros in frames without a person; source: whose they are. Returns scores (T, 133) in 0..1.
 
     A logit is a score by the odds of its bin against an indifferent one: 0 where they are even, tanh of half the logit. Raises
     NetworkError where the peaks are of no known kind.
@@ -30,7 +30,7 @@ def calibrate(peaks: np.ndarray) -> np.ndarray:
         return np.zeros_like(peaks)
     strong = float(np.percentile(seen, STRONG))
     if not LEAST <= strong <= MOST:  # NaN too
-        raise NetworkError(f"model file onnx-wholebody gives peaks whose strongest tenth begins at {strong:.3g}; expected {LEAST} to "
-                       f"{LOGITS} (DWPose, RTMPose) or up to {MOST:g} (RTMW): export the network without a softmax, or choose "
-                       "another; its scores would not tell a seen hand from a hidden one")
+        raise NetworkError(f"{source} gives peaks whose strongest tenth begins at {strong:.3g}; expected {LEAST} to {LOGITS} (DWPose, "
+                           f"RTMPose) or up to {MOST:g} (RTMW), else a seen hand is not told from a hidden one: export the network "
+                           "without a softmax, or choose another")
     return np.clip(peaks if strong < LOGITS else np.tanh(peaks / 2), 0, 1)

@@ -72,12 +72,17 @@ class Wholebody(Detector):
         drop_doubled_hand(frame)
 
     def settle(self, frames: list[Frame]) -> None:
-        try:
-            scores = calibrate(np.array([frame.score for frame in frames]))
-        except NetworkError as e:
-            raise BadInput(str(e)) from e
-        for frame, score in zip(frames, scores, strict=True):
-            frame.score[:] = score
+        settle_scores(frames, "model file onnx-wholebody")
+
+
+def settle_scores(frames: list[Frame], source: str) -> None:
+    """Makes scores of the peaks that the frames of a clip hold. source: whose they are, for the error."""
+    try:
+        scores = calibrate(np.array([frame.score for frame in frames]), source)
+    except NetworkError as e:
+        raise BadInput(str(e)) from e
+    for frame, score in zip(frames, scores, strict=True):
+        frame.score[:] = score
 
 
 def crop_matrix(points: np.ndarray, width: int, height: int) -> np.ndarray:

@@ -35,8 +35,8 @@ def write_wholebody(path: Path, nodes: list, constants: dict[str, np.ndarray]) -
 
 
 def write_brightest(path: Path, top: float) -> Path:
-    """A whole-body network: point i peaks where the red, green or blue (i modulo 3) of the crop is highest, as high as top times that
-    colour's share of 255; heights are read off the input by undoing mmpose's own normalisation."""
+    """A whole-body network: point i peaks where the red, green or blue (i modulo 3) of the crop is highest, as high as top times
+    that colour's share of 255; heights are read off the input by undoing mmpose's own normalisation."""
     constants = {"deviation": np.array([58.395, 57.12, 57.375], np.float32).reshape(1, 3, 1, 1) * np.float32(top / 255),
                  "mean": np.array([123.675, 116.28, 103.53], np.float32).reshape(1, 3, 1, 1) * np.float32(top / 255),
                  "colour": np.arange(POINTS) % 3, "last": np.array([3]), "halves": np.array([1, 0.9], np.float32)}
@@ -52,14 +52,15 @@ def write_brightest(path: Path, top: float) -> Path:
 
 
 def write_figure(path: Path, at: np.ndarray, high: np.ndarray, low: np.ndarray) -> Path:
-    """A whole-body network whose points (133, 2) px of the crop stay in place. Its peaks (133,) have the form of mmpose's labels; they
-    are high where the crop has blue, low where it has none."""
+    """A whole-body network whose points (133, 2) px of the crop stay in place. Its peaks (133,) have the form of mmpose's labels;
+    they are high where the crop has blue, low where it has none."""
     constants = {"blue": np.array([2]), "none": np.array([-103.53 / 57.375 + 1], np.float32)}
     nodes = [helper.make_node("Gather", ["image", "blue"], ["channel"], axis=1),
              helper.make_node("ReduceMax", ["channel"], ["most"], keepdims=0),
              helper.make_node("Greater", ["most", "none"], ["is_blue"])]
     for i, (name, size) in enumerate((("x", 288), ("y", 384))):
         form = np.exp(-((np.arange(2 * size) - 2 * at[:, i, None] + 1) / SIGMA[i]) ** 2 / 2)[None]
-        constants |= {f"{kind}_{name}": (form * peaks[:, None]).astype(np.float32) for kind, peaks in (("high", high), ("low", low))}
+        constants |= {f"{kind}_{name}": (form * peaks[:, None]).astype(np.float32)
+                      for kind, peaks in (("high", high), ("low", low))}
         nodes.append(helper.make_node("Where", ["is_blue", f"high_{name}", f"low_{name}"], [f"simcc_{name}"]))
     return write_wholebody(path, nodes, constants)
