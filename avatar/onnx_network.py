@@ -17,7 +17,7 @@ class NetworkError(ValueError):
 
 
 def open_network(path: Path, name: str, threads: int = 0) -> InferenceSession:
-    """Opens the ONNX file that was brought under a name; weights in external files lie beside it.
+    """Opens the ONNX file that was brought under a name, or the one in a folder where its weights lie beside it.
 
     threads: of the CPU; 0: as many as onnxruntime likes. Raises NetworkError where the file cannot be read.
     """
@@ -26,6 +26,8 @@ def open_network(path: Path, name: str, threads: int = 0) -> InferenceSession:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     here = onnxruntime.get_available_providers()
+    if path.is_dir():
+        path = next(path.glob("*.onnx"), path)
     try:
         return onnxruntime.InferenceSession(str(path), options, providers=[p for p in PREFERRED if p in here])
     except Exception as error:  # onnxruntime's own classes share no narrower base

@@ -30,7 +30,7 @@ def calibrate(peaks: np.ndarray, source: str) -> np.ndarray:
         return np.zeros_like(peaks)
     strong = float(np.percentile(seen, STRONG))
     if not LEAST <= strong <= MOST:  # NaN too
-        raise NetworkError(f"{source} gives peaks whose strongest tenth begins at {strong:.3g}; expected {LEAST} to {LOGITS} (DWPose, "
-                           f"RTMPose) or up to {MOST:g} (RTMW), else a seen hand is not told from a hidden one: export the network "
-                           "without a softmax, or choose another")
+        raise NetworkError(f"{source} gives peaks whose strongest tenth begins at {strong:.3g}; expected {LEAST} to {LOGITS} "
+                           f"(DWPose, RTMPose) or up to {MOST:g} (RTMW), else a seen hand is not told from a hidden one: export "
+                           "the network without a softmax, or choose another")
     return np.clip(peaks if strong < LOGITS else np.tanh(peaks / 2), 0, 1)

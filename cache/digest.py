@@ -46,6 +46,11 @@ def tree_digest(path: Path, memo: Memo | None = None) -> tuple[str, Manifest]:
     return manifest_digest(manifest), manifest
 
 
+def plain_digest(path: Path, memo: Memo | None = None) -> str:
+    """Plain sha256 of a file, tree digest of a folder: what a model is kept under."""
+    return tree_digest(path, memo)[0] if Path(path).is_dir() else file_digest(path, memo)
+
+
 def manifest_digest(manifest: Manifest) -> str:
     """Tree digest of a manifest."""
     return typed_digest("tree 1", canonical(manifest))

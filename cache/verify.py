@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gsac.cache import objects
-from gsac.cache.digest import file_digest
+from gsac.cache.digest import plain_digest
 from gsac.cache.key import KeyParts
 from gsac.cache.record import Record, is_digest, is_of_other_version
 from gsac.cache.store import DIGITS, Store, read_text
@@ -78,8 +78,8 @@ def _holds(store: Store, record: Record, declared: Collection[str] | None) -> bo
 
 
 def _check_model(store: Store, path: Path, report: VerifyReport) -> None:
-    """A model file lies in a folder that is named by the file's sha256."""
-    if path.is_file() and file_digest(path, objects.NO_MEMO) == path.parent.name:
+    """A model, a file or a folder of several, lies in a folder that is named by its digest."""
+    if path.exists() and plain_digest(path, objects.NO_MEMO) == path.parent.name:
         return
     report.damaged_models.append(path.name)
     try:

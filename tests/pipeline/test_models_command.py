@@ -12,6 +12,8 @@ from gsac.cache.store import Store
 from gsac.pipeline.cli import execute
 from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
+from gsac.stages.keypoints.simcc import SimccNetwork
+from support.onnx_files import write_brightest
 
 ROOT = Path(__file__).resolve().parents[2]
 OPEN_BODY = ROOT / "avatar" / "open_body" / "open_body.npz"
@@ -119,3 +121,23 @@ def test_only_what_was_brought_can_be_removed(models, capsys, name, words):
     execute(["models", "add", "mine", str(OPEN_BODY)])
     assert execute(["models", "remove", name]) == ExitCode.USAGE
     assert words in capsys.readouterr().err and set(models.brought) == {"mine"}
+
+
+def test_a_network_with_its_weights_beside_it_is_brought_whole_and_runs(models, tmp_path, capsys):
+    import onnx
+
+    folder = tmp_path / "brought"
+    folder.mkdir()
+    network = write_brightest(folder / "net.onnx", 1.0)
+    onnx.save(onnx.load(network), network, save_as_external_data=True, location="net.onnx_data", size_threshold=0)
+    words = ["models", "add", "onnx-wholebody", str(network)]
+    assert execute(words) == ExitCode.BAD_INPUT and "has weights in a file beside it; give both" in capsys.readouterr().err
+    assert execute([*words, f"{network}_data"]) == ExitCode.OK
+    path = models.need(["onnx-wholebody"], print)["onnx-wholebody"]
+    xy, _ = SimccNetwork(path).read(np.full((384, 288, 3), 200, np.uint8), np.eye(2, 3))
+    assert xy.shape == (133, 2)
+
+
+def test_files_that_belong_to_no_network_are_not_kept_together(models, flame, points, capsys):
+    assert execute(["models", "add", "mine", str(flame), str(points)]) == ExitCode.BAD_INPUT
+    assert "2 files were given, 0 of them .onnx" in capsys.readouterr().err and not models.brought
