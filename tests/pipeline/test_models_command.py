@@ -131,7 +131,7 @@ def test_a_network_with_its_weights_beside_it_is_brought_whole_and_runs(models, 
     network = write_brightest(folder / "net.onnx", 1.0)
     onnx.save(onnx.load(network), network, save_as_external_data=True, location="net.onnx_data", size_threshold=0)
     words = ["models", "add", "onnx-wholebody", str(network)]
-    assert execute(words) == ExitCode.BAD_INPUT and "has weights in a file beside it; give both" in capsys.readouterr().err
+    assert execute(words) == ExitCode.USAGE and "has weights in a file beside it; give both" in capsys.readouterr().err
     assert execute([*words, f"{network}_data"]) == ExitCode.OK
     path = models.need(["onnx-wholebody"], print)["onnx-wholebody"]
     xy, _ = SimccNetwork(path).read(np.full((384, 288, 3), 200, np.uint8), np.eye(2, 3))
@@ -139,5 +139,5 @@ def test_a_network_with_its_weights_beside_it_is_brought_whole_and_runs(models, 
 
 
 def test_files_that_belong_to_no_network_are_not_kept_together(models, flame, points, capsys):
-    assert execute(["models", "add", "mine", str(flame), str(points)]) == ExitCode.BAD_INPUT
+    assert execute(["models", "add", "mine", str(flame), str(points)]) == ExitCode.USAGE
     assert "2 files were given, 0 of them .onnx" in capsys.readouterr().err and not models.brought
