@@ -129,7 +129,7 @@ def test_a_network_with_its_weights_beside_it_is_brought_whole_and_runs(models, 
     folder = tmp_path / "brought"
     folder.mkdir()
     network = write_brightest(folder / "net.onnx", 1.0)
-    onnx.save(onnx.load(network), network, save_as_external_data=True, location="net.onnx_data", size_threshold=0)
+    onnx.save(onnx.load(network), network, save_as_external_data=True, location="net.onnx_data", size_threshold=100)
     words = ["models", "add", "onnx-wholebody", str(network)]
     assert execute(words) == ExitCode.USAGE and "has weights in a file beside it; give both" in capsys.readouterr().err
     assert execute([*words, f"{network}_data"]) == ExitCode.OK
