@@ -18,7 +18,8 @@ TAKEN = (OPEN, "none", "auto")
 
 def check_model(name: str, *files: Path) -> None:
     """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a face encoder, a FLAME head,
-    the points on one, its vertices in SMPL-X, or a body model. Several files are one network with its weights beside it."""
+    the points on one, its vertices in SMPL-X, key points of mmpose, or a body model. Several files are one network with its weights
+    beside it, or key points, a file a frame."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
@@ -36,7 +37,8 @@ def check_model(name: str, *files: Path) -> None:
         DecaEncoder(file)
         return
     try:
-        _read(file)
+        for one in files if file.suffix == ".json" else (file,):
+            _read(one)
     except (ArtifactError, NpzError, zipfile.BadZipFile) as error:
         said = str(error) if str(file) in str(error) else f"{file}: not a readable npz ({error})"
         raise BadInput(f"{said}; it was not added as {name}") from error
@@ -44,10 +46,12 @@ def check_model(name: str, *files: Path) -> None:
 
 def _whole(name: str, files: tuple[Path, ...]) -> Path:
     """The file among several that is read, the others go with it. Raises BadInput."""
+    if len(files) > 1 and all(file.suffix == ".json" for file in files):
+        return files[0]
     networks = [file for file in files if file.suffix == ".onnx"]
     if len(files) > 1 and len(networks) != 1:
         raise BadInput(f"{name}: {len(files)} files were given, {len(networks)} of them .onnx; several are kept together "
-                       "only as one .onnx with its weights beside it")
+                       "only as one .onnx with its weights beside it, or as .json that mmpose wrote")
     file = networks[0] if len(files) > 1 else files[0]
     beside = [other for end in WEIGHTS if (other := file.with_name(file.name + end)).is_file() and other not in files]
     if beside:
@@ -58,7 +62,11 @@ def _whole(name: str, files: tuple[Path, ...]) -> Path:
 def _read(file: Path) -> None:
     from gsac.avatar.body_file import read_body_file
     from gsac.avatar.flame_file import ARRAYS, POINTS, read_flame, read_flame_ids, read_flame_points
+    from gsac.avatar.mmpose_file import read_mmpose
 
+    if file.suffix == ".json":
+        read_mmpose(file)
+        return
     if file.suffix == ".npy":
         read_flame_ids(file)
         return

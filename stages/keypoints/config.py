@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from gsac.stages.brought_file import NONE
 from gsac.stages.contract import BadInput
 
-DetectorName = Literal["mediapipe", "onnx-wholebody"]
+DetectorName = Literal["mediapipe", "onnx-wholebody", "mmpose-json"]
 
 MODELS: dict[DetectorName, tuple[str, ...]] = {
     "mediapipe": ("pose_detection", "pose_landmark_full", "hand_recrop", "palm_detection_full", "hand_landmark_full",
                   "face_detection_short_range", "face_landmark"),
     "onnx-wholebody": ("pose_detection", "pose_landmark_full", "onnx-wholebody", "face_detection_short_range",
                        "face_landmark"),
+    "mmpose-json": ("pose_detection", "pose_landmark_full", "face_detection_short_range", "face_landmark"),
 }
 """Detector -> the network files it needs."""
 
@@ -22,7 +24,10 @@ MODELS: dict[DetectorName, tuple[str, ...]] = {
 class KeypointsConfig:
     detector: DetectorName = "mediapipe"
     """Networks that find the points. mediapipe: the embedded ones; onnx-wholebody: a SimCC whole-body network (RTMW, DWPose) that
-    you bring by `gsac models add onnx-wholebody FILE`."""
+    you bring by `gsac models add onnx-wholebody FILE`; mmpose-json: none, `points` names what mmpose found."""
+    points: str = NONE
+    """Name under which `gsac models add NAME FILE...` keeps the key points that mmpose's inferencer wrote as JSON for the frames in
+    split/frames, one file or one a frame, or none."""
     person_threshold: float = 0.5
     """Least confidence, 0..1, for a person to count as seen."""
     hand_threshold: float = 0.5
@@ -33,6 +38,9 @@ class KeypointsConfig:
     """Farthest that a hand's wrist may lie from the body's wrist, in forearm lengths; a hand beyond it is not taken."""
 
     def check(self) -> None:
+        if (self.points == NONE) == (self.detector == "mmpose-json"):
+            raise BadInput(f"keypoints.detector is {self.detector} and keypoints.points is {self.points}; expected mmpose-json "
+                           "with the name of mmpose's file (`gsac models add NAME FILE`), or neither")
         for name in ("person_threshold", "hand_threshold", "face_threshold"):
             value = getattr(self, name)
             if not 0 < value < 1:
@@ -42,4 +50,4 @@ class KeypointsConfig:
 
     def models(self) -> tuple[str, ...]:
         """Names of the network files that the detector needs."""
-        return MODELS[self.detector]
+        return (*MODELS[self.detector], *(() if self.points == NONE else (self.points,)))

@@ -23,10 +23,12 @@ from gsac.stages.keypoints.cut_off import Cut, find_cuts, name_cuts
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
 from gsac.stages.keypoints.mediapipe import Mediapipe
+from gsac.stages.keypoints.mmpose_points import MmposePoints
 from gsac.stages.keypoints.second_look import look_again
 from gsac.stages.keypoints.simcc import Wholebody
 
-DETECTORS: dict[DetectorName, type[Detector]] = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody}
+DETECTORS: dict[DetectorName, type[Detector]] = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody,
+                                               "mmpose-json": MmposePoints}
 """keypoints.detector -> its class."""
 MOST_THREADS = 8
 """Each holds networks of its own, some 40 MB."""

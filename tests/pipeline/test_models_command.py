@@ -1,5 +1,6 @@
 """gsac models add and remove: what is brought is looked at, and nothing is replaced unasked."""
 
+import json
 import pickle
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 from gsac.avatar.body_file import read_body_file
 from gsac.avatar.flame_file import ARRAYS
+from gsac.avatar.mmpose_file import read_mmpose
 from gsac.cache.store import Store
 from gsac.pipeline.cli import execute
 from gsac.pipeline.model_store import ModelStore
@@ -136,6 +138,18 @@ def test_a_network_with_its_weights_beside_it_is_brought_whole_and_runs(models, 
     path = models.need(["onnx-wholebody"], print)["onnx-wholebody"]
     xy, _ = SimccNetwork(path).read(np.full((384, 288, 3), 200, np.uint8), np.eye(2, 3))
     assert xy.shape == (133, 2)
+
+
+def test_key_points_of_mmpose_are_brought_a_file_a_frame(models, tmp_path, capsys):
+    files = [tmp_path / f"{t:06d}.json" for t in range(3)]
+    person = {"keypoints": np.ones((133, 2)).tolist(), "keypoint_scores": [1] * 133}
+    for file in files:
+        file.write_text(json.dumps([person]))
+    assert execute(["models", "add", "mine", *map(str, files)]) == ExitCode.OK
+    assert sorted(read_mmpose(models.need(["mine"], print)["mine"])) == [0, 1, 2]
+    files[2].write_text("{}")
+    assert execute(["models", "add", "other", *map(str, files)]) == ExitCode.USAGE
+    assert "000002.json: not mmpose's key points" in capsys.readouterr().err
 
 
 def test_files_that_belong_to_no_network_are_not_kept_together(models, flame, points, capsys):

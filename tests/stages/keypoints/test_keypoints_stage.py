@@ -50,7 +50,7 @@ def stage_on(frames: list[np.ndarray], folder: Path, store: Path) -> tuple[dict,
 
 
 def test_a_wrong_parameter_is_named_with_its_choices():
-    with pytest.raises(BadInput, match="keypoints.detector is 'alphapose'; choices: mediapipe, onnx-wholebody"):
+    with pytest.raises(BadInput, match="keypoints.detector is 'alphapose'; choices: mediapipe, onnx-wholebody, mmpose-json"):
         make_config(STAGE, {"detector": "alphapose"})
     with pytest.raises(BadInput, match="keypoints.hand_threshold is 1.5"):
         KeypointsConfig(hand_threshold=1.5).check()
