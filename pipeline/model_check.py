@@ -16,15 +16,16 @@ TAKEN = (OPEN, "none", "auto")
 """Words that mean something else where a parameter names a model file."""
 
 
-def check_model(name: str, *files: Path) -> None:
+def check_model(name: str, file: Path, *others: Path) -> None:
     """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a face encoder, a FLAME head,
-    the points on one, its vertices in SMPL-X, key points of mmpose, or a body model. Several files are one network with its weights
+    the points on one, its vertices in SMPL-X, key points of mmpose, a detector's errors, or a body model. Several files are one network with its weights
     beside it, or key points, a file a frame."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
     if name in TAKEN:
         raise BadInput(f"{name} is not a name for a model file: parameters give the word another meaning; choose another")
+    files = (file, *others)
     file = _whole(name, files)
     if name == DETECTOR:
         from gsac.stages.keypoints.simcc import SimccNetwork
@@ -44,7 +45,7 @@ def check_model(name: str, *files: Path) -> None:
         raise BadInput(f"{said}; it was not added as {name}") from error
 
 
-def _whole(name: str, files: tuple[Path, ...]) -> Path:
+def _whole(name: str, files: tuple[Path, *tuple[Path, ...]]) -> Path:
     """The file among several that is read, the others go with it. Raises BadInput."""
     if len(files) > 1 and all(file.suffix == ".json" for file in files):
         return files[0]
@@ -63,6 +64,7 @@ def _read(file: Path) -> None:
     from gsac.avatar.body_file import read_body_file
     from gsac.avatar.flame_file import ARRAYS, POINTS, read_flame, read_flame_ids, read_flame_points
     from gsac.avatar.mmpose_file import read_mmpose
+    from gsac.stages.smplx.detector_errors import read_errors
 
     if file.suffix == ".json":
         read_mmpose(file)
@@ -71,7 +73,9 @@ def _read(file: Path) -> None:
         read_flame_ids(file)
         return
     arrays = _array_names(file)
-    if arrays & POINTS.keys() and "v_template" not in arrays:
+    if {"habit", "spread"} <= arrays:
+        read_errors(file)
+    elif arrays & POINTS.keys() and "v_template" not in arrays:
         read_flame_points(file)
     elif arrays and _joints(file) == ARRAYS["kintree_table"][1]:
         read_flame(file)

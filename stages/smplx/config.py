@@ -23,6 +23,9 @@ class SmplxConfig:
     """Name of your FLAME head, the one of `face.flame`, or none. With it and `flame_ids` an SMPL-X body acts FLAME's expression."""
     flame_ids: str = "smplx-flame-ids"
     """Name of SMPL-X's own SMPL-X__FLAME_vertex_ids.npy; used only with a FLAME head."""
+    detector_offsets: str = NONE
+    """Name under which `gsac models add NAME FILE.npz` keeps the systematic errors of the detector that you brought, as
+    `tools/detector_offsets.py` measures them, or none: those of the embedded detector are known, of others none."""
     height_m: float | None = None
     """Height of the person, m; fixes the scale, which one camera cannot see. null: the shape prior gives the scale."""
     focal_px: float | None = None
@@ -45,7 +48,8 @@ class SmplxConfig:
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
-        return (*brought_files(self.body_model), *(() if self.flame == NONE else (self.flame, self.flame_ids)))
+        flame = () if self.flame == NONE else (self.flame, self.flame_ids)
+        return (*brought_files(self.body_model), *flame, *(() if self.detector_offsets == NONE else (self.detector_offsets,)))
 
     def check(self) -> None:
         """Raises BadInput where a value is out of range."""

@@ -11,20 +11,42 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import read_arrays
+from gsac.avatar.artifacts import check_arrays, read_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import INDEX
+from gsac.stages.brought_file import NONE, read_brought
+from gsac.stages.contract import BadInput, Job
 from gsac.stages.smplx.symmetry import mirror_directions
 
 FILES = {"mediapipe": Path(__file__).parent / "offsets" / "mediapipe.npz"}
 """Detector -> its errors, measured on truth clips by `tools/detector_offsets.py`."""
 HARMONICS = 3
 """H, of the yaw."""
+SHAPES = {"offsets": (133, 3), "by_betas": (133, 3, "F"), "own": (133, 3, "K"), "habit": (133, 2 * HARMONICS + 1, 2),
+          "spread": (133,), "model": ()}
+"""Of a file of errors; `model` is the digest of the body on which they were measured."""
 UNKNOWN, UNKNOWN_FACE = 0.006, 0.009
 """Spreads of an unmeasured detector, as a share of the person's height; wider for eyes, ears and nose, whose definitions differ."""
 PERSONAL = {"shoulder": (6, 4, 3), "elbow": (8, 3, 3), "wrist": (7, 2, 2), "hip": (4, 17, 3), "knee": (4, 12, 4),
             "ankle": (2, 7, 3), "big_toe": (3, 5, 5), "heel": (3, 6, 5)}
 """Points that a detector places differently on different people, and the standard deviation, mm along x, y, z, if unmeasured."""
+
+
+def read_errors(path: Path) -> dict[str, np.ndarray]:
+    """The arrays (...) of a file of errors, by name. Raises ArtifactError."""
+    return check_arrays(path, SHAPES)
+
+
+def find_errors(job: Job, body: Body, detector: str) -> str | Path:
+    """What `Detector.load` takes: the file that `smplx.detector_offsets` names, else the detector's name. Raises BadInput."""
+    name = job.config.detector_offsets
+    if name == NONE:
+        return detector
+    measured_on = str(read_brought(job, "smplx", "detector_offsets", read_errors)["model"])
+    if measured_on != body.digest:
+        raise BadInput(f"smplx.detector_offsets is {name}: it was measured on the body {measured_on[:12]}, smplx.body_model is "
+                       f"{body.digest[:12]}; measure anew with that body, or leave it out")
+    return job.models[name]
 
 
 @dataclass
@@ -39,9 +61,11 @@ class Detector:
     spread: np.ndarray  # (133,) standard deviation of the rest, the same shares
 
     @classmethod
-    def load(cls, name: str, body: Body) -> Detector:
-        """The measured errors of a detector; zero with wide spreads where the detector or this body was not measured."""
-        arrays = read_arrays(FILES[name]) if name in FILES else None
+    def load(cls, source: str | Path, body: Body) -> Detector:
+        """The measured errors of a detector of that name, or in that file; zero with wide spreads where the detector or this body was
+        not measured."""
+        path = source if isinstance(source, Path) else FILES.get(source)
+        arrays = None if path is None else read_arrays(path)
         if arrays is None or str(arrays["model"]) != body.digest:
             spread = np.full(133, UNKNOWN)
             spread[:5] = UNKNOWN_FACE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -35,7 +36,8 @@ class Sightings:
     width: int
     height: int
     focal_px: float | None
-    detector: str = ""
+    detector: str | Path = ""
+    """Its name, or the file of its measured errors."""
     face: dict[str, np.ndarray] | None = None
     """Arrays of face.npz: `valid` (T,), `expression` (T, E), `jaw` (T, 3) and, where a head was fitted, its mesh."""
     missing: np.ndarray | None = None

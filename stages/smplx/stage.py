@@ -14,6 +14,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector_errors import find_errors
 from gsac.stages.smplx.expression import translate_expression, translate_rest
 from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
@@ -50,7 +51,8 @@ def run(job: Job) -> None:
     shared = read_shared(job, body)
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side)
+                          clip.focal_px, find_errors(job, body, str(points["detector"])), face, points["missing"],
+                          clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from pathlib import Path
+
 import numpy as np
+import pytest
 
 from gsac.avatar import rotation
+from gsac.avatar.artifacts import read_arrays, write_arrays
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX
 from gsac.avatar.yaw import yaw as turn_yaw
-from gsac.stages.smplx.detector_errors import HARMONICS, PERSONAL, Detector, harmonics
+from gsac.pipeline.model_check import check_model
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector_errors import HARMONICS, PERSONAL, Detector, find_errors, harmonics
 from support.scripts import script
 
 detector_offsets = script("detector_offsets")
@@ -116,3 +124,34 @@ def test_an_unknown_detector_has_no_habits(body):
     unknown = Detector.load("someone-else", body)
     assert not unknown.offsets.any() and not unknown.habit.any() and (unknown.spread > 0).all()
     assert not unknown.slopes(body).any() and unknown.own.any()
+
+
+@pytest.fixture
+def brought(tmp_path, body):
+    """Errors of a detector that nobody knows, 10 cm along x at each point."""
+    kept = Detector.load("someone-else", body)
+    kept.offsets[:, 0] = 0.1
+    write_arrays(tmp_path / "mine.npz", **{f.name: getattr(kept, f.name) for f in fields(kept)}, model=np.array(body.digest))
+    return tmp_path / "mine.npz"
+
+
+def job_of(path: Path, name: str = "mine") -> Job:
+    return Job({}, Path(), SmplxConfig(detector_offsets=name), {"mine": path})
+
+
+def test_errors_that_the_user_measured_are_those_of_the_fit(body, brought):
+    assert SmplxConfig(detector_offsets="mine").models() == ("mine",) and SmplxConfig().models() == ()
+    check_model("mine", brought)
+    kept = Detector.load(find_errors(job_of(brought), body, "mediapipe"), body)
+    assert np.allclose(kept.offsets, [0.1, 0, 0]) and kept.own.any()
+    assert find_errors(job_of(brought, "none"), body, "mediapipe") == "mediapipe"
+
+
+def test_errors_measured_on_another_body_or_of_other_shapes_are_refused(body, brought):
+    arrays = read_arrays(brought)
+    write_arrays(brought, **arrays | {"model": np.array("0" * 64)})
+    with pytest.raises(BadInput, match="smplx.detector_offsets is mine: it was measured on the body 0000"):
+        find_errors(job_of(brought), body, "mediapipe")
+    write_arrays(brought, **arrays | {"spread": np.zeros(17)})
+    with pytest.raises(BadInput, match=r"array spread has shape \(17,\), expected \(133,\); it was not added as mine"):
+        check_model("mine", brought)
