@@ -18,8 +18,8 @@ TAKEN = (OPEN, "none", "auto")
 
 def check_model(name: str, file: Path, *others: Path) -> None:
     """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a face encoder, a FLAME head,
-    the points on one, its vertices in SMPL-X, key points of mmpose, a detector's errors, or a body model. Several files are one network with its weights
-    beside it, or key points, a file a frame."""
+    the points on one, its vertices in SMPL-X, key points of mmpose, a detector's errors, or a body model. Several files are one
+    network with its weights beside it, or key points, a file a frame."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
@@ -28,9 +28,13 @@ def check_model(name: str, file: Path, *others: Path) -> None:
     files = (file, *others)
     file = _whole(name, files)
     if name == DETECTOR:
-        from gsac.stages.keypoints.simcc import SimccNetwork
+        from gsac.avatar.onnx_network import NetworkError
+        from gsac.avatar.simcc import SimccNetwork
 
-        SimccNetwork(file)
+        try:
+            SimccNetwork(file)
+        except NetworkError as error:
+            raise BadInput(str(error)) from error
         return
     if name == ENCODER:
         from gsac.stages.face.deca import DecaEncoder

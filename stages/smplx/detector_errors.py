@@ -62,8 +62,8 @@ class Detector:
 
     @classmethod
     def load(cls, source: str | Path, body: Body) -> Detector:
-        """The measured errors of a detector of that name, or in that file; zero with wide spreads where the detector or this body was
-        not measured."""
+        """The measured errors of a detector of that name, or in that file; zero with wide spreads where the detector or this body
+        was not measured."""
         path = source if isinstance(source, Path) else FILES.get(source)
         arrays = None if path is None else read_arrays(path)
         if arrays is None or str(arrays["model"]) != body.digest:

@@ -10,11 +10,11 @@ import pytest
 from gsac.avatar.body_file import read_body_file
 from gsac.avatar.flame_file import ARRAYS
 from gsac.avatar.mmpose_file import read_mmpose
+from gsac.avatar.simcc import SimccNetwork
 from gsac.cache.store import Store
 from gsac.pipeline.cli import execute
 from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
-from gsac.stages.keypoints.simcc import SimccNetwork
 from support.onnx_files import write_brightest
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from gsac.avatar.artifacts import check_filled_keypoints, read_arrays
+from gsac.avatar.simcc import SimccNetwork, crop_matrix
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.handgap.config import HandgapConfig
 from gsac.stages.handgap.stage import run as fill
 from gsac.stages.keypoints.config import KeypointsConfig
-from gsac.stages.keypoints.simcc import SimccNetwork, crop_matrix
 from support.onnx_files import write_brightest, write_figure
 from support.standing import HEIGHT, WIDTH, Blaze, blaze, run_keypoints, stand  # noqa: F401, blaze is a fixture
 
