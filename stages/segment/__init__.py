@@ -1,13 +1,14 @@
 """segment: how much of each pixel is the person.
 
-takes  split/frames (frames/plate.png where photos came with the empty scene), split/clip.json, keypoints/keypoints.npz
+takes  split/frames (frames/plate.png where photos came with the empty scene, frames/masks where the footage came with masks),
+       split/clip.json, keypoints/keypoints.npz
 gives  alpha/%06d.exr (H, W) half, 0..1
 
 A person network finds the rough region (`network.py`), GrabCut at half size its outline (`grabcut.py`), of which the parts that
 are no person are dropped (`components.py`). At full size the outline is corrected by the empty scene (`correction.py`), and the
 colours on both sides of it give the soft edge (`matting.py`). Each step uses a plate, the empty scene, where there is one
 (`plate.py`); from a video of a still camera it is computed, once from the rough regions and again from the outlines
-(`plate_from_video.py`).
+(`plate_from_video.py`). Masks that the user brought stay as they are (`brought.py`).
 """
 
 from gsac.avatar.artifacts import check_image_folder

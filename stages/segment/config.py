@@ -7,18 +7,19 @@ from typing import Literal
 
 from gsac.stages.contract import BadInput
 
-Method = Literal["pose", "selfie"]
+Method = Literal["pose", "selfie", "brought"]
 
-MODELS: dict[Method, tuple[str, ...]] = {"pose": ("pose_landmark_full",), "selfie": ("selfie_segmentation",)}
+MODELS: dict[Method, tuple[str, ...]] = {"pose": ("pose_landmark_full",), "selfie": ("selfie_segmentation",), "brought": ()}
 """segment.method -> the network files it needs."""
 
 
 @dataclass
 class SegmentConfig:
     method: Method = "pose"
-    """Network that finds the person's rough region. pose: the body network's own mask; selfie: the selfie network."""
+    """Network that finds the person's rough region. pose: the body network's own mask; selfie: the selfie network. brought: no
+    network, the masks in the folder masks beside the footage are the alpha, as they are."""
     iterations: int = 1
-    """Iterations of GrabCut; 0 keeps the network's outline."""
+    """Iterations of GrabCut; 0 keeps the network's outline. Of pose and selfie only."""
     use_plate: bool = True
     """Whether the empty scene is used: the plate that photos came with, or for a video of a still camera the median of its
     frames."""

@@ -14,6 +14,7 @@ from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
+from gsac.stages.segment.brought import MASKS, hand_on
 from gsac.stages.segment.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.stages.segment.components import keep_person
 from gsac.stages.segment.config import Method
@@ -57,8 +58,42 @@ def run(job: Job) -> None:
     keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     if len(paths) != len(keypoints["xy"]):
         raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
-    network = METHODS[job.config.method](job.models)
     clip = Clip.read(job.inputs["split/clip.json"])
+    (job.out / "alpha").mkdir()
+    if job.config.method == "brought":
+        sway = use_brought(job, paths)
+    else:
+        if (frames / MASKS).is_dir():
+            job.note("Masks lie beside the footage and are not used; segment.method=brought takes them.")
+        sway = cut_frames(job, paths, keypoints, clip)
+    moved = find_moved(sway, max(clip.width, clip.height))
+    if clip.timestamps_s is not None and moved.any():
+        job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
+
+
+def use_brought(job: Job, paths: list[Path]) -> np.ndarray:
+    """Hands on the masks that came with the footage. paths: T frames. Returns (T,) px, how far the camera sways."""
+    empty = np.zeros(len(paths), bool)
+    sway = measure_sway(count_views(job, hand_on(paths, job.out / "alpha", empty), len(paths)))
+    if empty.all():
+        raise StageError(f"frame 0 ({paths[0].name}) and all others: the mask that came with it shows nobody there")
+    if empty.any():
+        job.warn(Finding.of(Code.EMPTY_MASK, empty))
+    return sway
+
+
+def count_views(job: Job, views: Iterable[View], total: int) -> Iterator[View]:
+    """Yields them, and tells how many there were."""
+    for done, view in enumerate(views, 1):
+        job.progress(done, total, "frames")
+        yield view
+
+
+def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], clip: Clip) -> np.ndarray:
+    """Finds the person in each frame and writes the masks. paths: T frames; keypoints: their arrays (T, ...) by name. Returns (T,)
+    px, how far the camera sways."""
+    frames = job.inputs["split/frames"]
+    network = METHODS[job.config.method](job.models)
     is_video = clip.timestamps_s is not None
     plate, given = None, (frames / "plate.png").exists()
     if job.config.use_plate and given:
@@ -86,11 +121,6 @@ def run(job: Job) -> None:
             absent[t] = unfound[t] = True
         return make_view(image, cutouts[t].on_frame(image.shape).astype(np.float32))
 
-    def counted(views: Iterable[View]) -> Iterator[View]:
-        for done, view in enumerate(views, 1):
-            job.progress(done, len(paths), "frames")
-            yield view
-
     def outline(t: int, image: np.ndarray) -> np.ndarray:
         return cutouts[t].on_frame(image.shape)
 
@@ -100,21 +130,18 @@ def run(job: Job) -> None:
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
     with ThreadPoolExecutor(available_cores()) as pool:
-        sway = measure_sway(counted(prefetch(pool, cut, masks(pool), available_cores())))
+        sway = measure_sway(count_views(job, prefetch(pool, cut, masks(pool), available_cores()), len(paths)))
         if absent.all():
             raise StageError(describe_nobody(paths, unfound))
         if plate is not None and not given:
             plate = relearn_plate(paths, ~absent, outline) if fits[~absent].mean() >= MOSTLY else None
-        (job.out / "alpha").mkdir()
         deque(pool.map(soft, range(len(paths))), maxlen=0)
     if absent.any():
         job.warn(Finding.of(Code.EMPTY_MASK, absent))
     other_scene = ~fits & ~absent
     if given and other_scene.any():
         job.warn(Finding.of(Code.OTHER_SCENE, other_scene))
-    moved = find_moved(sway, max(clip.width, clip.height))
-    if is_video and moved.any():
-        job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
+    return sway
 
 
 def describe_nobody(paths: list[Path], unfound: np.ndarray) -> str:
