@@ -139,7 +139,7 @@ def _read_picture(path: Path) -> np.ndarray:
 
 
 def _of_one(pixels: np.ndarray) -> np.ndarray | None:
-    """(H, W) of (H, W) or (H, W, C) pixels: the transparency where it says something, else the grey; None where that is coloured."""
+    """pixels: (H, W) or (H, W, C). Returns (H, W): the transparency where it varies, else the grey; None of colours."""
     if pixels.ndim == 2:
         return pixels
     if pixels.shape[2] in (2, 4):
