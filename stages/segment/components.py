@@ -31,8 +31,8 @@ def keep_person(outline: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.nd
 
 
 def keep_soft_person(alpha: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """alpha: (H, W) 0..1, soft; xy: (133, 2) px; score: (133,). Returns the alpha (H, W) without the parts that hold no seen point, and
-    without what is nearer to them than to the person."""
+    """alpha: (H, W) 0..1, soft; xy: (133, 2) px; score: (133,). Returns the alpha (H, W) without the parts that hold no
+    seen point, and without what is nearer to them than to the person."""
     kept = keep_person(alpha, xy, score) > 0.5
     dropped = (alpha > 0.5) & ~kept
     if not dropped.any():

@@ -9,8 +9,9 @@ from gsac.stages.contract import BadInput
 
 Method = Literal["pose", "selfie", "sapiens", "brought"]
 
-MODELS: dict[Method, tuple[str, ...]] = {"pose": ("pose_landmark_full",), "selfie": ("selfie_segmentation",), "sapiens": ("sapiens-seg",),
-                                        "brought": ()}
+MODELS: dict[Method, tuple[str, ...]] = {
+    "pose": ("pose_landmark_full",), "selfie": ("selfie_segmentation",), "sapiens": ("sapiens-seg",), "brought": (),
+}
 """segment.method -> the network files it needs."""
 
 

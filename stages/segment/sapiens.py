@@ -6,14 +6,13 @@ each class of `PARTS`, over the whole frame. Numbers and order of classes are th
 
 from __future__ import annotations
 
-import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from gsac.avatar.onnx_network import NetworkError, open_network
+from gsac.avatar.brought_network import open_brought
+from gsac.avatar.onnx_network import NetworkError
 from gsac.avatar.region import Region
 from gsac.stages.contract import BadInput
 
@@ -24,23 +23,24 @@ MEAN = np.array([123.5, 116.5, 103.5], np.float32)
 DEVIATION = np.array([58.5, 57.0, 57.5], np.float32)
 PARTS = ("background", "apparel", "face_neck", "hair", "left_foot", "left_hand", "left_lower_arm", "left_lower_leg", "left_shoe",
          "left_sock", "left_upper_arm", "left_upper_leg", "lower_clothing", "right_foot", "right_hand", "right_lower_arm",
-         "right_lower_leg", "right_shoe", "right_sock", "right_upper_arm", "right_upper_leg", "torso", "upper_clothing", "lower_lip",
-         "upper_lip", "lower_teeth", "upper_teeth", "tongue")
+         "right_lower_leg", "right_shoe", "right_sock", "right_upper_arm", "right_upper_leg", "torso", "upper_clothing",
+         "lower_lip", "upper_lip", "lower_teeth", "upper_teeth", "tongue")
 """Goliath's 28 classes: a label's number is its place here."""
 CERTAIN = 80.0
 """Logits above the background's from which on alpha is 1 in any float."""
 EXPECTED = f"expected Sapiens' segmentation: input [1, 3, {HEIGHT}, {WIDTH}], output [1, {len(PARTS)}, height, width]"
-
-Logits = Callable[[np.ndarray], np.ndarray]
-"""(1, 3, 1024, 768) float32 -> (1, 28, h, w)."""
 
 
 class Sapiens:
     """Who and what is in a frame. models: its file as `MODEL`; raises `BadInput` where that is no such network."""
 
     def __init__(self, models: dict[str, Path]):
-        path = models[MODEL]
-        self._logits = _open_torchscript(path) if zipfile.is_zipfile(path) else _open_onnx(path)
+        try:
+            self._network = open_brought(models[MODEL], MODEL)
+        except NetworkError as e:
+            raise BadInput(str(e)) from e
+        if not self._network.may_be([1, 3, HEIGHT, WIDTH], [1, len(PARTS), None, None]):
+            raise BadInput(f"model file {MODEL} has input {self._network.given} and output {self._network.gives}; {EXPECTED}")
 
     def __call__(self, image: np.ndarray, region: Region) -> np.ndarray:
         """image: (H, W, 3) uint8. Returns (H, W) float32, alpha of all persons: the network sees the whole frame."""
@@ -48,7 +48,10 @@ class Sapiens:
 
     def read(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """image: (H, W, 3) uint8. Returns alpha (H, W) float32 of all persons, and the label (H, W) uint8 of each pixel."""
-        logits = np.asarray(self._logits(prepare(image)), np.float32)
+        try:
+            logits = self._network.run(prepare(image))
+        except NetworkError as e:
+            raise BadInput(f"{e}; {EXPECTED}") from e
         if logits.ndim != 4 or logits.shape[1] != len(PARTS):
             raise BadInput(f"model file {MODEL} gives an output of shape {logits.shape}; {EXPECTED}")
         return decide(logits[0], *image.shape[:2])
@@ -72,42 +75,3 @@ def decide(logits: np.ndarray, height: int, width: int) -> tuple[np.ndarray, np.
         np.maximum(best, above, out=best)
         odds += np.exp(np.minimum(above, CERTAIN, out=above), out=above)
     return odds / (1 + odds), labels
-
-
-def _open_onnx(path: Path) -> Logits:
-    try:
-        session = open_network(path, MODEL)
-    except NetworkError as e:
-        raise BadInput(str(e)) from e
-    given, outputs = session.get_inputs()[0], session.get_outputs()
-    if not (_fits(given.shape, (1, 3, HEIGHT, WIDTH)) and _fits(outputs[0].shape, (1, len(PARTS), None, None))):
-        raise BadInput(f"model file {MODEL} has input {given.shape} and output {outputs[0].shape}; {EXPECTED}")
-    kind = np.float16 if given.type == "tensor(float16)" else np.float32
-    return lambda ready: session.run([outputs[0].name], {given.name: ready.astype(kind)})[0]
-
-
-def _fits(shape: list, wanted: tuple[int | None, ...]) -> bool:
-    """Whether a shape, in which a name stands for any length, may be the wanted one, in which None does."""
-    return len(shape) == len(wanted) and all(
-        have == want for have, want in zip(shape, wanted, strict=True) if isinstance(have, int) and want is not None)
-
-
-def _open_torchscript(path: Path) -> Logits:
-    import torch
-
-    device = "cuda" if torch.cuda.is_available() else "cpu"
-    try:
-        network = torch.jit.load(str(path), map_location=device).eval()
-    except (RuntimeError, ValueError) as e:
-        raise BadInput(f"model file {MODEL} is neither ONNX nor TorchScript ({str(e).splitlines()[0]}); weights alone, or what "
-                       f"torch.export wrote, do not do. Bring it again with `gsac models add {MODEL} FILE`") from e
-    kind = next((weight.dtype for weight in network.parameters()), torch.float32)
-
-    def logits(ready: np.ndarray) -> np.ndarray:
-        with torch.inference_mode():
-            out = network(torch.from_numpy(ready).to(device, kind))
-        if not isinstance(out, torch.Tensor):
-            raise BadInput(f"model file {MODEL} gives a {type(out).__name__}; {EXPECTED}")
-        return out.float().cpu().numpy()
-
-    return logits

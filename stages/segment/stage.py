@@ -100,43 +100,37 @@ def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], cl
     px, how far the camera sways."""
     frames = job.inputs["split/frames"]
     network = METHODS[job.config.method](job.models)
-    is_video = clip.timestamps_s is not None
+    sapiens = network if isinstance(network, Sapiens) else None
     plate, given = None, (frames / "plate.png").exists()
+    learns = job.config.use_plate and clip.timestamps_s is not None and not given
     if job.config.use_plate and given:
         image = read_frame(frames / "plate.png")
         plate = Plate(image, np.ones(image.shape[:2], bool))
-    elif job.config.use_plate and is_video and not isinstance(network, Sapiens):
+    elif learns and sapiens is None:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
     absent, unfound, fits = np.zeros((3, len(paths)), bool)
     cutouts: dict[int, Cutout] = {}
-
-    def write_labels(t: int, labels: np.ndarray) -> None:
-        write_image(job.out / "alpha" / LABELS / f"{paths[t].stem}.png", labels)
 
     def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]]:
         """Index, image, probability and labels of each frame; the network has threads of its own, so one thread feeds it."""
         for t, image in enumerate(prefetch(pool, read_frame, paths, 2)):
             region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
-            if region is None:
-                yield t, image, None, None
-            elif isinstance(network, Sapiens):
-                yield t, image, *network.read(image)
+            if sapiens is not None and region is not None:
+                yield t, image, *sapiens.read(image)
             else:
-                yield t, image, network(image, region), None
+                yield t, image, None if region is None else network(image, region), None
 
     def cut(masked: tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]) -> View:
         t, image, probability, labels = masked
         absent[t] = probability is None
         if probability is None:
-            if isinstance(network, Sapiens):
-                write_labels(t, np.zeros(image.shape[:2], np.uint8))
             return make_view(image, np.zeros(image.shape[:2], np.float32))
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
         if labels is None:
             cutouts[t], fits[t] = cut_frame(image, probability, xy, score, plate, job.config.iterations)
         else:
             cutouts[t], fits[t] = cut_soft_frame(image, probability, xy, score, plate)
-            write_labels(t, keep_labels(labels, cutouts[t]))
+            write_image(labels_of(job.out, paths[t]), keep_labels(labels, cutouts[t]))
         if not cutouts[t].outline.any():
             absent[t] = unfound[t] = True
         return make_view(image, cutouts[t].on_frame(image.shape).astype(np.float32))
@@ -149,16 +143,16 @@ def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], cl
         alpha = np.zeros(shape, np.float32) if absent[t] else finish(cutouts.pop(t), shape, plate)
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
-    if isinstance(network, Sapiens):
-        (job.out / "alpha" / LABELS).mkdir()
+    if sapiens is not None:
+        prepare_labels(job.out, paths, (clip.height, clip.width))
     with ThreadPoolExecutor(available_cores()) as pool:
         sway = measure_sway(count_views(job, prefetch(pool, cut, masks(pool), available_cores()), len(paths)))
         if absent.all():
             raise StageError(describe_nobody(paths, unfound))
-        if isinstance(network, Sapiens) and job.config.use_plate and is_video and not given:
-            plate = relearn_plate(paths, ~absent, outline) if not find_moved(sway, max(clip.width, clip.height)).any() else None
-        elif plate is not None and not given:
-            plate = relearn_plate(paths, ~absent, outline) if fits[~absent].mean() >= MOSTLY else None
+        if learns:
+            still = not find_moved(sway, max(clip.width, clip.height)).any() if sapiens is not None else (
+                plate is not None and fits[~absent].mean() >= MOSTLY)
+            plate = relearn_plate(paths, ~absent, outline) if still else None
         deque(pool.map(soft, range(len(paths))), maxlen=0)
     if absent.any():
         job.warn(Finding.of(Code.EMPTY_MASK, absent))
@@ -166,6 +160,18 @@ def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], cl
     if given and other_scene.any():
         job.warn(Finding.of(Code.OTHER_SCENE, other_scene))
     return sway
+
+
+def labels_of(out: Path, frame: Path) -> Path:
+    """Where a frame's labels lie."""
+    return out / "alpha" / LABELS / f"{frame.stem}.png"
+
+
+def prepare_labels(out: Path, paths: list[Path], shape: tuple[int, int]) -> None:
+    """Writes labels that name nothing, for the frames in which nobody is. paths: T frames; shape: H, W of each."""
+    (out / "alpha" / LABELS).mkdir()
+    for path in paths:
+        write_image(labels_of(out, path), np.zeros(shape, np.uint8))
 
 
 def describe_nobody(paths: list[Path], unfound: np.ndarray) -> str:

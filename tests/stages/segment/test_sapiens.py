@@ -35,7 +35,8 @@ def weights():
 
 def onnx(folder, classes=28, side=(1024, 768), kind="network"):
     weight, offset = weights()
-    return write_network(folder / f"{kind}.onnx", ("image", (1, 3, *side)), ("logits", (1, classes, side[0] // CELL, side[1] // CELL)),
+    return write_network(folder / f"{kind}.onnx", ("image", (1, 3, *side)),
+                         ("logits", (1, classes, side[0] // CELL, side[1] // CELL)),
                          [node("AveragePool", ["image"], "cells", kernel_shape=[CELL, CELL], strides=[CELL, CELL]),
                           node("Conv", ["cells", "weight", "offset"], "logits")],
                          {"weight": weight[:classes], "offset": offset[:classes]})
@@ -76,8 +77,8 @@ def paint(*patches, height=HEIGHT, width=WIDTH):
 
 
 @pytest.mark.parametrize(("colour", "part"), [
-    ((160, 20, 20), "lower_clothing"), ((20, 135, 20), "upper_clothing"), ((20, 20, 130), "hair"), ((150, 133, 100), "upper_clothing"),
-    ((140, 20, 20), "background"), ((20, 20, 20), "background"), ((255, 255, 255), "hair"),
+    ((160, 20, 20), "lower_clothing"), ((20, 135, 20), "upper_clothing"), ((20, 20, 130), "hair"),
+    ((150, 133, 100), "upper_clothing"), ((140, 20, 20), "background"), ((20, 20, 20), "background"), ((255, 255, 255), "hair"),
 ])
 def test_alpha_and_label_follow_from_a_colours_logits(network, colour, part):
     alpha, labels = network.read(paint(((0, 0, WIDTH, HEIGHT), colour)))
@@ -137,6 +138,13 @@ def test_the_networks_own_alpha_and_labels_come_out_of_the_stage(other_network, 
     assert np.abs(alpha[110:190, 100:150] - alpha_of(faint)).max() < 5e-4
     assert not alpha[:, 230:].any() and not labels[:, 230:].any()
     assert (labels[60:390, 70:190] == PARTS.index("lower_clothing")).all()
+
+
+def test_a_frame_without_a_person_has_empty_labels_too(other_network, tmp_path):
+    image = paint(((60, 50, 200, 400), (160, 20, 20)))
+    alphas, labels, warnings = run(tmp_path, [image, paint()], [(80, 80), (180, 80), (120, 300), (130, 350)], other_network)
+    assert alphas[0].any() and labels[0].any() and not alphas[1].any() and not labels[1].any()
+    assert warnings == ["No person is in frame 1; the mask there is empty."]
 
 
 def test_of_two_persons_the_one_with_the_points_is_kept_to_the_edge(other_network, tmp_path):
