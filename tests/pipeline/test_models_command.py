@@ -68,6 +68,8 @@ def write_torn(path: Path) -> Path:
     (write_torn, "torn.npz", "my-body", "not a readable"),
     (write_headless, "other.npz", "my-body", "array v_template is missing"),
     (write_text, "net.onnx", "onnx-wholebody", "cannot be read as ONNX"),
+    (write_text, "net.onnx", "sapiens-seg", "cannot be read as ONNX"),
+    (lambda file: file.write_bytes(ONNX.read_bytes()) and file, "net.onnx", "sapiens-seg", "expected Sapiens' segmentation"),
     (write_text, "weights.npz", "lpips-vgg", "cannot be read as .npz"),
 ])
 def test_a_file_that_is_no_model_is_refused_and_not_kept(models, tmp_path, capsys, make, file, name, words):

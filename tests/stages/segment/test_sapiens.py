@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from onnx import helper
 
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_alpha, write_arrays, write_frame
 from gsac.stages.contract import BadInput, Job
@@ -10,7 +11,7 @@ from gsac.stages.segment import stage
 from gsac.stages.segment.config import SegmentConfig
 from gsac.stages.segment.sapiens import PARTS, Sapiens, decide
 from support.artifacts import blank
-from support.onnx_file import node, write_network
+from support.onnx_files import write_network
 
 MEAN, DEVIATION = (123.5, 116.5, 103.5), (58.5, 57.0, 57.5)
 """Of red, green and blue, as published."""
@@ -35,10 +36,9 @@ def weights():
 
 def onnx(folder, classes=28, side=(1024, 768), kind="network"):
     weight, offset = weights()
-    return write_network(folder / f"{kind}.onnx", ("image", (1, 3, *side)),
-                         ("logits", (1, classes, side[0] // CELL, side[1] // CELL)),
-                         [node("AveragePool", ["image"], "cells", kernel_shape=[CELL, CELL], strides=[CELL, CELL]),
-                          node("Conv", ["cells", "weight", "offset"], "logits")],
+    cells = helper.make_node("AveragePool", ["image"], ["cells"], kernel_shape=[CELL, CELL], strides=[CELL, CELL])
+    return write_network(folder / f"{kind}.onnx", (1, 3, *side), {"logits": (1, classes, side[0] // CELL, side[1] // CELL)},
+                         [cells, helper.make_node("Conv", ["cells", "weight", "offset"], ["logits"])],
                          {"weight": weight[:classes], "offset": offset[:classes]})
 
 
