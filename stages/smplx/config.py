@@ -49,9 +49,6 @@ class SmplxConfig:
 
     def check(self) -> None:
         """Raises BadInput where a value is out of range."""
-        if self.flame != NONE and self.body_model == OPEN:
-            raise BadInput("smplx.flame is given, but smplx.body_model is open, whose face acts the facial actions; leave it out, "
-                           "or give an SMPL-X body")
         if self.method not in METHODS:
             raise BadInput(f"smplx.method is {self.method!r}; choose one of {', '.join(METHODS)}")
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:

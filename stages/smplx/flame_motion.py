@@ -15,6 +15,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.flame_file import Flame, read_flame, read_flame_ids
 from gsac.avatar.joints import JAW
+from gsac.stages.body_choice import OPEN
 from gsac.stages.brought_file import NONE, read_brought
 from gsac.stages.contract import BadInput, Job
 
@@ -111,6 +112,9 @@ def read_shared(job: Job, body: Body) -> tuple[Flame, np.ndarray] | None:
     """The user's FLAME head and (5023,) the body's vertices that are its; None without `smplx.flame`."""
     if job.config.flame == NONE:
         return None
+    if job.config.body_model == OPEN:
+        raise BadInput("smplx.flame is given, but smplx.body_model is open, whose face acts the facial actions; leave it out, or "
+                       "give an SMPL-X body")
     flame = read_brought(job, "smplx", "flame", read_flame)
     ids = read_brought(job, "smplx", "flame_ids", read_flame_ids)
     if ids.max() >= len(body.v_template):

@@ -104,7 +104,7 @@ def test_vertex_numbers_that_do_not_fit_are_refused_by_name(tmp_path, flame_file
         read_shared(job, body)
 
 
-def test_the_open_body_takes_no_flame_and_says_so():
+def test_the_open_body_takes_no_flame_and_says_so(tmp_path, body):
     with pytest.raises(BadInput, match="smplx.flame is given, but smplx.body_model is open"):
-        make_config(STAGE, {"flame": "flame"})
+        read_shared(Job({}, tmp_path, make_config(STAGE, {"flame": "flame"})), body)
     assert make_config(STAGE, {"flame": "f", "body_model": "mine"}).models() == ("mine", "f", "smplx-flame-ids")
