@@ -121,3 +121,11 @@ def test_only_what_was_brought_can_be_removed(models, capsys, name, words):
     execute(["models", "add", "mine", str(OPEN_BODY)])
     assert execute(["models", "remove", name]) == ExitCode.USAGE
     assert words in capsys.readouterr().err and set(models.brought) == {"mine"}
+
+
+def test_the_list_names_the_networks_that_methods_would_use_and_nobody_brought(models, capsys):
+    execute(["models", "add", "onnx-wholebody", str(ONNX)])
+    capsys.readouterr()
+    assert execute(["models", "ls"]) == ExitCode.OK
+    said = {line.split()[0]: line.split()[1] for line in capsys.readouterr().out.splitlines()}
+    assert said["sapiens-seg"] == "not" and said["onnx-wholebody"] == "here"
