@@ -28,9 +28,13 @@ def check_model(name: str, file: Path) -> None:
         SimccNetwork(file)
         return
     if name == PARTS:
-        from gsac.stages.segment.sapiens import Sapiens
+        from gsac.avatar.onnx_network import NetworkError
+        from gsac.avatar.sapiens import Sapiens
 
-        Sapiens({PARTS: file})
+        try:
+            Sapiens({PARTS: file})
+        except NetworkError as error:
+            raise BadInput(str(error)) from error
         return
     if name == ENCODER:
         from gsac.stages.face.deca import DecaEncoder

@@ -10,14 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.artifacts import read_alpha, read_frame
+from gsac.avatar.camera_motion import View, make_view
+from gsac.avatar.mask_file import LEAST_SHOWN
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import BadInput, StageError
-from gsac.stages.segment.camera_motion import View, make_view
 
 MASKS = "masks"
 """Folder of `split/frames` that holds them."""
-LEAST_SHOWN = 0.5
-"""A mask without a pixel of so much alpha shows nobody."""
 
 
 def hand_on(paths: list[Path], out: Path, empty: np.ndarray) -> Iterator[View]:

@@ -12,11 +12,13 @@ import cv2
 import numpy as np
 
 from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha, write_image
+from gsac.avatar.camera_motion import View, find_moved, make_view, measure_sway
+from gsac.avatar.onnx_network import NetworkError
+from gsac.avatar.sapiens import Sapiens
 from gsac.avatar.threads import available_cores, prefetch
-from gsac.stages.contract import Job, StageError
+from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.segment.brought import MASKS, hand_on
-from gsac.stages.segment.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
 from gsac.stages.segment.correction import correct, match_scene
@@ -25,7 +27,6 @@ from gsac.stages.segment.matting import BAND, soften
 from gsac.stages.segment.network import PersonMask, PoseMask, SelfieMask, person_region
 from gsac.stages.segment.plate import HALF, Plate, compare
 from gsac.stages.segment.plate_from_video import learn_plate, relearn_plate
-from gsac.stages.segment.sapiens import Sapiens
 
 METHODS: dict[Method, Callable[[dict[str, Path]], PersonMask]] = {"pose": PoseMask, "selfie": SelfieMask, "sapiens": Sapiens}
 """segment.method -> its class, made from the model files."""
@@ -71,7 +72,10 @@ def run(job: Job) -> None:
     else:
         if (frames / MASKS).is_dir():
             job.note("Masks lie beside the footage and are not used; segment.method=brought takes them.")
-        sway = cut_frames(job, paths, keypoints, clip)
+        try:
+            sway = cut_frames(job, paths, keypoints, clip)
+        except NetworkError as e:
+            raise BadInput(str(e)) from e
     moved = find_moved(sway, max(clip.width, clip.height))
     if clip.timestamps_s is not None and moved.any():
         job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))

@@ -6,10 +6,11 @@ import pytest
 from onnx import helper
 
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_alpha, write_arrays, write_frame
-from gsac.stages.contract import BadInput, Job
+from gsac.avatar.onnx_network import NetworkError
+from gsac.avatar.sapiens import PARTS, Sapiens, decide
+from gsac.stages.contract import Job
 from gsac.stages.segment import stage
 from gsac.stages.segment.config import SegmentConfig
-from gsac.stages.segment.sapiens import PARTS, Sapiens, decide
 from support.artifacts import blank
 from support.onnx_files import write_network
 
@@ -195,7 +196,7 @@ def test_what_is_no_such_network_is_refused_by_name(tmp_path):
     for file, words in ((onnx(tmp_path, classes=20, kind="few"), r"output \[1, 20, 256, 192\]; expected Sapiens' segmentation"),
                         (onnx(tmp_path, side=(512, 512), kind="square"), r"has input \[1, 3, 512, 512\]"),
                         (weights_only, "is neither ONNX nor TorchScript"), (tmp_path / "junk", "cannot be read as ONNX")):
-        with pytest.raises(BadInput, match=f"model file sapiens-seg.*{words}"):
+        with pytest.raises(NetworkError, match=f"model file sapiens-seg.*{words}"):
             Sapiens({"sapiens-seg": file})
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from gsac.avatar.brought_network import open_brought
 from gsac.avatar.onnx_network import NetworkError
 from gsac.avatar.region import Region
-from gsac.stages.contract import BadInput
 
 MODEL = "sapiens-seg"
 """Name under which the network is brought."""
@@ -32,15 +31,12 @@ EXPECTED = f"expected Sapiens' segmentation: input [1, 3, {HEIGHT}, {WIDTH}], ou
 
 
 class Sapiens:
-    """Who and what is in a frame. models: its file as `MODEL`; raises `BadInput` where that is no such network."""
+    """Who and what is in a frame. models: its file as `MODEL`; raises NetworkError where that is no such network."""
 
     def __init__(self, models: dict[str, Path]):
-        try:
-            self._network = open_brought(models[MODEL], MODEL)
-        except NetworkError as e:
-            raise BadInput(str(e)) from e
+        self._network = open_brought(models[MODEL], MODEL)
         if not self._network.may_be([1, 3, HEIGHT, WIDTH], [1, len(PARTS), None, None]):
-            raise BadInput(f"model file {MODEL} has input {self._network.given} and output {self._network.gives}; {EXPECTED}")
+            raise NetworkError(f"model file {MODEL} has input {self._network.given} and output {self._network.gives}; {EXPECTED}")
 
     def __call__(self, image: np.ndarray, region: Region) -> np.ndarray:
         """image: (H, W, 3) uint8. Returns (H, W) float32, alpha of all persons: the network sees the whole frame."""
@@ -48,12 +44,9 @@ class Sapiens:
 
     def read(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """image: (H, W, 3) uint8. Returns alpha (H, W) float32 of all persons, and the label (H, W) uint8 of each pixel."""
-        try:
-            logits = self._network.run(prepare(image))
-        except NetworkError as e:
-            raise BadInput(f"{e}; {EXPECTED}") from e
+        logits = self._network.run(prepare(image))
         if logits.ndim != 4 or logits.shape[1] != len(PARTS):
-            raise BadInput(f"model file {MODEL} gives an output of shape {logits.shape}; {EXPECTED}")
+            raise NetworkError(f"model file {MODEL} gives an output of shape {logits.shape}; {EXPECTED}")
         return decide(logits[0], *image.shape[:2])
 
 
