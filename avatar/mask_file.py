@@ -65,7 +65,7 @@ def _read_picture(path: Path) -> np.ndarray:
     if pixels is None:
         raise ValueError("its content is no picture")
     # Some write 0 and 1 where 0 and 255 are meant.
-    most = 1 if pixels.max() <= 1 else np.iinfo(pixels.dtype).max
+    most = 1 if pixels.max() <= 1 else 255 if pixels.dtype == np.uint8 else 65535
     return pixels.astype(np.float32) / most
 
 
