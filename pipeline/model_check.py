@@ -8,8 +8,8 @@ from pathlib import Path
 from gsac.stages.body_choice import OPEN
 from gsac.stages.contract import BadInput
 
-DETECTOR, ENCODER = "onnx-wholebody", "deca-encoder"
-"""Names under which stages keypoints and face look for networks that users bring."""
+DETECTOR, ENCODER, PARTS = "onnx-wholebody", "deca-encoder", "sapiens-seg"
+"""Names under which stages keypoints, face and segment look for networks that users bring."""
 WEIGHTS = ("_data", ".data")
 """What follows a network's own name in that of a file with its weights."""
 TAKEN = (OPEN, "none", "auto")
@@ -17,9 +17,9 @@ TAKEN = (OPEN, "none", "auto")
 
 
 def check_model(name: str, file: Path, *others: Path) -> None:
-    """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a face encoder, a FLAME head,
-    the points on one, its vertices in SMPL-X, key points of mmpose, a detector's errors, or a body model. Several files are one
-    network with its weights beside it, or key points, a file a frame."""
+    """Raises BadInput unless the file is what its name or its arrays say: a network of key points or body parts, a face encoder,
+    a FLAME head, the points on one, its vertices in SMPL-X, key points of mmpose, a detector's errors, or a body model. Several
+    files are one network with its weights beside it, or key points, a file a frame."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
@@ -27,12 +27,13 @@ def check_model(name: str, file: Path, *others: Path) -> None:
         raise BadInput(f"{name} is not a name for a model file: parameters give the word another meaning; choose another")
     files = (file, *others)
     file = _whole(name, files)
-    if name == DETECTOR:
+    if name in (DETECTOR, PARTS):
         from gsac.avatar.onnx_network import NetworkError
+        from gsac.avatar.sapiens import Sapiens
         from gsac.avatar.simcc import SimccNetwork
 
         try:
-            SimccNetwork(file)
+            _ = SimccNetwork(file) if name == DETECTOR else Sapiens({PARTS: file})
         except NetworkError as error:
             raise BadInput(str(error)) from error
         return

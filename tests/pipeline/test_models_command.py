@@ -72,6 +72,8 @@ def write_torn(path: Path) -> Path:
     (write_torn, "torn.npz", "my-body", "not a readable"),
     (write_headless, "other.npz", "my-body", "array v_template is missing"),
     (write_text, "net.onnx", "onnx-wholebody", "cannot be read as ONNX"),
+    (write_text, "net.onnx", "sapiens-seg", "cannot be read as ONNX"),
+    (lambda file: file.write_bytes(ONNX.read_bytes()) and file, "net.onnx", "sapiens-seg", "expected Sapiens' segmentation"),
     (write_text, "weights.npz", "lpips-vgg", "cannot be read as .npz"),
 ])
 def test_a_file_that_is_no_model_is_refused_and_not_kept(models, tmp_path, capsys, make, file, name, words):
@@ -155,3 +157,11 @@ def test_key_points_of_mmpose_are_brought_a_file_a_frame(models, tmp_path, capsy
 def test_files_that_belong_to_no_network_are_not_kept_together(models, flame, points, capsys):
     assert execute(["models", "add", "mine", str(flame), str(points)]) == ExitCode.USAGE
     assert "2 files were given, 0 of them .onnx" in capsys.readouterr().err and not models.brought
+
+
+def test_the_list_names_the_networks_that_methods_would_use_and_nobody_brought(models, capsys):
+    execute(["models", "add", "onnx-wholebody", str(ONNX)])
+    capsys.readouterr()
+    assert execute(["models", "ls"]) == ExitCode.OK
+    said = {line.split()[0]: line.split()[1] for line in capsys.readouterr().out.splitlines()}
+    assert said["sapiens-seg"] == "not" and said["onnx-wholebody"] == "here"
