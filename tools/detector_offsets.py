@@ -216,6 +216,8 @@ def main() -> None:
     parser.add_argument("paths", nargs="+", type=Path, help="RUN TRUTH pairs")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
+    if len(options.paths) % 2 or len(options.paths) < 4:
+        parser.error(f"{len(options.paths)} paths were given; expected RUN TRUTH of at least two clips")
     body = Body.load()
     clips = [SeenClip.read(body, *pair) for pair in zip(options.paths[::2], options.paths[1::2], strict=True)]
     offsets, quality = measure_offsets(body, clips)
