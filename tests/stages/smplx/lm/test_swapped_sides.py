@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.lm.fit import fit_clip
-from gsac.stages.smplx.lm.swapped_sides import propose_swapped
+from gsac.stages.smplx.lm.swapped_sides import is_swapped, propose_swapped
 from gsac.stages.smplx.state import to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, sightings_of, turning_person
 
@@ -38,3 +38,7 @@ def test_backs_taken_for_fronts_are_exchanged_and_named(body, truth):
     error = joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), truth)
     assert [(note.code, note.frames) for note in fit.notes] == [(Code.SIDES_EXCHANGED, [[6, 9]])]
     assert error[BACK].mean() < 40
+
+
+def test_points_that_contradict_an_exchange_outweigh_any_jumps():
+    assert not is_swapped(saved=-700.0, smoother=9, frames=9) and is_swapped(saved=290.0, smoother=4, frames=4)
