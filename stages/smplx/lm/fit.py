@@ -28,7 +28,7 @@ from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.lm.shake import transl_acceleration
-from gsac.stages.smplx.lm.swapped_sides import is_swapped, propose_swapped
+from gsac.stages.smplx.lm.swapped_sides import MARGIN, propose_swapped
 from gsac.stages.smplx.lm.turn_jumps import find_jumps
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
@@ -90,8 +90,7 @@ def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], d
         problem, state = set_up(body, seen, outlines, detector, config)
         state, steps = fit_points(problem, state, seen, detector, 3 * config.iterations)
         fits.append((problem.cost(state), seen, problem, state, steps))
-    best = int(len(fits) == 2 and is_swapped(fits[0][0] - fits[1][0], int(fits[0][2].jumps.sum()) - int(fits[1][2].jumps.sum()),
-                                             int(swapped.sum())))
+    best = int(len(fits) == 2 and fits[1][0] < fits[0][0] - MARGIN * swapped.sum())
     said = [Finding.of(Code.SIDES_EXCHANGED, swapped)] if best else []
     jumps = fits[best][2].jumps
     if jumps.any():

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.stages.smplx.initial import TRUNK
-from gsac.stages.smplx.lm.turn_jumps import JUMP_COST
 from gsac.stages.smplx.sightings import Sightings
 
 JUMP = np.radians(60)
@@ -17,8 +16,8 @@ JUMP = np.radians(60)
 UNLIKELY = np.radians(0.5)
 """Cost of a swapped frame: of two halves that contradict each other the longer one is right."""
 MARGIN = 20.0
-"""By how much the fit's cost must fall for each exchanged frame. It falls by 180 to 420 where sides were swapped, of three rendered
-people at 20 frames and one at 60, and rises where pictures are out of order or each turns by half a circle."""
+"""By how much the fit's cost must fall for each exchanged frame. It falls by 29 to 104 where sides were swapped, of three rendered
+people at 20 frames, and rises by 79 where pictures are out of order."""
 
 
 def propose_swapped(sightings: Sightings) -> np.ndarray:
@@ -39,11 +38,3 @@ def propose_swapped(sightings: Sightings) -> np.ndarray:
     for t in range(len(frames) - 1, -1, -1):
         out[frames[t]], swapped = bool(swapped), came[t, swapped]
     return out
-
-
-def is_swapped(saved: float, smoother: int, frames: int) -> bool:
-    """Whether an exchange is right. saved: of the fit's cost, by the exchange; smoother: by how many jumps; frames: exchanged ones.
-
-    The points must agree: half of the pictures of a turn of half a circle a frame, exchanged, always make it smoother.
-    """
-    return saved > 0 and saved + JUMP_COST * smoother > MARGIN * frames

@@ -2,56 +2,48 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import cv2
 import numpy as np
-from threadpoolctl import threadpool_limits
+import pytest
 
-from gsac.avatar.artifacts import write_alpha
-from gsac.avatar.zbuffer import silhouette
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.lm.wide_clothes import STRANGE, fit_under_clothes, measure_strangeness
-from gsac.stages.smplx.silhouette import read_outline
-from gsac.stages.smplx.state import to_params
-from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, sightings_of, turning_person
-
-FRAMES = 8
+from gsac.stages.smplx.lm import wide_clothes
+from gsac.stages.smplx.lm.wide_clothes import STRANGE, fit_under_clothes
+from gsac.stages.smplx.state import Fit, State
 
 
-def dressed_outlines(body, truth, folder, px):
-    """Outlines of a person whose clothes hang px away from the legs, (T,) of them; 0: bare."""
-    out = []
-    for t in range(truth.frames):
-        vertices, joints = body.posed(truth, [t])
-        camera = truth.camera(WIDTH, HEIGHT)
-        alpha = silhouette(vertices[0], body.faces, camera).astype(np.float32)
-        hips, ankles = (camera.project(joints[0, [a, b]]).mean(0) for a, b in ((1, 2), (7, 8)))
-        if px:
-            skirt = np.array([hips - (px / 2, 30), hips + (px / 2, -30), ankles + (px, -60), ankles - (px, 60)])
-            cv2.fillPoly(alpha, [skirt.round().astype(np.int32)], 1.0)
-        write_alpha(folder / f"{t:06d}.exr", alpha)
-        out.append(read_outline(folder / f"{t:06d}.exr"))
-    return out
+@pytest.fixture
+def fit_of_skirt(body, monkeypatch):
+    """A fit whose figure is `strange` spreads away by a strong outline and `freed` by a weak one; the weights asked for."""
+    weights = []
+
+    def fit(strange: float, freed: float, config: SmplxConfig) -> Fit:
+        def answer(body, sightings, outlines, config, progress):
+            weights.append(config.silhouette)
+            betas = np.full(body.num_betas, strange if config.silhouette == 1 else freed)
+            state = State(np.zeros((1, 55, 3, 3)), np.zeros((1, 3)), betas, 0.0, np.zeros(0))
+            return Fit(state, np.zeros((1, 55)), np.ones(1), np.zeros(1), 1, None)
+
+        monkeypatch.setattr(wide_clothes, "fit_with_doubt", answer)
+        return fit_under_clothes(body, None, [], config, lambda *a: None)
+
+    return fit, weights
 
 
-def fit_dressed(body, folder, px):
-    """The fit of such a person, and its mean joint error, mm."""
-    truth = turning_person(body, FRAMES)
-    config = replace(SmplxConfig(), height_m=height_of(body, truth))
-    with threadpool_limits(1, "blas"):
-        fit = fit_under_clothes(body, sightings_of(body, truth, noise=1.0), dressed_outlines(body, truth, folder, px), config,
-                                lambda *a: None)
-    return fit, joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), truth).mean()
+def test_a_figure_that_no_person_has_is_fitted_anew_by_the_key_points_and_named(fit_of_skirt):
+    fit, weights = fit_of_skirt
+    found = fit(2.0, 0.7, SmplxConfig(silhouette=1.0))
+    (note,) = found.notes
+    assert note.code is Code.CLOTHES_HIDE_SHAPE and note.figure == pytest.approx(2.0)
+    assert found.state.betas[0] == 0.7 and weights[1] < 0.2 * weights[0]
 
 
-def test_a_skirt_too_wide_for_any_figure_leaves_the_joints_to_the_key_points_and_is_named(body, tmp_path):
-    fit, error = fit_dressed(body, tmp_path, px=90)
-    (note,) = [note for note in fit.notes if note.code is Code.CLOTHES_HIDE_SHAPE]
-    assert note.figure > STRANGE > measure_strangeness(body, fit.state.betas) and error < 40
+def test_a_figure_that_people_have_costs_one_fit_and_is_not_accused(fit_of_skirt):
+    fit, weights = fit_of_skirt
+    assert not fit(0.9 * STRANGE, 0.7, SmplxConfig(silhouette=1.0)).notes and len(weights) == 1
 
 
-def test_a_bare_figure_is_believed(body, tmp_path):
-    fit, _ = fit_dressed(body, tmp_path, px=0)
-    assert Code.CLOTHES_HIDE_SHAPE not in [note.code for note in fit.notes]
+def test_a_figure_that_the_key_points_find_as_strange_is_the_persons(fit_of_skirt):
+    fit, _ = fit_of_skirt
+    found = fit(2.0, 2.1, SmplxConfig(silhouette=1.0))
+    assert not found.notes and found.state.betas[0] == 2.0
