@@ -1,7 +1,4 @@
-"""Clothes so wide that the outline no longer tells the figure: skirts, coats, hoodies a hand wider than the body.
-
-The outline then makes a figure that no person has, and its joints go with it; the key points alone know better.
-"""
+"""Clothes so wide that their outline makes a figure that no person has, and its joints go with it; the key points know better."""
 
 from __future__ import annotations
 
@@ -27,17 +24,13 @@ WEAK = 0.05
 
 def fit_under_clothes(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
                       progress: Callable[[int, int, str], None]) -> Fit:
-    """Fits the clip; where the figure is no person's, once more with a weak outline."""
+    """Fits the clip; where the figure is no person's, once more with a weak outline, if that makes one that is."""
+    weak = replace(config, silhouette=WEAK * config.silhouette)
     fit = fit_with_doubt(body, sightings, outlines, config, progress)
-    strange = measure_strangeness(body, fit.state.betas)
+    strange = float(np.sqrt(np.mean(fit.state.betas[:body.num_figure] ** 2)))
     if config.silhouette == 0 or strange < STRANGE:
         return fit
-    freed = fit_with_doubt(body, sightings, outlines, replace(config, silhouette=WEAK * config.silhouette), progress)
-    if measure_strangeness(body, freed.state.betas) >= strange:
+    freed = fit_with_doubt(body, sightings, outlines, weak, progress)
+    if np.sqrt(np.mean(freed.state.betas[:body.num_figure] ** 2)) >= STRANGE:
         return fit
     return replace(freed, notes=(*freed.notes, Finding.of(Code.CLOTHES_HIDE_SHAPE, figure=strange)))
-
-
-def measure_strangeness(body: Body, betas: np.ndarray) -> float:
-    """Root mean square of the figure's betas, in spreads of people: 1 of most. betas: (B,), the figure's and the clothes'."""
-    return float(np.sqrt(np.mean(betas[:body.num_figure] ** 2)))
