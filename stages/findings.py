@@ -77,8 +77,7 @@ class Code(Enum):
                           "Film where nothing stands between the person and the camera.")
     POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
                              "frames: wide clothes, or a mask that holds more than the person.")
-    CLOTHES_HIDE_SHAPE = Wording("Clothes hide the body's shape: with their outline it would be {figure:.1f} times as far from the "
-                                 "mean as most people are, so that the key points shape it, not the outline.",
+    CLOTHES_HIDE_SHAPE = Wording("Clothes hide the body's shape: they stand up to {figure:.0f} cm off it.",
                                  "Wear clothes that lie close to the body.")
     HAND_HIDDEN = Wording("The {side} hand is hidden in {frames}, behind the body as the camera sees it; where it lies is a guess.",
                           "Keep the hands beside the body.")

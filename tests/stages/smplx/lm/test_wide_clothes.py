@@ -8,42 +8,40 @@ import pytest
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.lm import wide_clothes
-from gsac.stages.smplx.lm.wide_clothes import STRANGE, fit_under_clothes
+from gsac.stages.smplx.lm.wide_clothes import STRANGE, THICK, fit_under_clothes
 from gsac.stages.smplx.state import Fit, State
 
 
 @pytest.fixture
-def fit_of_skirt(body, monkeypatch):
-    """A fit whose figure is `strange` spreads away by a strong outline and `freed` by a weak one; the weights asked for."""
-    weights = []
+def fit_dressed(body, monkeypatch):
+    """(figure, spreads; thickness of one garment, cm; its name) -> the fit, and the outline's weight in each fit that it took."""
+    def fit(figure: float, thick: float, name: str = "thighs") -> tuple[Fit, list[float]]:
+        weights = []
 
-    def fit(strange: float, freed: float, config: SmplxConfig) -> Fit:
         def answer(body, sightings, outlines, config, progress):
             weights.append(config.silhouette)
-            betas = np.full(body.num_betas, strange if config.silhouette == 1 else freed)
+            betas = np.append(np.full(body.num_figure, figure), np.where(np.array(body.clothes) == name, thick, 1.0))
             state = State(np.zeros((1, 55, 3, 3)), np.zeros((1, 3)), betas, 0.0, np.zeros(0))
-            return Fit(state, np.zeros((1, 55)), np.ones(1), np.zeros(1), 1, None)
+            return Fit(state, np.zeros((1, 55)), np.ones(1), np.zeros(1), 1)
 
         monkeypatch.setattr(wide_clothes, "fit_with_doubt", answer)
-        return fit_under_clothes(body, None, [], config, lambda *a: None)
+        return fit_under_clothes(body, None, [], SmplxConfig(silhouette=1.0), lambda *a: None), weights
 
-    return fit, weights
-
-
-def test_a_figure_that_no_person_has_is_fitted_anew_by_the_key_points_and_named(fit_of_skirt):
-    fit, weights = fit_of_skirt
-    found = fit(2.0, 0.7, SmplxConfig(silhouette=1.0))
-    (note,) = found.notes
-    assert note.code is Code.CLOTHES_HIDE_SHAPE and note.figure == pytest.approx(2.0)
-    assert found.state.betas[0] == 0.7 and weights[1] < 0.2 * weights[0]
+    return fit
 
 
-def test_a_figure_that_people_have_costs_one_fit_and_is_not_accused(fit_of_skirt):
-    fit, weights = fit_of_skirt
-    assert not fit(0.9 * STRANGE, 0.7, SmplxConfig(silhouette=1.0)).notes and len(weights) == 1
+def test_a_skirt_that_makes_a_figure_no_person_has_is_named_and_its_outline_hardly_counts(fit_dressed):
+    fit, weights = fit_dressed(STRANGE + 0.3, 5.3)
+    (note,) = fit.notes
+    assert note.code is Code.CLOTHES_HIDE_SHAPE and note.figure == pytest.approx(5.3) and weights[1] < 0.2 * weights[0]
 
 
-def test_a_figure_that_the_key_points_find_as_strange_is_the_persons(fit_of_skirt):
-    fit, _ = fit_of_skirt
-    found = fit(2.0, 2.1, SmplxConfig(silhouette=1.0))
-    assert not found.notes and found.state.betas[0] == 2.0
+def test_thick_clothes_over_a_usual_figure_are_named_and_fitted_once(fit_dressed):
+    fit, weights = fit_dressed(0.8, THICK + 1)
+    assert [note.code for note in fit.notes] == [Code.CLOTHES_HIDE_SHAPE] and len(weights) == 1
+
+
+@pytest.mark.parametrize(("figure", "thick", "name"), [(0.8, 2.5, "thighs"), (1.9, 2.5, "chest"), (0.8, 8.0, "hair")])
+def test_usual_clothes_an_unusual_figure_and_much_hair_are_not_accused(fit_dressed, figure, thick, name):
+    fit, weights = fit_dressed(figure, thick, name)
+    assert not fit.notes and len(weights) == 1
