@@ -15,8 +15,8 @@ from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.state import Fit
 
-THICK = 4.0
-"""cm, of clothes that hide a figure: six clean clips have 2.5 at most, skirts and hoodies twice or three times too thick 4 to 6.5."""
+NO_CLOTHES, THICK = ("hair", "nape", "soles"), 4.0
+"""Of clothes that hide a figure, cm: six clean clips have 2.5 at most, skirts and hoodies 2 or 3 times too thick 4 to 6.5."""
 STRANGE = 1.5
 """Root mean square of a figure's betas, in spreads, that one person in a thousand exceeds (20 betas, chi-squared). Under skirts and
 hoodies three times too thick it is 1.8 to 2.0; below, the outline serves all the same."""
@@ -29,7 +29,7 @@ def fit_under_clothes(body: Body, sightings: Sightings, outlines: list[Outline],
     """Fits the clip; where clothes are thick and the figure in them is no person's, once more with a weak outline."""
     fit = fit_with_doubt(body, sightings, outlines, config, progress)
     figure, clothes = np.split(fit.state.betas, [body.num_figure])
-    thickest = max((cm for cm, name in zip(clothes, body.clothes, strict=True) if name not in ("hair", "nape", "soles")), default=0.0)
+    thickest = max((cm for cm, name in zip(clothes, body.clothes, strict=True) if name not in NO_CLOTHES), default=0.0)
     if thickest < THICK:
         return fit
     if np.sqrt(np.mean(figure**2)) > STRANGE:
