@@ -22,6 +22,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.jacobians import make_pairs, place_points
+from gsac.stages.smplx.lm.doubtful_arms import describe_doubtful, find_doubtful, widen_doubtful
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import HiddenArms
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
@@ -74,8 +75,11 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     sigma = estimate_joint_sigma(problem, state)
     hidden.widen(sigma)
+    doubtful = find_doubtful(hidden, problem, state, sightings.missing)
+    widen_doubtful(sigma, doubtful)
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
-               problem.person_offsets.joint_offset(state.own), (*said, *hidden.describe(len(sigma))), cost)
+               problem.person_offsets.joint_offset(state.own),
+               (*said, *hidden.describe(len(sigma)), *describe_doubtful(doubtful)), cost)
 
 
 def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
