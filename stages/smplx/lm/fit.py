@@ -22,9 +22,9 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.jacobians import make_pairs, place_points
-from gsac.stages.smplx.lm.doubtful_arms import describe_doubtful, find_doubtful, widen_doubtful
+from gsac.stages.smplx.lm.doubtful_arms import find_doubtful
 from gsac.stages.smplx.lm.ground import Ground
-from gsac.stages.smplx.lm.hidden_arms import HiddenArms
+from gsac.stages.smplx.lm.hidden_arms import HiddenArms, describe_arms, widen_arm
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
@@ -76,10 +76,11 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     sigma = estimate_joint_sigma(problem, state)
     hidden.widen(sigma)
     doubtful = find_doubtful(hidden, problem, state, sightings.missing)
-    widen_doubtful(sigma, doubtful)
+    for side in (0, 1):
+        widen_arm(sigma, side, doubtful[:, [side]])
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
                problem.person_offsets.joint_offset(state.own),
-               (*said, *hidden.describe(len(sigma)), *describe_doubtful(doubtful)), cost)
+               (*said, *hidden.describe(len(sigma)), *describe_arms(Code.ARM_DOUBTFUL, doubtful)), cost)
 
 
 def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,

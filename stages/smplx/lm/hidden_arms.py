@@ -134,10 +134,13 @@ class HiddenArms:
         near, _ = self.measure_trunk(state, chain, t, wrist)
         if wrist[2] < near - BEFORE:
             return 1.0
+        return OUTSIDE_COUNTS if self.measure_outside(problem, state, chain, t, side) > OUTSIDE_SHARE else 0.0
+
+    def measure_outside(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> float:
+        """Share of a forearm with its hand that lies outside the mask; 0 without one. chain: of frame t alone."""
         x = place_points(chain, self.forearm[side], state.shape)[0] + state.transl[t]
         distance, _, inside = problem.seen.outlines[t].at(problem.project(state, x))
-        outside = problem.seen.outlines[t].area > 0 and (inside & (distance > OUTSIDE * self.height)).mean() > OUTSIDE_SHARE
-        return OUTSIDE_COUNTS if outside else 0.0
+        return float((inside & (distance > OUTSIDE * self.height)).mean()) if problem.seen.outlines[t].area > 0 else 0.0
 
     def measure_trunk(self, state: State, chain: Chain, t: int, place: np.ndarray) -> tuple[float, float]:
         """Depths, m, of the trunk's near and far surface on the line of sight to a place (3,) m; -inf and nan where there is none.
@@ -231,20 +234,26 @@ class HiddenArms:
             frame = np.arange(stay.start, stay.stop)
             before, after = stay.first - stay.start + 1, stay.stop - stay.last + 1
             share = np.minimum(1, np.minimum((frame - stay.start + 1) / before, (stay.stop - frame) / after))[:, None]
-            for name, more in SIGMA.items():
-                own = [INDEX[f"{SIDES[stay.side]}_{name}"], *(np.arange(J)[HANDS[stay.side]] if name == "wrist" else ())]
-                sigma[stay.start:stay.stop, own] = np.hypot(sigma[stay.start:stay.stop, own], more * share)
+            widen_arm(sigma[stay.around], stay.side, share)
 
     def describe(self, frames: int) -> list[Finding]:
         """What the user should know. frames: T."""
-        out = []
-        for side in (0, 1):
-            hidden = np.zeros(frames, bool)
-            for stay in self.stays:
-                hidden[stay.first:stay.last] |= stay.side == side
-            if hidden.any():
-                out.append(Finding.of(Code.HAND_HIDDEN, hidden, figure=hidden.sum(), side=SIDES[side]))
-        return out
+        hidden = np.zeros((frames, 2), bool)
+        for stay in self.stays:
+            hidden[stay.first:stay.last, stay.side] = True
+        return describe_arms(Code.HAND_HIDDEN, hidden)
+
+
+def describe_arms(code: Code, arms: np.ndarray) -> list[Finding]:
+    """A finding for each side that has frames. arms: (T, 2) bool."""
+    return [Finding.of(code, own, figure=own.sum(), side=side) for side, own in zip(SIDES, arms.T, strict=True) if own.any()]
+
+
+def widen_arm(sigma: np.ndarray, side: int, share: np.ndarray) -> None:
+    """Adds a share (T, 1) of `SIGMA` to the standard deviations of an arm. sigma: (T, 55) m, changed in place."""
+    for name, more in SIGMA.items():
+        own = [INDEX[f"{SIDES[side]}_{name}"], *(np.arange(J)[HANDS[side]] if name == "wrist" else ())]
+        sigma[:, own] = np.hypot(sigma[:, own], more * share)
 
 
 def sample_surface(body: Body, part: np.ndarray, most: int) -> Pairs:

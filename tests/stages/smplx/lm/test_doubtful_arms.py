@@ -11,9 +11,9 @@ from gsac.avatar.wholebody import INDEX as POINT
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.lm.doubtful_arms import describe_doubtful, find_doubtful, widen_doubtful
+from gsac.stages.smplx.lm.doubtful_arms import find_doubtful
 from gsac.stages.smplx.lm.fit import fit_points, set_up
-from gsac.stages.smplx.lm.hidden_arms import HiddenArms, Stay
+from gsac.stages.smplx.lm.hidden_arms import HiddenArms, Stay, describe_arms, widen_arm
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
 
 FRAMES = 16
@@ -42,7 +42,7 @@ def test_a_hand_that_is_not_detected_for_most_of_a_turn_is_doubted(fitted):
     missing[3:12, 1] = True
     found = find_doubtful(*fitted, missing)
     assert np.flatnonzero(found[:, 1]).tolist() == list(range(3, 12)) and not found[:, 0].any()
-    (finding,) = describe_doubtful(found)
+    (finding,) = describe_arms(Code.ARM_DOUBTFUL, found)
     assert (finding.code, finding.frames) == (Code.ARM_DOUBTFUL, [[3, 11]]) and "right arm" in finding.message
 
 
@@ -72,6 +72,6 @@ def test_a_wrist_seen_elsewhere_for_some_frames_makes_its_arm_doubtful(fitted):
 def test_the_sigma_of_a_doubtful_arm_is_raised_in_its_frames_alone():
     sigma, doubtful = np.full((4, 55), 0.02), np.zeros((4, 2), bool)
     doubtful[1, 0] = True
-    widen_doubtful(sigma, doubtful)
+    widen_arm(sigma, 0, doubtful[:, [0]])
     assert sigma[1, INDEX["left_wrist"]] > 0.1 and sigma[1, INDEX["left_elbow"]] > 0.05
     assert (sigma[[0, 2, 3]] == 0.02).all() and sigma[1, INDEX["right_wrist"]] == 0.02
