@@ -79,7 +79,7 @@ class Code(Enum):
                              "frames: wide clothes, or a mask that holds more than the person.")
     HAND_HIDDEN = Wording("The {side} hand is hidden in {frames}, behind the body as the camera sees it; where it lies is a guess.",
                           "Keep the hands beside the body.")
-    ARM_DOUBTFUL = Wording("The {side} arm is doubtful in {frames}: what is fitted there is not what the pictures show.",
+    ARM_DOUBTFUL = Wording("The {side} arm is doubtful in {frames}: the pictures do not show it as fitted.",
                            "Let the arms hang a little away from the body, hands in sight.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")

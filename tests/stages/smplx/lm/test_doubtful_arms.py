@@ -11,7 +11,6 @@ from gsac.avatar.wholebody import INDEX as POINT
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.lm.doubtful_arms import find_doubtful
 from gsac.stages.smplx.lm.fit import fit_points, set_up
 from gsac.stages.smplx.lm.hidden_arms import HiddenArms, Stay, describe_arms, widen_arm
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
@@ -34,13 +33,13 @@ def fitted(body, tmp_path_factory):
 def test_arms_that_hang_are_not_doubted_where_the_body_covers_a_hand(fitted):
     missing = np.zeros((FRAMES, 2), bool)
     missing[4:6, 0] = missing[10:12, 1] = True
-    assert not find_doubtful(*fitted, missing).any()
+    assert not fitted[0].find_doubtful(*fitted[1:], missing).any()
 
 
 def test_a_hand_that_is_not_detected_for_most_of_a_turn_is_doubted(fitted):
     missing = np.zeros((FRAMES, 2), bool)
     missing[3:12, 1] = True
-    found = find_doubtful(*fitted, missing)
+    found = fitted[0].find_doubtful(*fitted[1:], missing)
     assert np.flatnonzero(found[:, 1]).tolist() == list(range(3, 12)) and not found[:, 0].any()
     (finding,) = describe_arms(Code.ARM_DOUBTFUL, found)
     assert (finding.code, finding.frames) == (Code.ARM_DOUBTFUL, [[3, 11]]) and "right arm" in finding.message
@@ -48,8 +47,8 @@ def test_a_hand_that_is_not_detected_for_most_of_a_turn_is_doubted(fitted):
 
 def test_a_hand_that_the_detector_hardly_ever_finds_is_no_doubt(fitted):
     missing = np.ones((FRAMES, 2), bool)
-    missing[::5] = False
-    assert not find_doubtful(*fitted, missing).any()
+    missing[::3] = False
+    assert not fitted[0].find_doubtful(*fitted[1:], missing).any()
 
 
 def test_a_hand_that_is_said_to_be_hidden_is_not_said_to_be_doubtful_too(fitted):
@@ -57,14 +56,14 @@ def test_a_hand_that_is_said_to_be_hidden_is_not_said_to_be_doubtful_too(fitted)
     missing = np.zeros((FRAMES, 2), bool)
     missing[3:12, 1] = True
     told = HiddenArms(arms.trunk, arms.forearm, arms.height, [Stay(1, 3, 12, 0, FRAMES)])
-    assert not find_doubtful(told, problem, state, missing).any()
+    assert not told.find_doubtful(problem, state, missing).any()
 
 
 def test_a_wrist_seen_elsewhere_for_some_frames_makes_its_arm_doubtful(fitted):
     arms, problem, state = fitted
     kept = problem.seen.xy.copy()
     problem.seen.xy[2:7, POINT["left_wrist"]] += 0.2 * arms.height
-    found = find_doubtful(arms, problem, state, None)
+    found = arms.find_doubtful(problem, state, None)
     problem.seen.xy[:] = kept
     assert np.flatnonzero(found[:, 0]).tolist() == [2, 3, 4, 5, 6] and not found[:, 1].any()
 
