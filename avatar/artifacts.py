@@ -148,9 +148,14 @@ def read_alpha(path: Path) -> np.ndarray:
     import numpy as np
     import OpenEXR
 
-    # OpenEXR itself opens no path that is not UTF-8.
-    with open(path, "rb") as stream, OpenEXR.File(stream) as f:
-        return np.ascontiguousarray(next(iter(f.channels().values())).pixels, dtype=np.float32)
+    try:  # OpenEXR itself opens no path that is not UTF-8
+        with open(path, "rb") as stream, OpenEXR.File(stream) as f:
+            alpha = np.ascontiguousarray(next(iter(f.channels().values())).pixels, dtype=np.float32)
+    except (OSError, RuntimeError, StopIteration, ValueError) as e:
+        raise ArtifactError(f"{path}: cannot be read as a mask ({e or type(e).__name__})") from e
+    if alpha.ndim != 2 or not (alpha.min() >= 0 and alpha.max() <= 1):
+        raise ArtifactError(f"{path}: expected one channel, every pixel in 0..1")
+    return alpha
 
 
 def write_alpha(path: Path, alpha: np.ndarray) -> None:
@@ -189,7 +194,7 @@ Shapes = Mapping[str, tuple[int | str, ...]]
 
 
 def check_arrays(path: Path, shapes: Shapes, *groups: Shapes) -> dict[str, np.ndarray]:
-    """Reads an npz and checks names and shapes. Returns its arrays (...) by name, those that nobody asked for among them.
+    """Reads an npz and checks names, shapes and kinds. Returns its arrays (...) by name, those that nobody asked for among them.
 
     groups: arrays of which a file has all or none.
     """
@@ -206,7 +211,24 @@ def check_arrays(path: Path, shapes: Shapes, *groups: Shapes) -> dict[str, np.nd
                      for i, s in enumerate(shape))
         if got != want:
             raise ArtifactError(f"{path}: array {name} has shape {got}, expected {want}")
+        _check_kind(path, name, arrays[name])
     return arrays
+
+
+TEXT = ("detector", "model")
+"""Arrays of text; all others hold numbers."""
+WHOLE = ("face", "coarser_face", "levels", "head_faces")
+"""Arrays of whole numbers."""
+NOWHERE = ("xy", "world", "face_mesh", "landmarks")
+"""Arrays of points, which are NaN where a point is nowhere; all others are finite."""
+
+
+def _check_kind(path: Path, name: str, array: np.ndarray) -> None:
+    kinds, words = ("U", "text") if name in TEXT else ("iu", "whole numbers") if name in WHOLE else ("biuf", "numbers")
+    if array.dtype.kind not in kinds:
+        raise ArtifactError(f"{path}: array {name} is of type {array.dtype}, expected {words}")
+    if name not in NOWHERE and not _finite(array):
+        raise ArtifactError(f"{path}: array {name} is not finite")
 
 
 def _finite(array: np.ndarray) -> bool:
@@ -243,6 +265,9 @@ LEVEL_SHAPES: Shapes = {"levels": ("L",), **{f"coarser_{name}": ("M", *shape[1:]
 LEVEL_HEIGHT_SHAPE: Shapes = {"level_heights": ("L",)}
 MORE_AVATAR_SHAPES = LIGHT_SHAPE, LOW_PASS_SHAPE, LEVEL_SHAPES, LEVEL_HEIGHT_SHAPE
 """Groups of arrays that avatar.npz has or has not."""
+PER_FRAME = frozenset(name for shapes in (KEYPOINT_SHAPES, FILLED_SHAPES, FACE_SHAPES, FLAME_SHAPES, BODY_SHAPES)
+                      for name, shape in shapes.items() if shape[:1] == ("T",))
+"""Arrays with a row for each kept frame."""
 
 
 def check_keypoints(path: Path) -> dict[str, np.ndarray]:
@@ -254,7 +279,7 @@ def check_keypoints(path: Path) -> dict[str, np.ndarray]:
 
     arrays = check_arrays(path, KEYPOINT_SHAPES)
     score = arrays["score"]
-    if not (_finite(score) and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
+    if not (score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
         raise ArtifactError(f"{path}: score must lie in 0..1")
     placed = np.asarray(np.isfinite(arrays["xy"]).all(-1))
     return arrays if placed.all() else arrays | {"score": np.where(placed, score, 0).astype(score.dtype),
@@ -276,9 +301,6 @@ def check_face(path: Path) -> dict[str, np.ndarray]:
 def check_body(path: Path) -> dict[str, np.ndarray]:
     """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3); `REST_SHAPE` and `OCCLUDER_SHAPE` or not."""
     arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE, OCCLUDER_SHAPE)
-    for name, a in arrays.items():
-        if not _finite(a):
-            raise ArtifactError(f"{path}: array {name} is not finite")
     if "rest_expression" in arrays and not (arrays["rest_expression"].min() >= 0 and arrays["rest_expression"].max() <= 1):
         raise ArtifactError(f"{path}: array rest_expression must lie in 0..1")
     return arrays
@@ -290,9 +312,6 @@ def check_avatar(path: Path) -> dict[str, np.ndarray]:
     Where there are levels, level_heights (L,) or not.
     """
     arrays = check_arrays(path, AVATAR_SHAPES, *MORE_AVATAR_SHAPES)
-    for name in {name for shapes in (AVATAR_SHAPES, *MORE_AVATAR_SHAPES) for name in shapes}:
-        if name in arrays and not _finite(arrays[name]):
-            raise ArtifactError(f"{path}: array {name} is not finite")
     if "level_heights" in arrays and not ("levels" in arrays and (arrays["level_heights"] > 0).all()):
         raise ArtifactError(f"{path}: array level_heights must hold the height of the person for each of `levels`, px, above 0")
     if "levels" in arrays:

@@ -1,10 +1,12 @@
-"""One small clip of a made-up person, taken once through the eight real stages."""
+"""One small clip of a made-up person, taken once through the eight real stages, and the fixtures cut from that run."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,13 +23,19 @@ SMALL = ("smplx.rounds=1", "smplx.iterations=2", "train.steps=4", "train.gaussia
 
 
 class SmallRun:
-    """A clip, the folder of its run, and the command over a store of the test's own; models are those of the user's store."""
+    """A clip, the folder of its run, its fixtures, and the command over stores of the test's own with the user's models."""
 
     def __init__(self, root: Path):
-        self.root, self.out = root, root / "run"
+        self.root, self.out, self.fixtures = root, root / "run", root / "fixtures"
         self.clip = make_clip(root / "truth", seed=3, frames=8, height=288)
         done = self.gsac("run", self.clip, "--out", self.out, *(word for setting in SMALL for word in ("--set", setting)))
         assert done.code == 0, done.err
+        done = self.gsac("fixtures", self.out, "--out", self.fixtures)
+        assert done.code == 0, done.err
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        return json.loads((self.fixtures / "manifest.json").read_text())
 
     def store(self, name: str) -> Path:
         """A store that holds the models and else what commands have put there."""
@@ -41,9 +49,9 @@ class SmallRun:
         """store: its name."""
         return os.environ | {"GSAC_CACHE": str(self.store(store)), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
 
-    def gsac(self, *arguments: object, store: str = "store") -> Done:
+    def gsac(self, *arguments: object, store: str = "store", cwd: Path | None = None) -> Done:
         done = subprocess.run([sys.executable, "-P", "-m", "gsac.pipeline.cli", *map(str, arguments)], env=self.env(store),
-                              cwd=self.root, text=True, capture_output=True, timeout=600)
+                              cwd=cwd or self.root, text=True, capture_output=True, timeout=600)
         return Done(done.returncode, done.stdout, done.stderr)
 
 

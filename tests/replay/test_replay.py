@@ -1,4 +1,7 @@
-"""Every real stage replays from what the stage before it made: the same bytes once more, and no work a third time."""
+"""Every real stage replays from fixtures that the stage before it made: the same bytes, and no work a third time."""
+
+import shlex
+from pathlib import Path
 
 import pytest
 
@@ -11,14 +14,17 @@ PROJECT = Project.at_hand()
 
 
 @pytest.mark.parametrize("name", PROJECT.graph.steps)
-def test_a_stage_replays_to_the_same_bytes_in_a_fresh_store_and_is_cached_from_then_on(small_run, tmp_path, name):
-    command = ("stage", name, "--inputs", small_run.out, "--out", tmp_path / name, "--params", small_run.out / "params.yaml", "--json")
-    again = small_run.gsac(*command, "--force", store="fresh")
+def test_a_stage_replays_to_the_same_bytes_in_a_fresh_store_and_is_cached_from_then_on(small_run, name):
+    promised = small_run.manifest["stages"][name]
+    command = shlex.split(promised["command"])[1:]
+    again = small_run.gsac(*command, "--force", store="fresh", cwd=small_run.fixtures)
     assert again.code == 0 and again.statuses == {name: "ran"}, again.err
+    assert again.json["stages"][0]["outputs"] == promised["outputs"]
     for output in PROJECT.outputs(name):
-        made, before = (tree_digest(folder / name / output)[1] for folder in (tmp_path, small_run.out))
+        made = tree_digest(Path(again.json["outputs"][f"{name}/{output}"]))[1]
+        before = tree_digest(small_run.out / name / output)[1]
         assert made == before, f"{name}/{output}"
-    assert small_run.gsac(*command, store="fresh").statuses == {name: "cached"}
+    assert small_run.gsac(*command, store="fresh", cwd=small_run.fixtures).statuses == {name: "cached"}
 
 
 def test_dvc_takes_the_run_for_up_to_date_and_sees_a_changed_parameter_as_gsac_does(small_run):
