@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import shutil
 from dataclasses import MISSING, fields, replace
 from pathlib import Path
 
@@ -18,14 +19,21 @@ from gsac.avatar.artifacts import (
     KEYPOINT_SHAPES,
     LEVEL_SHAPES,
     LIGHT_SHAPE,
+    NOWHERE,
     REST_SHAPE,
+    TEXT,
+    WHOLE,
     ArtifactError,
     Clip,
     Crop,
+    read_arrays,
     write_arrays,
 )
 from gsac.avatar.body import Body
-from gsac.stages.contract import Job
+from gsac.avatar.frame_range import copy_frames
+from gsac.pipeline.fixtures import fixture_paths
+from gsac.pipeline.project import Project
+from gsac.stages.contract import BadInput, Job
 from support.artifacts import blank
 
 PORTS = {
@@ -39,6 +47,7 @@ PORTS = {
 """Port -> the arrays that its file may hold."""
 ALONE = ("light", "rest_expression")
 """Arrays that may be there or not, whatever else is."""
+PROJECT = Project.at_hand()
 STAGES = {name: importlib.import_module(f"gsac.stages.{name}").STAGE
           for name in ("split", "keypoints", "handgap", "segment", "face", "smplx", "train", "export")}
 WRITTEN = [(port, array) for port, shapes in PORTS.items() for array in shapes if array not in ALONE]
@@ -59,6 +68,8 @@ def write_whole(folder: Path, without: str = "", port: str = "") -> dict[str, Pa
     Clip(30.0, [0.0, 0.1, 0.2], 64, 64, None, "0" * 64).write(inputs["split/clip.json"])
     for name, shapes in PORTS.items():
         arrays = blank(shapes, L=1 if name == "train/avatar.npz" else 468, M=4)
+        if "levels" in arrays:
+            arrays["levels"][:] = 4
         if "model" in arrays:
             arrays["model"] = np.array(Body.load().digest)
         write_arrays(inputs[name], **{key: value for key, value in arrays.items() if (name, key) != (port, without)})
@@ -80,6 +91,42 @@ def test_the_stage_that_writes_a_file_is_held_to_every_array(tmp_path, port, arr
     check = next(output.check for output in STAGES[name].outputs if output.path == path)
     with pytest.raises(ArtifactError, match=rf"{path}: array {array} is missing"):
         check(inputs[port])
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    write_whole(folder)
+    return folder
+
+
+WRONG = {
+    "has shape": lambda array: np.stack([array, array]),
+    "is of type": lambda array: np.zeros(array.shape, np.int32 if array.dtype.kind == "U" else "U4"),
+    "is not finite": lambda array: np.full(array.shape, np.nan, np.float32),
+}
+"""What a replay says of an array -> how it comes about."""
+
+
+@pytest.mark.parametrize("words", WRONG)
+@pytest.mark.parametrize("port", PORTS)
+def test_a_replay_names_the_array_that_was_edited(whole, port, words):
+    arrays, reader = read_arrays(whole / port), next(name for name, stage in STAGES.items() if port in stage.inputs)
+    edited = arrays.keys() - (NOWHERE + TEXT + WHOLE if words == "is not finite" else ())
+    for array in sorted(edited):
+        write_arrays(whole / port, **arrays | {array: WRONG[words](arrays[array])})
+        with pytest.raises(BadInput, match=rf"{port} is not what {port} promises: .*array {array} {words}"):
+            fixture_paths(PROJECT, reader, whole)
+    write_arrays(whole / port, **arrays)
+
+
+@pytest.mark.parametrize("port", [port for port in PORTS if port != "train/avatar.npz"])
+def test_a_replay_names_the_artifact_that_speaks_of_another_number_of_frames(tmp_path, whole, port):
+    folder = shutil.copytree(whole, tmp_path / "fixtures")
+    copy_frames(whole / port, folder / port, 2)
+    reader = max((name for name, stage in STAGES.items() if port in stage.inputs), key=lambda name: len(STAGES[name].inputs))
+    with pytest.raises(BadInput, match=rf"{port} speaks of 2 frames, but .*split/clip.json.* of 3; take all from one run"):
+        fixture_paths(PROJECT, reader, folder)
 
 
 @pytest.mark.parametrize(("port", "few"), [("face/face.npz", FACE_SHAPES), ("train/avatar.npz", AVATAR_SHAPES)])
