@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+import math
+import struct
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from gsac.avatar.files import told_no_room, write_file
 
@@ -93,6 +95,9 @@ class Clip:
         for each in fields(cls):
             if each.name not in values and each.default_factory is MISSING and each.default is MISSING:
                 raise ArtifactError(f"{path}: field {each.name} is missing (has {', '.join(sorted(values))})")
+        for name, (words, fits) in CLIP_FIELDS.items():
+            if name in values and not fits(values[name]):
+                raise ArtifactError(f"{path}: field {name} is {str(values[name])[:40]!r}, expected {words}")
         clip = cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
         try:
             if cut := values.get("crop"):
@@ -104,6 +109,26 @@ class Clip:
             raise ArtifactError(f"{path}: crop and center must be an object of {', '.join(f.name for f in fields(Crop))}, "
                                 f"and two numbers ({e})") from e
         return clip
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_list(value: object, of: Callable[[object], bool]) -> bool:
+    return isinstance(value, list) and all(map(of, value))
+
+
+CLIP_FIELDS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
+    "fps": ("a number or null", lambda value: value is None or _is_number(value)),
+    "timestamps_s": ("a list of numbers or null", lambda value: value is None or _is_list(value, _is_number)),
+    "width": ("a whole number of px", lambda value: type(value) is int),
+    "height": ("a whole number of px", lambda value: type(value) is int),
+    "focal_px": ("a number above 0 or null", lambda value: value is None or _is_number(value) and cast("float", value) > 0),
+    "source_sha256": ("text", lambda value: isinstance(value, str)),
+    "repeated": ("a list of frame numbers", lambda value: _is_list(value, lambda t: type(t) is int)),
+}
+"""Field of clip.json -> what it must be, in words and as a test."""
 
 
 def frame_paths(frames: Path) -> list[Path]:
@@ -124,6 +149,21 @@ def read_frame(path: Path) -> np.ndarray:
     if image is None:
         raise ArtifactError(f"{path}: cannot be read as an image")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """Width and height, px, of a frame or mask, from the head of its PNG or EXR."""
+    try:
+        with open(path, "rb") as stream:
+            if path.suffix == ".png":
+                width, height = struct.unpack_from(">II", stream.read(24), 16)
+                return width, height
+            import OpenEXR
+
+            (x0, y0), (x1, y1) = OpenEXR.File(stream, header_only=True).header()["dataWindow"]
+            return int(x1 - x0 + 1), int(y1 - y0 + 1)
+    except (OSError, RuntimeError, struct.error) as e:
+        raise ArtifactError(f"{path}: cannot be read as an image") from e
 
 
 def write_frame(path: Path, rgb: np.ndarray) -> None:

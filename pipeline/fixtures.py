@@ -12,7 +12,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from gsac.avatar.frame_range import copy_frames, count_frames
+from gsac.avatar.artifacts import Clip, frame_paths, image_size
+from gsac.avatar.frame_range import CLIP_FILE, copy_frames, count_frames
 from gsac.cache.digest import tree_digest
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.params import config_values, resolve, to_yaml
@@ -60,7 +61,7 @@ def replay_command(name: str) -> str:
 
 def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:
     """Port -> path under the folder of artifacts, each checked as the stage that makes it declares, and that all speak of as many
-    frames."""
+    frames of one size."""
     graph = project.graph
     paths = {}
     for port in graph.step(name).deps:
@@ -75,14 +76,26 @@ def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:
             except Exception as error:
                 raise BadInput(f"{folder / port} is not what {port} promises: {error}") from error
         paths[port] = path
-    _check_lengths(folder, [port for port in paths if port != CLIP])
+    made = {port: folder / port for port in paths if port != CLIP}
+    _check_lengths(made)
+    _check_sizes(made)
     return paths
 
 
-def _check_lengths(folder: Path, ports: list[str]) -> None:
-    counts = {port: count for port in ports if (count := count_frames(folder / port)) is not None}
+def _check_lengths(made: dict[str, Path]) -> None:
+    counts = {port: count for port, path in made.items() if (count := count_frames(path)) is not None}
     for most, _ in Counter(counts.values()).most_common(1):
         others = ", ".join(port for port in counts if counts[port] == most)
-        for port in counts:
-            if counts[port] != most:
-                raise BadInput(f"{folder / port} speaks of {counts[port]} frames, but {others} of {most}; take all from one run")
+        for port, count in counts.items():
+            if count != most:
+                raise BadInput(f"{made[port]} speaks of {count} frames, but {others} of {most}; take all from one run")
+
+
+def _check_sizes(made: dict[str, Path]) -> None:
+    images = [image for path in made.values() if path.is_dir() for image in frame_paths(path)]
+    sizes = {path: (clip.width, clip.height) for path in made.values() if path.name == CLIP_FILE for clip in [Clip.read(path)]}
+    sizes |= {image: image_size(image) for image in images}
+    for most, _ in Counter(sizes.values()).most_common(1):
+        for path, (width, height) in sizes.items():
+            if (width, height) != most:
+                raise BadInput(f"{path} is of {width}x{height} px, others of {most[0]}x{most[1]}; take all from one run")

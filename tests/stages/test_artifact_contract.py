@@ -26,8 +26,11 @@ from gsac.avatar.artifacts import (
     ArtifactError,
     Clip,
     Crop,
+    read_alpha,
     read_arrays,
+    write_alpha,
     write_arrays,
+    write_frame,
 )
 from gsac.avatar.body import Body
 from gsac.avatar.frame_range import copy_frames
@@ -64,7 +67,7 @@ def write_whole(folder: Path, without: str = "", port: str = "") -> dict[str, Pa
     for name in ("split/frames", "segment/alpha"):
         inputs[name].mkdir()
         for t in range(3):
-            (inputs[name] / f"{t:06d}.png").touch()
+            write_frame(inputs[name] / f"{t:06d}.png", np.zeros((64, 64, 3), np.uint8))
     Clip(30.0, [0.0, 0.1, 0.2], 64, 64, None, "0" * 64).write(inputs["split/clip.json"])
     for name, shapes in PORTS.items():
         arrays = blank(shapes, L=1 if name == "train/avatar.npz" else 468, M=4)
@@ -127,6 +130,35 @@ def test_a_replay_names_the_artifact_that_speaks_of_another_number_of_frames(tmp
     reader = max((name for name, stage in STAGES.items() if port in stage.inputs), key=lambda name: len(STAGES[name].inputs))
     with pytest.raises(BadInput, match=rf"{port} speaks of 2 frames, but .*split/clip.json.* of 3; take all from one run"):
         fixture_paths(PROJECT, reader, folder)
+
+
+@pytest.mark.parametrize("port", ["split/frames", "segment/alpha", "split/clip.json"])
+def test_a_replay_names_the_picture_of_another_size(tmp_path, whole, port):
+    folder = shutil.copytree(whole, tmp_path / "fixtures")
+    if port == "split/clip.json":
+        replace(Clip.read(folder / port), width=60).write(folder / port)
+    else:
+        write_frame(folder / port / "000001.png", np.zeros((64, 60, 3), np.uint8))
+    with pytest.raises(BadInput, match=rf"{port}.* is of 60x64 px, others of 64x64; take all from one run"):
+        fixture_paths(PROJECT, "train", folder)
+
+
+@pytest.mark.parametrize(("field", "value"), [("fps", "fast"), ("timestamps_s", [0, None, 1]), ("width", 64.5), ("height", "64"),
+                                              ("focal_px", float("nan")), ("source_sha256", 5), ("repeated", ["a"])])
+def test_clip_json_names_the_field_that_is_of_another_kind(tmp_path, field, value):
+    path = tmp_path / "clip.json"
+    Clip(30.0, [0.0, 0.1, 0.2], 64, 64, None, "0" * 64).write(path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {field: value}))
+    with pytest.raises(ArtifactError, match=rf"clip.json: field {field} is .*, expected "):
+        Clip.read(path)
+
+
+@pytest.mark.parametrize("content", [np.full((4, 5), np.nan), np.full((4, 5), 2.0), None], ids=["nan", "2", "damaged"])
+def test_a_mask_that_is_none_is_named(tmp_path, content):
+    path = tmp_path / "000000.exr"
+    path.write_bytes(b"no picture") if content is None else write_alpha(path, content)
+    with pytest.raises(ArtifactError, match="000000.exr: (expected one channel, every pixel in 0..1|cannot be read as a mask)"):
+        read_alpha(path)
 
 
 @pytest.mark.parametrize(("port", "few"), [("face/face.npz", FACE_SHAPES), ("train/avatar.npz", AVATAR_SHAPES)])
