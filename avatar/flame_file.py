@@ -101,6 +101,19 @@ def read_flame_points(path: Path | str) -> FlamePoints:
                        a["lmk_b_coords"][known].astype(np.float32))
 
 
+def read_flame_ids(path: Path | str) -> np.ndarray:
+    """(5023,) int, the vertices of SMPL-X that are FLAME's (`SMPL-X__FLAME_vertex_ids.npy`). Raises `ArtifactError`."""
+    path, count = Path(path), ARRAYS["v_template"][0]
+    try:
+        ids = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as e:
+        raise ArtifactError(f"{path}: not a readable npy ({e}); SMPL-X's site hands it out as SMPL-X__FLAME_vertex_ids.npy") from e
+    if not isinstance(ids, np.ndarray) or ids.shape != (count,) or ids.dtype.kind not in "iu" or ids.min() < 0:
+        raise ArtifactError(f"{path}: expected {count} vertex numbers, found {getattr(ids, 'dtype', type(ids).__name__)} of shape "
+                            f"{np.shape(ids)}")
+    return ids.astype(np.int64)
+
+
 def _arrays(path: Path, names: dict) -> dict[str, np.ndarray]:
     """The named arrays, whatever else the file holds."""
     if path.suffix != ".npz" and not zipfile.is_zipfile(path):  # the model store keeps files under names without suffix

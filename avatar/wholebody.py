@@ -22,6 +22,8 @@ NAMES = tuple(
     + [f"left_hand_{n}" for n in HAND_POINTS.split()] + [f"right_hand_{n}" for n in HAND_POINTS.split()]
 )
 INDEX = {name: i for i, name in enumerate(NAMES)}
+OTHER_SIDE = tuple(INDEX[name.replace("left", "?").replace("right", "left").replace("?", "right")] for name in NAMES)
+"""The point of the same name on the other side."""
 
 PALM = {"left": INDEX["left_hand_middle1"], "right": INDEX["right_hand_middle1"]}
 """The paper's palm point is read as the root of the middle finger."""

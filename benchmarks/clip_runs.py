@@ -22,7 +22,8 @@ def render_clip(folder: Path, say: PlainReporter, **options: Any) -> Path:
     if not (folder / "truth.npz").is_file():
         from gsac.turntable.clip import make_clip
 
-        make_clip(folder, height=HEIGHT, progress=lambda done, total, unit: say.progress(folder.name, done, total, unit), **options)
+        make_clip(folder, progress=lambda done, total, unit: say.progress(folder.name, done, total, unit),
+                  **{"height": HEIGHT, **options})
     return folder
 
 

@@ -8,15 +8,15 @@ from pathlib import Path
 from gsac.stages.body_choice import OPEN
 from gsac.stages.contract import BadInput
 
-DETECTOR = "onnx-wholebody"
-"""Name under which stage keypoints looks for a network of its own."""
+DETECTOR, ENCODER = "onnx-wholebody", "deca-encoder"
+"""Names under which stages keypoints and face look for networks that users bring."""
 TAKEN = (OPEN, "none", "auto")
 """Words that mean something else where a parameter names a model file."""
 
 
 def check_model(name: str, file: Path) -> None:
-    """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a FLAME head, the points on
-    one, or a body model."""
+    """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a face encoder, a FLAME head,
+    the points on one, its vertices in SMPL-X, or a body model."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
@@ -27,6 +27,11 @@ def check_model(name: str, file: Path) -> None:
 
         SimccNetwork(file)
         return
+    if name == ENCODER:
+        from gsac.stages.face.deca import DecaEncoder
+
+        DecaEncoder(file)
+        return
     try:
         _read(file)
     except (ArtifactError, NpzError, zipfile.BadZipFile) as error:
@@ -36,8 +41,11 @@ def check_model(name: str, file: Path) -> None:
 
 def _read(file: Path) -> None:
     from gsac.avatar.body_file import read_body_file
-    from gsac.avatar.flame_file import ARRAYS, POINTS, read_flame, read_flame_points
+    from gsac.avatar.flame_file import ARRAYS, POINTS, read_flame, read_flame_ids, read_flame_points
 
+    if file.suffix == ".npy":
+        read_flame_ids(file)
+        return
     arrays = _array_names(file)
     if arrays & POINTS.keys() and "v_template" not in arrays:
         read_flame_points(file)

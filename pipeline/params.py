@@ -32,7 +32,7 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
     sources.extend((options or {}).items())
     sources.extend((f"--set {text}", _assignment(text)) for text in sets)
     values: Values = {name: {} for name in project.graph.steps}
-    configs = {}
+    configs, faults = {}, {}
     for source, sections in sources:
         for section, parameters in sections.items():
             if section not in values:
@@ -43,8 +43,11 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
             values[section] |= parameters
             try:
                 configs[section] = make_config(project.stage(section), values[section])
+                faults.pop(section, None)  # a later value may mend what an earlier one alone makes no sense without
             except BadInput as e:
-                raise BadInput(f"{source}: {e}") from e
+                faults.setdefault(section, (source, e))
+    for source, fault in faults.values():
+        raise BadInput(f"{source}: {fault}") from fault
     return {name: configs.get(name) or make_config(project.stage(name), {}) for name in wanted}
 
 

@@ -62,8 +62,12 @@ class Code(Enum):
     FACE_AT_REST = Wording("The face was never seen from the front; the avatar's face stays at rest.")
     JAW_ALONE = Wording("This body model has no named facial actions: of the face only the jaw is carried over; a FLAME head "
                         "(face.flame) would bring the rest.")
+    FLAME_LEFT_OUT = Wording("FLAME's expression goes into this body by the vertices that both share, and these were not given; "
+                             "of the face only the jaw is carried over.", "Give smplx.flame and smplx.flame_ids.")
     ODD_FOCAL = Wording("The focal length given, {given:.0f} px, is {figure:.2f} times the picture's longer side, as hardly any "
                         "phone's is: if it is wrong, so is the body.", "Leave it out, and it is found from the person.")
+    FOCAL_NOT_BELIEVED = Wording("The focal length given, {given:.0f} px, contradicts the pictures; {figure:.0f} px, as the person "
+                                 "shows it, is used.", "Leave it out.", Severity.NEWS)
     PAPER_START = Wording("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's "
                           "regression", severity=Severity.NEWS)
     PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "
@@ -98,6 +102,9 @@ class Code(Enum):
                              "Lock exposure and focus before the turn: hold a finger on the person in the picture.")
     BLURRED = Wording("The picture is blurred in {frames}.",
                       "Clean the lens, let the phone focus on the person, film in more light and turn slower.")
+    SIDES_EXCHANGED = Wording("Left was taken for right in {frames}; the sides are exchanged there.", severity=Severity.NEWS)
+    TURN_JUMPS = Wording("The turn jumps in {frames}, by pictures out of order or a fast turn; each is fitted alone there.",
+                         "Give one recording without cuts, and turn evenly and slowly.", Severity.NEWS)
     OTHER = Wording("{what}")
     """Of a stage that is not of this package."""
 

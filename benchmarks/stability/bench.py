@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 TINY = {"frames": 8, "height": 320}
 """Of the clip of --quick."""
+CPU_SECONDS = {"default": 0.3, "paper": 1.7}
+"""Method -> CPU seconds of one frame of a trial, 20 frames of 480 px, mean of a few faults."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--jobs", type=int, default=1, metavar="N", help="trials side by side (default: 1)")
     out.add_argument("--limit", type=float, default=600, metavar="S", help="seconds after which a trial hangs (default: 600)")
     out.add_argument("--until-s", type=float, default=None, metavar="S", help="begin no trial after so many seconds")
+    out.add_argument("--dry-run", action="store_true", help="only say how many trials there are and what they may take")
     out.add_argument("--quick", action="store_true", help="a few faults at severity 3 on a tiny clip")
     out.add_argument("--out", type=Path, default=Path("bench-stability"), metavar="DIR", help="default: ./bench-stability")
     return out
@@ -49,14 +52,19 @@ def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.stability import chart, table
     from gsac.benchmarks.stability.outcome import draw_curves, find_outcomes
+    from gsac.benchmarks.stability.trial import hash_results
     from gsac.pipeline.reporter import PlainReporter
 
     say = PlainReporter(sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)
     keep_settings(options)
     lines = options.out / "trials.jsonl"
-    measure(options, lines, say)
-    outcomes = find_outcomes(table.read_lines(lines))
+    tasks = list_open(options, lines, say)
+    say.note(forecast(tasks, options.jobs))
+    if options.dry_run:
+        return 0
+    measure(options, tasks, lines, say)
+    outcomes = find_outcomes(t for t in table.read_lines(lines) if t.code == hash_results(options.until))
     curves = draw_curves(outcomes)
     if not curves:
         say.note("no trial with a fault was finished")
@@ -65,6 +73,7 @@ def main(argv: list[str] | None = None) -> int:
     words = table.text(curves)
     print(words)
     (options.out / "stability.txt").write_text(words + "\n")
+    (options.out / "stability.md").write_text(table.markdown(curves))
     chart.draw(curves, options.out)
     return 0
 
@@ -79,13 +88,29 @@ def keep_settings(options: argparse.Namespace) -> None:
     path.write_text(json.dumps(own) + "\n")
 
 
-def measure(options: argparse.Namespace, lines: Path, say: PlainReporter) -> None:
-    """Runs the tasks that are not in the file of lines yet, and appends each as it ends."""
+def list_open(options: argparse.Namespace, lines: Path, say: PlainReporter) -> list[Task]:
+    """Tasks that the file of lines has no trial of by today's code."""
+    from gsac.benchmarks.stability import table
+    from gsac.benchmarks.stability.trial import hash_results
+
+    kept, code = table.read_lines(lines), hash_results(options.until)
+    done = {(t.clip, t.fault, t.severity, t.seed, t.method) for t in kept if t.code == code}
+    if others := sum(t.code != code for t in kept):
+        say.note(f"{lines} holds {others} trials of other code; they do not count, and run again where they are asked for")
+    return [t for t in list_tasks(options, say) if (t.clip.name, t.fault, t.severity, t.seed, t.method) not in done]
+
+
+def forecast(tasks: list[Task], jobs: int) -> str:
+    """A sentence: how many trials, and the minutes that they may take."""
+    minutes = sum(CPU_SECONDS[t.method] * t.frames for t in tasks) / 60
+    return f"{len(tasks)} trials, about {minutes:.0f} CPU minutes, {minutes / max(1, jobs):.0f} with {jobs} side by side"
+
+
+def measure(options: argparse.Namespace, tasks: list[Task], lines: Path, say: PlainReporter) -> None:
+    """Runs the tasks and appends each to the file of lines as it ends."""
     from gsac.benchmarks.stability import table, workers
     from gsac.benchmarks.stability.trial import Trial
 
-    done = {(t.clip, t.fault, t.severity, t.seed, t.method) for t in table.read_lines(lines)}
-    tasks = [t for t in list_tasks(options, say) if (t.clip.name, t.fault, t.severity, t.seed, t.method) not in done]
     lock = threading.Lock()
 
     def tell(trial: Trial) -> None:
@@ -93,13 +118,16 @@ def measure(options: argparse.Namespace, lines: Path, say: PlainReporter) -> Non
             table.add_line(trial, lines)
             figure = "-" if trial.mean_mm is None else f"{trial.mean_mm:.0f} mm"
             say.note(f"{trial.clip} {trial.fault} {trial.severity} {trial.method}: {trial.end} {trial.message} {figure}, "
-                     f"{trial.seconds:.0f} s")
+                     f"{trial.seconds:.0f} s, {trial.cpu_seconds:.0f} CPU s")
 
     workers.run_all(tasks, options.jobs, options.limit, tell, options.until_s)
 
 
 def list_tasks(options: argparse.Namespace, say: PlainReporter) -> list[Task]:
-    """Tasks in the order in which they should be done: methods, clean clips before faults, seeds, then severities 3, 5, 1, 4, 2."""
+    """Tasks in the order in which they should be done: methods, clean clips before faults, severities 3, 5, 1, 4, 2, then seeds.
+
+    So a sweep that ends early has all persons at the severities that it came to.
+    """
     from gsac.benchmarks.clip_runs import render_clip
     from gsac.benchmarks.stability.fault import Origin
     from gsac.benchmarks.stability.faults import FAULTS, QUICK
@@ -130,4 +158,4 @@ def list_tasks(options: argparse.Namespace, say: PlainReporter) -> list[Task]:
 
     return [each for method in options.methods or ([DEFAULT] if quick else METHODS)
             for each in ([task(CLEAN, 0, seed, method) for seed in seeds[:len(clips)]]
-                         + [task(f.name, severity, seed, method) for seed in seeds for severity in severities for f in faults])]
+                         + [task(f.name, severity, seed, method) for severity in severities for seed in seeds for f in faults])]

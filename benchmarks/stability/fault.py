@@ -31,6 +31,10 @@ class Origin(StrEnum):
     """Options of the turntable, by name: the person behaves or dresses otherwise, and is rendered anew."""
 
 
+Change = Callable[[Any, float, np.random.Generator], tuple[Any, np.ndarray]]
+"""(what `Fault.origin` says, level, random numbers) -> the same changed, and the frames that it touches, (T,) bool."""
+
+
 @dataclass(frozen=True)
 class Fault:
     """One way in which clips go wrong."""
@@ -40,8 +44,7 @@ class Fault:
     """What it is and what its levels mean."""
     levels: tuple[float, float, float, float, float]
     """Of severities 1 to 5."""
-    change: Callable[[Any, float, np.random.Generator], tuple[Any, np.ndarray]]
-    """(what `origin` says, level, random numbers) -> the same changed, and the frames that it touches, (T,) bool."""
+    change: Change
     origin: Origin = Origin.TAKE
 
     def inject(self, clean: Any, severity: int, seed: int) -> tuple[Any, np.ndarray]:

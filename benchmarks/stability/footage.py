@@ -1,4 +1,4 @@
-"""Faults of the file: rotation tags, uneven rates, very long clips, and files of which a part is missing."""
+"""Faults of the file: rotation tags, uneven rates, very long clips, 10 bits and HDR, and files of which a part is missing."""
 
 from __future__ import annotations
 
@@ -14,6 +14,11 @@ from gsac.benchmarks.stability.take import FPS, Take
 from gsac.turntable.clip import VideoWriter
 from gsac.turntable.options import TurntableOptions
 
+DEEP = (("yuv420p10le", "bt709", "bt709", "bt709"), ("yuv422p10le", "bt709", "bt709", "bt709"),
+        ("yuv420p10le", "bt2020-10", "bt2020", "bt2020nc"), ("yuv420p10le", "arib-std-b67", "bt2020", "bt2020nc"),
+        ("yuv420p10le", "smpte2084", "bt2020", "bt2020nc"))
+"""Kinds of 10-bit files, each farther from a plain one: pixels, transfer, primaries and matrix as the file says them."""
+
 
 @dataclass(frozen=True)
 class Film:
@@ -26,13 +31,15 @@ class Film:
     """Pictures that are missing; the others keep their times."""
     frames: int = 0
     """Length; the take is repeated until then. 0: once."""
+    deep: int = 0
+    """1 to 5: the kind of 10-bit file in DEEP, whose words about its colours players follow. 0: 8 bits."""
     share: float = 1.0
     """Of the file's bytes, from its beginning."""
 
     @property
     def plain(self) -> bool:
         """Whether the file itself has no fault."""
-        return (self.rotation, self.gone, self.frames, self.share) == (0, (), 0, 1.0)
+        return (self.rotation, self.gone, self.frames, self.deep, self.share) == (0, (), 0, 0, 1.0)
 
     @property
     def rate(self) -> float:
@@ -58,6 +65,10 @@ class Film:
         if self.gone:
             lost = "+".join(f"eq(n,{n})" for n in self.gone)
             after = ["-vf", f"select='not({lost})'", "-fps_mode", "vfr", "-c:v", "libx264", "-crf", "4"]
+        if self.deep:
+            pixels, transfer, primaries, matrix = DEEP[self.deep - 1]
+            after = ["-c:v", "libx264", "-crf", "4", "-pix_fmt", pixels, "-color_trc", transfer, "-color_primaries", primaries,
+                     "-colorspace", matrix]
         subprocess.run([ffmpeg_program(), "-y", "-loglevel", "error", *before, "-i", str(plain), *after, "-movflags", "+faststart",
                         str(path)], check=True, stdin=subprocess.DEVNULL)
         plain.unlink()
@@ -86,6 +97,11 @@ def repeat(film: Film, frames: float, rng: np.random.Generator) -> tuple[Film, n
     return replace(film, frames=int(frames)), np.ones(len(film.take.frames), bool)
 
 
+def deepen(film: Film, kind: float, rng: np.random.Generator) -> tuple[Film, np.ndarray]:
+    """kind: in DEEP, from 1. Returns the film and frames (T,) bool."""
+    return replace(film, deep=int(kind)), np.ones(len(film.take.frames), bool)
+
+
 def tear(film: Film, share: float, rng: np.random.Generator) -> tuple[Film, np.ndarray]:
     """share: of the file that is there. Returns the film and frames (T,) bool."""
     return replace(film, share=share), np.ones(len(film.take.frames), bool)
@@ -95,5 +111,6 @@ FAULTS = (
     Fault("torn-file", "share of the file that is there", (0.95, 0.8, 0.5, 0.2, 0.0), tear, Origin.FILM),
     Fault("rotation-tag", "degrees", (90, 180, 270, 90, 270), turn_file, Origin.FILM),
     Fault("uneven-rate", "share of pictures that are missing, true times", (0.1, 0.2, 0.3, 0.45, 0.6), vary_rate, Origin.FILM),
+    Fault("ten-bit", "kind of 10-bit file: 4:2:0, 4:2:2, BT.2020, HLG, PQ", (1, 2, 3, 4, 5), deepen, Origin.FILM),
     Fault("long-clip", "frames of the file", (100, 300, 1000, 3000, 10_000), repeat, Origin.FILM),
 )

@@ -28,19 +28,7 @@ def slide(body: dict[str, np.ndarray], metres: float, rng: np.random.Generator) 
     return body | {"transl": place + rng.normal(0, metres, place.shape).astype(place.dtype)}, np.ones(len(place), bool)
 
 
-def hide_hand(options: dict, share: float, rng: np.random.Generator) -> tuple[dict, np.ndarray]:
-    """share: of the clip in which the left hand is behind the back, before its end. Returns options and frames (0,) bool."""
-    return options | {"hidden_hand": "left_back", "hidden_from": 0.97 - share, "hidden_to": 0.97}, np.zeros(0, bool)
-
-
-def dress(options: dict, factor: float, rng: np.random.Generator) -> tuple[dict, np.ndarray]:
-    """factor: on the thickness of clothes and hair. Returns options and frames (0,) bool."""
-    return options | {"clothing": factor}, np.zeros(0, bool)
-
-
 FAULTS = (
-    Fault("hand-behind-back", "share of the clip", (0.08, 0.14, 0.2, 0.28, 0.4), hide_hand, Origin.PERSON),
-    Fault("wide-clothes", "factor on the thickness of clothes and hair", (1.5, 2.0, 2.5, 3.0, 4.0), dress, Origin.PERSON),
     Fault("focal-short", "given focal length over the true one", (0.8, 0.65, 0.5, 0.33, 0.2), give_focal),
     Fault("focal-long", "given focal length over the true one", (1.25, 1.5, 2.0, 3.0, 5.0), give_focal),
     Fault("pose-noise", "standard deviation of each joint, degrees; training only", (0.5, 1, 2, 4, 8), disturb_poses, Origin.BODY),

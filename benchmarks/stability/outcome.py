@@ -13,6 +13,7 @@ from gsac.stages.severity import Severity
 
 BREAKDOWN = 0.8
 """Retained quality below which a clip has failed: over a fifth is lost."""
+NO_RESULT = (End.CRASHED, End.HUNG)
 TWICE = 2.0
 """Times the clean clip's error from which on a fault breaks the fit, whatever is retained."""
 
@@ -30,6 +31,14 @@ class Outcome:
     """Over a fifth of the quality is lost, or a joint is off in five frames in which it is not in the clean clip."""
     said: tuple[str, ...]
     """Codes that the clean clip does not have in those frames, whose frames overlap with what went wrong."""
+
+    warned: bool | None
+    """Whether `gsac check` has a code for the clip that it does not have for the clean one; None for faults of artifacts."""
+
+    @property
+    def foretold(self) -> bool | None:
+        """Whether the check agrees with the run: both find something, or neither does."""
+        return None if self.warned is None else self.warned == (self.failed or bool(self.said))
 
     @property
     def silent(self) -> bool:
@@ -49,7 +58,8 @@ def find_outcome(trial: Trial, clean: Trial) -> Outcome:
     share = retain(trial, clean)
     off = {n for name, frames in trial.off.items() if len(own := {*frames} - {*clean.off.get(name, ())}) >= WORST for n in own}
     ratio = trial.mean_mm / clean.mean_mm if trial.mean_mm and clean.mean_mm else None
-    return Outcome(trial, ratio, share, share < BREAKDOWN or bool(off), find_codes(trial, clean, off))
+    warned = None if trial.checked is None or trial.end in NO_RESULT else bool({*trial.checked} - {*(clean.checked or ())})
+    return Outcome(trial, ratio, share, share < BREAKDOWN or bool(off), find_codes(trial, clean, off), warned)
 
 
 def retain(trial: Trial, clean: Trial) -> float:
@@ -102,6 +112,10 @@ class Curve:
     crashed: int
     refused: int
     trials: int
+    checked: int
+    """Trials of which `gsac check` has a say."""
+    foretold: int
+    """Those in which it agrees with the run."""
 
     @property
     def area(self) -> float:
@@ -127,9 +141,10 @@ def _curve(fault: str, method: str, some: list[Outcome]) -> Curve:
     tried = sorted({o.trial.severity for o in some})
     means = [float(np.mean([o.retained for o in some if o.trial.severity == severity])) for severity in tried]
     errors = [_mean_ratio([o for o in some if o.trial.severity == severity]) for severity in tried]
-    crashes = sum(o.trial.end in (End.CRASHED, End.HUNG) for o in some)
+    crashes = sum(o.trial.end in NO_RESULT for o in some)
     return Curve(fault, method, (0, *tried), (1.0, *means), (1.0, *errors), sum(o.silent for o in some), crashes,
-                 sum(o.trial.end is End.REFUSED for o in some), len(some))
+                 sum(o.trial.end is End.REFUSED for o in some), len(some), sum(o.foretold is not None for o in some),
+                 sum(bool(o.foretold) for o in some))
 
 
 def _mean_ratio(some: list[Outcome]) -> float:

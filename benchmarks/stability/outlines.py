@@ -58,6 +58,11 @@ def empty(alpha: np.ndarray, share: float, rng: np.random.Generator) -> Touched:
     return np.where(some[:, None, None], np.float32(0), alpha), some
 
 
+def end_early(alpha: np.ndarray, share: float, rng: np.random.Generator) -> Touched:
+    """share: of the masks, the last ones, that the folder lacks. alpha: (T, H, W)."""
+    return alpha[:len(alpha) - max(1, round(share * len(alpha)))], np.ones(len(alpha), bool)
+
+
 def _disc(alpha: np.ndarray, px: float) -> np.ndarray:
     radius = max(1, round(px * max(alpha.shape) / 1280))
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
@@ -74,4 +79,5 @@ FAULTS = (
     Fault("mask-late", "frames", (1, 2, 3, 4, 6), delay, Origin.ALPHA),
     Fault("mask-part-missing", "share of the width, in every third frame", (0.1, 0.2, 0.3, 0.45, 0.6), drop_part, Origin.ALPHA),
     Fault("mask-empty", "share of masks", (0.1, 0.3, 0.6, 0.9, 1.0), empty, Origin.ALPHA),
+    Fault("masks-missing", "share of masks that the folder lacks", (0.05, 0.2, 0.5, 0.9, 1.0), end_early, Origin.ALPHA),
 )

@@ -85,6 +85,13 @@ def lose_person(points: Points, share: float, rng: np.random.Generator) -> Touch
     return out, some
 
 
+def end_early(points: Points, share: float, rng: np.random.Generator) -> Touched:
+    """share: of the frames, the last ones, that the file lacks. points: (T, 133, ...) by name."""
+    count = len(points["xy"])
+    kept = count - max(1, round(share * count))
+    return {name: array[:kept] if array.ndim else array for name, array in points.items()}, np.ones(count, bool)
+
+
 def _copy(points: Points) -> Points:
     return {name: array.astype(float) if array.dtype.kind == "f" else array.copy() for name, array in points.items()}
 
@@ -100,4 +107,5 @@ FAULTS = (
           Origin.POINTS),
     Fault("no-numbers", "share of points that are NaN or infinite", (0.001, 0.01, 0.05, 0.2, 1.0), spoil_numbers, Origin.POINTS),
     Fault("not-detected", "share of frames in which nothing is found", (0.1, 0.3, 0.6, 0.9, 1.0), lose_person, Origin.POINTS),
+    Fault("points-missing", "share of frames that the file lacks", (0.05, 0.2, 0.5, 0.9, 1.0), end_early, Origin.POINTS),
 )

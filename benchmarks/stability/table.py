@@ -14,8 +14,8 @@ from gsac.benchmarks.stability.trial import End, Trial
 
 HEAD = ("fault", "method", "area", "breaks at", "retained at 1 to 5", "error over clean's", "silent", "crashed", "refused",
         "trials")
-SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "mean_mm", "worst_mm",
-         "kept", "frames", "psnr", "seconds", "message")
+SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "failed", "silent", "said", "warned", "mean_mm",
+         "worst_mm", "kept", "frames", "psnr", "seconds", "cpu_seconds", "code", "message")
 """Columns of the CSV."""
 
 
@@ -35,10 +35,11 @@ def sum_up(curves: list[Curve]) -> list[str]:
         some = [c for c in curves if c.method == method]
         worst = min(some, key=lambda c: c.area)
         areas[method] = {c.fault: c.area for c in some}
-        trials, silent, crashed, refused = np.sum([(c.trials, c.silent, c.crashed, c.refused) for c in some], axis=0)
+        trials, silent, crashed, refused, checked, foretold = np.sum(
+            [(c.trials, c.silent, c.crashed, c.refused, c.checked, c.foretold) for c in some], axis=0)
         out.append(f"{method}: area under the curve, median fault {np.median([c.area for c in some]):.2f}, worst {worst.area:.2f} "
                    f"({worst.fault}); of {trials} trials {silent} failed silently, {crashed} crashed or hung, {refused} ended with "
-                   f"a sentence")
+                   f"a sentence; gsac check agrees on {foretold} of {checked} clips")
     if len(areas) == 2:
         (first, ours), (second, theirs) = areas.items()
         more = [ours[fault] - theirs[fault] for fault in ours if fault in theirs]
@@ -48,13 +49,26 @@ def sum_up(curves: list[Curve]) -> list[str]:
     return out
 
 
+def markdown(curves: list[Curve]) -> str:
+    """The table of docs/lab/stability.md: a row for each fault, the worst first, three columns for each method; then the sums."""
+    methods = list(dict.fromkeys(c.method for c in curves))
+    by_fault: dict[str, dict[str, Curve]] = {}
+    for curve in sorted(curves, key=lambda c: (methods.index(c.method), c.area)):
+        by_fault.setdefault(curve.fault, {})[curve.method] = curve
+    lines = [f"| fault | {' | '.join(f'{m}: area | breaks at | silent' for m in methods)} |",
+             "| --- " * (1 + 3 * len(methods)) + "|"]
+    lines += [f"| {fault} | {' | '.join(_brief(own.get(m)) for m in methods)} |" for fault, own in by_fault.items()]
+    return "\n".join([*lines, "", *(f"- {sentence}" for sentence in sum_up(curves))]) + "\n"
+
+
 def write_csv(outcomes: list[Outcome], path: Path) -> None:
     """Writes a row for each trial with a fault."""
     with open(path, "w", newline="") as f:
         sheet = csv.writer(f)
         sheet.writerow(SHEET)
         for o in outcomes:
-            own = {"retained": f"{o.retained:.4f}", "failed": int(o.failed), "silent": int(o.silent), "said": " ".join(o.said)}
+            own = {"retained": f"{o.retained:.4f}", "failed": int(o.failed), "silent": int(o.silent), "said": " ".join(o.said),
+                   "warned": None if o.warned is None else int(o.warned)}
             sheet.writerow([_cell(own[name] if name in own else getattr(o.trial, name)) for name in SHEET])
 
 
@@ -65,7 +79,7 @@ def add_line(trial: Trial, path: Path) -> None:
 
 
 def read_lines(path: Path) -> list[Trial]:
-    """The trials of such a file; none without one."""
+    """The trials of such a file, of whatever code; none without one."""
     if not path.is_file():
         return []
     found = [Trial(**json.loads(line)) for line in path.read_text().splitlines() if line.endswith("}")]
@@ -81,6 +95,13 @@ def _row(curve: Curve) -> tuple[str, ...]:
             " ".join(f"{shares[s]:.2f}" if s in shares else "  - " for s in SEVERITIES[1:]),
             " ".join(f"{errors[s]:4.1f}" if s in errors else "  - " for s in SEVERITIES[1:]), str(curve.silent), str(curve.crashed),
             str(curve.refused), str(curve.trials))
+
+
+def _brief(curve: Curve | None) -> str:
+    """Area, severity of breakdown and silent failures of a curve, as three cells."""
+    if curve is None:
+        return " | ".join("-" * 3)
+    return f"{curve.area:.2f} | {curve.breakdown or '-'} | {f'{curve.silent} of {curve.trials}' if curve.silent else '-'}"
 
 
 def _cell(value: object) -> object:

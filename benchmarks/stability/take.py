@@ -43,6 +43,12 @@ class Take:
         """px of these pictures for one of a clip 1280 px high."""
         return max(self.size) / 1280
 
+    @property
+    def camera(self) -> np.ndarray:
+        """(3, 3) px, the truth's camera at the size of these pictures."""
+        (x, y), scale = self.truth.center, self.size[0] / (2 * self.truth.center[1])
+        return np.array([[self.truth.focal * scale, 0, x * scale], [0, self.truth.focal * scale, y * scale], [0, 0, 1]])
+
     def at(self, order: np.ndarray) -> Take:
         """The take of pictures order, (N,) int, at their own times."""
         names = ("frames", "masks", "points", "times", "yaw", "number", "asked", "rotation")

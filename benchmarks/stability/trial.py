@@ -17,15 +17,19 @@ import numpy as np
 from gsac.avatar.artifacts import ArtifactError, Clip
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.joints import NAMES
-from gsac.benchmarks.clip_runs import render_clip
+from gsac.benchmarks.clip_runs import HEIGHT, render_clip
 from gsac.benchmarks.fit.score import align_joints
+from gsac.benchmarks.stability.code import hash_code
 from gsac.benchmarks.stability.fault import Fault, Origin
 from gsac.benchmarks.stability.faults import FAULTS
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
 from gsac.benchmarks.stability.take import Take, read_take
+from gsac.pipeline.clip_check import check_clip
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
+from gsac.stages.severity import Severity
+from gsac.turntable.options import TurntableOptions
 
 CLEAN = "clean"
 """The fault of severity 0."""
@@ -40,6 +44,12 @@ OFF_MM = 100.0
 """A joint farther than this from the truth is off."""
 WORST = 5
 """A joint's worst frames."""
+CLIP = (Origin.TAKE, Origin.FILM, Origin.PERSON)
+"""Origins of faults that are in the clip's file, as `gsac check` gets it."""
+CHECKED = "keypoints"
+"""The stage after which `gsac check` judges."""
+CRF = 4
+"""Of persons who are rendered anew; their file is read once more before it is a clip."""
 
 
 class End(StrEnum):
@@ -69,10 +79,15 @@ class Task:
     until: str = "smplx"
 
     @property
+    def code(self) -> str:
+        """Digest of the sources that make its results."""
+        return hash_results(self.until)
+
+    @property
     def folder(self) -> Path:
         """Results of this fault, severity and seed, of both methods."""
         name = f"{self.fault}_{self.severity}_{self.seed}" if self.severity else CLEAN
-        return self.out / "runs" / self.clip.name / name
+        return self.out / "runs" / self.code / self.clip.name / name
 
     @property
     def clean(self) -> Task:
@@ -92,6 +107,10 @@ class Trial:
     end: End = End.DONE
     message: str = ""
     seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    """Of all cores, with programs that the stages started."""
+    code: str = ""
+    """Digest of the sources that made it."""
     frames: int = 0
     """That are judged."""
     kept: int = 0
@@ -110,6 +129,8 @@ class Trial:
     """Joint -> kept frames in which it is off."""
     touched: list[int] = field(default_factory=list)
     """Frames that the fault touches."""
+    checked: list[str] | None = None
+    """Codes, mere news left out, that `gsac check` would give; [REFUSED] where it would end; None for faults of artifacts."""
     findings: list[Finding] = field(default_factory=list)
     """What was said: code, severity, frames (empty: the whole clip), figure."""
 
@@ -120,7 +141,17 @@ class Trial:
     @classmethod
     def of(cls, task: Task, **values: Any) -> Trial:
         """The trial of a task."""
-        return cls(task.clip.name, task.fault, task.severity, task.seed, task.method, **values)
+        return cls(task.clip.name, task.fault, task.severity, task.seed, task.method, code=task.code, **values)
+
+
+def stages_until(last: str) -> tuple[str, ...]:
+    """Stages that follow `split`, up to the last."""
+    return *BEFORE, "handgap", "smplx", *(["train"] if last == "train" else [])
+
+
+def hash_results(last: str) -> str:
+    """Digest of the sources that make the results of trials up to the stage `last`."""
+    return hash_code(__name__, *(f"gsac.stages.{name}.stage" for name in ("split", *stages_until(last))))
 
 
 def run_trial(task: Task) -> Trial:
@@ -133,7 +164,8 @@ def run_trial(task: Task) -> Trial:
     if fault and fault.origin is Origin.TAKE:
         take, touched = fault.inject(take, task.severity, task.seed)
         trial.touched = take.number[touched].tolist()
-    began = time.perf_counter()
+    trial.checked = [End.REFUSED.value] if fault is None or fault.origin in CLIP else None
+    began, cpu_began = time.perf_counter(), sum(os.times()[:4])
     try:
         ports, take = _run(task, fault, take, trial)
     except (StageError, ArtifactError) as error:
@@ -144,15 +176,21 @@ def run_trial(task: Task) -> Trial:
         trial.end, trial.message = End.CRASHED, f"{type(error).__name__}: {error} ({place})"
     else:
         _judge(trial, take, ports)
-    trial.seconds = time.perf_counter() - began
+    trial.seconds, trial.cpu_seconds = time.perf_counter() - began, sum(os.times()[:4]) - cpu_began
     return trial
 
 
 def render_person(task: Task, fault: Fault) -> Path:
-    """Folder of the clip of the same person who behaves otherwise; rendered unless it is there."""
-    seed = _seed_of(task.clip)
+    """Folder of the clip of the same person who behaves otherwise; rendered unless it is there.
+
+    It has no more frames and rows than the trial looks at, at the clean clip's times and with the noise of its scaled frames.
+    """
+    seed, rate = _seed_of(task.clip), Film(read_take(task.clip, task.frames, task.height)).rate
     options, _ = fault.inject({"seed": seed}, task.severity, task.seed)
-    return render_clip(task.out / "clips" / f"{task.clip.name}_{fault.name}_{task.severity}", PlainReporter(sys.stderr), **options)
+    options |= {"frames": task.frames, "height": task.height, "fps": rate, "crf": CRF,
+                "noise": TurntableOptions.noise * task.height / HEIGHT}
+    folder = task.out / "clips" / hash_code("gsac.turntable.clip")
+    return render_clip(folder / f"{task.clip.name}_{fault.name}_{task.severity}", PlainReporter(sys.stderr), **options)
 
 
 def _seed_of(clip: Path) -> int:
@@ -168,17 +206,19 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
 
     Returns ports -> files and folders, and the take that the stages after `split` saw.
     """
-    folder = task.folder if fault and fault.origin in (Origin.TAKE, Origin.PERSON, Origin.FILM) else task.clean.folder
+    folder = task.folder if fault and fault.origin in CLIP else task.clean.folder
     film = Film(take)
     if fault and fault.origin is Origin.FILM:
         film, touched = fault.inject(film, task.severity, task.seed)
         trial.touched = take.number[touched].tolist()
     ports, said, take = _split(film, folder)
     trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in said]
-    for name in (*BEFORE, "handgap", "smplx", *(["train"] if task.until == "train" else [])):
+    for name in stages_until(task.until):
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
         found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
         trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in found]
+        if name == CHECKED and trial.checked is not None:
+            trial.checked = _check(ports, [*said, *found])
         if fault and fault.origin.startswith(f"{name}/"):
             port, folder = fault.origin.value, task.folder
             value, touched = fault.inject(read_artifact(fault.origin, ports[port]), task.severity, task.seed)
@@ -203,6 +243,13 @@ def _split(film: Film, folder: Path) -> tuple[dict[str, Path], list[Finding], Ta
         ports["split/clip.json"] = folder / "clip.json"
         replace(clip, timestamps_s=take.times.tolist(), focal_px=take.focal).write(ports["split/clip.json"])
     return ports, said, take
+
+
+def _check(ports: dict[str, Path], said: list[Finding]) -> list[str]:
+    """Codes of `gsac check`, mere news left out, by all of the trial's frames; said: by split and keypoints."""
+    check = check_clip(ports["split/frames"], ports["split/clip.json"], ports["keypoints/keypoints.npz"],
+                       [(finding["message"], finding) for finding in said])
+    return sorted({entry["code"] for _, entry in check.findings if entry["severity"] != Severity.NEWS})
 
 
 def _numbers(runs: list[list[int]], number: np.ndarray) -> list[int]:

@@ -26,8 +26,11 @@ class Worker:
 
     def _start(self) -> None:
         self.pipe, other = CONTEXT.Pipe()
-        self.process = CONTEXT.Process(target=_serve, args=(other, self.cores), daemon=True)
+        self.process = CONTEXT.Process(target=_serve, args=(other,), daemon=True)
+        own = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, self.cores)  # the child inherits this thread's; libraries count cores as they load
         self.process.start()
+        os.sched_setaffinity(0, own)
         other.close()
 
     def run(self, task: Task, limit_s: float) -> Trial:
@@ -77,8 +80,7 @@ def run_all(tasks: list[Task], jobs: int, limit_s: float, tell: Callable[[Trial]
         list(pool.map(work, shares))
 
 
-def _serve(pipe: Connection, cores: list[int]) -> None:
-    os.sched_setaffinity(0, cores)
+def _serve(pipe: Connection) -> None:
     while True:
         try:
             task = pipe.recv()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
+from gsac.stages.brought_file import NONE
 from gsac.stages.contract import BadInput
 
-NONE = "none"
+ENCODER = "deca-encoder"
 
 
 @dataclass
@@ -33,6 +35,9 @@ class FaceConfig:
     shows them poorly; 0: that frame alone."""
     rest_time: float = 0.2
     """Time, s, in which the expression of an unseen face falls by a factor e."""
+    method: Literal["actions", "deca"] = "actions"
+    """Where a FLAME head's shape, expression and jaw come from. actions: from the facial actions; deca: from DECA's encoder, which
+    you bring by `gsac models add deca-encoder FILE.onnx`; it needs `face.flame`. The open body acts the actions either way."""
     flame: str = NONE
     """Name under which `gsac models add NAME FLAME.npz` keeps your FLAME head, or none. With it, smplx.method paper fits the body's
     head to FLAME's instead of the open body's, and an SMPL-X body takes its expression from it."""
@@ -42,11 +47,14 @@ class FaceConfig:
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
         own = () if self.flame == NONE else (self.flame, self.flame_points)
-        return ("face_detection_short_range", "face_landmark", *own)
+        return ("face_detection_short_range", "face_landmark", *own, *((ENCODER,) if self.method == "deca" else ()))
 
     def check(self) -> None:
         if not 90 <= self.angle < 180:
             raise BadInput(f"face.angle is {self.angle}; expected degrees from 90 to below 180")
+        if self.method == "deca" and self.flame == NONE:
+            raise BadInput("face.method is deca, but face.flame is none; DECA's numbers mean something to a FLAME head only: "
+                           "`gsac models add flame FLAME.npz`, then face.flame=flame")
         if not 0 < self.threshold < 1:
             raise BadInput(f"face.threshold is {self.threshold}; expected a number between 0 and 1")
         for name in ("doubt", "rest_time"):

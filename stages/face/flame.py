@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.flame_file import Flame, FlamePoints, read_flame, read_flame_points
 from gsac.avatar.rotation import hat
-from gsac.stages.contract import BadInput, Job
+from gsac.stages.brought_file import NONE, read_brought
+from gsac.stages.contract import Job
 from gsac.stages.face.actions import Actions
-from gsac.stages.face.config import NONE
 from gsac.stages.face.head import AXES, HeadModel
 
 SHAPES, EXPRESSIONS = 100, 50
@@ -36,15 +35,9 @@ class FlameHead:
     @classmethod
     def of(cls, job: Job) -> FlameHead | None:
         """None without `face.flame`. Raises BadInput that names the parameter and the fault of its file."""
-        read = {}
-        for name, reader in (("flame", read_flame), ("flame_points", read_flame_points)):
-            if job.config.flame == NONE:
-                return None
-            try:
-                read[name] = reader(job.models[getattr(job.config, name)])
-            except ArtifactError as e:
-                raise BadInput(f"face.{name} is {getattr(job.config, name)}: {e}") from e
-        return cls(read["flame"], read["flame_points"])
+        if job.config.flame == NONE:
+            return None
+        return cls(read_brought(job, "face", "flame", read_flame), read_brought(job, "face", "flame_points", read_flame_points))
 
     @property
     def model(self) -> HeadModel:
@@ -62,6 +55,10 @@ class FlameHead:
         found = model.arrays(shape)
         moved = expression @ self.response(found["head_vertices"], actions.response[0] / 1e3, turn, size)
         return found | {"flame_expression": moved[:, :-3].astype(np.float32), "flame_jaw": moved[:, -3:].astype(np.float32)}
+
+    def encoded(self, shape: np.ndarray, expression: np.ndarray, jaw: np.ndarray) -> dict[str, np.ndarray]:
+        """The same arrays of a head whose FLAME parameters are known: shape (SHAPES,), expression (T, EXPRESSIONS), jaw (T, 3)."""
+        return self.model.arrays(shape) | {"flame_expression": expression.astype(np.float32), "flame_jaw": jaw.astype(np.float32)}
 
     def response(self, head: np.ndarray, response: np.ndarray, turn: np.ndarray, size: float) -> np.ndarray:
         """head: (5023, 3) m at rest; response: (A, 468, 3) m of the network's points to each action; turn: (3, 3) and size: from

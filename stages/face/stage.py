@@ -13,6 +13,8 @@ from gsac.avatar.threads import available_cores
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sigma, solve
+from gsac.stages.face.config import ENCODER
+from gsac.stages.face.deca import EXPRESSION, JAW, SHAPE, DecaEncoder
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.head import HeadModel
 from gsac.stages.face.landmarks import align, read_averaged
@@ -51,7 +53,10 @@ def run(job: Job) -> None:
     seen_only = {}
     if valid.any():
         rest = find_resting_face(c, direction[valid])
-        seen_only = {**fit_head(actions, flame, own, expression), "rest_expression": rest.astype(np.float32)}
+        head = fit_head(actions, flame, own, expression)
+        if flame and config.method == "deca":
+            head = encode_head(flame, DecaEncoder(job.models[ENCODER]), paths, landmarks, times, config.rest_time)
+        seen_only = {**head, "rest_expression": rest.astype(np.float32)}
     write_arrays(job.out / "face.npz", valid=valid, expression=expression.astype(np.float32),
                  jaw=np.zeros((len(paths), 3), np.float32), shape=own.ravel().astype(np.float32),
                  landmarks=landmarks.astype(np.float32), **seen_only)
@@ -72,6 +77,19 @@ def fit_head(actions: Actions, flame: FlameHead | None, own: np.ndarray, express
         return flame.arrays(rest, actions, expression)
     model = HeadModel.of_open_body(actions)
     return model.arrays(model.fit_shape(rest)[0])
+
+
+def encode_head(flame: FlameHead, encoder: DecaEncoder, paths: list[Path], landmarks: np.ndarray, times: np.ndarray | None,
+                rest_time: float) -> dict[str, np.ndarray]:
+    """The arrays of face.npz for the person's head by DECA: one shape, the mean of all frames with a face, and each frame's
+    expression and jaw.
+
+    landmarks: (T, 468, 3) px, NaN without a face; times: (T,) s, None for photos; rest_time: s.
+    """
+    valid = np.isfinite(landmarks[:, 0, 0])
+    codes = np.stack([encoder.read(read_frame(paths[t]), landmarks[t]) for t in np.flatnonzero(valid)])
+    moved = fill_unseen(np.concatenate([codes[:, EXPRESSION], codes[:, JAW]], 1), valid, times, rest_time)
+    return flame.encoded(codes[:, SHAPE].mean(0), moved[:, :-3], moved[:, -3:])
 
 
 def read_clip(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], actions: Actions) -> tuple[np.ndarray, ...]:

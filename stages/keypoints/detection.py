@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gsac.avatar.region import Region
+
 
 def _nan(*shape: int):
     return field(default_factory=lambda: np.full(shape, np.nan, np.float32))
@@ -29,6 +31,8 @@ class Frame:
     """(33, 3) BlazePose's x, y px and visibility; zeros where nobody is seen."""
     face_mesh: np.ndarray = _nan(468, 3)
     """(468, 3) px; NaN where no face is found."""
+    region: Region | None = None
+    """Where the followed person is; not part of the file."""
     second_person: bool = False
     """Whether somebody else is seen beside the followed person; not part of the file."""
 

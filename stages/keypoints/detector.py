@@ -13,6 +13,7 @@ import numpy as np
 
 from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face, FaceMesh, head_yaw, region_of_head
+from gsac.avatar.region import Region
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
@@ -43,6 +44,11 @@ class Detector(ABC):
         pose = self._tracker.track(image, frame)
         return lambda: frame if pose is None else self._finish(frame, image, pose)
 
+    def look(self, image: np.ndarray, region: Region) -> Frame | None:
+        """image: (H, W, 3) uint8 RGB. What is found of a person in that region of it; None where none is."""
+        pose = self._tracker.look(image, region)
+        return None if pose is None else self._finish(Frame(), image, pose)
+
     def _finish(self, frame: Frame, image: np.ndarray, pose: Pose) -> Frame:
         write_body(frame, pose)
         face = self._face.find(image, region_of_head(pose.points[:11]), head_yaw(pose.world), self._config.face_threshold)
@@ -60,4 +66,5 @@ def write_body(frame: Frame, pose: Pose) -> None:
     frame.xy[BODY133] = pose.points[BODY33]
     frame.score[BODY133] = (pose.visibility * pose.presence * pose.score)[BODY33]
     frame.world[BODY133] = pose.world[BODY33]
+    frame.region = pose.region
     frame.pose33[:] = np.column_stack([pose.points, pose.visibility])

@@ -51,7 +51,7 @@ class SimccNetwork:
         centres[:, 2] += to_frame[:, :2] @ [0.5, 0.5] - 0.5
         crop = cv2.warpAffine(image, centres, (self.width, self.height), flags=cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR)
         ready = ((crop - MEAN) / DEVIATION).transpose(2, 0, 1)[None].astype(np.float32)
-        x, y = self._session.run(None, {self._input.name: ready})
+        x, y = map(np.asarray, self._session.run(None, {self._input.name: ready}))
         if x.shape[1] != POINTS:
             raise BadInput(f"model file onnx-wholebody gives {x.shape[1]} points; expected COCO-WholeBody's {POINTS}")
         xy, score = decode(x[0], y[0], self.width, self.height)

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, read_frame, write_arrays
+from gsac.avatar.region import Region
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
@@ -22,6 +23,7 @@ from gsac.stages.keypoints.cut_off import Cut, find_cuts, name_cuts
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
 from gsac.stages.keypoints.mediapipe import Mediapipe
+from gsac.stages.keypoints.second_look import look_again
 from gsac.stages.keypoints.simcc import Wholebody
 
 DETECTORS: dict[DetectorName, type[Detector]] = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody}
@@ -48,6 +50,7 @@ def run(job: Job) -> None:
             frames.append(frame)
             cuts.append(cut)
             job.progress(len(frames), len(paths), "frames")
+    look_again(frames, cuts, lambda t, region: _look(detector, read_frame(paths[t]), region))
     arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in KEYPOINT_SHAPES if name != "detector"}
     report(job, frames, cuts)
     judge_size(job, FirstLook.of(arrays))
@@ -59,6 +62,12 @@ def _finish(started: tuple[Callable[[], Frame], int, int]) -> tuple[Frame, set[C
     finish, height, width = started
     frame = finish()
     return frame, find_cuts(frame, width, height) if frame.seen else set()
+
+
+def _look(detector: Detector, image: np.ndarray, region: Region) -> tuple[Frame, set[Cut]] | None:
+    """image: (H, W, 3) uint8. What is found in the region, and what the image's edge cuts off of it."""
+    frame = detector.look(image, region)
+    return None if frame is None else (frame, find_cuts(frame, image.shape[1], image.shape[0]))
 
 
 def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:

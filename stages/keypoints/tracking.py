@@ -37,6 +37,11 @@ class Tracker:
             self._second(image, persons, pose, frame)
         return pose
 
+    def look(self, image: np.ndarray, region: Region) -> Pose | None:
+        """image: (H, W, 3) uint8. The pose of a person in that region, None when none is seen there; nobody is followed."""
+        pose = self._pose.pose(image, region)
+        return pose if pose.score >= self._least else None
+
     def _follow(self, image: np.ndarray, persons: list[Person]) -> Pose | None:
         """The followed person's pose; where that person is lost, the nearest other one's."""
         if self._last is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gsac.stages.body_choice import OPEN, brought_files
+from gsac.stages.brought_file import NONE
 from gsac.stages.contract import BadInput
 
 METHODS = ("lm", "paper")
@@ -18,6 +19,10 @@ class SmplxConfig:
     body_model: str = OPEN
     """Body model: `open`, or the name under which `gsac models add NAME SMPLX_NEUTRAL.npz` keeps your own; train and export must be
     given the same."""
+    flame: str = NONE
+    """Name of your FLAME head, the one of `face.flame`, or none. With it and `flame_ids` an SMPL-X body acts FLAME's expression."""
+    flame_ids: str = "smplx-flame-ids"
+    """Name of SMPL-X's own SMPL-X__FLAME_vertex_ids.npy; used only with a FLAME head."""
     height_m: float | None = None
     """Height of the person, m; fixes the scale, which one camera cannot see. null: the shape prior gives the scale."""
     focal_px: float | None = None
@@ -40,7 +45,7 @@ class SmplxConfig:
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
-        return brought_files(self.body_model)
+        return (*brought_files(self.body_model), *(() if self.flame == NONE else (self.flame, self.flame_ids)))
 
     def check(self) -> None:
         """Raises BadInput where a value is out of range."""

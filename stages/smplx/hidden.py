@@ -1,7 +1,7 @@
-"""What no frame shows of the person, for something stands still before them: furniture or a pole.
+"""What the camera does not see of the person: outside the picture, or behind something that stands still, furniture or a pole.
 
-It is where the mask never is although the person's limbs are. Points there are guesses of the detector. Points outside the picture
-are guesses as well, but better than none: without them knees are further off.
+Such a thing is where the mask never is although the person's limbs are. Points there are guesses of the detector, and so are those
+outside the picture: they lie too near to what is seen, and pull the rest of the body with them.
 """
 
 from __future__ import annotations
@@ -44,6 +44,12 @@ PARTS = {"the head": [*range(5), *range(FACE.start, FACE.stop)], "the shoulders"
 """What a warning calls points."""
 
 
+def leave_out_outside(sightings: Sightings) -> Sightings:
+    """Sightings in which no point outside the picture counts."""
+    inside = ((sightings.xy >= 0) & (sightings.xy < (sightings.width, sightings.height))).all(-1)
+    return replace(sightings, score=np.where(inside, sightings.score, 0))
+
+
 def find_occluder(sightings: Sightings, outlines: list[Outline]) -> np.ndarray | None:
     """(h, w) bool, where something that stands still hides the person, at the size of the outlines; None where nothing does."""
     shown = np.any([outline.mask for outline in outlines], axis=0)
@@ -60,7 +66,12 @@ def find_occluder(sightings: Sightings, outlines: list[Outline]) -> np.ndarray |
     behind = ~shown & (crossed >= max(2, OFTEN * len(deep)))
     count, label = cv2.connectedComponents(behind.astype(np.uint8))
     kept = np.isin(label, [part for part in range(1, count) if depth[label == part].max() > DEEP * height])
-    return _grow(kept, ~shown, round(REACH * height / scale)) if kept.any() else None
+    if not kept.any():
+        return None
+    lowest = np.flatnonzero(shown.any(1))[-1]
+    if kept[lowest + 1:].any():
+        kept[lowest + 1:] = True  # legs may stand anywhere below what is ever shown
+    return _grow(kept, ~shown, round(REACH * height / scale))
 
 
 def hide(sightings: Sightings, occluder: np.ndarray, scale: float) -> tuple[Sightings, np.ndarray]:

@@ -15,8 +15,9 @@ from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.expression import translate_expression, translate_rest
-from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide
-from gsac.stages.smplx.lm.fit import fit_clip
+from gsac.stages.smplx.flame_motion import read_shared
+from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
+from gsac.stages.smplx.lm.doubted_focal import fit_with_doubt
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
@@ -34,7 +35,9 @@ def fit_as_published(body: Body, sightings: Sightings, outlines: list[Outline], 
 
 FOCAL = 0.6, 3.0
 """Focal lengths of phones' lenses over the longer side of the picture; the main ones' are 0.8 to 1.1, of three times zoom 3."""
-METHODS = {"lm": fit_clip, "paper": fit_as_published}
+KEPT = 0.05
+"""Relative difference up to which the fit has a given focal length: its prior is 0.2 % wide."""
+METHODS = {"lm": fit_with_doubt, "paper": fit_as_published}
 """smplx.method -> fit; config.METHODS are the same names."""
 
 
@@ -44,6 +47,7 @@ def run(job: Job) -> None:
     points = check_filled_keypoints(job.inputs["handgap/keypoints.npz"])
     face = check_face(job.inputs["face/face.npz"])
     body = load_body(job, "smplx")
+    shared = read_shared(job, body)
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
                           clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side)
@@ -55,6 +59,7 @@ def run(job: Job) -> None:
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     own = clip.shows_own_moment(len(outlines))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
+    sightings = leave_out_outside(sightings)
     occluder, hidden = find_occluder(sightings, outlines), []
     if occluder is not None:
         outlines = [replace(outline, hidden=occluder) for outline in outlines]
@@ -62,7 +67,7 @@ def run(job: Job) -> None:
         hidden = describe_hidden(behind)
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
         fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
-    expression, jaw, silent = translate_expression(body, face)
+    expression, jaw, silent = translate_expression(body, fit.state.betas, face, shared)
     if silent is not None:
         job.warn(silent)
     params = to_params(body, fit.state, sightings.center, expression, fit.joint_offset)
@@ -74,7 +79,7 @@ def run(job: Job) -> None:
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
     for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit.iou)):
         job.warn(finding)
-    if (doubt := doubt_focal(job.config, clip)) is not None:
+    if (doubt := doubt_focal(job.config, clip, float(params.focal[0]))) is not None:
         job.warn(doubt)
     if guesses := describe_guesses(job.config, params, clip):
         job.note(guesses)
@@ -86,10 +91,17 @@ def warm(device: str) -> None:
     rehearse(run)
 
 
-def doubt_focal(config: SmplxConfig, clip: Clip) -> Finding | None:
-    """A given focal length that no phone's lens has; None where it is plausible, or not given."""
+def doubt_focal(config: SmplxConfig, clip: Clip, believed: float) -> Finding | None:
+    """A given focal length that the pictures contradict, or that no phone's lens has; None where it is plausible, or not given.
+
+    believed: px, as the fit has it.
+    """
     given = config.focal_px or clip.focal_px
-    ratio = given / clip.longer_side if given else 1.0
+    if not given:
+        return None
+    if abs(believed / given - 1) > KEPT:
+        return Finding.of(Code.FOCAL_NOT_BELIEVED, figure=believed, given=given)
+    ratio = given / clip.longer_side
     return None if FOCAL[0] <= ratio <= FOCAL[1] else Finding.of(Code.ODD_FOCAL, figure=ratio, given=given)
 
 

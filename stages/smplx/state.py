@@ -50,6 +50,8 @@ class Fit:
     joint_offset: np.ndarray | None = None  # (55, 3) m, where the method moves joints
     notes: tuple[Finding, ...] = ()
     """Sentences for the user."""
+    cost: float = np.nan
+    """By `lm`, of all but the fingers."""
 
 
 def to_params(body: Body, state: State, center: np.ndarray, expression: np.ndarray | None = None,

@@ -1,6 +1,7 @@
 """The faults of the stability benchmark, what counts as said, and what a trial's end is."""
 
 import csv
+import sys
 import time
 from dataclasses import replace
 
@@ -10,12 +11,16 @@ import pytest
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_frame
 from gsac.benchmarks.fit.truth import Truth
 from gsac.benchmarks.stability import bench, chart, outcome, stages, table, trial, workers
+from gsac.benchmarks.stability.code import hash_code
 from gsac.benchmarks.stability.fault import Origin
 from gsac.benchmarks.stability.faults import FAULTS, QUICK
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.take import Take
 from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, PAPER, End, Task, Trial
+from gsac.cache.code import code_parts
+from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
+from gsac.turntable.options import TurntableOptions
 
 FRAMES, HEIGHT, WIDTH = 20, 64, 36
 
@@ -115,7 +120,18 @@ def test_the_truth_rolls_with_the_camera():
     assert np.sign(row - HEIGHT / 2) == np.sign((quarter.rotation[0] @ [1, 0, 0])[1])
 
 
-@pytest.mark.parametrize("name", ["rotation-tag", "uneven-rate", "long-clip"])
+@pytest.mark.parametrize("name", ["head-cut", "feet-cut", "leaves"])
+def test_a_camera_aimed_elsewhere_takes_the_truth_with_it(name):
+    clean = make_take()
+    true = np.array([[-0.2, -0.6, 3.0], [0.1, 0.5, 2.5]])
+    project = lambda x: (x @ clean.camera.T)[..., :2] / (x @ clean.camera.T)[..., 2:]  # noqa: E731
+    clean = replace(clean, points=np.tile(project(true), (FRAMES, 1, 1)))
+    changed, _ = FAULTS[name].inject(clean, 3, 0)
+    assert np.abs(changed.points - clean.points).max() > 3, "px"
+    assert np.allclose(changed.points, project(np.einsum("tab,pb->tpa", changed.rotation, true)), atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["rotation-tag", "uneven-rate", "long-clip", "ten-bit"])
 def test_a_film_gives_upright_pictures_at_the_times_of_the_take(tmp_path, name):
     take = make_take()
     film, _ = FAULTS[name].inject(Film(take), 1, 0)
@@ -123,10 +139,33 @@ def test_a_film_gives_upright_pictures_at_the_times_of_the_take(tmp_path, name):
     stages.run_stage("split", {"count": 400, "crop": False}, {"clip": tmp_path / "clip.mp4"}, tmp_path / "split")
     number = film.number(np.array(Clip.read(tmp_path / "split" / "clip.json").timestamps_s))
     seen = [read_frame(path).astype(int) for path in frame_paths(tmp_path / "split" / "frames")]
-    assert len(seen) == {"rotation-tag": FRAMES, "uneven-rate": FRAMES - 2, "long-clip": 100}[name]
+    assert len(seen) == {"rotation-tag": FRAMES, "uneven-rate": FRAMES - 2, "long-clip": 100, "ten-bit": FRAMES}[name]
     grey = [np.mean(pictures, axis=-1)[take.masks[number]] for pictures in (seen, take.frames[number])]
     assert np.corrcoef(grey)[0, 1] > 0.7, "the same pictures, upright"
     assert number[0] == 0 and (np.diff(number) != 0).all()
+
+
+@pytest.mark.parametrize("severity", range(1, 6))
+def test_a_person_who_behaves_otherwise_is_one_that_the_turntable_can_render(severity):
+    people = [fault for fault in FAULTS.values() if fault.origin is Origin.PERSON]
+    for fault in people:
+        TurntableOptions(**fault.inject({"seed": 7}, severity, 0)[0]).check()
+    assert len(people) > 10
+
+
+def test_a_person_who_behaves_otherwise_is_rendered_at_the_size_and_times_of_the_trial(tmp_path, monkeypatch):
+    asked = {}
+    monkeypatch.setattr(trial, "read_take", lambda *_: make_take())
+    monkeypatch.setattr(trial, "render_clip", lambda folder, say, **options: asked.update(options) or folder)
+    trial.render_person(replace(make_task(tmp_path / "seed7_60", "hoodie"), frames=FRAMES, height=HEIGHT), FAULTS["hoodie"])
+    assert (asked["seed"], asked["top"], asked["frames"], asked["height"]) == (7, "hoodie", FRAMES, HEIGHT)
+    assert asked["fps"] == pytest.approx(10), "as many frames a second as the clean take has"
+
+
+@pytest.mark.parametrize("name", ["points-missing", "masks-missing"])
+def test_at_severity_5_nothing_is_left_of_a_missing_artifact(name):
+    changed, touched = FAULTS[name].inject(make_clean(FAULTS[name].origin), 5, 0)
+    assert not len(changed["xy"] if name == "points-missing" else changed) and touched.sum() == FRAMES
 
 
 def finding(code, frames, severity="poorer"):
@@ -167,6 +206,16 @@ def test_a_joint_that_is_off_in_fewer_than_five_frames_or_in_the_clean_clip_too_
     assert outcome.find_outcome(one("pole", 3, off=five), one(off={"right_wrist": [8]})).failed
 
 
+def test_the_check_agrees_where_it_and_the_run_find_something_or_neither_does():
+    def foretold(checked, mm=15.0, **more):
+        return outcome.find_outcome(one("pole", 3, mm=mm, checked=checked, **more), one(checked=["far_away"])).foretold
+
+    assert foretold(["far_away"]) and not foretold(["cut_off"])
+    assert foretold(["cut_off"], mm=115.0) and not foretold(["far_away"], mm=115.0)
+    assert foretold([End.REFUSED.value], end=End.REFUSED)
+    assert foretold(None) is None and foretold(["cut_off"], end=End.CRASHED) is None
+
+
 TRIALS = [one(), one("pole", 3, mm=115.0), one("pole", 5, end=End.CRASHED, message="ValueError"), one("blur", 3, mm=25.0),
           one(method=PAPER), one("pole", 3, PAPER, mm=215.0), one("blur", 5, PAPER, mm=35.0)]
 
@@ -186,6 +235,7 @@ def test_table_csv_and_chart_hold_every_fault(tmp_path):
     curves = outcome.draw_curves(outcomes)
     words = table.text(curves)
     assert words.splitlines()[2].startswith("pole   paper") and "default less paper, 2 faults that both have" in words
+    assert "| pole | 0.55 | 3 | 1 of 2 | 0.30 | 3 | 1 of 1 |" in table.markdown(curves).splitlines()
     table.write_csv(outcomes, tmp_path / "stability.csv")
     rows = list(csv.DictReader((tmp_path / "stability.csv").read_text().splitlines()))
     assert [(r["fault"], r["severity"], r["silent"]) for r in rows][:2] == [("pole", "3", "1"), ("pole", "5", "0")]
@@ -241,6 +291,43 @@ def test_trials_of_other_settings_are_not_mixed(tmp_path):
     bench.keep_settings(options("--seeds", "1"))
     with pytest.raises(BadInput, match="give another --out"):
         bench.keep_settings(options("--frames", "60"))
+
+
+def test_trials_of_other_code_do_not_count_and_run_again(tmp_path, capsys):
+    lines = tmp_path / "trials.jsonl"
+    options = bench.parser().parse_args(["--clip", str(tmp_path), "--fault", "blur", "--seeds", "0", "--severities", "3",
+                                         "--methods", DEFAULT, "--out", str(tmp_path)])
+    say = PlainReporter(sys.stderr)
+    clean, blurred = bench.list_open(options, lines, say)
+    table.add_line(Trial.of(clean), lines)
+    table.add_line(replace(Trial.of(blurred), code="0" * 12), lines)
+    assert bench.list_open(options, lines, say) == [blurred]
+    assert "holds 1 trials of other code" in capsys.readouterr().err
+    assert blurred.code in blurred.folder.parts, "what stages made by other code is not taken up either"
+
+
+def test_the_digest_covers_what_makes_results_and_nothing_else():
+    parts = code_parts("gsac.benchmarks.stability.trial", ("gsac.stages.smplx.stage",))
+    assert {"gsac.benchmarks.stability.trial", "gsac.stages.smplx.stage", "gsac.avatar.body"} < parts.keys()
+    assert hash_code("gsac.benchmarks.stability.trial") != hash_code("gsac.turntable.clip")
+
+
+def test_a_dry_run_says_what_a_sweep_takes_and_runs_nothing(tmp_path, capsys):
+    assert bench.main(["--clip", str(tmp_path), "--fault", "blur", "pole", "--seeds", "0", "--dry-run", "--frames", "20",
+                       "--out", str(tmp_path / "out")]) == 0
+    assert "22 trials, about 7 CPU minutes" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "trials.jsonl").exists()
+
+
+def test_seed_k_is_the_kth_person(tmp_path):
+    clips = [tmp_path / name for name in ("seed1", "seed2", "seed3")]
+    options = bench.parser().parse_args([part for clip in clips for part in ("--clip", str(clip))] + ["--out", str(tmp_path)])
+    assert {(t.seed, t.clip.name) for t in bench.list_tasks(options, None)} == {(0, "seed1"), (1, "seed2"), (2, "seed3")}
+
+
+def test_an_early_end_of_the_sweep_has_all_persons_at_severity_3(tmp_path):
+    options = bench.parser().parse_args(["--clip", str(tmp_path), "--fault", "blur", "--methods", DEFAULT, "--out", str(tmp_path)])
+    assert [(t.severity, t.seed) for t in bench.list_tasks(options, None)][1:5] == [(3, 0), (3, 1), (3, 2), (5, 0)]
 
 
 @pytest.mark.slow

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import pytest
 import yaml
 
-from gsac.pipeline.params import meanings, to_yaml
+from gsac.pipeline.params import meanings, resolve, to_yaml
+from gsac.pipeline.project import Project
 from gsac.stages.contract import BadInput, Stage, make_config
 
 
@@ -102,3 +103,11 @@ def test_a_bad_parameter_file_is_named_with_what_is_wrong(toy, content, words):
 def test_a_bad_set_is_named(toy, text):
     done = toy.gsac("run", toy.clip, "--set", text)
     assert done.code == 2 and f"--set {text}" in done.err and toy.runs == []
+
+
+def test_parameters_that_need_each_other_may_come_in_any_order():
+    project = Project.at_hand()
+    two = ("face.method=deca", "face.flame=mine")
+    assert resolve(project, sets=two)["face"] == resolve(project, sets=two[::-1])["face"]
+    with pytest.raises(BadInput, match="--set face.method=deca: face.method is deca, but face.flame is none"):
+        resolve(project, sets=("face.doubt=2", "face.method=deca"))

@@ -17,6 +17,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import LEFT_HAND, RIGHT_HAND
 from gsac.avatar.yaw import yaw
+from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.initial import estimate_start
@@ -27,6 +28,8 @@ from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.lm.shake import transl_acceleration
+from gsac.stages.smplx.lm.swapped_sides import MARGIN, propose_swapped
+from gsac.stages.smplx.lm.turn_jumps import find_jumps
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -49,8 +52,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
              progress: Callable[[int, int, str], None]) -> Fit:
     """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps."""
     detector = Detector.load(sightings.detector, body)
-    problem, state = set_up(body, sightings, outlines, detector, config)
-    state, steps = fit_points(problem, state, sightings, detector, 3 * config.iterations)
+    sightings, problem, state, steps, said = fit_either_side(body, sightings, outlines, detector, config)
     hidden = HiddenArms.of(body, sightings.person_height)
     hidden.find(problem, state, sightings.missing)
     state = hidden.search(problem, state)
@@ -67,12 +69,33 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
             stand_on_ground(problem, state, sightings, config.contact)
         state, more = problem.minimise(state, config.iterations)
         steps += more
+    cost = problem.cost(state)
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     sigma = estimate_joint_sigma(problem, state)
     hidden.widen(sigma)
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
-               problem.person_offsets.joint_offset(state.own), tuple(hidden.describe(len(sigma))))
+               problem.person_offsets.joint_offset(state.own), (*said, *hidden.describe(len(sigma))), cost)
+
+
+def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
+                    config: SmplxConfig) -> tuple[Sightings, Problem, State, int, list[Finding]]:
+    """Fits the key points, with left and right exchanged in the frames that the turn accuses if that costs much less.
+
+    Returns the sightings that were fitted, problem, state, number of steps and what the user should know.
+    """
+    fits: list[tuple[float, Sightings, Problem, State, int]] = []
+    swapped = propose_swapped(sightings)
+    for seen in (sightings, sightings.exchange_sides(swapped)) if swapped.any() else (sightings,):
+        problem, state = set_up(body, seen, outlines, detector, config)
+        state, steps = fit_points(problem, state, seen, detector, 3 * config.iterations)
+        fits.append((problem.cost(state), seen, problem, state, steps))
+    best = int(len(fits) == 2 and fits[1][0] < fits[0][0] - MARGIN * swapped.sum())
+    said = [Finding.of(Code.SIDES_EXCHANGED, swapped)] if best else []
+    jumps = fits[best][2].jumps
+    if jumps.any():
+        said.append(Finding.of(Code.TURN_JUMPS, np.pad(jumps, 1)))
+    return *fits[best][1:], said
 
 
 def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
@@ -86,6 +109,8 @@ def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: 
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, person_offsets)
     problem.transl_spread = transl_acceleration(sightings)
     state = replace(estimate_start(body, sightings, focal[0], center), own=np.zeros(len(person_offsets.spread)))
+    if sightings.seconds is not None:
+        problem.jumps = find_jumps(state.local[:, 0])
     seen.depth *= measure_world_scale(problem, state, sightings)
     seen.repeats = count_repeats(state.local[:, 0])
     return problem, state

@@ -40,10 +40,12 @@ BEFORE = 0.02
 """m before the trunk's near surface from which on a wrist is in plain view."""
 SKIN, BEHIND_SPREAD = 0.03, 0.05
 """m: a hidden wrist's depth behind the trunk's far surface, and its spread."""
-OUTSIDE, OUTSIDE_SHARE = 0.02, 0.35
-"""An arm is outside the mask if this share of its points lies farther out than this share of the person's height."""
-LEAST = 4
-"""Frames in plain view, at least, that contradict a hand which was not detected."""
+OUTSIDE, OUTSIDE_SHARE, OUTSIDE_COUNTS = 0.01, 0.1, 0.5
+"""An arm is outside the mask if the second, a share of its points, lies farther out than the first, a share of the person's height;
+then it counts so much of a frame with the hand before the trunk: masks miss arms. On three turns and a real one at most 0.09 of an
+arm that the body covers lies outside."""
+LEAST_S = 0.25
+"""Time in plain view, at least, that contradicts a hand which was not detected; one frame where frames are farther apart."""
 TRUSTED = 0.6
 """Share of frames with the hand beside the trunk in which it must be detected: a detector that misses it there proves nothing."""
 BRIDGED = 2
@@ -107,13 +109,13 @@ class HiddenArms:
         if seconds is None or missing is None:
             return
         chain = problem.skeleton.pose(state.local, state.shape)
+        least = max(1.0, LEAST_S / float(np.median(np.diff(seconds)))) if len(seconds) > 1 else np.inf
         for side in (0, 1):
             found = []
             for first, last in bridge(missing[:, side]):
                 lost = first + np.flatnonzero(missing[first:last, side])
-                plain = sum(self.is_in_plain_view(problem, state, chain.frame(t), t, side)
-                            for t in lost.tolist() if len(lost) >= LEAST)
-                if plain >= LEAST:
+                against = sum(self.contradict(problem, state, chain.frame(t), t, side) for t in lost.tolist() if len(lost) >= least)
+                if against >= least:
                     near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
                     found.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
             if found and self.is_detected(state, chain, missing[:, side], side):
@@ -125,15 +127,17 @@ class HiddenArms:
         beside = [np.isinf(self.measure_trunk(state, chain.frame(t), t, wrist[t])[0]) for t in range(len(missing))]
         return not any(beside) or bool((~missing[beside]).mean() > TRUSTED)
 
-    def is_in_plain_view(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> bool:
-        """Whether the fitted hand lies before the trunk, or the forearm beside the mask. chain: of frame t alone."""
+    def contradict(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> float:
+        """How much it contradicts the fit that the hand is not detected: 1 where it lies before the trunk, less where the arm is
+        outside the mask, else 0. chain: of frame t alone."""
         wrist = chain.place[0, ARM_JOINTS[side, 3]] + state.transl[t]
         near, _ = self.measure_trunk(state, chain, t, wrist)
         if wrist[2] < near - BEFORE:
-            return True
+            return 1.0
         x = place_points(chain, self.forearm[side], state.shape)[0] + state.transl[t]
         distance, _, inside = problem.seen.outlines[t].at(problem.project(state, x))
-        return problem.seen.outlines[t].area > 0 and bool((inside & (distance > OUTSIDE * self.height)).mean() > OUTSIDE_SHARE)
+        outside = problem.seen.outlines[t].area > 0 and (inside & (distance > OUTSIDE * self.height)).mean() > OUTSIDE_SHARE
+        return OUTSIDE_COUNTS if outside else 0.0
 
     def measure_trunk(self, state: State, chain: Chain, t: int, place: np.ndarray) -> tuple[float, float]:
         """Depths, m, of the trunk's near and far surface on the line of sight to a place (3,) m; -inf and nan where there is none.
@@ -201,7 +205,8 @@ class HiddenArms:
 
     def hold(self, problem: Problem, state: State) -> None:
         """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight."""
-        problem.inside = [(t, self.forearm[stay.side]) for stay in self.stays for t in range(stay.first, stay.last)]
+        problem.inside = [(t, self.forearm[stay.side]) for stay in self.stays for t in range(stay.first, stay.last)
+                          if problem.seen.outlines[t].area > 0]
         if not self.stays:
             return
         spread = np.broadcast_to(problem.seen.depth_spread, problem.seen.depth.shape).copy()

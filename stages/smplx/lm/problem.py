@@ -50,6 +50,8 @@ class Problem:
         self.speed_spread, self.acceleration_spread = speed, acceleration
         self.smoothness, self.outline_weight, self.limit = smoothness, 0.0, ROBUST
         self.transl_spread = np.full(3, prior.TRANSL_ACCELERATION)
+        self.jumps = np.zeros(max(len(seen.xy) - 2, 0), bool)
+        """(T - 2,) triples of frames in which the turn jumps: nothing holds the pelvis together there."""
         self.stance = Stance(active)
         self.ground: Ground | None = None
         self.inside: list[tuple[int, Pairs]] = []
@@ -279,12 +281,18 @@ class Problem:
         speed_spread, acceleration_spread = self._motion_spreads()
         return [scale * turn / speed_spread[..., None],
                 scale * np.diff(turn, axis=0) / span / acceleration_spread[..., None],
-                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / self.transl_spread]
+                scale * np.diff(moved, axis=0)[:, 0] / span[:, 0] / self._transl_spreads()]
 
     def _motion_spreads(self) -> tuple[np.ndarray, np.ndarray]:
         """Spreads of the joints' speed (T - 1, A) and acceleration (T - 2, A)."""
         pairs = np.maximum(self.loose[:-1], self.loose[1:])
-        return self.speed_spread * pairs, self.acceleration_spread * np.maximum(pairs[:-1], pairs[1:])
+        acceleration = self.acceleration_spread * np.maximum(pairs[:-1], pairs[1:])
+        acceleration[np.ix_(self.jumps, self.active == 0)] = np.inf
+        return self.speed_spread * pairs, acceleration
+
+    def _transl_spreads(self) -> np.ndarray:
+        """Spreads of the acceleration of transl (T - 2, 3)."""
+        return np.where(self.jumps[:, None], np.inf, self.transl_spread)
 
     def _add_temporal(self, system: System, state: State) -> None:
         """Adds speeds and accelerations."""
@@ -308,7 +316,7 @@ class Problem:
             first, second = w / gap[:-1, None, None], w / gap[1:, None, None]
             self._couple(system, block, n, [-back[:-1, i] * first, back[1:, i] * second - slope[:-1, i] * first,
                                             slope[1:, i] * second], acceleration[:, i])
-        eye = np.eye(3)[None] * (scale / self.transl_spread / span[:, None, None])
+        eye = np.eye(3)[None] * (scale / self._transl_spreads()[:, None] / span[:, None, None])
         first, second = eye / gap[:-1, None, None], eye / gap[1:, None, None]
         self._couple(system, slice(n - 3, n), n, [first, -first - second, second], transl)
 

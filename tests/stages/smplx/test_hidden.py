@@ -13,7 +13,7 @@ from gsac.avatar.artifacts import read_alpha, write_alpha
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide
+from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outline, sample_outlines
@@ -70,6 +70,36 @@ def test_legs_behind_furniture_are_not_pulled_to_where_the_detector_guesses_them
             fit = fit_clip(body, sightings, shown, SmplxConfig(height_m=height_of(body, person), rounds=1), lambda *a: None)
         error.append(joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), person).mean())
     assert error[1] < 0.5 * error[0]
+
+
+def test_legs_may_stand_anywhere_below_what_furniture_shows(body, person, tmp_path):
+    thing, seen = a_sofa(sightings_of(body, person))
+    outlines = behind(body, person, thing, tmp_path)
+    occluder = find_occluder(seen, outlines)
+    lowest = max(np.flatnonzero(outline.mask.any(1))[-1] for outline in outlines)
+    assert occluder is not None and occluder[lowest + 1:].all()
+
+
+def test_a_body_cut_off_by_the_edge_stands_on_legs_that_no_guess_shortens(body, person):
+    true = sightings_of(body, person)
+    edge = int(np.median(true.xy[:, [INDEX["left_knee"], INDEX["right_knee"]], 1])) - 10
+    xy = true.xy.copy()
+    below = xy[..., 1] > edge
+    xy[below, 1] -= 0.7 * (xy[below, 1] - edge)  # a detector guesses near the edge
+    cut = replace(true, xy=xy, height=edge)
+    config, error = SmplxConfig(height_m=height_of(body, person), rounds=1, silhouette=0), []
+    for sightings in (cut, leave_out_outside(cut)):
+        sightings = replace(sightings, principal_point=(WIDTH / 2, HEIGHT / 2))
+        with threadpool_limits(1, "blas"):
+            fit = fit_clip(body, sightings, [], config, lambda *a: None)
+        error.append(joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), person).mean())
+    assert error[1] < 0.6 * error[0]
+
+
+def test_the_height_of_a_person_whose_feet_are_not_seen_is_told_by_the_trunk(body, person):
+    whole = sightings_of(body, person)
+    half = replace(whole, score=np.where(np.isin(np.arange(133), range(13, 23)), 0, whole.score))
+    assert half.person_height == pytest.approx(whole.person_height, rel=0.1)
 
 
 def test_a_pole_does_not_count_against_a_body_behind_it(body, person, tmp_path):

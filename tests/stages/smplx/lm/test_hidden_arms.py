@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
+from gsac.avatar.artifacts import write_alpha
 from gsac.avatar.joints import INDEX
 from gsac.avatar.wholebody import INDEX as POINT
 from gsac.avatar.wholebody import LEFT_HAND
@@ -15,6 +16,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm.fit import fit_clip, fit_points, set_up
 from gsac.stages.smplx.lm.hidden_arms import HiddenArms, bridge
+from gsac.stages.smplx.silhouette import read_outline
 from gsac.stages.smplx.state import to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
 
@@ -38,12 +40,10 @@ def hide_left_hand(truth):
 @pytest.fixture(scope="module")
 def fitted(body, tmp_path_factory):
     truth = hide_left_hand(turning_person(body, FRAMES))
-    seen = sightings_of(body, truth)
+    seen = misread_left_arm(sightings_of(body, truth))
     seen.missing = np.zeros((FRAMES, 2), bool)
     seen.missing[HIDDEN, 0] = True
     seen.score[HIDDEN, LEFT_HAND] = 0
-    for point, nearer in (("left_elbow", 0.2), ("left_wrist", 0.45)):  # networks know hands before the body
-        seen.world[MISREAD, POINT[point], 2] -= nearer
     outlines = outlines_of(body, truth, tmp_path_factory.mktemp("alpha"))
     with threadpool_limits(1, "blas"):
         fit = fit_clip(body, seen, outlines, SmplxConfig(height_m=height_of(body, truth)), lambda *a: None)
@@ -77,6 +77,40 @@ def test_a_hand_that_the_body_covers_is_not_searched_again(body, tmp_path):
     arms = HiddenArms.of(body, seen.person_height)
     arms.find(problem, state, missing)
     assert not arms.stays
+
+
+@pytest.mark.parametrize("apart, noticed", [(0.3, True), (0.1, False)])
+def test_one_frame_in_plain_view_is_enough_where_frames_are_far_apart(body, tmp_path, apart, noticed):
+    truth = hide_left_hand(turning_person(body, FRAMES))
+    seen = misread_left_arm(sightings_of(body, truth))
+    problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
+    missing = np.zeros((FRAMES, 2), bool)
+    missing[4, 0] = True
+    problem.seen.seconds = apart * np.arange(FRAMES)
+    arms = HiddenArms.of(body, seen.person_height)
+    arms.find(problem, state, missing)
+    assert [(stay.side, stay.first, stay.last) for stay in arms.stays] == ([(0, 4, 5)] if noticed else [])
+
+
+def test_a_frame_without_a_mask_does_not_break_the_search(body, tmp_path):
+    truth = hide_left_hand(turning_person(body, FRAMES))
+    seen = misread_left_arm(sightings_of(body, truth))
+    outlines = outlines_of(body, truth, tmp_path)
+    write_alpha(tmp_path / "nobody.exr", np.zeros((HEIGHT, WIDTH), np.float32))
+    outlines[4] = read_outline(tmp_path / "nobody.exr")
+    problem, state = start_of(body, seen, outlines, SmplxConfig(height_m=height_of(body, truth)))
+    missing = np.zeros((FRAMES, 2), bool)
+    missing[2:6, 0] = True
+    arms = HiddenArms.of(body, seen.person_height)
+    arms.find(problem, state, missing)
+    assert arms.stays and np.isfinite(arms.search(problem, state).local).all()
+
+
+def misread_left_arm(seen):
+    """Networks know hands before the body, and put those behind it there too."""
+    for point, nearer in (("left_elbow", 0.2), ("left_wrist", 0.45)):
+        seen.world[MISREAD, POINT[point], 2] -= nearer
+    return seen
 
 
 def start_of(body, seen, outlines, config):
