@@ -28,9 +28,9 @@ def copy_frames(source: Path, target: Path, frames: int | None = None) -> None:
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     if source.is_dir():
-        left_out = set() if frames is None else set(frame_paths(source)[frames:])
+        left_out = slice(frames, None) if frames is not None else slice(0, 0)
         shutil.copytree(source, target, copy_function=shutil.copyfile,
-                        ignore=lambda folder, names: [name for name in names if Path(folder) / name in left_out])
+                        ignore=lambda folder, names: [path.name for path in frame_paths(Path(folder))[left_out]])
     elif frames is not None and target.suffix == ".npz":
         arrays = {name: array[:frames] if name in PER_FRAME else array for name, array in read_arrays(source).items()}
         write_arrays(target, **arrays)

@@ -25,8 +25,8 @@ from gsac.stages.contract import BadInput
 
 def add_clip(command: argparse.ArgumentParser) -> None:
     command.add_argument("clip", nargs="?", type=Path, metavar="CLIP",
-                         help="a video, or a folder of photos; masks/ beside either in a folder (default: the clip of the run whose "
-                              "folder this is)")
+                         help="a video, or a folder of photos; masks/ beside either in a folder (default: the clip of the run "
+                              "whose folder this is)")
 
 
 def add_params(command: argparse.ArgumentParser) -> None:
