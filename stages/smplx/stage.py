@@ -17,7 +17,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.expression import translate_expression, translate_rest
 from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
-from gsac.stages.smplx.lm.doubted_focal import fit_under_clothes
+from gsac.stages.smplx.lm.hiding_clothes import fit_under_clothes
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines

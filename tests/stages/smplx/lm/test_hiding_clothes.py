@@ -7,8 +7,8 @@ import pytest
 
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.lm import doubted_focal
-from gsac.stages.smplx.lm.doubted_focal import STRANGE, THICK, fit_under_clothes
+from gsac.stages.smplx.lm import hiding_clothes
+from gsac.stages.smplx.lm.hiding_clothes import STRANGE, THICK, fit_under_clothes
 from gsac.stages.smplx.state import Fit, State
 
 
@@ -24,7 +24,7 @@ def fit_dressed(body, monkeypatch):
             state = State(np.zeros((1, 55, 3, 3)), np.zeros((1, 3)), betas, 0.0, np.zeros(0))
             return Fit(state, np.zeros((1, 55)), np.ones(1), np.zeros(1), 1)
 
-        monkeypatch.setattr(doubted_focal, "fit_with_doubt", answer)
+        monkeypatch.setattr(hiding_clothes, "fit_with_doubt", answer)
         return fit_under_clothes(body, None, [], SmplxConfig(silhouette=1.0), lambda *a: None), weights
 
     return fit
