@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from gsac.pipeline.commands.run import find_clip
+
 
 def test_until_stops_after_a_stage_and_runs_only_what_it_needs(toy):
     assert toy.ran("--until", "left") == ["cut", "left"]
@@ -283,3 +285,9 @@ def test_a_quality_for_the_run_in_this_folder_is_refused_with_the_command_that_d
     toy.clip.unlink()
     done = toy.gsac("run", cwd=toy.out)
     assert done.code == 2 and "no clip here (a link to" in done.err
+
+
+def test_check_takes_the_clip_of_the_run_that_it_is_typed_in(toy, monkeypatch):
+    toy.ran("--until", "left")
+    monkeypatch.chdir(toy.out / "left")
+    assert find_clip(None) == toy.clip.resolve()
