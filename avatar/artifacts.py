@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+import math
+import struct
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from gsac.avatar.files import told_no_room, write_file
 
@@ -93,6 +95,9 @@ class Clip:
         for each in fields(cls):
             if each.name not in values and each.default_factory is MISSING and each.default is MISSING:
                 raise ArtifactError(f"{path}: field {each.name} is missing (has {', '.join(sorted(values))})")
+        for name, (words, fits) in CLIP_FIELDS.items():
+            if name in values and not fits(values[name]):
+                raise ArtifactError(f"{path}: field {name} is {str(values[name])[:40]!r}, expected {words}")
         clip = cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})
         try:
             if cut := values.get("crop"):
@@ -104,6 +109,26 @@ class Clip:
             raise ArtifactError(f"{path}: crop and center must be an object of {', '.join(f.name for f in fields(Crop))}, "
                                 f"and two numbers ({e})") from e
         return clip
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_list(value: object, of: Callable[[object], bool]) -> bool:
+    return isinstance(value, list) and all(map(of, value))
+
+
+CLIP_FIELDS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
+    "fps": ("a number or null", lambda value: value is None or _is_number(value)),
+    "timestamps_s": ("a list of numbers or null", lambda value: value is None or _is_list(value, _is_number)),
+    "width": ("a whole number of px", lambda value: type(value) is int),
+    "height": ("a whole number of px", lambda value: type(value) is int),
+    "focal_px": ("a number above 0 or null", lambda value: value is None or _is_number(value) and cast("float", value) > 0),
+    "source_sha256": ("text", lambda value: isinstance(value, str)),
+    "repeated": ("a list of frame numbers", lambda value: _is_list(value, lambda t: type(t) is int)),
+}
+"""Field of clip.json -> what it must be, in words and as a test."""
 
 
 def frame_paths(frames: Path) -> list[Path]:
@@ -124,6 +149,21 @@ def read_frame(path: Path) -> np.ndarray:
     if image is None:
         raise ArtifactError(f"{path}: cannot be read as an image")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """Width and height, px, of a frame or mask, from the head of its PNG or EXR."""
+    try:
+        with open(path, "rb") as stream:
+            if path.suffix == ".png":
+                width, height = struct.unpack_from(">II", stream.read(24), 16)
+                return width, height
+            import OpenEXR
+
+            (x0, y0), (x1, y1) = OpenEXR.File(stream, header_only=True).header()["dataWindow"]
+            return int(x1 - x0 + 1), int(y1 - y0 + 1)
+    except (OSError, RuntimeError, struct.error) as e:
+        raise ArtifactError(f"{path}: cannot be read as an image") from e
 
 
 def write_frame(path: Path, rgb: np.ndarray) -> None:
@@ -148,9 +188,14 @@ def read_alpha(path: Path) -> np.ndarray:
     import numpy as np
     import OpenEXR
 
-    # OpenEXR itself opens no path that is not UTF-8.
-    with open(path, "rb") as stream, OpenEXR.File(stream) as f:
-        return np.ascontiguousarray(next(iter(f.channels().values())).pixels, dtype=np.float32)
+    try:  # OpenEXR itself opens no path that is not UTF-8
+        with open(path, "rb") as stream, OpenEXR.File(stream) as f:
+            alpha = np.ascontiguousarray(next(iter(f.channels().values())).pixels, dtype=np.float32)
+    except (OSError, RuntimeError, StopIteration, ValueError) as e:
+        raise ArtifactError(f"{path}: cannot be read as a mask ({e or type(e).__name__})") from e
+    if alpha.ndim != 2 or not (alpha.min() >= 0 and alpha.max() <= 1):
+        raise ArtifactError(f"{path}: expected one channel, every pixel in 0..1")
+    return alpha
 
 
 def write_alpha(path: Path, alpha: np.ndarray) -> None:
@@ -189,7 +234,7 @@ Shapes = Mapping[str, tuple[int | str, ...]]
 
 
 def check_arrays(path: Path, shapes: Shapes, *groups: Shapes) -> dict[str, np.ndarray]:
-    """Reads an npz and checks names and shapes. Returns its arrays (...) by name, those that nobody asked for among them.
+    """Reads an npz and checks names, shapes and kinds. Returns its arrays (...) by name, those that nobody asked for among them.
 
     groups: arrays of which a file has all or none.
     """
@@ -206,7 +251,24 @@ def check_arrays(path: Path, shapes: Shapes, *groups: Shapes) -> dict[str, np.nd
                      for i, s in enumerate(shape))
         if got != want:
             raise ArtifactError(f"{path}: array {name} has shape {got}, expected {want}")
+        _check_kind(path, name, arrays[name])
     return arrays
+
+
+TEXT = ("detector", "model")
+"""Arrays of text; all others hold numbers."""
+WHOLE = ("face", "coarser_face", "levels", "head_faces")
+"""Arrays of whole numbers."""
+NOWHERE = ("xy", "world", "face_mesh", "landmarks")
+"""Arrays of points, which are NaN where a point is nowhere; all others are finite."""
+
+
+def _check_kind(path: Path, name: str, array: np.ndarray) -> None:
+    kinds, words = ("U", "text") if name in TEXT else ("iu", "whole numbers") if name in WHOLE else ("biuf", "numbers")
+    if array.dtype.kind not in kinds:
+        raise ArtifactError(f"{path}: array {name} is of type {array.dtype}, expected {words}")
+    if name not in NOWHERE and not _finite(array):
+        raise ArtifactError(f"{path}: array {name} is not finite")
 
 
 def _finite(array: np.ndarray) -> bool:
@@ -243,6 +305,9 @@ LEVEL_SHAPES: Shapes = {"levels": ("L",), **{f"coarser_{name}": ("M", *shape[1:]
 LEVEL_HEIGHT_SHAPE: Shapes = {"level_heights": ("L",)}
 MORE_AVATAR_SHAPES = LIGHT_SHAPE, LOW_PASS_SHAPE, LEVEL_SHAPES, LEVEL_HEIGHT_SHAPE
 """Groups of arrays that avatar.npz has or has not."""
+PER_FRAME = frozenset(name for shapes in (KEYPOINT_SHAPES, FILLED_SHAPES, FACE_SHAPES, FLAME_SHAPES, BODY_SHAPES)
+                      for name, shape in shapes.items() if shape[:1] == ("T",))
+"""Arrays with a row for each kept frame."""
 
 
 def check_keypoints(path: Path) -> dict[str, np.ndarray]:
@@ -254,7 +319,7 @@ def check_keypoints(path: Path) -> dict[str, np.ndarray]:
 
     arrays = check_arrays(path, KEYPOINT_SHAPES)
     score = arrays["score"]
-    if not (_finite(score) and score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
+    if not (score.min(initial=0) >= 0 and score.max(initial=0) <= 1):
         raise ArtifactError(f"{path}: score must lie in 0..1")
     placed = np.asarray(np.isfinite(arrays["xy"]).all(-1))
     return arrays if placed.all() else arrays | {"score": np.where(placed, score, 0).astype(score.dtype),
@@ -276,9 +341,6 @@ def check_face(path: Path) -> dict[str, np.ndarray]:
 def check_body(path: Path) -> dict[str, np.ndarray]:
     """The arrays of body.npz by name: `BODY_SHAPES`, as transl (T, 3); `REST_SHAPE` and `OCCLUDER_SHAPE` or not."""
     arrays = check_arrays(path, BODY_SHAPES, REST_SHAPE, OCCLUDER_SHAPE)
-    for name, a in arrays.items():
-        if not _finite(a):
-            raise ArtifactError(f"{path}: array {name} is not finite")
     if "rest_expression" in arrays and not (arrays["rest_expression"].min() >= 0 and arrays["rest_expression"].max() <= 1):
         raise ArtifactError(f"{path}: array rest_expression must lie in 0..1")
     return arrays
@@ -290,9 +352,6 @@ def check_avatar(path: Path) -> dict[str, np.ndarray]:
     Where there are levels, level_heights (L,) or not.
     """
     arrays = check_arrays(path, AVATAR_SHAPES, *MORE_AVATAR_SHAPES)
-    for name in {name for shapes in (AVATAR_SHAPES, *MORE_AVATAR_SHAPES) for name in shapes}:
-        if name in arrays and not _finite(arrays[name]):
-            raise ArtifactError(f"{path}: array {name} is not finite")
     if "level_heights" in arrays and not ("levels" in arrays and (arrays["level_heights"] > 0).all()):
         raise ArtifactError(f"{path}: array level_heights must hold the height of the person for each of `levels`, px, above 0")
     if "levels" in arrays:

@@ -232,9 +232,16 @@ class RunFolder:
 
         is_ours: whether a file is of gsac's making, asked where no file of this name was placed here before.
         """
-        self._make_way(name, is_ours)
+        if not self._holds(name, text):
+            self._make_way(name, is_ours)
         self._know({name: text_digest(text)})
         write_text(self.root / name, text)
+
+    def _holds(self, name: str, text: str) -> bool:
+        """Whether a file of this name and content is there, whoever wrote it."""
+        with contextlib.suppress(OSError):
+            return not (self.root / name).is_symlink() and (self.root / name).read_bytes() == text.encode()
+        return False
 
     def forget(self, name: str) -> None:
         """Removes one of the folder's own files; one that the user edited is moved aside."""

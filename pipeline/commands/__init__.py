@@ -20,6 +20,7 @@ COMMANDS = {
     "status": "what is up to date in the folder of a run",
     "explain": "what changed in the key of a stage",
     "stage": "run one stage, on a run's folder or on fixture artifacts",
+    "fixtures": "cut what every stage of a run read, as plain files that replay it elsewhere",
     "batch": "run many clips over one cache",
     "cache": "list, check and clean the cache",
     "models": "list, pull, add and remove model files",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gsac.cache.half_made import half_made, temporary_folder
 from gsac.pipeline.clip_check import FRAMES, check_clip
-from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter, writable_store
+from gsac.pipeline.commands.options import add_clip, add_json, answer_reporter, open_store, progress_reporter, writable_store
 from gsac.pipeline.commands.run import find_clip
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
@@ -22,7 +22,7 @@ LAST = "keypoints"
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("clip", type=Path, metavar="CLIP", help="a video, or a folder of photos")
+    add_clip(command)
     add_json(command)
     command.set_defaults(do=do)
 

@@ -23,6 +23,12 @@ from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
 
 
+def add_clip(command: argparse.ArgumentParser) -> None:
+    command.add_argument("clip", nargs="?", type=Path, metavar="CLIP",
+                         help="a video, or a folder of photos; masks/ beside either in a folder (default: the clip of the run "
+                              "whose folder this is)")
+
+
 def add_params(command: argparse.ArgumentParser) -> None:
     command.add_argument("--params", type=Path, metavar="FILE", help="YAML file with sections of parameters")
     command.add_argument("--set", action="append", default=[], metavar="stage.key=value",

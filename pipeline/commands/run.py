@@ -1,13 +1,15 @@
-"""gsac run CLIP: runs a clip through the stages."""
+"""gsac run [CLIP]: runs a clip through the stages; in the folder of a run its own clip, with its own parameters."""
 
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
 from gsac.cache.store import Store
 from gsac.pipeline.closing import closing_lines
 from gsac.pipeline.commands.options import (
+    add_clip,
     add_json,
     add_params,
     add_person,
@@ -22,11 +24,12 @@ from gsac.pipeline.json_output import emit
 from gsac.pipeline.other_clip import find_other_clip, forget_results
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.project import Project
-from gsac.pipeline.quality import quality_entry, resolve_quality
+from gsac.pipeline.quality import STANDARD, find_quality, name_of, quality_entry, resolve_quality
 from gsac.pipeline.report.refresh import EarlySections, refresh_report
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.rows import read_json
 from gsac.pipeline.run import ClipRun, Options
-from gsac.pipeline.run_folder import OWN_STORE, RunFolder, avatar_name
+from gsac.pipeline.run_folder import DAG, OWN_STORE, RUN, RunFolder, avatar_name
 from gsac.stages.contract import BadInput
 
 MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
@@ -34,7 +37,7 @@ MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("clip", type=Path, metavar="CLIP", help="a video, or a folder of photos; masks/ beside either in a folder")
+    add_clip(command)
     command.add_argument("--out", type=Path, metavar="DIR", help="where results are shown (default: ./<clip>-avatar)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
     command.add_argument("--from", dest="start", metavar="STAGE",
@@ -44,6 +47,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--replace", action="store_true", help="put this clip's avatar in place of another clip's in DIR")
     command.add_argument("--anyway", action="store_true", help="go on where nothing can come of the clip, as without a person")
     add_quality(command)
+    command.set_defaults(quality=None)
     add_person(command)
     add_params(command)
     command.add_argument("--dry-run", action="store_true", help="say what would run and why, and how long it would take")
@@ -53,10 +57,14 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     project = Project.at_hand()
-    configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
+    here = run_folder_here() if arguments.clip is None else None
+    quality, params = arguments.quality or STANDARD, arguments.params
+    if here is not None:
+        quality, params = own_quality(here, arguments.quality), params or here.params
+    configs = resolve_quality(quality, project, params, arguments.set, values_of_person(arguments, project))
     clip = find_clip(arguments.clip)
-    run_folder = RunFolder(arguments.out or default_out(clip))
-    options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
+    run_folder = RunFolder(arguments.out or (here.root if here is not None else default_out(clip)))
+    options = Options(arguments.until, arguments.start, tuple(arguments.force), quality, arguments.anyway)
     with progress_reporter(arguments) as reporter:
         store = open_store(reporter)
         clip_run = ClipRun(project, configs, store, run_folder, reporter)
@@ -126,8 +134,33 @@ def dry_run(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRepo
     return ExitCode.OK
 
 
-def find_clip(path: Path) -> Path:
-    """Absolute path of the clip. BadInput where there is none."""
+def own_quality(run_folder: RunFolder, asked: str | None) -> str:
+    """The preset that the run in this folder was made with. BadInput where another is asked for: the folder's params.yaml says all
+    that a preset says."""
+    run = read_json(run_folder.root / RUN)
+    own = name_of(run.get("quality") if isinstance(run, dict) else None) or STANDARD
+    if asked is not None and asked != own:
+        find_quality(asked)
+        command = shlex.join(["gsac", "run", str(run_folder.clip), "--out", str(run_folder.root), "--quality", asked])
+        raise BadInput(f"--quality {asked}: the run in this folder has parameters of its own, of {own}; `{command}` replaces them, "
+                       "--set changes one")
+    return own
+
+
+def run_folder_here() -> RunFolder:
+    """The folder of a run that the command was typed in. BadInput where it was typed elsewhere."""
+    here = Path.cwd()
+    try:
+        return RunFolder.around(here)
+    except BadInput as error:
+        raise BadInput(f"no CLIP was given, and this folder is not a run's: no {DAG} in {here} or above; give a video or a "
+                       "folder of photos") from error
+
+
+def find_clip(path: Path | None) -> Path:
+    """Absolute path of the clip; None: the clip of the run that the command was typed in. BadInput where there is none."""
+    if path is None:
+        return run_folder_here().require_clip()
     if not path.exists():
         raise BadInput(f"{path}: no such file or folder; give a video or a folder of photos")
     return path.resolve()

@@ -22,7 +22,7 @@ from gsac.pipeline.commands.options import (
     writable_store,
 )
 from gsac.pipeline.errors import StageFailedError, attach_summary
-from gsac.pipeline.graph import CLIP
+from gsac.pipeline.fixtures import fixture_paths
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
@@ -178,22 +178,3 @@ def note_in_folder(task: Task, result: StageResult, reporter: PlainReporter) -> 
     write_rows(task.folder, task.keys.project.graph, task.store, [result.to_json()], clip_entries(task.folder, task.store))
     if (task.folder.root / REPORT).exists() and (warning := refresh_report(task.folder)) is not None:
         reporter.note(f"gsac: warning: {warning}")
-
-
-def fixture_paths(project: Project, name: str, folder: Path) -> dict[str, Path]:
-    """Port -> path under the folder of artifacts, each checked as the stage that makes it declares."""
-    graph = project.graph
-    paths = {}
-    for port in graph.step(name).deps:
-        path = (folder / port).resolve()
-        if not path.exists():
-            raise BadInput(f"{folder / port}: missing; stage {name} reads {', '.join(graph.step(name).deps)}")
-        if port != CLIP:
-            maker = graph.producer[port]
-            output = next(o for o in project.stage(maker).outputs if port == f"{maker}/{o.path}")
-            try:
-                output.check(path)
-            except Exception as error:
-                raise BadInput(f"{folder / port} is not what {port} promises: {error}") from error
-        paths[port] = path
-    return paths

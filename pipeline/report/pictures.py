@@ -144,7 +144,7 @@ class Footage:
         path = self.results.path("segment/alpha") / f"{self.frames[t].stem}.exr"
         if not path.is_file():
             raise AbsentError(f"segment/alpha has no mask for frame {self.frames[t].stem}.")
-        return np.clip(np.nan_to_num(read_alpha(path)), 0, 1)
+        return read_alpha(path)
 
     def moment(self, t: int) -> str:
         """`frame 12 · 0.40 s`"""

@@ -18,6 +18,7 @@ from gsac.avatar.artifacts import (
     write_arrays,
     write_frame,
 )
+from support.artifacts import blank
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "flipped", "text"])
@@ -60,7 +61,7 @@ def test_a_path_that_is_not_utf8_is_read_as_any_other(tmp_path):
 
 
 def test_a_point_that_lies_nowhere_counts_as_unseen(tmp_path):
-    arrays = {name: np.zeros([2 if s == "T" else s for s in shape], np.float32) for name, shape in KEYPOINT_SHAPES.items()}
+    arrays = blank(KEYPOINT_SHAPES, T=2)
     path = tmp_path / "keypoints.npz"
     arrays["score"][0, 6:8] = 0.5
     for bad in (np.nan, np.inf):

@@ -9,35 +9,16 @@ from pathlib import Path
 import pytest
 
 from gsac.pipeline.project import shipped_dag
+from support.dvc import Dvc
 from support.toy import DAG
 
 pytestmark = pytest.mark.slow
 
 
-class Dvc:
-    """DVC in a workspace."""
-
-    def __init__(self, toy):
-        self.toy = toy
-        self("init", "--no-scm", "-q")
-
-    def __call__(self, *arguments: str) -> str:
-        done = subprocess.run([sys.executable, "-m", "dvc", *arguments], cwd=self.toy.out, env=self.toy.env, text=True,
-                              capture_output=True, timeout=300)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
-
-    @property
-    def is_clean(self) -> bool:
-        out = self("status")
-        return "up to date" in out
-
-
 @pytest.fixture
 def dvc(toy):
-    pytest.importorskip("dvc", reason="DVC is not installed (pip install 'gsac[dev]')")
     toy.out.mkdir()
-    return Dvc(toy)
+    return Dvc(toy.out, toy.env)
 
 
 def test_after_gsac_run_dvc_status_is_clean_and_dvc_repro_runs_nothing(toy, dvc):

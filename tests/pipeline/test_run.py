@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from gsac.pipeline.commands.run import find_clip
+
 
 def test_until_stops_after_a_stage_and_runs_only_what_it_needs(toy):
     assert toy.ran("--until", "left") == ["cut", "left"]
@@ -241,3 +243,51 @@ def test_ctrl_c_says_that_the_same_command_goes_on(toy):
     toy.wait_for(lambda: "left" in toy.runs)
     process.terminate()
     assert "the same command goes on from there" in process.communicate(timeout=30)[1]
+
+
+def test_in_the_folder_of_a_run_its_own_clip_runs_with_its_own_parameters(toy, everything):
+    toy.ran("--set", "left.word=last", "--until", "right")
+    toy.runs_file.write_text("")
+    done = toy.gsac("run", "--json", cwd=toy.out / "right")
+    assert done.code == 0 and toy.runs == ["left", "join"] and done.statuses.keys() == set(everything)
+    assert toy.result == "GAMMA ALPHA"
+    done = toy.gsac("run", "--set", "right.word=last", "--until", "right", cwd=toy.out)
+    assert done.code == 0 and toy.runs == ["left", "join", "right"]
+    assert toy.gsac("run", cwd=toy.out).code == 0 and toy.result == "GAMMA GAMMA"
+
+
+def test_edited_parameters_hold_where_no_clip_is_given_and_are_not_moved_aside(toy):
+    toy.ran()
+    params = toy.out / "params.yaml"
+    params.write_text(params.read_text().replace("left:\n  word: first", "left:\n  word: last"))
+    done = toy.gsac("run", cwd=toy.out)
+    assert done.code == 0 and toy.result == "GAMMA ALPHA" and "kept" not in done.err
+    assert not list(toy.out.glob("params*kept*"))
+
+
+def test_without_a_clip_another_folder_is_the_only_thing_that_is_not_as_it_was(toy):
+    toy.ran("--set", "left.word=last")
+    done = toy.gsac("run", "--out", toy.root / "other", cwd=toy.out)
+    assert done.code == 0 and (toy.root / "other/join/out.txt").read_text() == "GAMMA ALPHA"
+
+
+def test_elsewhere_a_run_without_a_clip_says_so(toy):
+    for command in ("run", "check"):
+        done = toy.gsac(command)
+        assert done.code == 2 and "no CLIP was given, and this folder is not a run's: no dvc.yaml in" in done.err
+
+
+def test_a_quality_for_the_run_in_this_folder_is_refused_with_the_command_that_does_it(toy):
+    toy.ran()
+    done = toy.gsac("run", "--quality", "draft", cwd=toy.out)
+    assert done.code == 2 and f"`gsac run {toy.out}/clip --out {toy.out} --quality draft`" in " ".join(done.err.split())
+    assert toy.gsac("run", "--quality", "standard", cwd=toy.out).code == 0
+    toy.clip.unlink()
+    done = toy.gsac("run", cwd=toy.out)
+    assert done.code == 2 and "no clip here (a link to" in done.err
+
+
+def test_check_takes_the_clip_of_the_run_that_it_is_typed_in(toy, monkeypatch):
+    toy.ran("--until", "left")
+    monkeypatch.chdir(toy.out / "left")
+    assert find_clip(None) == toy.clip.resolve()
