@@ -30,8 +30,7 @@ def run(job: Job) -> None:
         photos, plate = ([source], None) if source.suffix.lower() in SUFFIXES else ([], None)
     people = People(job.models) if job.config.crop and all(name in job.models for name in NETWORKS) else None
     if photos:
-        fields: dict[str, Any] = {"fps": None, "timestamps_s": None}
-        fields |= split_photos(photos, plate, frames, job.config, people, job.warn, job.progress)
+        fields: dict[str, Any] = split_photos(photos, plate, frames, job.config, people, job.warn, job.progress)
     else:
         fields = split_video(source, frames, job.config, people, job.warn, job.progress)
 
