@@ -27,7 +27,8 @@ FPS = 30.0
 """Frames a second where the video has no rate."""
 NOTICE = ("PeopleSnapshot: T. Alldieck, M. Magnor, W. Xu, C. Theobalt, G. Pons-Moll: Video Based Reconstruction of 3D People "
           "Models, CVPR 2018.\nhttps://graphics.tu-bs.de/people-snapshot\nFor research that is not commercial, under the licence "
-          "that you agreed to when you downloaded it; frames, masks and poses here are that data set's and must not be passed on.\n")
+          "that you agreed to when you downloaded it; frames, masks and poses here are that data set's and must not be passed "
+          "on.\n")
 
 
 def read(path: Path) -> Iterator[GivenClip]:
