@@ -6,11 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import frame_paths, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths, read_alpha, read_frame
 from gsac.pipeline.cli import execute
 from gsac.pipeline.data_sets.read import read_data_set
 from gsac.pipeline.data_sets.write import write_clip
-from gsac.stages.contract import BadInput
+from gsac.stages.contract import BadInput, Job
+from gsac.stages.split.config import SplitConfig
+from gsac.stages.split.stage import run
 from support import data_sets
 from support.data_sets import CENTER, FOCAL, picture, read_json
 
@@ -72,6 +74,17 @@ def test_neuman_comes_with_colmaps_cameras_and_its_split_without_the_validation_
     same_frame(folder, "000003", 3)
     turn = np.array(read_json(folder / "cameras.json")["extrinsics"]["000002"])
     np.testing.assert_allclose(turn, [[0, 0, 1, 0.5], [0, 1, 0, 0], [-1, 0, 0, 2]], atol=1e-8)
+
+
+def test_what_was_imported_goes_through_split_with_its_masks_and_times(tmp_path):
+    folder = brought("xhumans", data_sets.xhumans(tmp_path / "in"), tmp_path / "out")
+    (tmp_path / "split").mkdir()
+    run(Job({"clip": folder}, tmp_path / "split", SplitConfig(count=None, photo_fps=30)))
+    for t, of in enumerate((1, 2, 3, 1, 2, 1, 2)):
+        alpha = read_alpha(tmp_path / f"split/frames/masks/{t:06d}.exr")
+        np.testing.assert_array_equal(alpha, picture(of)[1])
+    times = np.array(Clip.read(tmp_path / "split/clip.json").timestamps_s)
+    np.testing.assert_allclose(np.diff(times) * 30, [1, 1, 1001, 1, 1001, 1], atol=1e-3)
 
 
 def test_a_folder_of_images_and_masks_is_taken_with_its_split(tmp_path):
