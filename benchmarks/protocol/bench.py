@@ -18,7 +18,7 @@ from gsac.stages.contract import BadInput
 
 
 def parser() -> argparse.ArgumentParser:
-    out = argparse.ArgumentParser(prog="gsac bench protocol", description=__doc__.splitlines()[0])
+    out = argparse.ArgumentParser(prog="gsac bench protocol", description=(__doc__ or "").partition("\n")[0])
     out.add_argument("name", choices=sorted(PROTOCOLS), metavar="NAME", help=f"one of: {', '.join(sorted(PROTOCOLS))}")
     out.add_argument("clips", type=Path, nargs="+", metavar="DIR", help="folders that `gsac data import` wrote, one a subject")
     out.add_argument("--recipe", default="fast", choices=["fast", "paper"], help="recipe of the trainings (default: fast)")

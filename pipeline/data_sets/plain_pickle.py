@@ -44,9 +44,9 @@ class _Kind:
     """Stands for numpy.dtype."""
 
     def __init__(self, text: Any, *_: Any):
-        self.kind = np.dtype(text) if isinstance(text, str) and len(text) <= 4 else None
-        if self.kind is None or self.kind.kind not in KINDS:
+        if not isinstance(text, str) or len(text) > 4 or np.dtype(text).kind not in KINDS:
             raise _RefusedError(f"it holds an array of {text!r}")
+        self.kind = np.dtype(text)
 
     def __setstate__(self, state: tuple) -> None:
         if state[1] in ("<", ">"):
