@@ -23,10 +23,12 @@ def read_hdf5(path: Path, *names: str) -> dict[str, np.ndarray]:
             missing = [name for name in names if name not in file]
             if missing:
                 raise BadInput(f"{path}: has no array {missing[0]}; it has {', '.join(sorted(file)) or 'none'}")
+            found = {}
             for name in names:
-                if not isinstance(file.get(name, getlink=True), h5py.HardLink) or not isinstance(file[name], h5py.Dataset) \
-                        or file[name].external:
+                array = file[name] if isinstance(file.get(name, getlink=True), h5py.HardLink) else None
+                if not isinstance(array, h5py.Dataset) or array.external:
                     raise BadInput(f"{path}: {name} is no array of this file itself; download it again")
-            return {name: np.asarray(file[name]) for name in names}
+                found[name] = np.asarray(array)
+            return found
     except OSError as e:
         raise BadInput(f"{path}: cannot be read as HDF5 ({e}); download it again") from e

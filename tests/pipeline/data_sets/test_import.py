@@ -142,3 +142,22 @@ def test_without_h5py_its_package_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(BadInput, match=r"h5py.*gsac\[data\]"):
         read_hdf5(tmp_path / "masks.hdf5", "masks")
+
+
+@pytest.mark.parametrize("how", ["link", "storage", "group"])
+def test_hdf5_that_reaches_into_another_file_is_refused(tmp_path, how):
+    h5py = pytest.importorskip("h5py")
+    from gsac.pipeline.data_sets.hdf5 import read_hdf5
+
+    (tmp_path / "secret").write_bytes(b"secret" * 4)
+    with h5py.File(tmp_path / "other.hdf5", "w") as other:
+        other["masks"] = np.ones(3)
+    with h5py.File(tmp_path / "masks.hdf5", "w") as file:
+        if how == "link":
+            file["masks"] = h5py.ExternalLink(str(tmp_path / "other.hdf5"), "masks")
+        elif how == "storage":
+            file.create_dataset("masks", (6,), "u1", external=[(str(tmp_path / "secret"), 0, 6)])
+        else:
+            file.create_group("masks")
+    with pytest.raises(BadInput, match=r"masks.hdf5: masks is no array of this file"):
+        read_hdf5(tmp_path / "masks.hdf5", "masks")
