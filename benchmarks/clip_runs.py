@@ -29,11 +29,13 @@ def render_clip(folder: Path, say: PlainReporter, **options: Any) -> Path:
 
 def run_clip(folder: Path, out: Path, stages: Iterable[str], store: Store, say: PlainReporter,
              settings: tuple[str, ...] = ()) -> RunFolder:
-    """Runs the folder's clip.mp4 up to each of the stages, with results from the store where it has them.
+    """Runs the folder's clip.mp4, or the folder itself where it holds photos, up to each of the stages, with results from the
+    store where it has them.
 
     settings: `stage.key=value` that differ from the defaults. Returns the run's folder, `out`.
     """
-    project, clip, run = Project.at_hand(), (folder / "clip.mp4").resolve(), RunFolder(out)
+    film = folder / "clip.mp4"
+    project, clip, run = Project.at_hand(), (film if film.is_file() else folder).resolve(), RunFolder(out)
     configs = resolve(project, sets=settings)
     run.prepare(clip, project, configs)
     for last in stages:

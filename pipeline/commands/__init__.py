@@ -24,6 +24,7 @@ COMMANDS = {
     "batch": "run many clips over one cache",
     "cache": "list, check and clean the cache",
     "models": "list, pull, add and remove model files",
+    "data": "import a data set that you downloaded: frames, masks, cameras, poses and the published split",
     "view": "show an avatar in the browser",
     "render": "make a video of an avatar, moving or from all sides",
     "report": "write report.html of a run's folder",

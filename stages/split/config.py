@@ -17,6 +17,9 @@ class SplitConfig:
     """Most frames kept in all, spread evenly over the clip; null: no limit."""
     max_height: int | None = 1280
     """Largest height of a frame, px; taller ones are scaled down with their aspect; null keeps the size."""
+    photo_fps: float | None = None
+    """Frames a second of a folder of photos that were taken out of a video: they have times then, and what is hidden in one is
+    filled from its neighbours. Numbers at the ends of the names that rise tell which frames are left out. null: photos."""
     crop: bool = True
     """Whether footage taller than max_height is cut to the person before it is scaled, where that makes the person larger by a
     fifth or more; the frames are whole where it is not sure where the person is."""
@@ -29,6 +32,9 @@ class SplitConfig:
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise BadInput(f"split.fps is {self.fps}; expected a positive number of frames a second, "
                            "or null for every frame")
+        if self.photo_fps is not None and not 0 < self.photo_fps < float("inf"):
+            raise BadInput(f"split.photo_fps is {self.photo_fps}; expected a positive number of frames a second, "
+                           "or null for photos without times")
         if self.count is not None and self.count < 1:
             raise BadInput(f"split.count is {self.count}; expected at least 1, or null for no limit")
         if self.max_height is not None and self.max_height < 16:

@@ -63,7 +63,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
                  mask_of: Callable[[Path, int, int], np.ndarray] | None = None) -> dict:
     """Writes frames/%06d.png and frames/plate.png. people: who finds the person, None: the frames stay whole; mask_of: gives the
     mask (height, width) of a photo of this width and height, px, for frames/masks/%06d.exr. Returns the Clip fields width, height,
-    focal_px, notes, crop, center."""
+    focal_px, notes, crop, center, fps, timestamps_s, repeated."""
     picks = [photos[i] for i in pick_evenly(len(photos), config.count)]
     if len(picks) < len(photos):
         warn(Finding.of(Code.PHOTOS_DROPPED, figure=len(picks), given=len(photos), count=config.count))
@@ -80,7 +80,8 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
 
     if mask_of is not None:
         (frames / MASKS).mkdir()
-    focals, looks, notes, other, unread = [], [], set(), [], []
+    moments = None if config.photo_fps is None else dict(zip(photos, photo_times(photos, config.photo_fps), strict=True))
+    focals, times, looks, notes, other, unread = [], [], [], set(), [], []
     for done, path in enumerate(picks):
         try:
             rgb, exif, had_alpha = read_photo(path)
@@ -97,6 +98,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         del rgb  # before the next one is read
         write_frame(frames / f"{len(focals):06d}.png", shown)
         focals.append(focal_px)
+        times += [moments[path]] if moments else []
         looks.append(look_at(_resize(shown, *fit_size(width, height, HEIGHT))))
         progress(done + 1, len(picks), "frames")
     if not focals:
@@ -111,14 +113,26 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         if had_alpha:
             notes.add(COMPOSITED)
         write_frame(frames / "plate.png", fit(rgb, Image.Exif())[0])
-    for finding in judge_pictures(looks, timed=False)[1]:
+    repeated, findings = judge_pictures(looks, timed=moments is not None)
+    for finding in findings:
         warn(finding)
     known = [f for f in focals if f is not None]
     if known and max(known) > 1.02 * min(known):
         warn(Finding.of(Code.PHOTO_ZOOM, least=min(known), most=max(known)))
     return {"width": width, "height": height, "focal_px": float(np.median(known)) if known else None,
-            "notes": sorted(notes), "crop": crop,
+            "notes": sorted(notes), "crop": crop, "fps": config.photo_fps,
+            "timestamps_s": [round(time - times[0], 6) for time in times] or None,
+            "repeated": np.flatnonzero(repeated).tolist(),
             "center": None if crop is None else principal_point(crop, (width, height), *usual)}
+
+
+def photo_times(photos: list[Path], fps: float) -> np.ndarray:
+    """(N,) s, rising, of photos in order. Where all names end in numbers that rise these count the frames, else the order does."""
+    ends = [re.search(r"(\d+)$", photo.stem) for photo in photos]
+    numbers = np.array([int(end[1]) if end else -1 for end in ends], float)
+    if numbers[0] < 0 or (np.diff(numbers) <= 0).any():
+        numbers = np.arange(len(photos), dtype=float)
+    return (numbers - numbers[0]) / fps
 
 
 def find_crop(photos: list[Path], usual: tuple[int, int], config: SplitConfig, people: People | None) -> Crop | None:

@@ -34,9 +34,8 @@ def run(job: Job) -> None:
         photos, plate = ([source], None) if source.suffix.lower() in SUFFIXES else ([], None)
     people = People(job.models) if job.config.crop and all(name in job.models for name in NETWORKS) else None
     if photos:
-        fields: dict[str, Any] = {"fps": None, "timestamps_s": None}
-        mask_of = match_photos(masks, photos)
-        fields |= split_photos(photos, plate, frames, job.config, people, job.warn, job.progress, mask_of)
+        fields: dict[str, Any] = split_photos(photos, plate, frames, job.config, people, job.warn, job.progress,
+                                              match_photos(masks, photos))
     else:
         fields = split_video(source, frames, job.config, people, job.warn, job.progress, masks)
 

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar import rotation
 from gsac.avatar.yaw import yaw
+from gsac.stages.contract import BadInput
 
 FEWEST = 5
 """Fewest frames of a clip that can spare one."""
@@ -26,6 +27,18 @@ def hold_out(global_orient: np.ndarray, usable: np.ndarray, every: int) -> np.nd
         return np.zeros(0, np.int64)
     every, yaws = min(every, len(frames)), yaw(rotation.exp(np.asarray(global_orient, np.float64)))[frames]
     return np.sort(frames[np.argsort(yaws, kind="stable")][every // 2::every])
+
+
+def hold_out_named(frames: list[int], usable: np.ndarray) -> np.ndarray:
+    """(m,) indices of those of the named frames that are usable. usable: (T,) bool. Raises BadInput."""
+    if frames[-1] >= len(usable):
+        raise BadInput(f"train.heldout_frames names frame {frames[-1]}, but the clip has frames 0 to {len(usable) - 1}")
+    held = np.array([t for t in frames if usable[t]], np.int64)
+    if not len(held):
+        raise BadInput("train.heldout_frames: none of these frames has a mask and a fitted body; look at the warnings of smplx")
+    if len(held) == usable.sum():
+        raise BadInput("train.heldout_frames names every frame that could be trained on; leave some")
+    return held
 
 
 def hold_out_for_choosing(global_orient: np.ndarray, usable: np.ndarray, held: np.ndarray, every: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 from gsac.stages.body_choice import OPEN, brought_files
@@ -26,6 +27,8 @@ MORE_ON_CUDA = 1.5
 DEVICES = (AUTO, "cpu", "cuda")
 LPIPS = (AUTO, "none", "judge", "loss")
 NETWORKS = ("lpips-vgg", "lpips-alex")
+MOST_FRAMES = 10**6
+"""Largest number of a frame."""
 
 
 def coarse_share(pixels: float) -> float:
@@ -44,6 +47,19 @@ def asked_size(pixels: float, device: str) -> int:
     """Gaussians that a person of so many pixels in a frame asks for on `device` (cpu, cuda)."""
     more = MORE_ON_CUDA if device == "cuda" else 1.0
     return round(min(max(more * FULL_SIZE * (pixels / LARGE[0]) ** 0.5, SIZES[0]), SIZES[1]), -3)
+
+
+def read_numbers(text: int | str) -> list[int]:
+    """Rising frame numbers of a list such as `100-119,125`. Raises BadInput."""
+    found: set[int] = set()
+    for part in str(text).split(","):
+        span = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+        first, last = (int(span[1]), int(span[2] or span[1])) if span else (0, -1)
+        if last < first or last > MOST_FRAMES:
+            raise BadInput(f"train.heldout_frames has {part.strip()!r}; expected frame numbers from 0 to {MOST_FRAMES} such as "
+                           "100-119,125")
+        found.update(range(first, last + 1))
+    return sorted(found)
 
 
 @dataclass
@@ -69,6 +85,9 @@ class TrainConfig:
     """Seed of the placement, the order of the frames and the backgrounds."""
     holdout: int = 8
     """Holds out every k-th frame, in the order of the body's yaw, for judging; at least one. 0, or fewer than 5 frames: none."""
+    heldout_frames: int | str | None = None
+    """Numbers of the frames to hold out for judging, from 0 and with both ends, such as 100-119,125: the test frames of a published
+    protocol. null: by holdout."""
     curve: int = 0
     """How often the held-out frames are judged during training, for the curve in metrics.json; that time is not counted."""
     mu_rate: float = 3e-3
@@ -163,6 +182,8 @@ class TrainConfig:
                           ("pose_test_steps", 0), ("needle", 1)):
             if getattr(self, name) is not None and getattr(self, name) < low:
                 raise BadInput(f"train.{name} is {getattr(self, name)}; it must be at least {low}")
+        if self.heldout_frames is not None:
+            read_numbers(self.heldout_frames)
         if self.holdout == 1:
             raise BadInput("train.holdout is 1: every frame would be held out; use 0 for none, or 2 and more")
         for name in ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "expression_rate",

@@ -28,8 +28,8 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.first_look import LEAST_TURN
 from gsac.stages.train.checkpoint import Checkpoints, State
-from gsac.stages.train.choose_heldout import hold_out, hold_out_for_choosing
-from gsac.stages.train.config import NETWORKS, TrainConfig
+from gsac.stages.train.choose_heldout import hold_out, hold_out_for_choosing, hold_out_named
+from gsac.stages.train.config import NETWORKS, TrainConfig, read_numbers
 from gsac.stages.train.fast.lod import judge_levels
 from gsac.stages.train.finite import named_result, named_values, require_finite
 from gsac.stages.train.judge.coverage import unseen_parts
@@ -91,7 +91,8 @@ def run(job: Job) -> None:
         job.warn(Finding.of(Code.POSE_NOT_TRAINED, failed))
     if not usable.any():
         raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
-    held = hold_out(params.global_orient, usable, config.holdout)
+    held = (hold_out(params.global_orient, usable, config.holdout) if config.heldout_frames is None
+            else hold_out_named(read_numbers(config.heldout_frames), usable))
     if not len(held):
         job.warn(Finding.of(Code.NOT_MEASURED, figure=int(usable.sum()), holdout=config.holdout))
     choosing = held

@@ -46,6 +46,23 @@ def test_photos_come_in_natural_order_without_timestamps(folder, tmp_path):
     assert clip.timestamps_s is None and clip.fps is None and clip.focal_px is None
 
 
+def test_photos_out_of_a_video_keep_its_times_and_the_frames_left_out_between_them(folder, tmp_path):
+    for i in (8, 12, 20, 24):
+        photo(folder / f"frame_{i:04d}.png", (i, i, i))
+    clip, _, _ = split(folder, tmp_path / "out", photo_fps=8)
+    assert clip.fps == 8
+    assert clip.timestamps_s == pytest.approx([0, 0.5, 1.5, 2])
+    (folder / "frame_0012.png").write_bytes(b"damaged")
+    assert split(folder, tmp_path / "damaged", photo_fps=8)[0].timestamps_s == pytest.approx([0, 1.5, 2])
+    assert split(folder, tmp_path / "few", photo_fps=8, count=2)[0].timestamps_s == pytest.approx([0, 2])
+
+
+def test_photos_whose_names_tell_no_order_follow_each_other(folder, tmp_path):
+    for name in "front", "left", "right":
+        photo(folder / f"{name}.png")
+    assert split(folder, tmp_path / "out", photo_fps=4)[0].timestamps_s == pytest.approx([0, 0.25, 0.5])
+
+
 def test_the_plate_is_no_frame(folder, tmp_path):
     photo(folder / "0.png")
     photo(folder / "1.png")

@@ -1,9 +1,12 @@
 """Held-out frames: spaced in yaw, and judged with their neighbours' pose correction."""
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
-from gsac.stages.train.choose_heldout import carry_corrections, hold_out, hold_out_for_choosing
+from gsac.stages.contract import BadInput
+from gsac.stages.train.choose_heldout import carry_corrections, hold_out, hold_out_for_choosing, hold_out_named
+from gsac.stages.train.config import TrainConfig, read_numbers
 
 
 def turning(yaws):
@@ -70,3 +73,22 @@ def test_frames_to_choose_by_are_others_only_where_the_clip_is_long():
     assert len(choosing) == 10 and not set(choosing) & set(held)
     assert np.diff(choosing).max() < 20, "from all sides"
     np.testing.assert_array_equal(*both(90, np.arange(90) < 60))
+
+
+def test_the_frames_of_a_published_test_are_held_out_as_they_are_named():
+    usable = np.ones(12, bool)
+    usable[9] = False
+    assert hold_out_named(read_numbers("8-11, 2"), usable).tolist() == [2, 8, 10, 11]
+    assert read_numbers(7) == [7]
+
+
+@pytest.mark.parametrize("numbers, what", [("0-11", "leave some"), ("12", "frames 0 to 11")])
+def test_named_frames_that_leave_nothing_or_are_not_there_are_refused(numbers, what):
+    with pytest.raises(BadInput, match=f"train.heldout_frames.*{what}"):
+        hold_out_named(read_numbers(numbers), np.ones(12, bool))
+
+
+@pytest.mark.parametrize("numbers", ["8-2", "last", "", "3,,4", "0-99999999999"])
+def test_a_list_of_frames_that_is_none_is_named(numbers):
+    with pytest.raises(BadInput, match="train.heldout_frames has"):
+        TrainConfig(heldout_frames=numbers).check()

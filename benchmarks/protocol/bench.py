@@ -1,0 +1,85 @@
+"""gsac bench protocol: trains and scores as another system was published, and prints our row beside the published ones.
+
+Frames, masks and split are those that `gsac data import` wrote. Test frames train no gaussian and no pose; the body fit sees their
+key points and masks, as the published fits did. The row is mean and spread of the trainings with several seeds. LPIPS is a dash
+without its weights (`gsac models add`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from gsac.benchmarks import training
+from gsac.benchmarks.protocol.protocols import PROTOCOLS, Protocol
+from gsac.stages.contract import BadInput
+
+
+def parser() -> argparse.ArgumentParser:
+    out = argparse.ArgumentParser(prog="gsac bench protocol", description=(__doc__ or "").partition("\n")[0])
+    out.add_argument("name", choices=sorted(PROTOCOLS), metavar="NAME", help=f"one of: {', '.join(sorted(PROTOCOLS))}")
+    out.add_argument("clips", type=Path, nargs="+", metavar="DIR", help="folders that `gsac data import` wrote, one a subject")
+    out.add_argument("--recipe", default="fast", choices=["fast", "paper"], help="recipe of the trainings (default: fast)")
+    out.add_argument("--device", default="cpu", choices=["cpu", "cuda"], help="where training runs (default: cpu)")
+    out.add_argument("--repeats", type=int, default=5, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 5)")
+    out.add_argument("--steps", type=int, default=None, help="steps of a training (default: the recipe's)")
+    out.add_argument("--gaussians", type=int, default=None, metavar="N", help="how many (default: train.gaussians=auto)")
+    out.add_argument("--set", action="append", default=[], metavar="STAGE.KEY=VALUE", dest="sets",
+                     help="a parameter up to the body fit, as of `gsac run`; may be repeated")
+    out.add_argument("--out", type=Path, default=Path("bench-protocol"), metavar="DIR", help="default: ./bench-protocol")
+    return out
+
+
+def main(argv: list[str] | None = None) -> int:
+    options = parser().parse_args(argv)
+    from gsac.benchmarks.protocol import table
+    from gsac.pipeline.reporter import PlainReporter
+
+    say, protocol = PlainReporter(sys.stderr), PROTOCOLS[options.name]
+    clips = {folder.resolve(): read_split(folder) for folder in options.clips}  # a wrong one is told before hours pass
+    rows: dict[str, list[dict]] = {}
+    values = {"steps": options.steps, "recipe": options.recipe, "device": options.device}
+    values |= {} if options.gaussians is None else {"gaussians": options.gaussians}
+    for folder, split in clips.items():
+        case = training.fit_clip(options.out, folder, options.name, say, (*settings(folder, split, protocol), *options.sets))
+        for seed in range(options.repeats):
+            out = options.out / "trainings" / f"{case.name}_{seed}"
+            found = training.train(case, out, seed=seed, heldout_frames=number_test(split), **values)
+            rows.setdefault(folder.name, []).append(found)
+            say.note(f"{folder.name}, seed {seed}: {table.cells([found], protocol)}")
+    words = table.text(rows, protocol)
+    print(words)
+    (options.out / f"{options.name}.txt").write_text(words + "\n")
+    return 0
+
+
+def read_split(folder: Path) -> dict:
+    """split.json of a folder that was imported. Raises BadInput where it names no test frames."""
+    path = folder / "split.json"
+    if not path.is_file():
+        raise BadInput(f"{path}: is missing; give a folder that `gsac data import` wrote")
+    split = json.loads(path.read_text())
+    if not split["test"] or not split["train"]:
+        raise BadInput(f"{path}: names no frames to test; this subject has no published split")
+    return split
+
+
+def settings(folder: Path, split: dict, protocol: Protocol) -> tuple[str, ...]:
+    """`stage.key=value` up to the body fit: every frame, whole, at the protocol's height, with its masks, time and focal length."""
+    height = "null" if protocol.height is None else str(protocol.height)
+    out = ["segment.method=brought", f"split.photo_fps={split['fps']}", "split.count=null", "split.crop=false",
+           f"split.max_height={height}"]
+    cameras = folder / "cameras.json"
+    if cameras.is_file():
+        camera = json.loads(cameras.read_text())
+        scale = 1.0 if protocol.height is None else min(1.0, protocol.height / camera["height"])
+        out.append(f"smplx.focal_px={scale * sum(camera['focal']) / 2}")
+    return tuple(out)
+
+
+def number_test(split: dict) -> str:
+    """`train.heldout_frames`: numbers of the test frames among all, as split numbers them."""
+    order = {name: at for at, name in enumerate(sorted({*split["train"], *split["test"]}))}
+    return ",".join(str(order[name]) for name in split["test"])

@@ -1,0 +1,35 @@
+"""gsac data import: a downloaded data set as folders that `gsac run` takes."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from gsac.pipeline.commands.options import progress_reporter
+from gsac.pipeline.outcomes import ExitCode
+
+
+def declare(command: argparse.ArgumentParser) -> None:
+    from gsac.pipeline.data_sets.read import DATA_SETS
+
+    does = command.add_subparsers(dest="does", required=True, metavar="import")
+    one = does.add_parser("import", help="write frames, masks, cameras, poses and the published split of a data set")
+    one.add_argument("name", choices=DATA_SETS, metavar="NAME", help=f"its layout: {', '.join(DATA_SETS)}")
+    one.add_argument("path", type=Path, metavar="PATH", help="folder of one subject or scene, or of several")
+    one.add_argument("--out", type=Path, default=Path("data"), metavar="DIR",
+                     help="where a folder for each subject is made (default: ./data)")
+    one.set_defaults(do=do_import)
+
+
+def do_import(arguments: argparse.Namespace) -> ExitCode:
+    from gsac.pipeline.data_sets.read import read_data_set
+    from gsac.pipeline.data_sets.write import write_clip
+
+    reporter = progress_reporter(arguments)
+    for clip in read_data_set(arguments.name, arguments.path):
+        folder = arguments.out / clip.name
+        write_clip(clip, folder)
+        test = f", {len(clip.test)} of them to test ({clip.split_source})" if clip.test else ""
+        reporter.result(f"{folder}: {len(clip.numbers)} frames with masks{test}")
+        reporter.note(f"gsac run {folder} --set segment.method=brought --set split.photo_fps={clip.fps:g} --set split.count=null")
+    return ExitCode.OK
