@@ -8,6 +8,7 @@ import numpy as np
 
 from gsac.avatar.wholebody import INDEX, OTHER_SIDE
 from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.start.read import Start
 
 HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
 """Hand points that no finger joint moves: they turn the wrist."""
@@ -44,6 +45,8 @@ class Sightings:
     """px; None: the frame's middle."""
     longer_side: float | None = None
     """Of the footage before it was cut, in px of the frames; None: the frame's."""
+    start: Start | None = None
+    """Poses that the user brought; their betas only where the body has SMPL-X's shapes."""
 
     @property
     def center(self) -> np.ndarray:

@@ -20,16 +20,12 @@ import torch
 from gsac.avatar.body import Body
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.initial import estimate_start
-from gsac.stages.smplx.jacobians import make_pairs
-from gsac.stages.smplx.lm.observations import observe
-from gsac.stages.smplx.lm.problem import Problem, estimate_joint_sigma
+from gsac.stages.smplx.lm.joint_sigma import estimate_sigma
 from gsac.stages.smplx.paper.loss import Objective, Unknowns
 from gsac.stages.smplx.paper.smooth import smooth_linear, smooth_rotations
-from gsac.stages.smplx.prior import BODY_JOINTS
-from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
+from gsac.stages.smplx.sightings import BODY_POINTS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
+from gsac.stages.smplx.start.begin import begin
 from gsac.stages.smplx.state import Fit, State, to_params
 
 BATCH = 64
@@ -68,9 +64,9 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
 def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
          progress: Callable[[int, int, str], None], passes: tuple[Pass, ...]) -> Fit:
     center = sightings.center
-    start = estimate_start(body, sightings, focal_prior(sightings, config)[0], center)
+    start, said = begin(body, sightings, focal_prior(sightings, config)[0], center)
     objective = Objective(body, sightings, start, center)
-    unknowns = Unknowns(objective.start, torch.tensor(start.transl, dtype=torch.float32), body.num_betas)
+    unknowns = Unknowns(objective.start, torch.tensor(start.transl, dtype=torch.float32), torch.tensor(start.betas, dtype=torch.float32))
     frames = len(sightings.xy)
     batches = [slice(a, min(a + BATCH, frames)) for a in range(0, frames, BATCH)]
     total, done = sum(p.steps for p in passes) * len(batches), 0
@@ -82,7 +78,7 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     if sightings.seconds is not None:
         local, transl = smooth_rotations(local), smooth_linear(transl)
     state = State(local, transl, betas, start.log_focal, np.zeros(0))
-    notes = (Finding.of(Code.PAPER_START),)
+    notes = said if sightings.start is not None else (Finding.of(Code.PAPER_START),)
     if objective.head is None:
         notes += (Finding.of(Code.PAPER_NO_HEAD),)
     params = to_params(body, state, center, joint_offset=joint_offset)
@@ -107,14 +103,6 @@ def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass,
         objective.loss(unknowns, batch, hold).backward()
         optimiser.step()
         tell(step + 1)
-
-
-def estimate_sigma(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
-    """sigma_joints (T, 55) m by the normal equations of `lm` at this state. center: (2,) px."""
-    detector = Detector.load(sightings.detector, body)
-    pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
-    seen = observe(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
-    return estimate_joint_sigma(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness), state)
 
 
 def measure_reprojection(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:

@@ -36,13 +36,13 @@ SPINE = [3, 6, 9, 12, 15]
 class Unknowns:
     """The unknowns of Adam: 6-D rotations and transl of each frame, betas and joint offsets of the clip."""
 
-    def __init__(self, local: torch.Tensor, transl: torch.Tensor, betas: int):
-        """The start: local (T, J, 3, 3), transl (T, 3) m; betas: their number, B."""
+    def __init__(self, local: torch.Tensor, transl: torch.Tensor, betas: torch.Tensor):
+        """The start: local (T, J, 3, 3), transl (T, 3) m, betas (B,)."""
         six = to_six(local)
         self.root, self.transl = six[:, :1].clone(), transl.clone()
         self.body, self.hands = six[:, 1:BODY].clone(), six[:, HANDS_FROM:].clone()
         self.face = local[:, BODY:HANDS_FROM]
-        self.betas, self.joint_offset = torch.zeros(betas), torch.zeros(local.shape[1], 3)
+        self.betas, self.joint_offset = betas.clone(), torch.zeros(local.shape[1], 3)
         self.movable = torch.ones(local.shape[1], 1)
         self.movable[FIXED_OFFSETS] = 0
 

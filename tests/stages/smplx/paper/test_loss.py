@@ -18,7 +18,7 @@ def test_joint_offsets_of_both_sides_are_drawn_together(body):
     sightings = sightings_of(body, facing_person(body), seconds=False)
     center = np.array([WIDTH / 2, HEIGHT / 2])
     objective = Objective(body, sightings, estimate_start(body, sightings, FOCAL, center), center)
-    unknowns = Unknowns(objective.start, torch.tensor([[0, 0, 2.4]] * 4), body.num_betas)
+    unknowns = Unknowns(objective.start, torch.tensor([[0, 0, 2.4]] * 4), torch.zeros(body.num_betas))
     losses = []
     for right in (torch.tensor([-0.01, 0.02, 0.0]), torch.tensor([0.01, 0.02, 0.0])):
         unknowns.joint_offset[18], unknowns.joint_offset[19] = torch.tensor([0.01, 0.02, 0.0]), right
