@@ -42,7 +42,7 @@ def check_model(name: str, file: Path) -> None:
 def _read(file: Path) -> None:
     from gsac.avatar.body_file import read_body_file
     from gsac.avatar.flame_file import ARRAYS, POINTS, read_flame, read_flame_ids, read_flame_points
-    from gsac.stages.smplx.start.read import read_poses
+    from gsac.avatar.pose_files.read import read_poses
 
     if file.suffix == ".npy":
         read_flame_ids(file)

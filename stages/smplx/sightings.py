@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gsac.avatar.pose_files.read import Start
 from gsac.avatar.wholebody import INDEX, OTHER_SIDE
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.start.read import Start
 
 HAND_ROOTS = tuple(first + i for first in (91, 112) for i in (0, 1, 5, 9, 13, 17))
 """Hand points that no finger joint moves: they turn the wrist."""

@@ -52,7 +52,8 @@ def run(job: Job) -> None:
     shared = read_shared(job, body)
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
-                          clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side, bring_start(job, len(points["xy"])))
+                          clip.focal_px, str(points["detector"]), face, points["missing"], clip.principal_point, clip.longer_side,
+                          bring_start(job, len(points["xy"])))
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from gsac.avatar.pose_files.read import Start, read_hand_means, read_start
 from gsac.stages.body_choice import OPEN
 from gsac.stages.brought_file import NONE, read_brought
 from gsac.stages.contract import Job
-from gsac.stages.smplx.start.read import Start, read_hand_means, read_start
 
 
 def bring_start(job: Job, frames: int) -> Start | None:

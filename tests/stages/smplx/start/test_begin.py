@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar import rotation
+from gsac.avatar.pose_files.read import Start
 from gsac.stages.contract import BadInput
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
@@ -13,7 +14,6 @@ from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.start.begin import begin
 from gsac.stages.smplx.start.fit import take_as_fit
-from gsac.stages.smplx.start.read import Start
 from gsac.stages.smplx.state import to_params
 from support.turning_person import FOCAL, HEIGHT, WIDTH, facing_person, joint_error_mm, sightings_of
 

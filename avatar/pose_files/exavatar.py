@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.stages.smplx.start.poses import Poses, assemble
+from gsac.avatar.pose_files.poses import Poses, assemble
 
 PARTS = {"global_orient": "root_pose", "body_pose": "body_pose", "jaw_pose": "jaw_pose", "leye_pose": "leye_pose",
          "reye_pose": "reye_pose", "left_hand_pose": "lhand_pose", "right_hand_pose": "rhand_pose"}

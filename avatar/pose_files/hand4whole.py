@@ -1,7 +1,7 @@
 """Hand4Whole's raw outputs (Moon et al. 2022), saved by the user as one npz of all frames or one a frame.
 
-`root_pose` 6, `body_pose` 21 x 6, `lhand_pose` and `rhand_pose` 15 x 6, `jaw_pose` 6 numbers of rotation, `shape` 10. Six numbers are
-the first two columns of a 3 x 2 matrix, row by row. The left hand is told as a right one in a mirror: its rotation vectors have y
+`root_pose` 6, `body_pose` 21 x 6, `lhand_pose` and `rhand_pose` 15 x 6, `jaw_pose` 6 numbers of rotation, `shape` 10. Six numbers
+are a rotation's first two columns, a 3 x 2 matrix row by row. The left hand is told as a right one in a mirror: its rotation vectors have y
 and z negated. The translation is of the network's own camera and left out.
 """
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar import rotation
-from gsac.stages.smplx.start.exavatar import PARTS
-from gsac.stages.smplx.start.poses import Poses, assemble
+from gsac.avatar.pose_files.exavatar import PARTS
+from gsac.avatar.pose_files.poses import Poses, assemble
 
 MIRROR = np.array([1.0, -1, -1])
 

@@ -12,12 +12,12 @@ from gsac.avatar import rotation
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.joints import FINGERS, J
 from gsac.avatar.npz import NpzError, read_npz
-from gsac.stages.smplx.start.exavatar import is_exavatar, read_exavatar
-from gsac.stages.smplx.start.files import read_frames
-from gsac.stages.smplx.start.hand4whole import is_hand4whole, read_hand4whole
-from gsac.stages.smplx.start.poses import Poses
-from gsac.stages.smplx.start.smpler_x import is_smpler_x, read_smpler_x
-from gsac.stages.smplx.start.wham import is_wham, read_wham
+from gsac.avatar.pose_files.exavatar import is_exavatar, read_exavatar
+from gsac.avatar.pose_files.files import read_frames
+from gsac.avatar.pose_files.hand4whole import is_hand4whole, read_hand4whole
+from gsac.avatar.pose_files.poses import Poses
+from gsac.avatar.pose_files.smpler_x import is_smpler_x, read_smpler_x
+from gsac.avatar.pose_files.wham import is_wham, read_wham
 
 Arrays = dict[str, np.ndarray]
 LAYOUTS: dict[str, tuple[Callable[[Arrays], bool], Callable[[Arrays], Poses]]] = {
@@ -66,10 +66,8 @@ def read_start(path: Path, frames: int, hand_means: np.ndarray | None = None) ->
 def read_poses(path: Path) -> tuple[Poses, np.ndarray | None]:
     """The poses of n frames, and their numbers (n,) where the file has them. Raises ArtifactError."""
     arrays, numbers = read_frames(path)
-    for takes, read in LAYOUTS.values():
-        if takes(arrays):
-            break
-    else:
+    read = next((read for takes, read in LAYOUTS.values() if takes(arrays)), None)
+    if read is None:
         raise ArtifactError(f"{path}: its arrays {', '.join(sorted(arrays))} are of none of the layouts {', '.join(LAYOUTS)}")
     try:
         poses = read(arrays)

@@ -12,10 +12,10 @@ import pytest
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.joints import LEFT_HAND, POSE_PARTS
+from gsac.avatar.pose_files.exavatar import PARTS
+from gsac.avatar.pose_files.read import read_hand_means, read_start
 from gsac.pipeline.model_check import check_model
 from gsac.stages.contract import BadInput
-from gsac.stages.smplx.start.exavatar import PARTS
-from gsac.stages.smplx.start.read import read_hand_means, read_start
 
 FRAMES = 3
 

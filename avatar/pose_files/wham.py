@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.artifacts import ArtifactError
-from gsac.stages.smplx.start.poses import Poses, assemble
+from gsac.avatar.pose_files.poses import Poses, assemble
 
 NUMBERS = 72
 BODY_NUMBERS = 66

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.joints import POSE_PARTS
-from gsac.stages.smplx.start.poses import Poses, assemble
+from gsac.avatar.pose_files.poses import Poses, assemble
 
 
 def is_smpler_x(arrays: dict[str, np.ndarray]) -> bool:
