@@ -17,7 +17,7 @@ from gsac.avatar.npz import NpzError, open_zip, read_npz
 MOST_MEMBER = 8 << 20
 """Bytes of one frame's file."""
 SHARED = "shape_param.json"
-"""ExAvatar's shape of all frames."""
+"""ExAvatar's shape of all frames, a plain list."""
 FRAME = re.compile(r"(\d+)(?:_\d+)?$")
 """Name of a frame's file: its number, and a person's as SMPLer-X has it."""
 FRAME_IDS = "frame_ids"
@@ -71,7 +71,8 @@ def _stack(path: Path, file: zipfile.ZipFile, names: list[str]) -> tuple[dict[st
 
 
 def _read_json(content: bytes) -> dict[str, np.ndarray]:
-    return {name: np.array(values, float) for name, values in json.loads(content).items()}
+    values = json.loads(content)
+    return {name: np.array(numbers, float) for name, numbers in (values if isinstance(values, dict) else {"shape": values}).items()}
 
 
 def _read_npz(content: bytes) -> dict[str, np.ndarray]:

@@ -1,8 +1,8 @@
 """Hand4Whole's raw outputs (Moon et al. 2022), saved by the user as one npz of all frames or one a frame.
 
 `root_pose` 6, `body_pose` 21 x 6, `lhand_pose` and `rhand_pose` 15 x 6, `jaw_pose` 6 numbers of rotation, `shape` 10. Six numbers
-are a rotation's first two columns, a 3 x 2 matrix row by row. The left hand is told as a right one in a mirror: its rotation vectors have y
-and z negated. The translation is of the network's own camera and left out.
+are a rotation's first two columns, a 3 x 2 matrix row by row. The left hand is told as a right one in a mirror: its rotation
+vectors have y and z negated. The translation is of the network's own camera and left out.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def hand4whole(vectors) -> dict[str, np.ndarray]:
 
 def test_exavatars_files_give_their_rotations(vectors, tmp_path):
     members = {f"smplx_params/{t}.json": exavatar(vectors, t) for t in range(FRAMES)}
-    shape = json.dumps({"shape": [0.5] * 100}).encode()
+    shape = json.dumps([0.5] * 100).encode()
     start = read_start(zip_of(tmp_path / "start", members | {"shape_param.json": shape, "face_offset.json": b"[]"}), FRAMES)
     np.testing.assert_allclose(start.rotations, rotation.exp(vectors), atol=1e-4)
     np.testing.assert_allclose(start.transl[:, 2], [3, 4, 5])
@@ -119,6 +119,7 @@ def test_a_file_that_holds_no_poses_is_refused_with_its_fault(vectors, tmp_path)
 
     refuse({"readme.txt": b""}, "no frame's file")
     refuse({"0.json": b"[1"}, "0.json is not readable")
+    refuse({"0.json": b"[1]"}, "none of the layouts ExAvatar")
     refuse({"0.json": b'{"a": 1}'}, "none of the layouts ExAvatar")
     refuse({"0_0.npz": smpler_x(vectors, 0), "0_1.npz": smpler_x(vectors, 1)}, "one person's files")
     refuse({"0.json": exavatar(vectors, 0), "1.json": b"{}"}, "every frame needs the same arrays")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from gsac.avatar import rotation
 from gsac.avatar.pose_files.read import Start
@@ -18,6 +19,7 @@ from gsac.stages.smplx.state import to_params
 from support.turning_person import FOCAL, HEIGHT, WIDTH, facing_person, joint_error_mm, sightings_of
 
 CENTER = np.array([WIDTH / 2, HEIGHT / 2])
+FEW_STEPS = SmplxConfig(rounds=1, iterations=4, silhouette=0.0, contact=0.0)
 
 
 def hard_person(body, frames=5):
@@ -74,14 +76,15 @@ def test_what_no_frame_has_stays_as_in_the_closed_form(body):
 
 
 def test_the_fit_of_a_hard_pose_gains_by_a_start(body):
-    params = hard_person(body)
+    params = hard_person(body, 3)
     errors = []
     for start in (start_of(params), None):
         sightings = seen(body, params, start)
         sightings.world[:] = np.nan
-        fit = fit_clip(body, sightings, [], SmplxConfig(rounds=1), lambda *done: None)
+        with threadpool_limits(1, "blas"):
+            fit = fit_clip(body, sightings, [], FEW_STEPS, lambda *done: None)
         errors.append(joint_error_mm(body, to_params(body, fit.state, CENTER), params).mean())
-    assert errors[0] < 0.7 * errors[1], errors
+    assert errors[0] < 0.5 * errors[1], errors
 
 
 def test_brought_poses_are_the_result_where_the_user_says_so(body):
