@@ -5,13 +5,13 @@ As published: the first 100 steps by the key points alone, roots and places only
 offsets; betas from zero; the start's mesh at the betas of the step, so that L_init holds the pose alone. The face offsets are
 dropped at the end, as GSAC drops them when it converts the fit: body.npz has none.
 
-It deviates from the publication in this: without `smplx.start` the start is the closed form of initial.py (the paper regresses it by
-Hand4Whole). The head of the face terms is that of face.npz, FLAME's or the open body's own (head.py), and is not itself fitted
+It deviates from the publication in this. Without `smplx.start` the start is the closed form of initial.py (the paper regresses it
+by Hand4Whole). The head of the face terms is that of face.npz, FLAME's or the open body's own (head.py), and is not itself fitted
 here: ExAvatar's terms of FLAME's key points, pose, shape and expression, and its warm-up of FLAME's root, are left out. So is the
 neck, which the head mesh has not, and its offsets' weight of 1000. There are no offsets of the locators, which only supervise the
 hips. L_face is weighted by the share of frames that show the face, as the paper says; ExAvatar's code weights it by 1. The
-Laplacian's weight is the paper's 10,000, not the code's 100,000, and goes over all neighbours of a vertex, not the first ten. Means
-over key points go over those that the body carries, and its clothes move none. Every step poses all vertices twice.
+Laplacian's weight is the paper's 10,000, not the code's 100,000, and it goes over all neighbours of a vertex, not the first ten.
+Means over key points go over those that the body carries; clothes move none of them. Every step poses all vertices twice.
 
 The published method knows no sigma of its joints: sigma_joints comes from `lm`'s normal equations, the one import of lm/.
 """
