@@ -70,6 +70,8 @@ MODELS: dict[str, ModelFile] = {
 
 BROUGHT = ("lpips-vgg", "lpips-alex")
 """Optional networks whose weights the user brings: `train` then also reports LPIPS (`avatar.lpips`)."""
+SLOTS = ("onnx-wholebody", "deca-encoder", "sapiens-seg")
+"""Networks that the user brings for a method of a stage, which looks for them under these names (docs/models.md)."""
 
 
 def model_path(name: str, store_root: Path) -> Path:

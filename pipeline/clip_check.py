@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame
+from gsac.avatar.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.avatar.threads import available_cores
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.findings import Code, Finding
 from gsac.stages.first_look import LEAST_TURN, FirstLook
-from gsac.stages.segment.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.stages.severity import Severity
 
 MOST = 6

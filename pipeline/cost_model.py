@@ -71,9 +71,9 @@ def _frames(config: Any, footage: Footage) -> tuple[float, ...]:
     return 1, footage.frames
 
 
-def _segment(config: Any, footage: Footage) -> tuple[float, ...]:
+def _segment(config: Any, footage: Footage) -> tuple[float, ...] | None:
     person = footage.frames * footage.square
-    return 1, footage.frames, person, config.iterations * person
+    return (1, footage.frames, person, config.iterations * person) if config.method in ("pose", "selfie") else None
 
 
 def _smplx(config: Any, footage: Footage) -> tuple[float, ...] | None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gsac.pipeline.batch import PHOTOS
+from gsac.stages.split.film import find_film
 
 HEADER_BYTES = 64 << 20
 """Largest header of a video that is read."""
@@ -53,7 +54,8 @@ def footage_of_result(frames: Path | None, clip: Path | None) -> Footage | None:
 
 
 def expect_footage(clip: Path, split: Any) -> Footage:
-    """What split will keep of a clip, a video or a folder of photos. split: its config, or None."""
+    """What split will keep of a clip, a video or a folder of photos or of a video with masks. split: its config, or None."""
+    clip = find_film(clip) or clip
     fps, count, most = (getattr(split, name, None) for name in ("fps", "count", "max_height"))
     height = most or LIKELY_HEIGHT
     if clip.is_dir():

@@ -8,15 +8,15 @@ from pathlib import Path
 from gsac.stages.body_choice import OPEN
 from gsac.stages.contract import BadInput
 
-DETECTOR, ENCODER = "onnx-wholebody", "deca-encoder"
-"""Names under which stages keypoints and face look for networks that users bring."""
+DETECTOR, ENCODER, PARTS = "onnx-wholebody", "deca-encoder", "sapiens-seg"
+"""Names under which stages keypoints, face and segment look for networks that users bring."""
 TAKEN = (OPEN, "none", "auto")
 """Words that mean something else where a parameter names a model file."""
 
 
 def check_model(name: str, file: Path) -> None:
-    """Raises BadInput unless the file is what its name or its arrays say: a network of key points, a face encoder, a FLAME head,
-    the points on one, its vertices in SMPL-X, poses of a person, or a body model."""
+    """Raises BadInput unless the file is what its name or its arrays say: a network of key points or body parts, a face encoder,
+    a FLAME head, the points on one, its vertices in SMPL-X, poses of a person, or a body model."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
@@ -26,6 +26,15 @@ def check_model(name: str, file: Path) -> None:
         from gsac.stages.keypoints.simcc import SimccNetwork
 
         SimccNetwork(file)
+        return
+    if name == PARTS:
+        from gsac.avatar.onnx_network import NetworkError
+        from gsac.avatar.sapiens import Sapiens
+
+        try:
+            Sapiens({PARTS: file})
+        except NetworkError as error:
+            raise BadInput(str(error)) from error
         return
     if name == ENCODER:
         from gsac.stages.face.deca import DecaEncoder

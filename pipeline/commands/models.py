@@ -34,7 +34,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.network_files import BROUGHT, MODELS
+    from gsac.avatar.network_files import BROUGHT, MODELS, SLOTS
 
     reporter = answer_reporter(arguments)
     models = ModelStore(open_store(reporter))
@@ -42,7 +42,8 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
     rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name),
              "licence": MODELS[name].licence if name in MODELS else "your own"}
             for name in (*MODELS, *sorted({*brought} - {*MODELS}))]
-    rows += [{"name": name, "sha256": "", "here": False, "licence": "your own"} for name in BROUGHT if name not in brought]
+    rows += [{"name": name, "sha256": "", "here": False, "licence": "your own"} for name in (*BROUGHT, *SLOTS)
+             if name not in brought]
     for row in rows:
         here = "here" if row["here"] else "missing" if row["sha256"] else "not brought"
         reporter.note(f"{row['name']:<32} {here:<11} {row['sha256'][:16]:<16}  {row['licence']}")

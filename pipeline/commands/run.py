@@ -34,7 +34,7 @@ MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("clip", type=Path, metavar="CLIP", help="a video, or a folder of photos")
+    command.add_argument("clip", type=Path, metavar="CLIP", help="a video, or a folder of photos; masks/ beside either in a folder")
     command.add_argument("--out", type=Path, metavar="DIR", help="where results are shown (default: ./<clip>-avatar)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
     command.add_argument("--from", dest="start", metavar="STAGE",

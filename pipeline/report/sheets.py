@@ -11,12 +11,12 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import frame_paths, read_frame
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.camera_motion import find_moved, make_view, measure_sway
 from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
 from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
 from gsac.pipeline.report.pictures import EXACT, QUALITIES, SEEN, Footage, Picture, make_picture, shrink_to_fit, spread_evenly
 from gsac.pipeline.report.results import AbsentError, Results, number
-from gsac.stages.segment.camera_motion import find_moved, make_view, measure_sway
 
 CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT, FACES = 12, 8, 8, 8, 8, 3
 """How many frames each sheet shows at most."""

@@ -18,6 +18,6 @@ STAGE = Stage(
     inputs=("split/frames", "split/clip.json", "keypoints/keypoints.npz"),
     outputs=(Output("face.npz", check_face),),
     config=FaceConfig,
-    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "onnxruntime", "scipy", "numba", "llvmlite"),
+    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "onnxruntime", "torch", "scipy", "numba", "llvmlite"),
     models=lambda config: config.models(),
 )

@@ -1,4 +1,4 @@
-"""DECA's encoder (Feng et al. 2021), brought by the user as ONNX: a face crop's FLAME shape, expression and jaw.
+"""DECA's encoder (Feng et al. 2021), brought by the user as ONNX or TorchScript: a face crop's FLAME shape, expression and jaw.
 
 Input 3 x 224 x 224, RGB in 0..1; output 236 numbers: 100 shape, 50 texture, 50 expression, 6 pose (rotation vectors of head and
 jaw), 3 camera, 27 light. The numbers mean what the user's FLAME file says, so they are read with it and never without.
@@ -11,8 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gsac.avatar.brought_network import open_brought
 from gsac.avatar.facemesh import IBUG68
-from gsac.avatar.onnx_network import NetworkError, open_network
+from gsac.avatar.onnx_network import NetworkError
 from gsac.stages.contract import BadInput
 from gsac.stages.face.config import ENCODER
 
@@ -24,24 +25,21 @@ TALL, WIDE = 1.1, 1.25
 
 
 class DecaEncoder:
-    """path: the ONNX file. Raises BadInput where it is no such network."""
+    """path: the file. Raises BadInput where it is no such network."""
 
     def __init__(self, path: Path):
         try:
-            self._session = open_network(path, ENCODER, threads=1)
+            self._network = open_brought(path, ENCODER)
         except NetworkError as error:
             raise BadInput(str(error)) from error
-        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
-        shape = list(inputs[0].shape)
-        if len(inputs) != 1 or len(outputs) != 1 or shape[1:] != [3, SIZE, SIZE]:
-            raise BadInput(f"model file {ENCODER} has input {shape} and {len(outputs)} outputs; expected DECA's E_flame: input "
-                           f"[N, 3, {SIZE}, {SIZE}] and one output of {CODES} numbers")
-        self._input = inputs[0].name
+        if not self._network.may_be([None, 3, SIZE, SIZE], [None, CODES]):
+            raise BadInput(f"model file {ENCODER} takes {self._network.given} and gives {self._network.gives}; expected DECA's "
+                           f"E_flame: [N, 3, {SIZE}, {SIZE}] and [N, {CODES}]")
 
     def read(self, image: np.ndarray, points: np.ndarray) -> np.ndarray:
         """The codes (236,) of one face. image: (H, W, 3) uint8 RGB; points: (468, 2 or 3) px, of the face network."""
         ready = (cut_face(image, points[IBUG68, :2]) / np.float32(255)).transpose(2, 0, 1)[None]
-        codes = np.asarray(self._session.run(None, {self._input: ready})[0])
+        codes = self._network.run(ready)
         if codes.shape != (1, CODES):
             raise BadInput(f"model file {ENCODER} gives {codes.shape}; expected (1, {CODES})")
         return codes[0].astype(np.float64)

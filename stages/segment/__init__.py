@@ -1,13 +1,16 @@
 """segment: how much of each pixel is the person.
 
-takes  split/frames (frames/plate.png where photos came with the empty scene), split/clip.json, keypoints/keypoints.npz
-gives  alpha/%06d.exr (H, W) half, 0..1
+takes  split/frames (frames/plate.png where photos came with the empty scene, frames/masks where the footage came with masks),
+       split/clip.json, keypoints/keypoints.npz
+gives  alpha/%06d.exr (H, W) half, 0..1; with method sapiens also alpha/labels/%06d.png (H, W) 8 bit, the part of the person that
+       each pixel shows (`avatar/sapiens.py` lists them), 0 where it is none
 
 A person network finds the rough region (`network.py`), GrabCut at half size its outline (`grabcut.py`), of which the parts that
 are no person are dropped (`components.py`). At full size the outline is corrected by the empty scene (`correction.py`), and the
 colours on both sides of it give the soft edge (`matting.py`). Each step uses a plate, the empty scene, where there is one
 (`plate.py`); from a video of a still camera it is computed, once from the rough regions and again from the outlines
-(`plate_from_video.py`).
+(`plate_from_video.py`). The alpha of Sapiens, a network that the user brings, is
+soft already and corrected by the plate only (`avatar/sapiens.py`). Masks that the user brought stay as they are (`brought.py`).
 """
 
 from gsac.avatar.artifacts import check_image_folder
@@ -19,6 +22,6 @@ STAGE = Stage(
     inputs=("split/frames", "split/clip.json", "keypoints/keypoints.npz"),
     outputs=(Output("alpha", check_image_folder),),
     config=SegmentConfig,
-    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "OpenEXR"),
+    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "OpenEXR", "onnxruntime", "torch"),
     models=lambda config: config.models(),
 )

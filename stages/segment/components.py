@@ -28,3 +28,14 @@ def keep_person(outline: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.nd
     island = (labels > 0) & ~np.isin(labels, list(keep))
     # Grown by a pixel, or the half-covered rim of a dropped part would stay.
     return np.where(cv2.dilate(island.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0, 0, outline).astype(np.float32)
+
+
+def keep_soft_person(alpha: np.ndarray, xy: np.ndarray, score: np.ndarray) -> np.ndarray:
+    """alpha: (H, W) 0..1, soft; xy: (133, 2) px; score: (133,). Returns the alpha (H, W) without the parts that hold no
+    seen point, and without what is nearer to them than to the person."""
+    kept = keep_person(alpha, xy, score) > 0.5
+    dropped = (alpha > 0.5) & ~kept
+    if not dropped.any():
+        return alpha
+    to_kept, to_dropped = (cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) for part in (kept, dropped))
+    return np.where(to_dropped < to_kept, 0, alpha).astype(np.float32)

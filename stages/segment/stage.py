@@ -8,24 +8,30 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha
+from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha, write_image
+from gsac.avatar.camera_motion import View, find_moved, make_view, measure_sway
+from gsac.avatar.onnx_network import NetworkError
+from gsac.avatar.sapiens import Sapiens
 from gsac.avatar.threads import available_cores, prefetch
-from gsac.stages.contract import Job, StageError
+from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.findings import Code, Finding
-from gsac.stages.segment.camera_motion import View, find_moved, make_view, measure_sway
-from gsac.stages.segment.components import keep_person
+from gsac.stages.segment.brought import MASKS, hand_on
+from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
 from gsac.stages.segment.correction import correct, match_scene
 from gsac.stages.segment.grabcut import cut_out
-from gsac.stages.segment.matting import soften
+from gsac.stages.segment.matting import BAND, soften
 from gsac.stages.segment.network import PersonMask, PoseMask, SelfieMask, person_region
 from gsac.stages.segment.plate import HALF, Plate, compare
 from gsac.stages.segment.plate_from_video import learn_plate, relearn_plate
 
-METHODS: dict[Method, Callable[[dict[str, Path]], PersonMask]] = {"pose": PoseMask, "selfie": SelfieMask}
+METHODS: dict[Method, Callable[[dict[str, Path]], PersonMask]] = {"pose": PoseMask, "selfie": SelfieMask, "sapiens": Sapiens}
 """segment.method -> its class, made from the model files."""
+LABELS = "labels"
+"""Folder of the alpha that holds a network's labels."""
 WIDE = 0.25
 """Margin around the person in which the scene is compared with the plate, as a share of the person's height."""
 
@@ -42,6 +48,8 @@ class Cutout(NamedTuple):
     """(h, w) bool."""
     image: np.ndarray
     """(h, w, 3) uint8, that part of the frame."""
+    soft: np.ndarray | None = None
+    """(h, w) half in 0..1, the alpha of a network whose edge is soft already."""
 
     def on_frame(self, shape: tuple[int, ...]) -> np.ndarray:
         """(H, W) bool. shape: (H, W, ...) of the frame."""
@@ -57,39 +65,79 @@ def run(job: Job) -> None:
     keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     if len(paths) != len(keypoints["xy"]):
         raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
-    network = METHODS[job.config.method](job.models)
     clip = Clip.read(job.inputs["split/clip.json"])
-    is_video = clip.timestamps_s is not None
+    (job.out / "alpha").mkdir()
+    if job.config.method == "brought":
+        sway = use_brought(job, paths)
+    else:
+        if (frames / MASKS).is_dir():
+            job.note("Masks lie beside the footage and are not used; segment.method=brought takes them.")
+        try:
+            sway = cut_frames(job, paths, keypoints, clip)
+        except NetworkError as e:
+            raise BadInput(str(e)) from e
+    moved = find_moved(sway, max(clip.width, clip.height))
+    if clip.timestamps_s is not None and moved.any():
+        job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
+
+
+def use_brought(job: Job, paths: list[Path]) -> np.ndarray:
+    """Hands on the masks that came with the footage. paths: T frames. Returns (T,) px, how far the camera sways."""
+    empty = np.zeros(len(paths), bool)
+    sway = measure_sway(count_views(job, hand_on(paths, job.out / "alpha", empty), len(paths)))
+    if empty.all():
+        raise StageError(f"frame 0 ({paths[0].name}) and all others: the mask that came with it shows nobody there")
+    if empty.any():
+        job.warn(Finding.of(Code.EMPTY_MASK, empty))
+    return sway
+
+
+def count_views(job: Job, views: Iterable[View], total: int) -> Iterator[View]:
+    """Yields them, and tells how many there were."""
+    for done, view in enumerate(views, 1):
+        job.progress(done, total, "frames")
+        yield view
+
+
+def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], clip: Clip) -> np.ndarray:
+    """Finds the person in each frame and writes the masks. paths: T frames; keypoints: their arrays (T, ...) by name. Returns (T,)
+    px, how far the camera sways."""
+    frames = job.inputs["split/frames"]
+    network = METHODS[job.config.method](job.models)
+    sapiens = network if isinstance(network, Sapiens) else None
     plate, given = None, (frames / "plate.png").exists()
+    learns = job.config.use_plate and clip.timestamps_s is not None and not given
     if job.config.use_plate and given:
         image = read_frame(frames / "plate.png")
         plate = Plate(image, np.ones(image.shape[:2], bool))
-    elif job.config.use_plate and is_video:
+    elif learns and sapiens is None:
         plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
     absent, unfound, fits = np.zeros((3, len(paths)), bool)
     cutouts: dict[int, Cutout] = {}
 
-    def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None]]:
-        """Index, image and probability of each frame; the network has threads of its own, so one thread feeds it."""
+    def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]]:
+        """Index, image, probability and labels of each frame; the network has threads of its own, so one thread feeds it."""
         for t, image in enumerate(prefetch(pool, read_frame, paths, 2)):
             region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
-            yield t, image, None if region is None else network(image, region)
+            if sapiens is not None and region is not None:
+                yield t, image, *sapiens.read(image)
+            else:
+                yield t, image, None if region is None else network(image, region), None
 
-    def cut(masked: tuple[int, np.ndarray, np.ndarray | None]) -> View:
-        t, image, probability = masked
+    def cut(masked: tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]) -> View:
+        t, image, probability, labels = masked
         absent[t] = probability is None
         if probability is None:
             return make_view(image, np.zeros(image.shape[:2], np.float32))
         xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
-        cutouts[t], fits[t] = cut_frame(image, probability, xy, score, plate, job.config.iterations)
+        if labels is None:
+            cutouts[t], fits[t] = cut_frame(image, probability, xy, score, plate, job.config.iterations)
+        else:
+            cutouts[t], fits[t] = cut_soft_frame(image, probability, xy, score, plate)
+            write_image(labels_of(job.out, paths[t]), keep_labels(labels, cutouts[t]))
         if not cutouts[t].outline.any():
             absent[t] = unfound[t] = True
         return make_view(image, cutouts[t].on_frame(image.shape).astype(np.float32))
-
-    def counted(views: Iterable[View]) -> Iterator[View]:
-        for done, view in enumerate(views, 1):
-            job.progress(done, len(paths), "frames")
-            yield view
 
     def outline(t: int, image: np.ndarray) -> np.ndarray:
         return cutouts[t].on_frame(image.shape)
@@ -99,22 +147,35 @@ def run(job: Job) -> None:
         alpha = np.zeros(shape, np.float32) if absent[t] else finish(cutouts.pop(t), shape, plate)
         write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
 
+    if sapiens is not None:
+        prepare_labels(job.out, paths, (clip.height, clip.width))
     with ThreadPoolExecutor(available_cores()) as pool:
-        sway = measure_sway(counted(prefetch(pool, cut, masks(pool), available_cores())))
+        sway = measure_sway(count_views(job, prefetch(pool, cut, masks(pool), available_cores()), len(paths)))
         if absent.all():
             raise StageError(describe_nobody(paths, unfound))
-        if plate is not None and not given:
-            plate = relearn_plate(paths, ~absent, outline) if fits[~absent].mean() >= MOSTLY else None
-        (job.out / "alpha").mkdir()
+        if learns:
+            still = not find_moved(sway, max(clip.width, clip.height)).any() if sapiens is not None else (
+                plate is not None and fits[~absent].mean() >= MOSTLY)
+            plate = relearn_plate(paths, ~absent, outline) if still else None
         deque(pool.map(soft, range(len(paths))), maxlen=0)
     if absent.any():
         job.warn(Finding.of(Code.EMPTY_MASK, absent))
     other_scene = ~fits & ~absent
     if given and other_scene.any():
         job.warn(Finding.of(Code.OTHER_SCENE, other_scene))
-    moved = find_moved(sway, max(clip.width, clip.height))
-    if is_video and moved.any():
-        job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
+    return sway
+
+
+def labels_of(out: Path, frame: Path) -> Path:
+    """Where a frame's labels lie."""
+    return out / "alpha" / LABELS / f"{frame.stem}.png"
+
+
+def prepare_labels(out: Path, paths: list[Path], shape: tuple[int, int]) -> None:
+    """Writes labels that name nothing, for the frames in which nobody is. paths: T frames; shape: H, W of each."""
+    (out / "alpha" / LABELS).mkdir()
+    for path in paths:
+        write_image(labels_of(out, path), np.zeros(shape, np.uint8))
 
 
 def describe_nobody(paths: list[Path], unfound: np.ndarray) -> str:
@@ -157,8 +218,38 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
     return Cutout(box, keep_person(outline, xy - corner, score) > 0.5, image[part].copy()), plate is None or here is not None
 
 
+def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: np.ndarray,
+                   plate: Plate | None) -> tuple[Cutout, bool]:
+    """image: (H, W, 3) uint8; alpha: (H, W) of all persons, with soft edges; xy: (133, 2) px; score: (133,).
+
+    Returns the person's alpha and outline, and whether the plate, if any, fits the frame.
+    """
+    kept = keep_soft_person(alpha, xy, score)
+    box = around(kept)
+    if box is None:
+        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0]), True
+    part = np.s_[box[1]: box[3], box[0]: box[2]]
+    fits = True
+    if plate is not None:
+        x0, y0, x1, y1 = wide = around(kept, margin=WIDE) or box
+        fits = compare(image[y0:y1, x0:x1], plate.part(wide), kept[y0:y1, x0:x1]) is not None
+    return Cutout(box, kept[part] > 0.5, image[part].copy(), kept[part].astype(np.float16)), fits
+
+
+def keep_labels(labels: np.ndarray, cutout: Cutout) -> np.ndarray:
+    """labels: (H, W) uint8 of all that a frame shows. Returns those (H, W) of the person, 0 elsewhere."""
+    kept = np.zeros_like(labels)
+    if cutout.soft is not None:
+        x0, y0, x1, y1 = cutout.box
+        kept[y0:y1, x0:x1] = np.where(cutout.soft > 0, labels[y0:y1, x0:x1], 0)
+    return kept
+
+
 def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.ndarray:
-    """Alpha (H, W) float32 of a frame: the outline, corrected where the plate shows the scene, with a soft edge. shape: H, W."""
+    """Alpha (H, W) float32 of a frame: the outline, corrected where the plate shows the scene, with a soft edge. shape: H, W.
+
+    An edge that was soft already stays but where the outline was corrected.
+    """
     alpha = np.zeros(shape, np.float32)
     outline = cutout.outline
     if not outline.any():
@@ -168,7 +259,10 @@ def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.nd
     scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
     if scene is not None:
         outline = correct(part, outline, scene)
-    alpha[y0:y1, x0:x1] = soften(part, outline.astype(np.float32), scene)
+    alpha[y0:y1, x0:x1] = soften(part, outline.astype(np.float32), scene) if cutout.soft is None else cutout.soft
+    if cutout.soft is not None and scene is not None:
+        near = cv2.dilate((outline != cutout.outline).astype(np.uint8), np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)) > 0
+        alpha[y0:y1, x0:x1][near] = soften(part, outline.astype(np.float32), scene)[near]
     return alpha
 
 

@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
-from gsac.avatar.artifacts import Crop, write_frame
+from gsac.avatar.artifacts import Crop, write_alpha, write_frame
 from gsac.stages.contract import BadInput
 from gsac.stages.findings import Code, Finding
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import plan_crop, principal_point
+from gsac.stages.split.film import MASKS, VIDEO_SUFFIXES
 from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_evenly
 from gsac.stages.split.picture_quality import HEIGHT, judge_pictures, look_at
@@ -25,7 +26,6 @@ HEIC = {".heic", ".heif"}
 """As iPhones write them."""
 SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"} | HEIC
 UNSUPPORTED = {".dng", ".raw", ".cr2", ".nef"}
-VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi"}
 PLATE = "plate"
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
 """What Pillow may take a photo's content for, whatever its name says. It knows others that are programs: EPS runs Ghostscript."""
@@ -59,9 +59,11 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
 
 
 def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: SplitConfig, people: People | None,
-                 warn: Callable[[Finding], None], progress: Callable[[int, int, str], None]) -> dict:
-    """Writes frames/%06d.png and frames/plate.png. people: who finds the person, None: the frames stay whole. Returns the Clip
-    fields width, height, focal_px, notes, crop, center."""
+                 warn: Callable[[Finding], None], progress: Callable[[int, int, str], None],
+                 mask_of: Callable[[Path, int, int], np.ndarray] | None = None) -> dict:
+    """Writes frames/%06d.png and frames/plate.png. people: who finds the person, None: the frames stay whole; mask_of: gives the
+    mask (height, width) of a photo of this width and height, px, for frames/masks/%06d.exr. Returns the Clip fields width, height,
+    focal_px, notes, crop, center."""
     picks = [photos[i] for i in pick_evenly(len(photos), config.count)]
     if len(picks) < len(photos):
         warn(Finding.of(Code.PHOTOS_DROPPED, figure=len(picks), given=len(photos), count=config.count))
@@ -76,6 +78,8 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         part = shown[crop.y: crop.y + crop.height, crop.x: crop.x + crop.width]
         return _resize(part, width, height), None if focal_px is None else focal_px * crop.scale
 
+    if mask_of is not None:
+        (frames / MASKS).mkdir()
     focals, looks, notes, other, unread = [], [], set(), [], []
     for done, path in enumerate(picks):
         try:
@@ -87,6 +91,8 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
             notes.add(COMPOSITED)
         if (rgb.shape[1], rgb.shape[0]) != usual:
             other.append(path.name)
+        if mask_of is not None:
+            write_alpha(frames / MASKS / f"{len(focals):06d}.exr", fit(mask_of(path, rgb.shape[1], rgb.shape[0]), exif)[0])
         shown, focal_px = fit(rgb, exif)
         del rgb  # before the next one is read
         write_frame(frames / f"{len(focals):06d}.png", shown)

@@ -11,6 +11,8 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.split.config import NETWORKS
 from gsac.stages.split.crop import describe_crop
+from gsac.stages.split.film import find_film
+from gsac.stages.split.masks import list_masks, match_photos
 from gsac.stages.split.people import People
 from gsac.stages.split.photos import SUFFIXES, list_photos, split_photos
 from gsac.stages.split.video import split_video
@@ -20,6 +22,8 @@ def run(job: Job) -> None:
     source = job.inputs["clip"]
     frames = job.out / "frames"
     frames.mkdir()
+    masks = list_masks(source)
+    source = find_film(source) or source
     if source.is_dir():
         photos, plate = list_photos(source)
     elif not source.is_file():
@@ -31,9 +35,10 @@ def run(job: Job) -> None:
     people = People(job.models) if job.config.crop and all(name in job.models for name in NETWORKS) else None
     if photos:
         fields: dict[str, Any] = {"fps": None, "timestamps_s": None}
-        fields |= split_photos(photos, plate, frames, job.config, people, job.warn, job.progress)
+        mask_of = match_photos(masks, photos)
+        fields |= split_photos(photos, plate, frames, job.config, people, job.warn, job.progress, mask_of)
     else:
-        fields = split_video(source, frames, job.config, people, job.warn, job.progress)
+        fields = split_video(source, frames, job.config, people, job.warn, job.progress, masks)
 
     # clip.json holds no file name: equal content must give equal bytes.
     clip = Clip(source_sha256=_digest(photos + [plate] * (plate is not None) if photos else [source]), **fields)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
@@ -22,6 +22,7 @@ from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_point, sides_near
 from gsac.stages.split.keyframes import read_key_frames
+from gsac.stages.split.masks import match_frames, write_masks
 from gsac.stages.split.mirrored import find_mirrored, turn_back
 from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
@@ -38,9 +39,9 @@ LOOKS, CHECKS, TRIES = 12, 30, 3
 
 
 def split_video(path: Path, frames: Path, config: SplitConfig, people: People | None, warn: Callable[[Finding], None],
-                progress: Callable[[int, int, str], None]) -> dict:
-    """Writes frames/%06d.png. people: who finds the person, None: the frames stay whole. Returns the Clip fields fps, timestamps_s,
-    width, height, focal_px, notes, crop, center, repeated."""
+                progress: Callable[[int, int, str], None], masks: Sequence[Path] = ()) -> dict:
+    """Writes frames/%06d.png, and frames/masks/%06d.exr where there are masks. people: who finds the person, None: the frames stay
+    whole. Returns the Clip fields fps, timestamps_s, width, height, focal_px, notes, crop, center, repeated."""
     video = probe(path)
     base = video.time_base
     if not len(video.ticks):
@@ -56,6 +57,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         raise BadInput(f"{path.name}: its frames lie {times[-1]:g} s apart from first to last; at most {LONGEST_S} s are read. "
                        "Copy the file from the phone again, or cut the clip.")
     picks = pick_by_time(times, config.fps, config.count)
+    mask_of = match_frames(masks, len(times), picks) if masks else {}
 
     looks: list[Look] = []
 
@@ -92,6 +94,9 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
             looks = [look.turned() if odd else look for look, odd in zip(looks, mirrored, strict=True)]
         warn(Finding.of(Code.MIRRORED, mirrored, figure=mirrored.sum(),
                         treated="turned back" if crop is None else "not used: they were cut to the person's place"))
+    if mask_of:
+        write_masks(frames, [mask_of[int(at)] for at in np.searchsorted(video.ticks, shown)], (video.width, video.height), crop,
+                    frame_size(video, config, crop), mirrored & (crop is None))
     repeated, findings = judge_pictures(looks, timed=True)
     if crop is not None:
         repeated |= mirrored

@@ -75,13 +75,17 @@ def test_a_wrong_parameter_is_said_once_before_any_clip_runs(toy, clips):
     assert done.code == 2 and "left.wrd" in done.err and toy.runs == []
 
 
-def test_folders_of_photos_are_clips_and_other_things_are_not(tmp_path):
+def test_folders_of_photos_or_of_a_video_with_masks_are_clips_and_other_things_are_not(tmp_path):
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "1.JPG").write_text("x")
     (tmp_path / "empty").mkdir()
     (tmp_path / "a.MOV").write_text("x")
     (tmp_path / "b.txt").write_text("x")
-    assert [clip.name for clip in find_clips(tmp_path)] == ["a.MOV", "photos"]
+    for name in ("film", "film/masks", "film-alone"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "film/a.mp4").write_text("x")
+    (tmp_path / "film-alone/a.mp4").write_text("x")
+    assert [clip.name for clip in find_clips(tmp_path)] == ["a.MOV", "film", "photos"]
 
 
 def test_clips_of_equal_name_get_folders_of_their_own(tmp_path):

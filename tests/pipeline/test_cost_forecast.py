@@ -69,8 +69,9 @@ def test_more_frames_pixels_steps_or_gaussians_cost_more(device):
 
 
 def test_methods_that_were_never_measured_have_no_cost():
-    unknown = costs(DEMO, "train.recipe=paper", "smplx.method=paper", "keypoints.detector=onnx-wholebody")
-    assert [name for name, cost in unknown.items() if cost is None] == ["keypoints", "smplx", "train"]
+    unknown = costs(DEMO, "train.recipe=paper", "smplx.method=paper", "keypoints.detector=onnx-wholebody",
+                    "segment.method=sapiens")
+    assert [name for name, cost in unknown.items() if cost is None] == ["keypoints", "segment", "smplx", "train"]
 
 
 def test_cores_help_what_is_shared_out_only():

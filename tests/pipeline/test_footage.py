@@ -42,6 +42,12 @@ def test_the_limits_of_split_hold_for_what_is_expected(clip, config, expected):
     assert expect_footage(clip, config) == expected
 
 
+def test_a_folder_with_a_video_and_masks_tells_what_the_video_tells(clip, tmp_path):
+    (tmp_path / "masks").mkdir()
+    (tmp_path / "clip.mov").write_bytes(clip.read_bytes())
+    assert expect_footage(tmp_path, SplitConfig()) == Footage(24, 64, 96)
+
+
 def test_a_clip_that_does_not_tell_is_taken_for_as_much_as_the_parameters_allow(clip, tmp_path):
     assert expect_footage(clip.with_name("flat.webm"), SplitConfig(count=50)) == Footage(50, 720, 1280, read=False)
     for i in range(5):

@@ -68,6 +68,8 @@ def write_torn(path: Path) -> Path:
     (write_torn, "torn.npz", "my-body", "not a readable"),
     (write_headless, "other.npz", "my-body", "array v_template is missing"),
     (write_text, "net.onnx", "onnx-wholebody", "cannot be read as ONNX"),
+    (write_text, "net.onnx", "sapiens-seg", "cannot be read as ONNX"),
+    (lambda file: file.write_bytes(ONNX.read_bytes()) and file, "net.onnx", "sapiens-seg", "expected Sapiens' segmentation"),
     (write_text, "weights.npz", "lpips-vgg", "cannot be read as .npz"),
 ])
 def test_a_file_that_is_no_model_is_refused_and_not_kept(models, tmp_path, capsys, make, file, name, words):
@@ -119,3 +121,11 @@ def test_only_what_was_brought_can_be_removed(models, capsys, name, words):
     execute(["models", "add", "mine", str(OPEN_BODY)])
     assert execute(["models", "remove", name]) == ExitCode.USAGE
     assert words in capsys.readouterr().err and set(models.brought) == {"mine"}
+
+
+def test_the_list_names_the_networks_that_methods_would_use_and_nobody_brought(models, capsys):
+    execute(["models", "add", "onnx-wholebody", str(ONNX)])
+    capsys.readouterr()
+    assert execute(["models", "ls"]) == ExitCode.OK
+    said = {line.split()[0]: line.split()[1] for line in capsys.readouterr().out.splitlines()}
+    assert said["sapiens-seg"] == "not" and said["onnx-wholebody"] == "here"

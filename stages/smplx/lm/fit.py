@@ -28,7 +28,7 @@ from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.lm.shake import transl_acceleration
 from gsac.stages.smplx.lm.swapped_sides import MARGIN, propose_swapped
-from gsac.stages.smplx.lm.turn_jumps import JUMP_COST, find_jumps
+from gsac.stages.smplx.lm.turn_jumps import find_jumps
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -91,7 +91,7 @@ def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], d
         problem, state, news = set_up(body, seen, outlines, detector, config)
         begun.append(news)
         state, steps = fit_points(problem, state, seen, detector, 3 * config.iterations)
-        fits.append((problem.cost(state) + JUMP_COST * problem.jumps.sum(), seen, problem, state, steps))
+        fits.append((problem.cost(state), seen, problem, state, steps))
     best = int(len(fits) == 2 and fits[1][0] < fits[0][0] - MARGIN * swapped.sum())
     said = [*begun[best], *([Finding.of(Code.SIDES_EXCHANGED, swapped)] if best else [])]
     jumps = fits[best][2].jumps

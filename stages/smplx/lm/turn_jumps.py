@@ -14,8 +14,6 @@ JUMP = np.radians(45)
 of order change it by twice their distance in the turn."""
 WIDEST = np.radians(120)
 """A step that may as well have gone the other way round: four frames of a turn, few as they are, make steps of 90."""
-JUMP_COST = 100.0
-"""Cost of a jump in the fit's cost, as of ten spreads: of two readings of the points, the one without jumps is likelier."""
 
 
 def find_jumps(turns: np.ndarray) -> np.ndarray:

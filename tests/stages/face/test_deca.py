@@ -74,13 +74,13 @@ def test_shape_expression_and_jaw_go_where_flame_has_them(encoder_file, flame_fi
 
 def test_another_network_is_refused_with_its_shapes(tmp_path):
     other = write_encoder(tmp_path / "small.onnx", np.zeros((12, CODES)), np.zeros(CODES), size=112)
-    with pytest.raises(BadInput, match=r"deca-encoder has input \['N', 3, 112, 112\].*expected DECA's E_flame"):
+    with pytest.raises(BadInput, match=r"deca-encoder takes \['N', 3, 112, 112\].*expected DECA's E_flame"):
         DecaEncoder(other)
     few = write_encoder(tmp_path / "few.onnx", np.zeros((12, 100)), np.zeros(100))
-    with pytest.raises(BadInput, match=r"deca-encoder gives \(1, 100\); expected \(1, 236\)"):
-        DecaEncoder(few).read(ramps(), face_at((150, 180), 90, 110))
+    with pytest.raises(BadInput, match=r"deca-encoder takes .* and gives \['N', 100\]; expected"):
+        DecaEncoder(few)
     (tmp_path / "text.onnx").write_text("no network")
-    with pytest.raises(BadInput, match="deca-encoder cannot be read as ONNX"):
+    with pytest.raises(BadInput, match="deca-encoder .*ONNX"):
         DecaEncoder(tmp_path / "text.onnx")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
@@ -38,3 +40,13 @@ def test_backs_taken_for_fronts_are_exchanged_and_named(body, truth):
     error = joint_error_mm(body, to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2])), truth)
     assert [(note.code, note.frames) for note in fit.notes] == [(Code.SIDES_EXCHANGED, [[6, 9]])]
     assert error[BACK].mean() < 40
+
+
+def test_of_pictures_in_no_order_none_is_exchanged(body, truth):
+    order = np.random.default_rng(1).permutation(FRAMES)
+    shuffled = replace(truth, global_orient=truth.global_orient[order], body_pose=truth.body_pose[order])
+    seen = sightings_of(body, shuffled)
+    assert propose_swapped(seen).any(), "the turn alone accuses some"
+    with threadpool_limits(1, "blas"):
+        fit = fit_clip(body, seen, [], SmplxConfig(height_m=height_of(body, truth), silhouette=0), lambda *a: None)
+    assert Code.SIDES_EXCHANGED not in [note.code for note in fit.notes]

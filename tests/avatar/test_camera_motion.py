@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.stages.segment.camera_motion import find_moved, make_view, measure_sway
+from gsac.avatar.camera_motion import find_moved, make_view, measure_sway
 
 T, WIDTH, HEIGHT = 12, 270, 480
 Y, X = np.mgrid[:HEIGHT, :WIDTH]
