@@ -1,6 +1,6 @@
 """Skeleton, points and vertices of the body as torch functions of the unknowns.
 
-T frames, J joints, P points, V vertices, B betas. As in jacobians.py a point is  x = sum_k G_k m_k + w_k t_k  with its moment m_k
+T frames, J joints, P points, V vertices, B betas. A point is  x = sum_k G_k m_k + w_k t_k  with its moment m_k
 and mass w_k on joint k; here over all joints, so that T frames of P points are one matrix product.
 `local`: (T, J, 3, 3) rotations of the joints against their parents; `world`: (T, J, 3, 3) against the camera;
 `place`: (T, J, 3) m, posed joints without transl; `rest`: (J, 3) m, resting joints.
