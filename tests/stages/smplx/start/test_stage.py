@@ -11,7 +11,7 @@ from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.paper import fit as paper
 from gsac.stages.smplx.stage import run
-from gsac.stages.smplx.warmup import FRAMES, TURN, write_inputs
+from gsac.stages.smplx.warmup import FOCAL, FRAMES, TURN, write_inputs
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def poses(folder, frames=FRAMES):
 def fit(inputs, folder, file, method):
     said = []
     (folder / "out").mkdir()
-    run(Job(inputs, folder / "out", SmplxConfig(method=method, start="poses"), {"poses": file}, warn=said.append))
+    run(Job(inputs, folder / "out", SmplxConfig(method=method, start="poses", focal_px=FOCAL), {"poses": file}, warn=said.append))
     return BodyParams.read(folder / "out" / "body.npz"), said
 
 
