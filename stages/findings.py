@@ -82,8 +82,12 @@ class Code(Enum):
                           "Film where nothing stands between the person and the camera.")
     POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
                              "frames: wide clothes, or a mask that holds more than the person.")
+    CLOTHES_HIDE_SHAPE = Wording("Clothes hide the body's shape: they stand up to {figure:.0f} cm off it.",
+                                 "Wear clothes that lie close to the body.")
     HAND_HIDDEN = Wording("The {side} hand is hidden in {frames}, behind the body as the camera sees it; where it lies is a guess.",
                           "Keep the hands beside the body.")
+    ARM_DOUBTFUL = Wording("The {side} arm is doubtful in {frames}: the pictures do not show it as fitted.",
+                           "Let the arms hang a little away from the body, hands in sight.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
     NOT_MEASURED = Wording("No frame is held out ({figure} usable frames, train.holdout is {holdout}): the quality of this avatar "

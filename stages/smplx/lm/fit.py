@@ -22,7 +22,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.ground import Ground
-from gsac.stages.smplx.lm.hidden_arms import HiddenArms
+from gsac.stages.smplx.lm.hidden_arms import HiddenArms, describe_arms, widen_arm
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
@@ -74,8 +74,12 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     sigma = estimate_joint_sigma(problem, state)
     hidden.widen(sigma)
+    doubtful = hidden.find_doubtful(problem, state, sightings.missing)
+    for side in (0, 1):
+        widen_arm(sigma, side, doubtful[:, [side]])
+    said += describe_arms(Code.HAND_HIDDEN, hidden.mark(len(sigma))) + describe_arms(Code.ARM_DOUBTFUL, doubtful)
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
-               problem.person_offsets.joint_offset(state.own), (*said, *hidden.describe(len(sigma))), cost)
+               problem.person_offsets.joint_offset(state.own), tuple(said), cost)
 
 
 def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
@@ -171,8 +175,7 @@ def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, stat
     fingers = Problem(body, pairs, (0, 0), seen, FINGER_JOINTS, config.smoothness, problem.person_offsets)
     state = replace(state, local=state.local.copy(), stance=np.zeros(0), level=np.zeros(0))
     state.local[:, FINGER_JOINTS] = rotation.exp(fingers.mean)
-    place = np.zeros(fingers.size, bool)
-    place[-3:] = True
+    place = np.arange(fingers.size) >= fingers.size - 3
     return fingers.minimise(state, config.iterations, place, np.ones(state.shared, bool))
 
 

@@ -17,6 +17,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, J
 from gsac.avatar.wholebody import INDEX as POINT
+from gsac.avatar.yaw import yaw
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.jacobians import Chain, Pairs, make_surface_pairs, place_points
 from gsac.stages.smplx.lm.problem import ROBUST, Problem
@@ -62,6 +63,8 @@ FAR_OFF = 5.0
 """Factor on the robust limit in the search."""
 STEPS = 12
 """Steps of each search, at most."""
+FAR, DOUBTS, ARC = 4.5, 3, np.radians(90)
+"""Of doubtful arms: spreads of a point (3.4 in clean turns), frames, turn without the hand (51 degrees; 114 on with a phone)."""
 SIGMA = {"elbow": 0.05, "wrist": 0.1}
 """m, added to the standard deviation of a hidden arm's joints; a hand's joints have the wrist's."""
 
@@ -164,8 +167,7 @@ class HiddenArms:
 
     def list_starts(self, state: State, stay: Stay) -> list[np.ndarray]:
         """Joint rotations (F, J, 3, 3) to search from: as they are, and each hiding pose, alone or with the way to it."""
-        asis = state.local[stay.around]
-        out = [asis]
+        out = [asis := state.local[stay.around]]
         frame = np.arange(stay.start, stay.stop)
         away = np.maximum(np.maximum(stay.first - frame, frame - stay.last + 1), 0)
         ramp = np.clip(1 - away / max(away.max(), 1), 0, 1)[:, None, None]
@@ -195,8 +197,7 @@ class HiddenArms:
         inner = replace(stay, first=stay.first - stay.start, last=stay.last - stay.start, start=0, stop=stay.stop - stay.start)
         hidden = replace(self, stays=[inner])
         trial = State(start, state.transl[around], state.betas, state.log_focal, np.zeros(0), state.own)
-        place = np.zeros(alone.size, bool)
-        place[-3:] = True
+        place = np.arange(alone.size) >= alone.size - 3
         for _ in range(2):
             hidden.hold(alone, trial)
             trial, _ = alone.minimise(trial, STEPS, place, np.ones(trial.shared, bool))
@@ -231,20 +232,41 @@ class HiddenArms:
             frame = np.arange(stay.start, stay.stop)
             before, after = stay.first - stay.start + 1, stay.stop - stay.last + 1
             share = np.minimum(1, np.minimum((frame - stay.start + 1) / before, (stay.stop - frame) / after))[:, None]
-            for name, more in SIGMA.items():
-                own = [INDEX[f"{SIDES[stay.side]}_{name}"], *(np.arange(J)[HANDS[stay.side]] if name == "wrist" else ())]
-                sigma[stay.start:stay.stop, own] = np.hypot(sigma[stay.start:stay.stop, own], more * share)
+            widen_arm(sigma[stay.around], stay.side, share)
 
-    def describe(self, frames: int) -> list[Finding]:
-        """What the user should know. frames: T."""
-        out = []
+    def find_doubtful(self, problem: Problem, state: State, missing: np.ndarray | None) -> np.ndarray:
+        """(T, 2) bool, arms far from their points, or without a hand for more of the turn than a trunk covers it, that no stay has.
+        missing: (T, 2) bool, hands that were not detected; None: all were."""
+        seen, turn = problem.seen, yaw(state.local[:, 0])
+        uv = problem.project(state, problem.locate_points(problem.skeleton.pose(state.local, state.shape), state))
+        far = np.linalg.norm(np.where(np.isfinite(seen.spread)[..., None], uv - seen.xy, 0), axis=-1) > FAR * seen.spread
+        out = np.zeros((len(turn), 2), bool)
         for side in (0, 1):
-            hidden = np.zeros(frames, bool)
-            for stay in self.stays:
-                hidden[stay.first:stay.last] |= stay.side == side
-            if hidden.any():
-                out.append(Finding.of(Code.HAND_HIDDEN, hidden, figure=hidden.sum(), side=SIDES[side]))
+            for first, last in bridge(far[:, [ELBOW[side], WRIST[side]]].any(1)):
+                out[first:last, side] |= last - first >= DOUBTS
+            for first, last in [] if missing is None else bridge(missing[:, side]):
+                others, around = np.delete(missing[:, side], np.s_[first:last]), np.ptp(np.unwrap(turn[first:last]))
+                out[first:last, side] |= len(others) >= DOUBTS and 1 - others.mean() > TRUSTED and around > ARC
+        return out & ~self.mark(len(turn))
+
+    def mark(self, frames: int) -> np.ndarray:
+        """(T, 2) bool, frames with a hidden hand. frames: T."""
+        out = np.zeros((frames, 2), bool)
+        for stay in self.stays:
+            out[stay.first:stay.last, stay.side] = True
         return out
+
+
+def describe_arms(code: Code, arms: np.ndarray) -> list[Finding]:
+    """A finding for each side that has frames. arms: (T, 2) bool."""
+    return [Finding.of(code, own, figure=own.sum(), side=side) for side, own in zip(SIDES, arms.T, strict=True) if own.any()]
+
+
+def widen_arm(sigma: np.ndarray, side: int, share: np.ndarray) -> None:
+    """Adds a share (T, 1) of `SIGMA` to the standard deviations of an arm. sigma: (T, 55) m, changed in place."""
+    for name, more in SIGMA.items():
+        own = [INDEX[f"{SIDES[side]}_{name}"], *(np.arange(J)[HANDS[side]] if name == "wrist" else ())]
+        sigma[:, own] = np.hypot(sigma[:, own], more * share)
 
 
 def sample_surface(body: Body, part: np.ndarray, most: int) -> Pairs:
