@@ -39,7 +39,7 @@ class Start:
     @property
     def given(self) -> np.ndarray:
         """(T,) bool, frames that the file has."""
-        return np.isfinite(self.rotations[:, 0]).all(-1).all(-1)
+        return np.isfinite(self.rotations[:, 0, 0, 0])
 
 
 def read_start(path: Path, frames: int, hand_means: np.ndarray | None = None) -> Start:

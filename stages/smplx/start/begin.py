@@ -43,7 +43,7 @@ def lay_out(body: Body, start: Start, ours: State) -> State:
     no betas, ours."""
     local = ours.local.copy()
     for j in range(local.shape[1]):
-        given = np.isfinite(start.rotations[:, j]).all(-1).all(-1)
+        given = np.isfinite(start.rotations[:, j, 0, 0])
         if given.any():
             local[:, j] = fill_gaps([turn if known else None for turn, known in zip(start.rotations[:, j], given, strict=True)])
     betas = ours.betas.copy()
