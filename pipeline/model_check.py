@@ -18,8 +18,8 @@ TAKEN = (OPEN, "none", "auto")
 
 def check_model(name: str, file: Path, *others: Path) -> None:
     """Raises BadInput unless the file is what its name or its arrays say: a network of key points or body parts, a face encoder,
-    a FLAME head, the points on one, its vertices in SMPL-X, key points of mmpose, a detector's errors, or a body model. Several
-    files are one network with its weights beside it, or key points, a file a frame."""
+    a FLAME head, the points on one, its vertices in SMPL-X, key points of mmpose, a detector's errors, poses of a person, or a body
+    model. Several files are one network with its weights beside it, or key points, a file a frame."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.npz import NpzError
 
@@ -69,6 +69,7 @@ def _read(file: Path) -> None:
     from gsac.avatar.body_file import read_body_file
     from gsac.avatar.flame_file import ARRAYS, POINTS, read_flame, read_flame_ids, read_flame_points
     from gsac.avatar.mmpose_file import read_mmpose
+    from gsac.avatar.pose_files.read import read_poses
     from gsac.stages.smplx.detector_errors import read_errors
 
     if file.suffix == ".json":
@@ -84,8 +85,15 @@ def _read(file: Path) -> None:
         read_flame_points(file)
     elif arrays and _joints(file) == ARRAYS["kintree_table"][1]:
         read_flame(file)
+    elif _holds_poses(arrays):
+        read_poses(file)
     else:
         read_body_file(file)
+
+
+def _holds_poses(members: set[str]) -> bool:
+    """Whether a zip of these members, arrays without `.npy`, is of a person's poses: one file a frame, or arrays of all frames."""
+    return bool(members & {"body_pose", "pose"}) or any(name.endswith((".json", ".npz")) for name in members)
 
 
 def _array_names(file: Path) -> set[str]:

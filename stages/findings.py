@@ -70,6 +70,11 @@ class Code(Enum):
                                  "shows it, is used.", "Leave it out.", Severity.NEWS)
     PAPER_START = Wording("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's "
                           "regression", severity=Severity.NEWS)
+    START_INTERPOLATED = Wording("The poses that you brought lack {figure} frames, {frames}; they start from their neighbours'.",
+                                 severity=Severity.NEWS)
+    START_DOUBTED = Wording("The poses that you brought put the trunk in a wrong place in {figure} frames, {frames}; the fit "
+                            "starts there from trunk and hanging arms.",
+                            "If these are many, check the poses' axes: x right, y down, z away.", Severity.NEWS)
     PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "
                             "are off", severity=Severity.NEWS)
     NOT_FITTED = Wording("Not fitted, and not learned from: {frames}; {reason}.", severity=Severity.WRONG)

@@ -8,14 +8,17 @@ from gsac.stages.body_choice import OPEN, brought_files
 from gsac.stages.brought_file import NONE
 from gsac.stages.contract import BadInput
 
-METHODS = ("lm", "paper")
+METHODS = ("lm", "paper", "brought")
 
 
 @dataclass
 class SmplxConfig:
     method: str = "lm"
     """Solver of the fit. `lm`: Levenberg-Marquardt over all frames at once; `paper`: the published co-registration by Adam, slower
-    and less exact."""
+    and less exact; `brought`: the poses of `start` as they are."""
+    start: str = NONE
+    """Name of a file of poses that the fit starts from, or none: ExAvatar's, SMPLer-X's, Hand4Whole's or WHAM's, as docs/models.md
+    tells. A frame whose trunk it puts in a wrong place starts in closed form."""
     body_model: str = OPEN
     """Body model: `open`, or the name under which `gsac models add NAME SMPLX_NEUTRAL.npz` keeps your own; train and export must be
     given the same."""
@@ -49,12 +52,15 @@ class SmplxConfig:
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
         flame = () if self.flame == NONE else (self.flame, self.flame_ids)
-        return (*brought_files(self.body_model), *flame, *(() if self.detector_offsets == NONE else (self.detector_offsets,)))
+        own = tuple(name for name in (self.detector_offsets, self.start) if name != NONE)
+        return (*brought_files(self.body_model), *flame, *own)
 
     def check(self) -> None:
         """Raises BadInput where a value is out of range."""
         if self.method not in METHODS:
             raise BadInput(f"smplx.method is {self.method!r}; choose one of {', '.join(METHODS)}")
+        if self.method == "brought" and self.start == NONE:
+            raise BadInput("smplx.method is 'brought', but smplx.start names no poses; bring them with `gsac models add NAME FILE`")
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
             raise BadInput(f"smplx.height_m is {self.height_m}; expected metres between 0.5 and 2.5")
         if self.focal_px is not None and self.focal_px <= 0:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.pose_files.read import Start
 from gsac.avatar.wholebody import INDEX, OTHER_SIDE
 from gsac.stages.smplx.config import SmplxConfig
 
@@ -46,6 +47,8 @@ class Sightings:
     """px; None: the frame's middle."""
     longer_side: float | None = None
     """Of the footage before it was cut, in px of the frames; None: the frame's."""
+    start: Start | None = None
+    """Poses that the user brought; their betas only where the body has SMPL-X's shapes."""
 
     @property
     def center(self) -> np.ndarray:

@@ -22,6 +22,8 @@ from gsac.stages.smplx.lm.hiding_clothes import fit_under_clothes
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
+from gsac.stages.smplx.start.bring import bring_start
+from gsac.stages.smplx.start.fit import take_as_fit
 from gsac.stages.smplx.state import Fit, to_params
 from gsac.stages.smplx.warmup import rehearse
 
@@ -38,7 +40,7 @@ FOCAL = 0.6, 3.0
 """Focal lengths of phones' lenses over the longer side of the picture; the main ones' are 0.8 to 1.1, of three times zoom 3."""
 KEPT = 0.05
 """Relative difference up to which the fit has a given focal length: its prior is 0.2 % wide."""
-METHODS = {"lm": fit_under_clothes, "paper": fit_as_published}
+METHODS = {"lm": fit_under_clothes, "paper": fit_as_published, "brought": take_as_fit}
 """smplx.method -> fit; config.METHODS are the same names."""
 
 
@@ -52,7 +54,7 @@ def run(job: Job) -> None:
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
                           clip.focal_px, find_errors(job, body, str(points["detector"])), face, points["missing"],
-                          clip.principal_point, clip.longer_side)
+                          clip.principal_point, clip.longer_side, bring_start(job, len(points["xy"])))
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")

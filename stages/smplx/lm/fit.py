@@ -1,6 +1,6 @@
 """The Levenberg-Marquardt fit of one clip.
 
-1. Start in closed form (initial.py); only root and place move.
+1. Start in closed form (initial.py), or from the poses that the user brought (start/); only root and place move.
 2. All joints, by the key points alone.
 3. Rounds that renew the outline points, learn the spreads of the stance, and put the feet on a ground.
 4. Fingers, on the fitted wrists.
@@ -20,7 +20,6 @@ from gsac.avatar.yaw import yaw
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import HiddenArms, describe_arms, widen_arm
@@ -33,6 +32,7 @@ from gsac.stages.smplx.lm.turn_jumps import find_jumps
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
+from gsac.stages.smplx.start.begin import begin
 from gsac.stages.smplx.state import Fit, State, to_params
 
 FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(hand.start, hand.stop)])
@@ -89,13 +89,15 @@ def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], d
     Returns the sightings that were fitted, problem, state, number of steps and what the user should know.
     """
     fits: list[tuple[float, Sightings, Problem, State, int]] = []
+    begun: list[tuple[Finding, ...]] = []
     swapped = propose_swapped(sightings)
     for seen in (sightings, sightings.exchange_sides(swapped)) if swapped.any() else (sightings,):
-        problem, state = set_up(body, seen, outlines, detector, config)
+        problem, state, news = set_up(body, seen, outlines, detector, config)
+        begun.append(news)
         state, steps = fit_points(problem, state, seen, detector, 3 * config.iterations)
         fits.append((problem.cost(state), seen, problem, state, steps))
     best = int(len(fits) == 2 and fits[1][0] < fits[0][0] - MARGIN * swapped.sum())
-    said = [Finding.of(Code.SIDES_EXCHANGED, swapped)] if best else []
+    said = [*begun[best], *([Finding.of(Code.SIDES_EXCHANGED, swapped)] if best else [])]
     jumps = fits[best][2].jumps
     if jumps.any():
         said.append(Finding.of(Code.TURN_JUMPS, np.pad(jumps, 1)))
@@ -103,8 +105,8 @@ def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], d
 
 
 def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
-           config: SmplxConfig) -> tuple[Problem, State]:
-    """The problem of the body's joints, and the state from which it is solved."""
+           config: SmplxConfig) -> tuple[Problem, State, tuple[Finding, ...]]:
+    """The problem of the body's joints, the state from which it is solved, and what the user should know of that."""
     center, focal = sightings.center, focal_prior(sightings, config)
     person_offsets = PersonOffsets.of(body, detector.own, config.joint_offsets)
     moves = np.concatenate([detector.slopes(body), person_offsets.points], 2)
@@ -112,12 +114,13 @@ def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: 
     seen = observe(sightings, detector, BODY_POINTS, center, focal, config, outlines)
     problem = Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness, person_offsets)
     problem.transl_spread = transl_acceleration(sightings)
-    state = replace(estimate_start(body, sightings, focal[0], center), own=np.zeros(len(person_offsets.spread)))
+    start, said = begin(body, sightings, focal[0], center)
+    state = replace(start, own=np.zeros(len(person_offsets.spread)))
     if sightings.seconds is not None:
         problem.jumps = find_jumps(state.local[:, 0])
     seen.depth *= measure_world_scale(problem, state, sightings)
     seen.repeats = count_repeats(state.local[:, 0])
-    return problem, state
+    return problem, state, said
 
 
 def fit_points(problem: Problem, state: State, sightings: Sightings, detector: Detector, iterations: int) -> tuple[State, int]:

@@ -1,10 +1,17 @@
 """The published co-registration (GSAC eq. 5-8, after ExAvatar's fitting): key points, initial values, face and regularisers,
 all means, by Adam in three passes over batches of frames. It is the baseline of `lm`.
 
-It deviates from the publication where an input of that is missing: the start is the closed form of initial.py (the paper regresses
-it by Hand4Whole); the head of the face terms is that of face.npz, FLAME's or the open body's own (head.py); the body has no face
-offsets, so that the face terms move its shape only, and the second key point term, which differs from the first by the face
-offsets alone, is left out. Every step poses all vertices, for the published term that keeps the mesh near the start.
+As published: the first 100 steps by the key points alone, roots and places only; both key point terms, with and without the face
+offsets; betas from zero; the start's mesh at the betas of the step, so that L_init holds the pose alone. The face offsets are
+dropped at the end, as GSAC drops them when it converts the fit: body.npz has none.
+
+It deviates from the publication in this. Without `smplx.start` the start is the closed form of initial.py (the paper regresses it
+by Hand4Whole). The head of the face terms is that of face.npz, FLAME's or the open body's own (head.py), and is not itself fitted
+here: ExAvatar's terms of FLAME's key points, pose, shape and expression, and its warm-up of FLAME's root, are left out. So is the
+neck, which the head mesh has not, and its offsets' weight of 1000. There are no offsets of the locators, which only supervise the
+hips. L_face is weighted by the share of frames that show the face, as the paper says; ExAvatar's code weights it by 1. The
+Laplacian's weight is the paper's 10,000, not the code's 100,000, and it goes over all neighbours of a vertex, not the first ten.
+Means over key points go over those that the body carries; clothes move none of them. Every step poses all vertices twice.
 
 The published method knows no sigma of its joints: sigma_joints comes from `lm`'s normal equations, the one import of lm/.
 """
@@ -20,16 +27,12 @@ import torch
 from gsac.avatar.body import Body
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
-from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.initial import estimate_start
-from gsac.stages.smplx.jacobians import make_pairs
-from gsac.stages.smplx.lm.observations import observe
-from gsac.stages.smplx.lm.problem import Problem, estimate_joint_sigma
+from gsac.stages.smplx.lm.joint_sigma import estimate_sigma
 from gsac.stages.smplx.paper.loss import Objective, Unknowns
 from gsac.stages.smplx.paper.smooth import smooth_linear, smooth_rotations
-from gsac.stages.smplx.prior import BODY_JOINTS
-from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
+from gsac.stages.smplx.sightings import BODY_POINTS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
+from gsac.stages.smplx.start.begin import begin
 from gsac.stages.smplx.state import Fit, State, to_params
 
 BATCH = 64
@@ -46,7 +49,7 @@ class Pass:
     decays: tuple[int, ...]
     """Steps at which the rate falls to a tenth."""
     warm_up: int
-    """Steps at first in which only the root moves."""
+    """Steps at first in which only roots and places move, by the key points alone."""
     shared: bool
     """Whether betas and joint offsets move."""
 
@@ -68,9 +71,9 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
 def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
          progress: Callable[[int, int, str], None], passes: tuple[Pass, ...]) -> Fit:
     center = sightings.center
-    start = estimate_start(body, sightings, focal_prior(sightings, config)[0], center)
+    start, said = begin(body, sightings, focal_prior(sightings, config)[0], center)
     objective = Objective(body, sightings, start, center)
-    unknowns = Unknowns(objective.start, torch.tensor(start.transl, dtype=torch.float32), body.num_betas)
+    unknowns = objective.unknowns(start.transl)
     frames = len(sightings.xy)
     batches = [slice(a, min(a + BATCH, frames)) for a in range(0, frames, BATCH)]
     total, done = sum(p.steps for p in passes) * len(batches), 0
@@ -82,7 +85,7 @@ def _fit(body: Body, sightings: Sightings, outlines: list[Outline], config: Smpl
     if sightings.seconds is not None:
         local, transl = smooth_rotations(local), smooth_linear(transl)
     state = State(local, transl, betas, start.log_focal, np.zeros(0))
-    notes = (Finding.of(Code.PAPER_START),)
+    notes = said if sightings.start is not None else (Finding.of(Code.PAPER_START),)
     if objective.head is None:
         notes += (Finding.of(Code.PAPER_NO_HEAD),)
     params = to_params(body, state, center, joint_offset=joint_offset)
@@ -104,17 +107,9 @@ def descend(objective: Objective, unknowns: Unknowns, batch: slice, sweep: Pass,
         optimiser.param_groups[0]["lr"] = sweep.rate * 0.1 ** sum(step >= d for d in sweep.decays)
         optimiser.zero_grad()
         hold = HAND_OFFSET if hold_hands and step < HAND_OFFSET_STEPS else 1.0
-        objective.loss(unknowns, batch, hold).backward()
+        objective.loss(unknowns, batch, hold, step < sweep.warm_up).backward()
         optimiser.step()
         tell(step + 1)
-
-
-def estimate_sigma(body: Body, sightings: Sightings, state: State, config: SmplxConfig, center: np.ndarray) -> np.ndarray:
-    """sigma_joints (T, 55) m by the normal equations of `lm` at this state. center: (2,) px."""
-    detector = Detector.load(sightings.detector, body)
-    pairs = make_pairs(body, body.keypoint_matrix[BODY_POINTS], detector.offsets[BODY_POINTS])
-    seen = observe(sightings, detector, BODY_POINTS, center, focal_prior(sightings, config), config, [])
-    return estimate_joint_sigma(Problem(body, pairs, HIPS, seen, BODY_JOINTS, config.smoothness), state)
 
 
 def measure_reprojection(objective: Objective, sightings: Sightings, state: State, joint_offset: np.ndarray) -> np.ndarray:

@@ -16,14 +16,15 @@ from scipy.spatial import cKDTree
 
 from gsac.avatar import joints, rotation
 from gsac.avatar.body import Body
-from gsac.avatar.wholebody import FACE, INDEX
+from gsac.avatar.wholebody import INDEX
 from gsac.stages.contract import StageError
 
 VERTEX, LAPLACIAN, EDGE = 10.0, 10000.0, 1.0
 """Weights of the paper's L_face."""
 VISIBLE = float(np.cos(np.radians(135)))
 EYES = [INDEX["left_eye"], INDEX["right_eye"]]
-EARS = [INDEX["left_ear"], INDEX["right_ear"]]
+MIRROR = np.array([-1.0, 1, 1])
+"""Left to right in the body's axes."""
 ICP_STEPS = 24
 """Rounds of iterative closest points."""
 NEAR, LEAST_SHARE = 0.015, 0.3
@@ -122,46 +123,58 @@ def find_closest(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray, ar
 
 
 class HeadTerms:
-    """L_face as a function of the betas."""
+    """L_face as a function of the betas and of the face offsets, and the symmetry of these."""
 
     def __init__(self, body: Body, head: Head):
-        self.rest = torch.tensor(body.v_template[head.index])
+        rest = body.v_template[head.index]
+        self.rest = torch.tensor(rest)
         self.dirs = torch.tensor(body.shapedirs[head.index])
         target = torch.tensor(np.asarray(head.vertices, np.float32))
         self.target = target - target.mean(0)
-        pairs = np.unique(np.sort(np.concatenate([head.faces[:, [0, 1]], head.faces[:, [1, 2]], head.faces[:, [2, 0]]]), 1), axis=0)
-        self.pairs = torch.tensor(pairs)
+        edges = np.concatenate([head.faces[:, [0, 1]], head.faces[:, [0, 2]], head.faces[:, [1, 2]]])
+        self.edges = torch.tensor(edges)
+        pairs = np.unique(np.sort(edges, 1), axis=0)
         both = np.concatenate([pairs, pairs[:, ::-1]])
         degree = np.bincount(both[:, 0], minlength=len(head.vertices))
         self.from_, self.to = torch.tensor(both[:, 0].copy()), torch.tensor(both[:, 1].copy())
         self.share = torch.tensor(1 / np.maximum(degree, 1), dtype=torch.float32)[:, None]
+        corners, share = find_closest(rest * MIRROR, rest, head.faces, find_incident_faces(head.faces, len(rest)))[1:]
+        self.other_corners, self.other_share = torch.tensor(corners), torch.tensor(share, dtype=torch.float32)
 
-    def loss(self, betas: torch.Tensor) -> torch.Tensor:
-        """Weighted sum, a scalar, of vertex L1, Laplacian L2 and edge length L1, each a mean; vertices are centred. betas: (B,)."""
-        x = self.rest + self.dirs @ betas
+    @property
+    def count(self) -> int:
+        """N, the head's vertices."""
+        return len(self.rest)
+
+    def loss(self, betas: torch.Tensor, face_offset: torch.Tensor) -> torch.Tensor:
+        """Weighted sum, a scalar, of vertex L1, Laplacian L2 and edge length L1, each a mean; vertices are centred, and an edge
+        counts once for each face. betas: (B,); face_offset: (N, 3) m."""
+        x = self.rest + self.dirs @ betas + face_offset
         x = x - x.mean(0)
         vertex = (x - self.target).abs().mean()
         laplacian = ((self._laplacian(x) - self._laplacian(self.target)) ** 2).mean()
         edge = (self._lengths(x) - self._lengths(self.target)).abs().mean()
         return VERTEX * vertex + LAPLACIAN * laplacian + EDGE * edge
 
+    def asymmetry(self, face_offset: torch.Tensor) -> torch.Tensor:
+        """L1, summed over xyz, of face_offset (N, 3) m and its mirror image on the other side of the head; a mean over vertices."""
+        other = (face_offset[self.other_corners] * self.other_share[..., None]).sum(1)
+        return (face_offset - other * torch.tensor(MIRROR, dtype=torch.float32)).abs().sum(1).mean()
+
     def _laplacian(self, x: torch.Tensor) -> torch.Tensor:
         around = torch.zeros_like(x).index_add(0, self.from_, x[self.to])
         return x - around * self.share
 
     def _lengths(self, x: torch.Tensor) -> torch.Tensor:
-        return (x[self.pairs[:, 0]] - x[self.pairs[:, 1]]).norm(dim=1)
+        return (x[self.edges[:, 0]] - x[self.edges[:, 1]]).norm(dim=1)
 
 
-def faces_camera(points: np.ndarray) -> np.ndarray:
-    """Whether the face looks towards the camera, (T,) bool. points: (T, 133, 3) m, camera frame, NaN where the body carries none.
+def faces_camera(centre: np.ndarray, eyes: np.ndarray) -> np.ndarray:
+    """Whether the face looks towards the camera, (T,) bool. centre: (T, 3) m, of the head's vertices; eyes: (T, 3) m, between them;
+    camera frame.
 
-    In the camera's xz plane the direction from the face's centre to the eyes must be more than 135 degrees off the line of sight.
+    In the camera's xz plane the direction from the centre to the eyes must be more than 135 degrees off the line of sight.
     """
-    face = points[:, FACE]
-    carried = np.isfinite(face).all((0, 2))
-    centre = face[:, carried].mean(1) if carried.any() else points[:, EARS].mean(1)
-    look = points[:, EYES].mean(1) - centre
-    look, sight = look[:, [0, 2]], centre[:, [0, 2]]
+    look, sight = (eyes - centre)[:, [0, 2]], centre[:, [0, 2]]
     cos = (look * sight).sum(1) / np.maximum(np.linalg.norm(look, axis=1) * np.linalg.norm(sight, axis=1), 1e-9)
     return cos < VISIBLE

@@ -10,7 +10,7 @@ from gsac.avatar import rotation
 from gsac.avatar.body import BodyParams
 from gsac.avatar.flame_file import read_flame
 from gsac.stages.contract import StageError
-from gsac.stages.smplx.paper.head import Head, HeadTerms, faces_camera, select_head
+from gsac.stages.smplx.paper.head import EYES, Head, HeadTerms, faces_camera, select_head
 from support.turning_person import FOCAL, head_of
 
 
@@ -35,7 +35,7 @@ def test_a_flame_head_is_carried_over_to_the_bodys_vertices(body, flame_file):
 def test_the_face_terms_tell_a_head_from_another(body, flame_file):
     betas = np.random.default_rng(1).normal(0, 1, body.num_betas).astype(np.float32)
     terms = HeadTerms(body, Head.from_arrays(brought(flame_file, betas), body))
-    own, other = (float(terms.loss(torch.tensor(b))) for b in (betas, np.zeros_like(betas)))
+    own, other = (float(terms.loss(torch.tensor(b), torch.zeros(terms.count, 3))) for b in (betas, np.zeros_like(betas)))
     assert own < 0.5 * other
 
 
@@ -56,8 +56,9 @@ def test_face_terms_vanish_at_the_same_head_and_lead_towards_it(body):
     betas = np.random.default_rng(3).normal(0, 1, body.num_betas).astype(np.float32)
     terms = HeadTerms(body, Head.from_arrays(head_of(body, betas), body))
     none, half = (torch.tensor(betas * share, requires_grad=True) for share in (0.0, 0.5))
-    terms.loss(half).backward()
-    here, midway, there = (float(terms.loss(b.detach())) for b in (torch.tensor(betas), half, none))
+    none_offset = torch.zeros(terms.count, 3)
+    terms.loss(half, none_offset).backward()
+    here, midway, there = (float(terms.loss(b.detach(), none_offset)) for b in (torch.tensor(betas), half, none))
     assert here < 0.1 * there and here < midway < there
     assert float((half.grad * torch.tensor(betas)).sum()) < 0
 
@@ -69,5 +70,6 @@ def test_the_face_counts_only_when_it_looks_at_the_camera(body):
     pose[:, 0] = rotation.log(rotation.exp(np.array([np.pi, 0, 0])) @ rotation.exp(np.stack([0 * yaw, yaw, 0 * yaw], 1)))
     transl = np.tile([0, 0, 3.0], (len(yaw), 1))
     params = BodyParams.from_pose(pose, transl, np.zeros(20), np.zeros((len(yaw), 52)), FOCAL, (180, 320))
-    seen = faces_camera(body.keypoints(body.posed(params)[0]))
+    vertices = body.posed(params)[0]
+    seen = faces_camera(vertices[:, select_head(body)].mean(1), body.keypoints(vertices)[:, EYES].mean(1))
     assert seen.tolist() == [True, True, False, False, False, False, True]

@@ -7,10 +7,16 @@ import pytest
 import torch
 
 from gsac.avatar import rotation
-from gsac.stages.smplx.paper.kinematics import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
+from gsac.avatar.body import Body
+from gsac.avatar.torch_body import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from support.turning_person import facing_person
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.load()
 
 
 def test_six_numbers_and_rotations_say_the_same():

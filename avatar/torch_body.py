@@ -1,6 +1,6 @@
 """Skeleton, points and vertices of the body as torch functions of the unknowns.
 
-T frames, J joints, P points, V vertices, B betas. As in jacobians.py a point is  x = sum_k G_k m_k + w_k t_k  with its moment m_k
+T frames, J joints, P points, V vertices, B betas. A point is  x = sum_k G_k m_k + w_k t_k  with its moment m_k
 and mass w_k on joint k; here over all joints, so that T frames of P points are one matrix product.
 `local`: (T, J, 3, 3) rotations of the joints against their parents; `world`: (T, J, 3, 3) against the camera;
 `place`: (T, J, 3) m, posed joints without transl; `rest`: (J, 3) m, resting joints.
@@ -71,8 +71,9 @@ class Kinematics:
 class Points:
     """P points of the body as moments over all joints."""
 
-    def __init__(self, body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None):
-        """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m, in the axes of each point's heaviest joint."""
+    def __init__(self, body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, head: np.ndarray | None = None):
+        """matrix: (P, V) weights of the points over the vertices; offsets: (P, 3) m, in the axes of each point's heaviest joint;
+        head: (N,) vertices that may have offsets of their own, or none."""
         matrix = matrix.tocsr()
         points, joints = matrix.shape[0], body.weights.shape[1]
         mass = np.asarray(matrix @ body.weights)
@@ -88,10 +89,19 @@ class Points:
         self.mass = torch.tensor(mass, dtype=torch.float32)  # (P, J)
         self.moment = torch.tensor(moment, dtype=torch.float32).flatten(1)  # (P, 3 J)
         self.dirs = torch.tensor(dirs).flatten(1, 2)  # (P, 3 J, B)
+        if head is not None:
+            share = matrix[:, head].toarray()
+            self.moved = torch.tensor(np.flatnonzero(share.any(0)))  # (M,) of the head's vertices, those that points lie on
+            carried = share[:, None, self.moved] * body.weights[head[self.moved]].T  # (P, J, M)
+            self.carried = torch.tensor(carried, dtype=torch.float32)
 
-    def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
-        """Points (T, P, 3) m without transl. world: (T, J, 3, 3); place: (T, J, 3) m; rest: (J, 3) m; betas: (B,)."""
+    def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor,
+           face_offset: torch.Tensor | None = None) -> torch.Tensor:
+        """Points (T, P, 3) m without transl. world: (T, J, 3, 3); place: (T, J, 3) m; rest: (J, 3) m; betas: (B,); face_offset:
+        (N, 3) m of the head's vertices, or none."""
         moment = self.moment + self.dirs @ betas
+        if face_offset is not None:
+            moment = moment + (self.carried @ face_offset[self.moved]).flatten(1)
         shift = place - (world @ rest[None, :, :, None])[..., 0]
         turned = world.transpose(1, 2).flatten(2) @ moment.T  # (T, 3, P)
         return turned.transpose(1, 2) + self.mass @ shift
