@@ -241,11 +241,12 @@ class HiddenArms:
         uv = problem.project(state, problem.locate_points(problem.skeleton.pose(state.local, state.shape), state))
         far = np.linalg.norm(np.where(np.isfinite(seen.spread)[..., None], uv - seen.xy, 0), axis=-1) > FAR * seen.spread
         out = np.zeros((len(turn), 2), bool)
+        lost = np.zeros_like(out) if missing is None else missing.astype(bool)
         for side in (0, 1):
             for first, last in bridge(far[:, [ELBOW[side], WRIST[side]]].any(1)):
                 out[first:last, side] |= last - first >= DOUBTS
-            for first, last in [] if missing is None else bridge(missing[:, side]):
-                others, around = np.delete(missing[:, side], np.s_[first:last]), np.ptp(np.unwrap(turn[first:last]))
+            for first, last in bridge(lost[:, side]):
+                others, around = np.delete(lost[:, side], np.s_[first:last]), np.ptp(np.unwrap(turn[first:last]))
                 out[first:last, side] |= len(others) >= DOUBTS and 1 - others.mean() > TRUSTED and around > ARC
         return out & ~self.mark(len(turn))
 
