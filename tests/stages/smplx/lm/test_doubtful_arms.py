@@ -23,7 +23,7 @@ def fitted(body, tmp_path_factory):
     """Arms, problem and state of a person who turns with hanging arms, fitted by the points."""
     truth = turning_person(body, FRAMES)
     seen = sightings_of(body, truth)
-    problem, state = set_up(body, seen, outlines_of(body, truth, tmp_path_factory.mktemp("alpha")),
+    problem, state, _ = set_up(body, seen, outlines_of(body, truth, tmp_path_factory.mktemp("alpha")),
                             Detector.load(seen.detector, body), SmplxConfig(height_m=height_of(body, truth)))
     with threadpool_limits(1, "blas"):
         return HiddenArms.of(body, seen.person_height), problem, fit_points(problem, state, seen,

@@ -116,7 +116,7 @@ def misread_left_arm(seen):
 def start_of(body, seen, outlines, config):
     """Problem and state after the fit of the points."""
     detector = Detector.load(seen.detector, body)
-    problem, state = set_up(body, seen, outlines, detector, config)
+    problem, state, _ = set_up(body, seen, outlines, detector, config)
     with threadpool_limits(1, "blas"):
         return problem, fit_points(problem, state, seen, detector, 8)[0]
 
