@@ -57,7 +57,7 @@ def test_networks_that_are_not_here_and_cannot_be_pulled_are_known_at_once_and_l
     began, worked = time.monotonic(), sum(os.times()[:4])
     words = {"run": [str(clip)], "batch": [str(clip.parent)], "demo": []}[command]
     assert execute([command, *words]) == ExitCode.USAGE
-    assert sum(os.times()[:4]) - worked < 1, "CPU s, pip's too: a busy machine must not fail it"
+    assert sum(os.times()[:4]) - worked < 2, "CPU s, pip's too, and modules that are compiled at their first import"
     assert time.monotonic() - began < 6, "pip's own way of asking again takes 8 s"
     assert "cannot get mediapipe" in capsys.readouterr().err
     assert {path.name for path in clip.parent.iterdir()} == {"clip.mp4", "cache"}
