@@ -54,4 +54,4 @@ shaders: setup
 
 lint: setup
 	$(BIN)/ruff check
-	$(BIN)/basedpyright
+	$(BIN)/basedpyright --baselinemode=lock
