@@ -1,9 +1,12 @@
-"""Networks that a user brings as ONNX files, run by onnxruntime: on the GPU where its provider is installed, else on the CPU."""
+"""Networks that a user brings as ONNX files, run by onnxruntime: on the GPU where its provider is installed and GSAC_DEVICE allows
+it, else on the CPU."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from gsac.avatar.cuda import is_forbidden
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -25,7 +28,7 @@ def open_network(path: Path, name: str, threads: int = 0) -> InferenceSession:
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
-    here = onnxruntime.get_available_providers()
+    here = PREFERRED[-1:] if is_forbidden() else onnxruntime.get_available_providers()
     if path.is_dir():
         path = next(path.glob("*.onnx"), path)
     try:

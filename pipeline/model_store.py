@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gsac.cache import objects
-from gsac.cache.digest import plain_digest, tree_files
+from gsac.cache.digest import file_digest, plain_digest, tree_files
 from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.lock import exclusive
 from gsac.cache.record import is_digest
@@ -229,10 +229,18 @@ class ModelStore:
         if self.brought.get(name, sha256) != sha256 and not force:
             raise BadInput(f"{name} is another file already ({self.path(name)}); choose another name, or `--force` to replace it")
         self._keep(file, sha256, name)
+        self._remember(self.root / sha256 / name)
         if name not in MODELS:
             with exclusive(self.root / "add.lock"):
                 self._write_list(_listed(self.root) | {name: sha256})
         return self.root / sha256 / name
+
+    def _remember(self, path: Path) -> None:
+        """Reads the kept files once, so that no run does: the first would take seconds for gigabytes."""
+        memo = self._store.memo
+        for file in tree_files(path).values():
+            memo.put("file", file.stat(), file_digest(file, objects.NO_MEMO), sealed=True)
+        memo.flush()
 
     def _write_list(self, brought: dict[str, str]) -> None:
         with self._store.private("models") as temp:

@@ -30,6 +30,8 @@ def do_import(arguments: argparse.Namespace) -> ExitCode:
         folder = arguments.out / clip.name
         write_clip(clip, folder)
         test = f", {len(clip.test)} of them to test ({clip.split_source})" if clip.test else ""
-        reporter.result(f"{folder}: {len(clip.numbers)} frames with masks{test}")
-        reporter.note(f"gsac run {folder} --set segment.method=brought --set split.photo_fps={clip.fps:g} --set split.count=null")
+        masks = "with masks" if clip.masked else "without masks, which stage segment will make"
+        reporter.result(f"{folder}: {len(clip.numbers)} frames {masks}{test}")
+        brought = "--set segment.method=brought " if clip.masked else ""
+        reporter.note(f"gsac run {folder} {brought}--set split.photo_fps={clip.fps:g} --set split.count=null")
     return ExitCode.OK

@@ -14,7 +14,7 @@ import pytest
 from gsac.avatar import network_files as table
 from gsac.avatar.lpips import Lpips, shapes
 from gsac.avatar.npz import read_npz
-from gsac.cache import digest, memo
+from gsac.cache import digest
 from gsac.cache.errors import IntegrityError
 from gsac.cache.gc import sweep_store
 from gsac.cache.store import Store
@@ -237,12 +237,10 @@ def test_two_files_of_one_name_are_refused(store, pair, tmp_path):
         ModelStore(store).add("mine", pair[0], tmp_path / "other" / "net.onnx")
 
 
-def test_a_model_that_nobody_touched_is_read_once(store, tmp_path, monkeypatch):
+def test_a_model_that_nobody_touched_is_read_when_it_is_added_and_by_no_run(store, tmp_path, monkeypatch):
     """Of a network of gigabytes, only size, times and inode are looked at."""
     (tmp_path / "huge.onnx").write_bytes(b"huge")
     path = ModelStore(store).add("mine", tmp_path / "huge.onnx")
-    monkeypatch.setattr(memo, "SETTLED_NS", -1)  # as if it had been added long ago
-    ModelStore(store).need(["mine"], lambda message: None)
     read = []
     monkeypatch.setattr(digest.hashlib, "file_digest", lambda *given: read.append(given))
     assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": path} and not read

@@ -94,22 +94,25 @@ def lay_limb(resting: np.ndarray, posed: np.ndarray, axis: np.ndarray, above: np
 
 
 def find_bend(resting: np.ndarray, cosine: float, axis: np.ndarray) -> float:
-    """The hinge's angle, rad, at which the parts' directions (2, 3), of length one, have that cosine between them; the nearest
-    where none has. axis: (3,) of the hinge."""
+    """The hinge's angle, rad, at which the parts have that cosine between them; the nearest where none has.
+
+    resting: (2, 3), their directions, of length one; axis: (3,) of the hinge.
+    """
     along = (resting[0] @ axis) * (axis @ resting[1])
     level, across = resting[0] @ resting[1] - along, resting[0] @ np.cross(axis, resting[1])
     return float(np.arctan2(across, level) + np.arccos(np.clip((cosine - along) / max(np.hypot(level, across), 1e-9), -1, 1)))
 
 
 def frame_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Right-handed axes (3, 3) in columns: the first direction (3,), of length one, and what stands across it and the second."""
+    """Right-handed axes (3, 3) in columns: the first direction, and what stands across it and the second. first: (3,) of length
+    one; second: (3,)."""
     across = np.cross(first, second)
     across /= np.linalg.norm(across)
     return np.stack([first, across, np.cross(first, across)], 1)
 
 
 def swing(source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """The least rotation (3, 3) from a direction (3,) to another."""
+    """The least rotation (3, 3) that takes a direction to another. source, target: (3,)."""
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
     axis, cosine = np.cross(a, b), a @ b
     sine = np.linalg.norm(axis)
