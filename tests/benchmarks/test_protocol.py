@@ -28,6 +28,13 @@ def test_ground_pose_and_pooling_are_the_protocols():
     assert table.mean_of_batches([20.0, 30.0], None) == pytest.approx(pooled)
 
 
+def test_lpips_is_of_the_network_that_the_published_scorer_takes():
+    # 3DGS-Avatar's own scorer for PeopleSnapshot takes Alex; that with VGG is for ZJU-MoCap.
+    assert {name: protocol.lpips for name, protocol in PROTOCOLS.items()} == {
+        "gsac": "lpips_alex_black", "haha": "lpips_alex_black", "instant-avatar": "lpips_alex_unscaled",
+        "3dgs-avatar": "lpips_alex_black", "exavatar-xhumans": "lpips_alex", "exavatar-neuman": "lpips_alex"}
+
+
 def test_our_row_stands_beside_the_published_ones_with_their_source():
     words = table.text({"female-4-casual": [metrics(28.0, 29.0), metrics(29.0, 30.0)]}, PROTOCOLS["gsac"])
     ours = next(line for line in words.splitlines() if "ours, recipe" in line)
