@@ -104,6 +104,19 @@ def test_the_command_imports_every_subject_of_a_folder_and_tells_how_to_run_it(t
     assert "there already" in "".join(capsys.readouterr())
 
 
+def test_an_import_that_broke_off_goes_on_with_the_subjects_that_lack(tmp_path, capsys):
+    for scene in "bike", "my lab":
+        data_sets.neuman(tmp_path / "in", scene)
+    typed = ["data", "import", "neuman", str(tmp_path / "in"), "--out", str(tmp_path / "out")]
+    (tmp_path / "in/my lab/images").rename(tmp_path / "in/my lab/misnamed")
+    assert execute(typed) == 0  # of the one scene that is whole
+    (tmp_path / "in/my lab/misnamed").rename(tmp_path / "in/my lab/images")
+    assert execute(typed) == 0
+    said = "".join(capsys.readouterr())
+    assert "bike is there already and left as it is" in said and f"gsac run '{tmp_path}/out/my lab' --set" in said
+    assert read_json(tmp_path / "out/my lab/split.json")["test"] == ["000004"]
+
+
 MISSING = {
     "neuman": ["images", "segmentations/00002.png", "sparse/images.txt", "test_split.txt"],
     "xhumans": ["test", "train/Take1/render/depth/depth_000002.tiff", "train/Take2/render/cameras.npz",
