@@ -55,12 +55,28 @@ def test_every_protocol_is_settings_that_the_stages_take(tmp_path):
 
 def test_test_frames_are_numbered_as_split_numbers_them_and_a_folder_without_a_split_is_named(tmp_path):
     assert number_test({"train": ["000000", "000004", "000012"], "test": ["000008", "000016"]}) == "2,4"
+    assert number_test({"train": ["999999", "1000001"], "test": ["1000000"]}) == "1"
     with pytest.raises(BadInput, match=r"split.json: is missing"):
         read_split(tmp_path)
-    (tmp_path / "split.json").write_text(json.dumps({"train": ["000000"], "test": []}))
+    (tmp_path / "split.json").write_text(json.dumps({"fps": 30, "train": ["000000"], "test": []}))
     with pytest.raises(BadInput, match="names no frames to test"):
         read_split(tmp_path)
     assert parser().parse_args(["gsac", str(tmp_path)]).repeats == 5
+
+
+@pytest.mark.parametrize(("content", "said"), [("{", "not readable as JSON"), ("[]", "not what .* expected fps, train, test"),
+                                                ('{"train": ["000000"]}', "not what .* expected fps, train, test")])
+def test_a_damaged_split_is_named_before_a_training(tmp_path, content, said):
+    (tmp_path / "split.json").write_text(content)
+    with pytest.raises(BadInput, match=rf"split.json: is {said}"):
+        main(["gsac", str(tmp_path)])
+
+
+def test_no_repeats_and_two_subjects_of_one_name_are_refused(tmp_path):
+    with pytest.raises(BadInput, match="--repeats 0: expected 1 or more"):
+        main(["gsac", str(tmp_path), "--repeats", "0"])
+    with pytest.raises(BadInput, match="two folders are called me"):
+        main(["gsac", str(tmp_path / "a/me"), str(tmp_path / "b/me")])
 
 
 @pytest.mark.slow
