@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.brought_network import shape_fits
-from gsac.avatar.onnx_network import NetworkError, open_network
+from gsac.avatar.onnx_network import NetworkError, open_network, run_checked
 from gsac.avatar.wholebody import HANDS, INDEX
 
 SIZE = 224
@@ -44,14 +44,13 @@ class InstantHmr:
 
     def read(self, image: np.ndarray, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The points of one person: xy (70, 2) px of the frame, and (70, 3) m. image: (H, W, 3) uint8 RGB; box: (4,) px, the
-        person's left, top, right, bottom. Raises NetworkError where they are not finite."""
+        person's left, top, right, bottom. Raises NetworkError where it cannot be run, or gives NaN."""
         crop, corner, side = cut_person(image, box)
         ready = ((crop / np.float32(255) - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
-        xy, points = self._session.run(list(GIVES), {"image": ready.astype(np.float32), "cliff_cond": _condition(image, box)[None]})
-        xy, points = np.asarray(xy[0], float), np.asarray(points[0], float)
-        if not (np.isfinite(xy).all() and np.isfinite(points).all()):
-            raise NetworkError(f"model file {self._name} gives points that are not finite; bring the 32-bit export of the network")
-        return corner + (xy + 1) / 2 * side, points
+        beside = {"cliff_cond": _condition(image, box)[None]}
+        xy, points = run_checked(lambda given: self._session.run(list(GIVES), {"image": given} | beside), ready.astype(np.float32),
+                                 self._name)
+        return corner + (xy[0].astype(float) + 1) / 2 * side, points[0].astype(float)
 
 
 def cut_person(image: np.ndarray, box: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

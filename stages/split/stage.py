@@ -41,7 +41,7 @@ def run(job: Job) -> None:
         fields = split_video(source, frames, job.config, people, job.warn, job.progress, masks, plate)
 
     # clip.json holds no file name: equal content must give equal bytes.
-    clip = Clip(source_sha256=_digest((photos or [source]) + [plate] * (plate is not None)), **fields)
+    clip = Clip(source_sha256=_digest([*(photos or [source]), *([] if plate is None else [plate])]), **fields)
     kept = len(frame_paths(frames))
     if clip.timestamps_s is not None and len(clip.timestamps_s) != kept:
         raise StageError(f"{source.name}: {kept} frames and {len(clip.timestamps_s)} timestamps")
