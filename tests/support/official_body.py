@@ -1,0 +1,100 @@
+"""A made-up body file of SMPL-X's official arrays: 300 + 100 directions, pose correctives, mean hands and their components.
+
+The data are nobody's. The mesh is the small figure of tubes, or the open body's.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gsac.avatar.body import Body
+from gsac.avatar.mesh import vertex_normals
+from support.figure import make_figure
+
+SHAPES, EXPRESSIONS = 300, 100
+BULGE = 0.012
+"""m, the largest that one direction of a corrective moves a vertex at its joint."""
+SPAN = 0.07
+"""m, sigma of a corrective about its joint."""
+FAINT = 1e-8
+"""m, of what every joint does to every vertex."""
+
+
+def official_arrays(mesh: str = "figure", directions: int = SHAPES + EXPRESSIONS, seed: int = 0) -> dict[str, np.ndarray]:
+    """The file's arrays (...) by name. mesh: figure or open."""
+    rng = np.random.default_rng(seed)
+    vertices, faces, joints, parents, weights, regressor = (_figure if mesh == "figure" else _open)()
+    turns = np.zeros((len(vertices), 3, 54, 9), np.float32)
+    normals = vertex_normals(vertices, faces)
+    for j in range(1, 55):
+        near = BULGE * np.exp(-((vertices - joints[j]) ** 2).sum(1) / (2 * SPAN**2))
+        near[near < BULGE / 500] = 0
+        outward = normals[:, :, None] * rng.uniform(-1, 1, 9) + 0.3 * rng.uniform(-1, 1, (3, 9))
+        turns[:, :, j - 1] = near[:, None, None] * outward
+    turns += FAINT * rng.uniform(-1, 1, turns.shape).astype(np.float32)
+    shapes = rng.normal(0, 1, (directions, 4, 3)) * (0.02 / np.sqrt(1 + np.arange(directions)))[:, None, None]
+    waves = np.stack([np.ones(len(vertices)), *np.sin(3 * vertices.T)], 1)  # smooth over the body
+    return {
+        "v_template": vertices.astype(np.float64), "f": faces.astype(np.uint32), "J_regressor": regressor, "weights": weights,
+        "kintree_table": np.array([[2**32 - 1, *parents[1:]], range(55)], np.uint32),
+        "shapedirs": np.einsum("vk,dkc->vcd", waves, shapes).astype(np.float32),
+        "posedirs": turns.reshape(len(vertices), 3, 486),
+        "hands_meanl": rng.normal(0, 0.3, 45), "hands_meanr": rng.normal(0, 0.3, 45),
+        "hands_componentsl": rng.normal(0, 0.1, (45, 45)), "hands_componentsr": rng.normal(0, 0.1, (45, 45)),
+    }
+
+
+def official_file(path: Path, **options) -> Path:
+    """Writes `official_arrays` to the path, and returns it."""
+    np.savez(path, **official_arrays(**options))
+    return path
+
+
+def _figure() -> tuple[np.ndarray, ...]:
+    """Vertices (V, 3), faces (F, 3), joints (55, 3), parents (55,), weights (V, 55) and regressor (55, V) of the tubes."""
+    avatar = make_figure()
+    V = len(avatar.vertices)
+    weights = np.zeros((V, 55))
+    np.add.at(weights, (np.arange(V)[:, None], avatar.skin_index), avatar.skin_weight)
+    regressor = np.zeros((55, V))
+    for j, place in enumerate(avatar.joints):
+        regressor[j, np.argsort(((avatar.vertices - place) ** 2).sum(1), kind="stable")[:20]] = 1 / 20
+    return avatar.vertices, avatar.faces, regressor @ avatar.vertices, avatar.parents, weights, regressor
+
+
+def _open() -> tuple[np.ndarray, ...]:
+    """The same of the open body."""
+    body = Body.load()
+    return (body.v_template, body.faces, body.J_regressor @ body.v_template, body.parents, body.weights.astype(float),
+            body.J_regressor.astype(float))
+
+
+def posed_as_written(a: dict[str, np.ndarray], betas: np.ndarray, expression: np.ndarray, pose: np.ndarray,
+                     transl: np.ndarray) -> np.ndarray:
+    """Vertices (V, 3) m by SMPL-X's own formulae (Pavlakos et al. 2019, eq. 1 to 6), written out in plain float64.
+
+    a: `official_arrays`; betas: (300,); expression: (100,); pose: (55, 3) axis-angle with nothing to be added; transl: (3,) m.
+    """
+    template, dirs = a["v_template"], a["shapedirs"].astype(np.float64)
+    shaped = template + sum(beta * dirs[:, :, n] for n, beta in enumerate(betas))  # eq. 3: B_S
+    joints = a["J_regressor"] @ shaped  # eq. 6
+    bent = shaped + sum(psi * dirs[:, :, SHAPES + n] for n, psi in enumerate(expression))  # eq. 5: B_E
+    turns = []
+    for x, y, z in pose:
+        angle = np.sqrt(x * x + y * y + z * z)
+        k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) / (angle or 1.0)
+        turns.append(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k)
+    feature = np.concatenate([(turn - np.eye(3)).ravel() for turn in turns[1:]])
+    bent = bent + sum(f * a["posedirs"][:, :, n].astype(np.float64) for n, f in enumerate(feature))  # eq. 4: B_P
+    parents = a["kintree_table"][0].astype(np.int64)
+    world = []
+    for j, turn in enumerate(turns):
+        own = np.eye(4)
+        own[:3, :3], own[:3, 3] = turn, joints[j] - (joints[parents[j]] if j else 0)
+        world.append(world[parents[j]] @ own if j else own)
+    out = np.zeros_like(bent)
+    for j, matrix in enumerate(world):  # eq. 1: W
+        out += a["weights"][:, j:j + 1] * ((bent - joints[j]) @ matrix[:3, :3].T + matrix[:3, 3])
+    return out + transl
