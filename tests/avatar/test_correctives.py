@@ -5,22 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.body import BodyParams
 from gsac.avatar.correctives import DIRECTIONS, LEFT_OUT, move_rest, move_rest_backward, thin_out
 from gsac.avatar.joints import INDEX
 from support.official_body import EXPRESSIONS, SHAPES, official_arrays, posed_as_written
-
-
-@pytest.fixture(scope="module")
-def arrays() -> dict[str, np.ndarray]:
-    return official_arrays()
-
-
-@pytest.fixture(scope="module")
-def body(arrays, tmp_path_factory) -> Body:
-    path = tmp_path_factory.mktemp("body") / "SMPLX_MADE_UP.npz"
-    np.savez(path, **arrays)
-    return Body.load(path)
 
 
 def strong_poses(count: int, seed: int = 0) -> np.ndarray:
@@ -28,30 +16,30 @@ def strong_poses(count: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).normal(0, 0.8, (count, 55, 3))
 
 
-def test_a_whole_file_poses_as_the_publications_formulae_say(arrays, body):
-    rng = np.random.default_rng(1)
+def test_a_whole_file_poses_as_the_publications_formulae_say(official_body):
+    rng, arrays = np.random.default_rng(1), official_arrays()
     betas, expression, pose = rng.normal(0, 1, SHAPES), rng.normal(0, 1, (3, EXPRESSIONS)), strong_poses(3)
     transl = rng.normal(0, 1, (3, 3))
-    got = body.posed(BodyParams.from_pose(pose, transl, betas, expression, 500.0, (0, 0)))[0]
+    got = official_body.posed(BodyParams.from_pose(pose, transl, betas, expression, 500.0, (0, 0)))[0]
     want = [posed_as_written(arrays, betas, expression[t], pose[t], transl[t]) for t in range(3)]
     np.testing.assert_allclose(got, want, atol=2e-5)
 
 
-def test_an_elbow_bends_the_surface_that_plain_skinning_leaves(body):
+def test_an_elbow_bends_the_surface_that_plain_skinning_leaves(official_body):
     pose = np.zeros((1, 55, 3))
     pose[0, INDEX["left_elbow"], 1] = -1.8
-    moved = np.linalg.norm(move_rest(body.posedirs, pose[0]), axis=1)
-    _, joints = body.rest(np.zeros(1))
-    far = np.linalg.norm(body.v_template - joints[INDEX["left_elbow"]], axis=1) > 0.4
+    moved = np.linalg.norm(move_rest(official_body.posedirs, pose[0]), axis=1)
+    _, joints = official_body.rest(np.zeros(1))
+    far = np.linalg.norm(official_body.v_template - joints[INDEX["left_elbow"]], axis=1) > 0.4
     assert moved.max() > 3e-3 and moved[far].max() < 1e-5
     turned = np.zeros((55, 3))
     turned[0] = [0.3, 2, 0.1]
-    assert not move_rest(body.posedirs, turned).any(), "the root has none"
+    assert not move_rest(official_body.posedirs, turned).any(), "the root has none"
 
 
-def test_the_gradient_agrees_with_central_differences(body):
+def test_the_gradient_agrees_with_central_differences(official_body):
     rng, pose = np.random.default_rng(2), strong_poses(1)[0]
-    posedirs, grad = body.posedirs.astype(np.float64), rng.normal(size=body.v_template.shape)
+    posedirs, grad = official_body.posedirs.astype(np.float64), rng.normal(size=official_body.v_template.shape)
     got = move_rest_backward(posedirs, pose, grad)
     for _ in range(6):
         step = rng.normal(size=pose.shape)
@@ -59,9 +47,9 @@ def test_the_gradient_agrees_with_central_differences(body):
         assert (got * step).sum() == pytest.approx(slope, rel=1e-6)
 
 
-def test_what_thinning_leaves_out_moves_no_vertex_farther_than_promised(body):
+def test_what_thinning_leaves_out_moves_no_vertex_farther_than_promised(official_body):
     rng = np.random.default_rng(3)
-    dense = body.posedirs + rng.normal(0, 3e-8, body.posedirs.shape).astype(np.float32)
+    dense = official_body.posedirs + rng.normal(0, 3e-8, official_body.posedirs.shape).astype(np.float32)
     thin = thin_out(dense)
     assert 0.01 < len(thin.joint) / (54 * len(dense)) < 0.5 and thin.start[-1] == len(thin.joint) and thin.joint.min() > 0
     worst = max(np.linalg.norm(thin.move_rest(p) - move_rest(dense, p), axis=1).max() for p in strong_poses(20))

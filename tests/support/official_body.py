@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from gsac.avatar.body import Body
 from gsac.avatar.mesh import vertex_normals
@@ -50,6 +51,12 @@ def official_file(path: Path, **options) -> Path:
     """Writes `official_arrays` to the path, and returns it."""
     np.savez(path, **official_arrays(**options))
     return path
+
+
+@pytest.fixture(scope="session")
+def official_body(tmp_path_factory) -> Body:
+    """The body of `official_arrays` on the tubes."""
+    return Body.load(official_file(tmp_path_factory.mktemp("official") / "SMPLX_MADE_UP.npz"))
 
 
 def _figure() -> tuple[np.ndarray, ...]:
