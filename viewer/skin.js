@@ -77,7 +77,9 @@ export class Skin {
     // (J, 3, 4) [R | t], from the rest place to the posed one.
     this.bones = new Float32Array(avatar.names.length * 12);
     this.local = new Float32Array(9);
-    // (V, 3), m: at rest with the expression, and posed.
+    // (J, 3, 3), rotations less the identity, where the avatar has pose correctives.
+    this.turns = new Float32Array(avatar.correctives ? avatar.names.length * 9 : 0);
+    // (V, 3), m: at rest with the pose's correctives and the expression, and posed.
     this.rest = new Float32Array(avatar.vertices.length);
     this.vertices = new Float32Array(avatar.vertices.length);
   }
@@ -89,7 +91,7 @@ export class Skin {
    */
   update(pose, expression) {
     this.moveBones(pose);
-    this.rest.set(this.avatar.vertices);
+    this.bend(pose);
     const { expressions, start, moved, delta } = this.avatar;
     for (let e = 0; e < expressions.length; e++) {
       const weight = expression[expressions[e]] || 0;
@@ -119,6 +121,28 @@ export class Skin {
           place = x * jx + y * jy + z * jz + B[p + r * 4 + 3];
         }
         B[o + r * 4 + 3] = place - (B[o + r * 4] * jx + B[o + r * 4 + 1] * jy + B[o + r * 4 + 2] * jz);
+      }
+    }
+  }
+
+  // Fills this.rest: the vertices at rest, as the pose's correctives move them.
+  bend(pose) {
+    const { vertices, correctives } = this.avatar, { rest, turns } = this;
+    rest.set(vertices);
+    if (!correctives) return;
+    for (let j = 0; j < this.count; j++) {
+      quatToMatrix(turns, j * 9, pose.quats, j * 4);
+      for (let c = 0; c < 9; c += 4) turns[j * 9 + c] -= 1;
+    }
+    const { start, joint, delta } = correctives;
+    for (let v = 0, n = rest.length / 3; v < n; v++) {
+      for (let i = start[v]; i < start[v + 1]; i++) {
+        const t = joint[i] * 9;
+        for (let axis = 0, d = i * 27; axis < 3; axis++, d += 9) {
+          let sum = 0;
+          for (let c = 0; c < 9; c++) sum += delta[d + c] * turns[t + c];
+          rest[v * 3 + axis] += sum;
+        }
       }
     }
   }

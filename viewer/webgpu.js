@@ -3,7 +3,7 @@
 
 import { EVEN_LIGHT } from "./binding.js";
 import { reachDevice } from "./device.js";
-import { indexQuads, packBody, packLevel } from "./pack.js";
+import { indexQuads, packBody, packLevel, packRest } from "./pack.js";
 import { transformPoint } from "./projection.js";
 import { SHADERS } from "./shaders.js";
 
@@ -129,10 +129,11 @@ export class WebgpuRenderer {
     return this.device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries });
   }
 
-  // Sends the skin's bones and the expression's weights, by name.
+  // Sends the skin's bones, what the pose's correctives move, and the expression's weights, by name.
   move(expression) {
     this.avatar.expressions.forEach((name, e) => { this.weights[e] = expression[name] || 0; });
     this.device.queue.writeBuffer(this.buffers.GsacBones, 0, this.skin.bones);
+    if (this.avatar.correctives) this.device.queue.writeBuffer(this.buffers.GsacRest, 0, packRest(this.skin.rest));
     this.device.queue.writeBuffer(this.buffers.GsacWeights, 0, this.weights);
   }
 
@@ -237,10 +238,17 @@ function planSort(count) {
 // The greatest distance of gaussians from a joint that moves them, m, by joint: however the joints turn, a skinned vertex stays
 // in the hull of balls around its joints; gaussians are let stand half as far again off the mesh as at rest.
 function jointReach(avatar, bindings) {
-  const { vertices, faces, joints, names, skinIndex, skinWeight, moved, delta } = avatar;
+  const { vertices, faces, joints, names, skinIndex, skinWeight, moved, delta, correctives } = avatar;
   const reach = new Float64Array(names.length), far = new Float64Array(vertices.length / 3);
   const length = (x, y, z) => Math.hypot(x, y, z);
   for (let i = 0; i < moved.length; i++) far[moved[i]] += length(...delta.subarray(i * 3, i * 3 + 3));
+  if (correctives) {
+    const { start, delta } = correctives;
+    // A rotation less the identity has at most the norm of half a turn, the root of 8.
+    for (let v = 0; v < far.length; v++) {
+      for (let i = start[v]; i < start[v + 1]; i++) far[v] += Math.sqrt(8) * Math.hypot(...delta.subarray(i * 27, i * 27 + 27));
+    }
+  }
   for (let k = 0; k < skinIndex.length; k++) {
     if (skinWeight[k] === 0) continue;
     const v = k >> 2, j = skinIndex[k];

@@ -1,4 +1,4 @@
-"""Pose correctives: the formula, its gradient, and the sparse ones that an avatar's file carries."""
+"""Pose correctives: the publication's formula, and its gradient."""
 
 from __future__ import annotations
 
@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import BodyParams
-from gsac.avatar.correctives import DIRECTIONS, LEFT_OUT, move_rest, move_rest_backward, thin_out
+from gsac.avatar.correctives import move_rest, move_rest_backward
 from gsac.avatar.joints import INDEX
-from support.official_body import EXPRESSIONS, SHAPES, official_arrays, posed_as_written
-
-
-def strong_poses(count: int, seed: int = 0) -> np.ndarray:
-    """(count, 55, 3) axis-angle, every joint turned by up to half a turn and more."""
-    return np.random.default_rng(seed).normal(0, 0.8, (count, 55, 3))
+from support.official_body import EXPRESSIONS, SHAPES, official_arrays, posed_as_written, strong_poses
 
 
 def test_a_whole_file_poses_as_the_publications_formulae_say(official_body):
@@ -45,14 +40,3 @@ def test_the_gradient_agrees_with_central_differences(official_body):
         step = rng.normal(size=pose.shape)
         slope = ((move_rest(posedirs, pose + 1e-5 * step) - move_rest(posedirs, pose - 1e-5 * step)) * grad).sum() / 2e-5
         assert (got * step).sum() == pytest.approx(slope, rel=1e-6)
-
-
-def test_what_thinning_leaves_out_moves_no_vertex_farther_than_promised(official_body):
-    rng = np.random.default_rng(3)
-    dense = official_body.posedirs + rng.normal(0, 3e-8, official_body.posedirs.shape).astype(np.float32)
-    thin = thin_out(dense)
-    assert 0.01 < len(thin.joint) / (54 * len(dense)) < 0.5 and thin.start[-1] == len(thin.joint) and thin.joint.min() > 0
-    worst = max(np.linalg.norm(thin.move_rest(p) - move_rest(dense, p), axis=1).max() for p in strong_poses(20))
-    assert 0 < worst < LEFT_OUT
-    whole = thin_out(rng.normal(0, 1, (5, 3, DIRECTIONS)).astype(np.float32))
-    assert len(whole.joint) == 5 * 54

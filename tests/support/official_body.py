@@ -5,13 +5,21 @@ The data are nobody's. The mesh is the small figure of tubes, or the open body's
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from gsac.avatar.body import Body
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.gsac_file.write import avatar_bytes
+from gsac.avatar.joints import INDEX
 from gsac.avatar.mesh import vertex_normals
+from gsac.stages.export.animations import add_motion
+from gsac.stages.export.stage import rig_avatar
 from support.figure import make_figure
 
 SHAPES, EXPRESSIONS = 300, 100
@@ -53,10 +61,42 @@ def official_file(path: Path, **options) -> Path:
     return path
 
 
+def strong_poses(count: int, seed: int = 0) -> np.ndarray:
+    """(count, 55, 3) axis-angle, every joint turned by up to half a turn and more."""
+    return np.random.default_rng(seed).normal(0, 0.8, (count, 55, 3))
+
+
 @pytest.fixture(scope="session")
 def official_body(tmp_path_factory) -> Body:
     """The body of `official_arrays` on the tubes."""
     return Body.load(official_file(tmp_path_factory.mktemp("official") / "SMPLX_MADE_UP.npz"))
+
+
+class BentArm(NamedTuple):
+    """An exported avatar of `official_body` in a pose, and where the Python body has its vertices."""
+
+    avatar: RiggedAvatar
+    """As it was written."""
+    file: Path
+    pose: np.ndarray  # (55, 3) axis-angle
+    vertices: np.ndarray  # (V, 3) m
+    plain: np.ndarray  # (V, 3) m, without correctives
+
+
+@pytest.fixture(scope="session")
+def bent_arm(official_body, tmp_path_factory) -> BentArm:
+    """The left elbow bent by 103 degrees, the shoulder and a finger turned, of a person with 20 betas."""
+    betas, pose = np.random.default_rng(7).normal(0, 1, 20), np.zeros((1, 55, 3), np.float32)
+    for joint, turn in (("left_elbow", (0, -1.8, 0)), ("left_shoulder", (0.3, 0.2, -0.7)), ("left_index1", (0, 0.1, -0.9))):
+        pose[0, INDEX[joint]] = turn
+    params = BodyParams.from_pose(pose, np.zeros((1, 3)), betas, np.zeros((1, EXPRESSIONS)), 500.0, (0, 0))
+    avatar = rig_avatar(official_body, params, Gaussians.area(official_body.rest(betas)[0], official_body.faces, 300))
+    avatar.licence = {"avatar": "none"}
+    add_motion(avatar, ("wave",))
+    file = tmp_path_factory.mktemp("bent") / "avatar.gsac"
+    file.write_bytes(avatar_bytes(avatar))
+    return BentArm(avatar, file, pose[0], official_body.posed(params)[0][0],
+                   replace(official_body, posedirs=None).posed(params)[0][0])
 
 
 def _figure() -> tuple[np.ndarray, ...]:

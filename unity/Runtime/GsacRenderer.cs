@@ -49,7 +49,8 @@ namespace Gsac
         ComputeShader kernels;
         int skinKernel, bindKernel;
         Material material;
-        GraphicsBuffer bones, weights, posed, splats;
+        GraphicsBuffer bones, weights, posed, splats, bent;
+        float[] turns, bentRows; // J x 9; V x 4, as in `bent`: at rest, as the pose's correctives move it
         Vector4[] boneRows;
         int drawn;
         string trouble;
@@ -88,7 +89,8 @@ namespace Gsac
             weights.Dispose();
             posed.Dispose();
             splats.Dispose();
-            bones = null;
+            if (bent != null) bent.Dispose();
+            bones = bent = null;
         }
 
         void LateUpdate()
@@ -143,6 +145,12 @@ namespace Gsac
             posed = GsacModel.Empty(V, 4);
             splats = GsacModel.Empty(most * 3, 4);
             boneRows = new Vector4[model.Data.JointCount * 3];
+            if (model.Data.Correctives != null)
+            {
+                bent = GsacModel.Empty(V, 4);
+                turns = new float[model.Data.JointCount * 9];
+                bentRows = new float[V * 4];
+            }
             kernels = Resources.Load<ComputeShader>("Gsac/Gsac");
             skinKernel = kernels.FindKernel("Skin");
             bindKernel = kernels.FindKernel("Bind");
@@ -163,7 +171,8 @@ namespace Gsac
             if (avatar.DrawnWeights.Length > 0) weights.SetData(avatar.DrawnWeights);
             kernels.SetInt(VertexCountId, model.Data.VertexCount);
             kernels.SetInt(SplatCountId, level.Count);
-            kernels.SetBuffer(skinKernel, RestId, model.Rest);
+            if (bent != null) Bend();
+            kernels.SetBuffer(skinKernel, RestId, bent ?? model.Rest);
             kernels.SetBuffer(skinKernel, SkinId, model.Skin);
             kernels.SetBuffer(skinKernel, MovesId, model.Moves);
             kernels.SetBuffer(skinKernel, WeightsId, weights);
@@ -177,6 +186,18 @@ namespace Gsac
             kernels.SetBuffer(bindKernel, PosedId, posed);
             kernels.SetBuffer(bindKernel, SplatsId, splats);
             kernels.Dispatch(bindKernel, Groups(level.Count), 1, 1);
+        }
+
+        /// <summary>Fills `bent`.</summary>
+        void Bend()
+        {
+            for (int j = 0; j < avatar.Joints.Length; j++)
+            {
+                Quaternion q = avatar.Joints[j].localRotation;
+                GsacCorrectives.SetTurn(turns, j, q.x, q.y, q.z, q.w);
+            }
+            model.Data.Correctives.Move(model.Data.Vertices, turns, bentRows);
+            bent.SetData(bentRows);
         }
 
         /// <summary>A channel's factors of a normal's x, y, |z| and of 1, between even light and the clip's.</summary>
