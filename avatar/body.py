@@ -2,7 +2,8 @@
 
 B betas, E expression size, J = 55 joints in SMPL-X's order, V vertices, F faces, T frames, K = 133 keypoints.
 Canonical body: metres, right-handed, y up, facing +z, left = +x, T-pose at zero rotation. Linear blend skinning with
-axis-angle joint rotations, of a surface that pose correctives bend where the file has them; `global_orient` turns the body about its pelvis joint, then `transl` moves it.
+axis-angle joint rotations, of a surface that pose correctives bend where the file has them; `global_orient` turns the body about
+its pelvis joint, then `transl` moves it.
 Source: SMPL-X (Pavlakos et al. 2019), eq. 1-7; `tools/open_body/bake.py` bakes the open body.
 """
 
@@ -116,8 +117,6 @@ class Body:
     faces: np.ndarray  # (F, 3) int32
     shapedirs: np.ndarray  # (V, 3, B) m
     exprdirs: np.ndarray  # (V, 3, E) m
-    posedirs: np.ndarray | None  # (V, 3, 486) m
-    """Pose correctives, as correctives.py takes them; None: the file has none."""
     J_regressor: np.ndarray  # (55, V)
     weights: np.ndarray  # (V, 55), at most four a row
     parents: np.ndarray  # (55,) int, -1 for the pelvis
@@ -125,16 +124,18 @@ class Body:
     expression_names: tuple[str, ...]
     clothes: tuple[str, ...]
     """Names of the last betas, which lift clothes off the skin; empty where all betas shape the figure."""
-    hand_means: np.ndarray | None  # (30, 3) rad
-    """The mean fingers, left hand first, at which a hand rests; at zero rotation it is flat. None: the file has none."""
-    hand_components: np.ndarray | None  # (2, 45, 45) rad
-    """Principal components of the left and the right hand, a row each, that are added to the mean; None: the file has none."""
     jaw_actions: np.ndarray  # (E, 3) expression that a jaw rotation stands for; zeros where the jaw has skin of its own
     keypoint_matrix: csr_matrix  # (133, V); an all-zero row is a keypoint that this body does not carry
     vt: np.ndarray | None  # (U, 2)
     ft: np.ndarray | None  # (F, 3) int32
     digest: str
     """sha256 of the file."""
+    posedirs: np.ndarray | None = None  # (V, 3, 486) m
+    """Pose correctives, as correctives.py takes them; None: the file has none."""
+    hand_means: np.ndarray | None = None  # (30, 3) rad
+    """The mean fingers, left hand first, at which a hand rests; at zero rotation it is flat. None: the file has none."""
+    hand_components: np.ndarray | None = None  # (2, 45, 45) rad
+    """Principal components of the left and the right hand, a row each, that are added to the mean; None: the file has none."""
 
     @classmethod
     def load(cls, path: Path | str | None = None) -> Body:

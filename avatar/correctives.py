@@ -27,7 +27,10 @@ def move_rest(posedirs: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 
 def move_rest_backward(posedirs: np.ndarray, pose: np.ndarray, grad: np.ndarray) -> np.ndarray:
-    """Gradient of the pose (J, 3) through `move_rest` from grad (V, 3), that of the vertices at rest."""
+    """Gradient of the pose (J, 3) through `move_rest` from grad (V, 3), that of the vertices at rest.
+
+    posedirs: (V, 3, D) m; pose: (J, 3) axis-angle.
+    """
     grad_local = np.zeros((J, 3, 3), np.float64)
     grad_local[1:] = (grad.reshape(-1) @ posedirs.reshape(-1, DIRECTIONS)).reshape(-1, 3, 3)
     return rotation_matrices_backward(pose, grad_local)

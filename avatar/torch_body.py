@@ -70,7 +70,8 @@ class Kinematics:
 
 
 def turn_features(world: torch.Tensor, parents: np.ndarray) -> torch.Tensor:
-    """(T, 486), the joints' rotations but the root's, against their parents, less the identity. world: (T, J, 3, 3); parents: (J,)."""
+    """(T, 486), as correctives.py's: the joints' rotations against their parents less the identity. world: (T, J, 3, 3); parents:
+    (J,)."""
     local = world[:, parents[1:]].transpose(-1, -2) @ world[:, 1:]
     return (local - torch.eye(3)).flatten(1)
 

@@ -137,7 +137,8 @@ class Chain:
 
     def frame(self, t: int) -> Chain:
         """The chain of one frame alone."""
-        return Chain(self.local[t: t + 1], self.world[t: t + 1], self.place[t: t + 1], self.shift[t: t + 1], self.shift_dirs[t: t + 1])
+        one = slice(t, t + 1)
+        return Chain(self.local[one], self.world[one], self.place[one], self.shift[one], self.shift_dirs[one])
 
 
 def place_points(chain: Chain, pairs: Pairs, shape: np.ndarray) -> np.ndarray:

@@ -130,14 +130,16 @@ def corrected(data, head):
     V, joint = head["blocks"]["rest.vertices"]["shape"][0], np.array([3, 18, 54], np.uint8)
     start, delta = np.array([*[0] * V, 3], np.uint32), np.zeros((3, 3, 9), np.float16)
     good = {"start": start, "joint": joint, "delta": delta}
-    bad = {"root": ({"joint": joint * 0}, {"ok"}), "wide": ({"joint": joint.astype(np.uint32), "delta": delta.astype(np.float32)}, {"ok"}),
-           "joint": ({"joint": joint + 1}, {"value"}), "short": ({"start": start[1:]}, {"block"}),
-           "ends": ({"start": start - (start > 0)}, {"value"}), "begins": ({"start": np.maximum(start, 1)}, {"value"}),
-           "falls": ({"start": np.where(np.arange(V + 1) == V // 2, 2, start).astype(np.uint32)}, {"value"}),
+    wide = {"joint": joint.astype(np.uint32), "delta": delta.astype(np.float32)}
+    falls = np.where(np.arange(V + 1) == V // 2, 2, start).astype(np.uint32)
+    bad = {"good": ({}, {"ok"}), "root": ({"joint": joint * 0}, {"ok"}), "wide": (wide, {"ok"}),
+           "joint": ({"joint": joint + 1}, {"value"}), "real": ({"joint": joint.astype(np.float32)}, {"block"}),
+           "lacks": ({"joint": None}, {"block"}), "short": ({"start": start[1:]}, {"block"}),
+           "falls": ({"start": falls}, {"value"}), "ends": ({"start": start - (start > 0)}, {"value"}),
+           "begins": ({"start": np.maximum(start, 1)}, {"value"}),
            "huge": ({"start": start * 2**30}, {"value"}), "fewer": ({"delta": delta[1:]}, {"block"}),
            "flat": ({"delta": delta.reshape(3, 27)}, {"block"}), "nan": ({"delta": delta * np.float16(np.nan)}, {"value"}),
-           "whole": ({"delta": delta.astype(np.uint8)}, {"block"}), "real": ({"joint": joint.astype(np.float32)}, {"block"}),
-           "lacks": ({"joint": None}, {"block"}), "good": ({}, {"ok"})}
+           "whole": ({"delta": delta.astype(np.uint8)}, {"block"})}
     out = {}
     for name, (change, words) in bad.items():
         made = data

@@ -2,22 +2,12 @@
 
 import numpy as np
 
-from gsac.avatar.skinning import skin
-
-MIRROR = np.array([-1.0, 1, 1])
+from support.bending import MIRROR, pose_in_unity
 
 
-def test_a_bent_elbow_lies_where_the_python_body_has_it(play, mono, bent_arm, tmp_path):
-    """The buffers that a frame hands to the skinning on the GPU, skinned here."""
-    numbers = np.concatenate([bent_arm.pose.ravel(), np.zeros(3 + 100)])
-    np.savetxt(tmp_path / "numbers", numbers[None], "%.9g")
-    play("frame", bent_arm.file, tmp_path / "numbers", tmp_path / "frame")
-    asked = mono.arrays(tmp_path / "frame")
-    avatar = bent_arm.avatar
-    rest, bones = asked["GsacRest"].view(np.float32).reshape(-1, 4), asked["GsacBones"].view(np.float32).reshape(-1, 3, 4)
-    assert (rest[:, 3] == 1).all()
-    posed = skin(np.ascontiguousarray(rest[:, :3]), bones, avatar.skin_index, avatar.skin_weight) + [0, avatar.ground, 0]
-    assert np.linalg.norm(posed * MIRROR - bent_arm.vertices, axis=1).max() < 1e-4, "0.1 mm"
+def test_a_bent_elbow_lies_where_the_python_body_has_it(play, bent_arm, tmp_path):
+    posed = pose_in_unity(play, bent_arm.file, bent_arm.pose, tmp_path)
+    assert np.linalg.norm(posed - bent_arm.vertices, axis=1).max() < 1e-4, "0.1 mm"
 
 
 def test_all_instances_share_the_rest_of_a_body_without_correctives(play, mono, files, figure, tmp_path):
@@ -27,8 +17,8 @@ def test_all_instances_share_the_rest_of_a_body_without_correctives(play, mono, 
 
 
 def test_the_reader_has_the_correctives_of_the_python_reader(mono, package, programs_folder, bent_arm, tmp_path):
-    exe = mono.compile_csharp([*(package / "Runtime" / "Core").glob("*.cs"), programs_folder / "Dump.cs", programs_folder / "Read.cs"],
-                              tmp_path / "read.exe")
+    sources = [*(package / "Runtime" / "Core").glob("*.cs"), programs_folder / "Dump.cs", programs_folder / "Read.cs"]
+    exe = mono.compile_csharp(sources, tmp_path / "read.exe")
     mono.run(exe, "dump", bent_arm.file, tmp_path / "arrays")
     got, want = mono.arrays(tmp_path / "arrays"), bent_arm.avatar.correctives
     np.testing.assert_array_equal(got["corrective_start"], want.start)
