@@ -31,28 +31,36 @@ FAINT = 1e-8
 """m, of what every joint does to every vertex."""
 
 
-def official_arrays(mesh: str = "figure", directions: int = SHAPES + EXPRESSIONS, seed: int = 0) -> dict[str, np.ndarray]:
+def official_arrays(mesh: str = "figure", seed: int = 0) -> dict[str, np.ndarray]:
     """The file's arrays (...) by name. mesh: figure or open."""
     rng = np.random.default_rng(seed)
     vertices, faces, joints, parents, weights, regressor = (_figure if mesh == "figure" else _open)()
     turns = np.zeros((len(vertices), 3, 54, 9), np.float32)
     normals = vertex_normals(vertices, faces)
     for j in range(1, 55):
-        near = BULGE * np.exp(-((vertices - joints[j]) ** 2).sum(1) / (2 * SPAN**2))
-        near[near < BULGE / 500] = 0
+        near = BULGE * _near(vertices, joints[j])
         outward = normals[:, :, None] * rng.uniform(-1, 1, 9) + 0.3 * rng.uniform(-1, 1, (3, 9))
         turns[:, :, j - 1] = near[:, None, None] * outward
     turns += FAINT * rng.uniform(-1, 1, turns.shape).astype(np.float32)
-    shapes = rng.normal(0, 1, (directions, 4, 3)) * (0.02 / np.sqrt(1 + np.arange(directions)))[:, None, None]
+    size = 0.02 / np.sqrt(1 + np.arange(SHAPES + EXPRESSIONS))
+    shapes = rng.normal(0, 1, (len(size), 4, 3)) * size[:, None, None]
     waves = np.stack([np.ones(len(vertices)), *np.sin(3 * vertices.T)], 1)  # smooth over the body
+    directions = np.einsum("vk,dkc->vcd", waves, shapes)
+    directions[:, :, SHAPES:] *= _near(vertices, joints[INDEX["head"]])[:, None, None]
     return {
         "v_template": vertices.astype(np.float64), "f": faces.astype(np.uint32), "J_regressor": regressor, "weights": weights,
         "kintree_table": np.array([[2**32 - 1, *parents[1:]], range(55)], np.uint32),
-        "shapedirs": np.einsum("vk,dkc->vcd", waves, shapes).astype(np.float32),
+        "shapedirs": directions.astype(np.float32),
         "posedirs": turns.reshape(len(vertices), 3, 486),
         "hands_meanl": rng.normal(0, 0.3, 45), "hands_meanr": rng.normal(0, 0.3, 45),
         "hands_componentsl": rng.normal(0, 0.1, (45, 45)), "hands_componentsr": rng.normal(0, 0.1, (45, 45)),
     }
+
+
+def _near(vertices: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(V,) 1 at the place (3,) m, falling to 0 within four SPANs. vertices: (V, 3) m."""
+    near = np.exp(-((vertices - place) ** 2).sum(1) / (2 * SPAN**2))
+    return np.where(near < 2e-3, 0, near)
 
 
 def official_file(path: Path, **options) -> Path:
