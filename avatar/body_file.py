@@ -35,6 +35,8 @@ SMPLX_KEYPOINT_VERTICES = {
     95: 5361, 99: 4933, 103: 5058, 107: 5169, 111: 5286, 116: 8079, 120: 7669, 124: 7794, 128: 7905, 132: 8022,
 }
 """COCO-WholeBody keypoint -> vertex of SMPL-X's mesh: nose, eyes, ears, toes, heels and finger tips."""
+INFLUENCES = 4
+"""Joints that move a vertex at most: Unity, glTF and the browser skin with no more, and fit and training see what they will show."""
 SMPLX_VERTICES = 10475
 SMPLX_EXPRESSIONS = 100
 """The last shape directions of an official file are expressions: 300 + 100 in v1.1; older files have 10 + 10."""
@@ -73,7 +75,7 @@ def _fields(path: Path, a: dict[str, np.ndarray]) -> dict:
         "shapedirs": np.ascontiguousarray(shapedirs), "exprdirs": np.ascontiguousarray(exprdirs),
         "posedirs": _posedirs(path, a, v), "hand_means": _of_both_hands(path, a, "hands_mean", (45,)),
         "hand_components": _of_both_hands(path, a, "hands_components", (45, 45)),
-        "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": _four_heaviest(np.asarray(a["weights"], np.float32)),
+        "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": keep_heaviest(np.asarray(a["weights"], np.float32), INFLUENCES),
         "parents": _parents_of(a["kintree_table"]), "joint_names": joints.NAMES,
         "expression_names": tuple(names or (f"expression{i}" for i in range(expressions))),
         "jaw_actions": np.asarray(a.get("jaw_actions", np.zeros((expressions, 3))), np.float32).reshape(expressions, 3),
@@ -149,9 +151,9 @@ def _parents_of(kintree: np.ndarray) -> np.ndarray:
     return parents
 
 
-def _four_heaviest(weights: np.ndarray) -> np.ndarray:
-    """(V, 55) with at most four weights a row, renormalised: Unity and the browser skin with no more."""
-    keep = np.argsort(-weights, 1, kind="stable")[:, :4]
+def keep_heaviest(weights: np.ndarray, most: int) -> np.ndarray:
+    """(V, J), the most heavy of weights (V, J) of each row, renormalised."""
+    keep = np.argsort(-weights, 1, kind="stable")[:, :most]
     out = np.zeros_like(weights)
     np.put_along_axis(out, keep, np.take_along_axis(weights, keep, 1), 1)
     return out / out.sum(1, keepdims=True)
