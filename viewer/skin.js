@@ -136,14 +136,15 @@ export class Skin {
     }
     const { start, joint, delta } = correctives;
     for (let v = 0, n = rest.length / 3; v < n; v++) {
+      let x = rest[v * 3], y = rest[v * 3 + 1], z = rest[v * 3 + 2];
       for (let i = start[v]; i < start[v + 1]; i++) {
-        const t = joint[i] * 9;
-        for (let axis = 0, d = i * 27; axis < 3; axis++, d += 9) {
-          let sum = 0;
-          for (let c = 0; c < 9; c++) sum += delta[d + c] * turns[t + c];
-          rest[v * 3 + axis] += sum;
+        const t = joint[i] * 9, d = i * 27;
+        for (let c = 0; c < 9; c++) {
+          const turn = turns[t + c];
+          x += delta[d + c] * turn; y += delta[d + 9 + c] * turn; z += delta[d + 18 + c] * turn;
         }
       }
+      rest[v * 3] = x; rest[v * 3 + 1] = y; rest[v * 3 + 2] = z;
     }
   }
 
