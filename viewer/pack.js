@@ -15,24 +15,30 @@ export function packBody(avatar) {
   for (let e = 0; e < expressions.length; e++) {
     for (let i = start[e]; i < start[e + 1]; i++) moves.set([...delta.subarray(i * 3, i * 3 + 3), e], next[moved[i]]++ * 4);
   }
-  const skin = new Uint32Array((V + 1) * 4);
+  const rest = new Float32Array(V * 4).fill(1), skin = new Uint32Array((V + 1) * 4);
   for (let v = 0; v < V; v++) {
+    rest.set(vertices.subarray(v * 3, v * 3 + 3), v * 4);
     const j = skinIndex.subarray(v * 4, v * 4 + 4);
     const w = Array.from(skinWeight.subarray(v * 4, v * 4 + 4), (x) => Math.round(x * 65535));
     skin.set([j[0] | j[1] << 8 | j[2] << 16 | j[3] << 24, w[0] | w[1] << 16, w[2] | w[3] << 16], v * 4);
   }
   for (let v = 0; v <= V; v++) skin[v * 4 + 3] = first[v];
-  return { GsacRest: packRest(vertices), GsacSkin: skin, GsacMoves: moves };
+  return { GsacRest: rest, GsacSkin: skin, GsacMoves: moves };
 }
 
 /**
- * Places at rest, (V, 4).
- * @param {Float32Array} vertices (V, 3)
+ * The pose correctives, none where the body has none.
+ * @param {import("./reader.js").Avatar} avatar
+ * @returns {Object<string, Float32Array | Uint32Array>} by the buffer's name in the shader
  */
-export function packRest(vertices) {
-  const V = vertices.length / 3, rest = new Float32Array(V * 4).fill(1);
-  for (let v = 0; v < V; v++) for (let c = 0; c < 3; c++) rest[v * 4 + c] = vertices[v * 3 + c];
-  return rest;
+export function packCorrectives({ correctives }) {
+  if (!correctives) return {};
+  const { start, joint, delta } = correctives, pairs = new Float32Array(joint.length * 28);
+  for (let i = 0; i < joint.length; i++) {
+    pairs.set(delta.subarray(i * 27, i * 27 + 27), i * 28);
+    pairs[i * 28 + 27] = joint[i];
+  }
+  return { GsacPairs: pairs, GsacFirst: Uint32Array.from(start) };
 }
 
 /**

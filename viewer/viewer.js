@@ -197,7 +197,7 @@ export class Viewer {
   move() {
     if (this.renderer && "move" in this.renderer && !this.session) {
       this.skin.moveBones(this.pose);
-      if (this.avatar.correctives) this.skin.bend(this.pose);
+      this.skin.turn(this.pose);
       this.renderer.move(this.expression);
     } else {
       this.skin.update(this.pose, this.expression);

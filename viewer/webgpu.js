@@ -3,7 +3,7 @@
 
 import { EVEN_LIGHT } from "./binding.js";
 import { reachDevice } from "./device.js";
-import { indexQuads, packBody, packLevel, packRest } from "./pack.js";
+import { indexQuads, packBody, packCorrectives, packLevel } from "./pack.js";
 import { transformPoint } from "./projection.js";
 import { SHADERS } from "./shaders.js";
 
@@ -69,11 +69,18 @@ export class WebgpuRenderer {
     this.buffers = this.upload({ ...packBody(avatar), GsacWeights: this.weights, GsacBones: size(names.length * 48),
       GsacPosed: size(vertices.length / 3 * 16), GsacSplats: size(most * 48),
       GsacKeys: size(Math.max(...sorts.map((sort) => sort.keys)) * 4) });
+    // Where there are pose correctives, Correct makes of the rest places those that Skin takes.
+    if (avatar.correctives) {
+      Object.assign(this.buffers, this.upload({ ...packCorrectives(avatar), GsacTurns: skin.turns,
+        GsacBent: size(vertices.length / 3 * 16) }));
+    }
     this.corners = this.buffer(indexQuads(most), GPUBufferUsage.INDEX);
     // What draws each level of detail.
     this.plans = avatar.levels.map((level, i) => {
+      const skinGroups = Math.ceil(vertices.length / 3 / SKIN_THREADS);
       /** @type {Dispatch[]} */
-      const dispatches = [{ entry: "Skin", groups: Math.ceil(vertices.length / 3 / SKIN_THREADS) },
+      const dispatches = [...(avatar.correctives ? [{ entry: "Correct", groups: skinGroups }] : []),
+        { entry: "Skin", groups: skinGroups },
         { entry: "Bind", groups: Math.ceil(counts[i] / SKIN_THREADS) }, ...sorts[i].steps];
       return { count: counts[i], indexBits: sorts[i].indexBits, dispatches,
         buffers: { ...this.buffers, ...this.upload(packLevel(avatar, level)) } };
@@ -114,7 +121,8 @@ export class WebgpuRenderer {
     this.kernels = this.plans.map(({ dispatches, buffers }) => dispatches.map(({ entry }, i) => {
       const pipeline = kernels[entries.indexOf(entry)], parameters = { buffer: this.dispatchBuffer, offset: i * PARAMETER_BYTES,
         size: PARAMETER_BYTES };
-      return { pipeline, group: this.group(pipeline, entry, { ...buffers, parameters }) };
+      const bent = entry === "Skin" && buffers.GsacBent ? { GsacRest: buffers.GsacBent } : {};
+      return { pipeline, group: this.group(pipeline, entry, { ...buffers, ...bent, parameters }) };
     }));
     const parameters = { buffer: this.eyeBuffer };
     this.splats = this.plans.map(({ buffers }) => ({ pipeline: splats,
@@ -133,7 +141,7 @@ export class WebgpuRenderer {
   move(expression) {
     this.avatar.expressions.forEach((name, e) => { this.weights[e] = expression[name] || 0; });
     this.device.queue.writeBuffer(this.buffers.GsacBones, 0, this.skin.bones);
-    if (this.avatar.correctives) this.device.queue.writeBuffer(this.buffers.GsacRest, 0, packRest(this.skin.rest));
+    if (this.avatar.correctives) this.device.queue.writeBuffer(this.buffers.GsacTurns, 0, this.skin.turns);
     this.device.queue.writeBuffer(this.buffers.GsacWeights, 0, this.weights);
   }
 

@@ -18,41 +18,36 @@ from support.page_modules import copy_modules
 
 JS = r"""
 import fs from "node:fs";
-import { packRest } from "./pack.js";
 import { readAvatar } from "./reader.js";
 import { Pose, Skin } from "./skin.js";
 const [file, numbers] = process.argv.slice(2);
 const avatar = readAvatar(new Uint8Array(fs.readFileSync(file)).buffer), pose = new Pose(avatar), skin = new Skin(avatar);
 const turns = JSON.parse(numbers);
-const turn = () => turns.forEach(([x, y, z], joint) => pose.turn(joint, x, y, z));
-turn();
+turns.forEach(([x, y, z], joint) => pose.turn(joint, x, y, z));
 skin.update(pose, {});
 const vertices = Array.from(skin.vertices);
 pose.reset();
 skin.update(pose, {});
 const rest = Array.from(skin.vertices);
-turn();
-skin.bend(pose);
-console.log(JSON.stringify({ vertices, rest, bent: Array.from(packRest(skin.rest)) }));
+console.log(JSON.stringify({ vertices, rest }));
 """
 MIRROR = np.array([-1.0, 1, 1])
 """Unity's axes to ours."""
 
 
 def pose_in_viewer(file: Path, pose: np.ndarray, folder: Path) -> dict[str, np.ndarray]:
-    """`vertices` (V, 3) m posed, `rest` (V, 3) m in the T-pose, and `bent` (V, 4) at rest as the pose's correctives move it and the
-    graphics card is sent it. pose: (55, 3) axis-angle; folder: empty."""
+    """`vertices` (V, 3) m posed, and `rest` (V, 3) m in the T-pose. pose: (55, 3) axis-angle; folder: empty."""
     if not shutil.which("node"):
         pytest.skip("needs node")
     script = copy_modules(folder) / "bend.js"
     script.write_text(JS)
     done = subprocess.run(["node", str(script), str(file), json.dumps(pose.tolist())], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
-    return {name: np.array(values).reshape(-1, 4 if name == "bent" else 3) for name, values in json.loads(done.stdout).items()}
+    return {name: np.array(values).reshape(-1, 3) for name, values in json.loads(done.stdout).items()}
 
 
 def pose_in_unity(play: Callable, file: Path, pose: np.ndarray, folder: Path) -> np.ndarray:
-    """(V, 3) m posed, in our axes: the buffers that a frame of the scripts hands to the skinning on the GPU, skinned here.
+    """(V, 3) m posed, in our axes: the buffers that a frame of the scripts hands to Gsac.compute, its arithmetic done here.
 
     play: runs a command of programs/Play.cs; pose: (55, 3) axis-angle.
     """
@@ -61,7 +56,12 @@ def pose_in_unity(play: Callable, file: Path, pose: np.ndarray, folder: Path) ->
     np.savetxt(folder / "numbers", numbers[None], "%.9g")
     play("frame", file, folder / "numbers", folder / "frame")
     asked = mono.arrays(folder / "frame")
-    rest, bones = asked["GsacRest"].view(np.float32).reshape(-1, 4), asked["GsacBones"].view(np.float32).reshape(-1, 3, 4)
-    assert (rest[:, 3] == 1).all()
-    posed = skin(np.ascontiguousarray(rest[:, :3]), bones, avatar.skin_index, avatar.skin_weight)
+    assert asked["skins_bent"].tolist() == [1]
+    rest, pairs, turns = (asked[name].view(np.float32).reshape(-1, width)
+                          for name, width in (("GsacRest", 4), ("GsacPairs", 28), ("GsacTurns", 12)))
+    moves = np.einsum("cab,cb->ca", pairs[:, :27].reshape(-1, 3, 9), turns[pairs[:, 27].astype(int), :9])
+    bent = rest[:, :3].astype(np.float64)
+    np.add.at(bent, np.repeat(np.arange(len(bent)), np.diff(asked["GsacFirst"].view(np.int32))), moves)
+    bones = asked["GsacBones"].view(np.float32).reshape(-1, 3, 4)
+    posed = skin(bent.astype(np.float32), bones, avatar.skin_index, avatar.skin_weight)
     return (posed + [0, avatar.ground, 0]) * MIRROR

@@ -12,10 +12,10 @@ namespace Gsac
         public int[] Joint;   // C
         public float[] Delta; // C x 3 x 9, m
 
-        /// <summary>A joint's rotation, x y z w, as the nine numbers of it in `turns`, J x 9.</summary>
+        /// <summary>A joint's rotation, x y z w, as the nine numbers of it in `turns`, J x 12.</summary>
         public static void SetTurn(float[] turns, int joint, float x, float y, float z, float w)
         {
-            int o = joint * 9;
+            int o = joint * 12;
             turns[o] = -2 * (y * y + z * z);
             turns[o + 1] = 2 * (x * y - w * z);
             turns[o + 2] = 2 * (x * z + w * y);
@@ -25,30 +25,6 @@ namespace Gsac
             turns[o + 6] = 2 * (x * z - w * y);
             turns[o + 7] = 2 * (y * z + w * x);
             turns[o + 8] = -2 * (x * x + y * y);
-        }
-
-        /// <summary>Places of the vertices at rest, V x 3, as the turns, J x 9, move them, into `rows`, V x 4, as GsacPacking.Rest.</summary>
-        public void Move(float[] vertices, float[] turns, float[] rows)
-        {
-            for (int v = 0; v + 1 < Start.Length; v++)
-            {
-                float x = vertices[v * 3], y = vertices[v * 3 + 1], z = vertices[v * 3 + 2];
-                for (int i = Start[v]; i < Start[v + 1]; i++)
-                {
-                    int d = i * 27, t = Joint[i] * 9;
-                    for (int c = 0; c < 9; c++)
-                    {
-                        float turn = turns[t + c];
-                        x += Delta[d + c] * turn;
-                        y += Delta[d + 9 + c] * turn;
-                        z += Delta[d + 18 + c] * turn;
-                    }
-                }
-                rows[v * 4] = x;
-                rows[v * 4 + 1] = y;
-                rows[v * 4 + 2] = z;
-                rows[v * 4 + 3] = 1;
-            }
         }
 
         /// <summary>m: how far a vertex can be moved at most, whatever the pose.</summary>
