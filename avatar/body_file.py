@@ -36,7 +36,7 @@ SMPLX_KEYPOINT_VERTICES = {
 }
 """COCO-WholeBody keypoint -> vertex of SMPL-X's mesh: nose, eyes, ears, toes, heels and finger tips."""
 INFLUENCES = 4
-"""Joints that move a vertex at most: Unity, glTF and the browser skin with no more, and fit and training see what they will show."""
+"""Joints that move a vertex at most: Unity, glTF and the browser skin with no more, and fit and training see what these show."""
 SMPLX_VERTICES = 10475
 SMPLX_EXPRESSIONS = 100
 """The last shape directions of an official file are expressions: 300 + 100 in v1.1; older files have 10 + 10."""
@@ -75,7 +75,8 @@ def _fields(path: Path, a: dict[str, np.ndarray]) -> dict:
         "shapedirs": np.ascontiguousarray(shapedirs), "exprdirs": np.ascontiguousarray(exprdirs),
         "posedirs": _posedirs(path, a, v), "hand_means": _of_both_hands(path, a, "hands_mean", (45,)),
         "hand_components": _of_both_hands(path, a, "hands_components", (45, 45)),
-        "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": keep_heaviest(np.asarray(a["weights"], np.float32), INFLUENCES),
+        "J_regressor": np.asarray(a["J_regressor"], np.float32),
+        "weights": keep_heaviest(np.asarray(a["weights"], np.float32), INFLUENCES),
         "parents": _parents_of(a["kintree_table"]), "joint_names": joints.NAMES,
         "expression_names": tuple(names or (f"expression{i}" for i in range(expressions))),
         "jaw_actions": np.asarray(a.get("jaw_actions", np.zeros((expressions, 3))), np.float32).reshape(expressions, 3),

@@ -1,8 +1,8 @@
 """What a SMPL-X file loses on its way into an avatar: `python -m gsac.benchmarks.brought_body [SMPLX_NEUTRAL.npz]`.
 
-In strong poses, against all weights and correctives of the file: a body of the four or eight heaviest weights a vertex, as everything
-here draws four; the correctives as the avatar's file carries them; and none, as glTF and FBX have it. Without a file the weights are
-made up, the open body's smoothed over its mesh, for its own are four at most.
+In strong poses, against all weights and correctives of the file: a body of the four or eight heaviest weights a vertex (four are
+drawn); the correctives as the avatar's file carries them; and none, as glTF and FBX have it. Without a file the weights are made
+up, the open body's smoothed over its mesh, for its own are four at most.
 """
 
 from __future__ import annotations
