@@ -63,8 +63,14 @@ FAR_OFF = 5.0
 """Factor on the robust limit in the search."""
 STEPS = 12
 """Steps of each search, at most."""
-FAR, DOUBTS, ARC = 4.5, 3, np.radians(90)
-"""Of doubtful arms: spreads of a point (3.4 in clean turns), frames, turn without the hand (51 degrees; 114 on with a phone)."""
+FAR, ASTRAY, DOUBTS = 4.5, 2.5, 3
+"""Of doubtful arms: spreads from a point, in frames that may lie a little apart (3.4 in clean turns) and in frames on end (1.9; 3.2
+with a hand on the back that is taken for one before the belly), and frames."""
+ARC = np.radians(90)
+"""Turn without the hand: 51 degrees in clean turns, 114 on with a phone."""
+MOVED, LOST = 0.11, 0.03
+"""m by which a hand has moved on the trunk while it was not detected, and a share of the person's height, the spread of a wrist that
+nothing tells. Hanging arms move by 83 mm in turns of 20 frames, hands that went to the hips or the back meanwhile by 138 on."""
 SIGMA = {"elbow": 0.05, "wrist": 0.1}
 """m, added to the standard deviation of a hidden arm's joints; a hand's joints have the wrist's."""
 
@@ -235,20 +241,30 @@ class HiddenArms:
             widen_arm(sigma[stay.around], stay.side, share)
 
     def find_doubtful(self, problem: Problem, state: State, missing: np.ndarray | None) -> np.ndarray:
-        """(T, 2) bool, arms far from their points, or without a hand for more of the turn than a trunk covers it, that no stay has.
-        missing: (T, 2) bool, hands that were not detected; None: all were."""
+        """(T, 2) bool, arms far from their points, or without a hand that has moved meanwhile, or for more of the turn than a trunk
+        covers it, that no stay has. missing: (T, 2) bool, hands that were not detected; None: all were."""
         seen, turn = problem.seen, yaw(state.local[:, 0])
-        uv = problem.project(state, problem.locate_points(problem.skeleton.pose(state.local, state.shape), state))
-        far = np.linalg.norm(np.where(np.isfinite(seen.spread)[..., None], uv - seen.xy, 0), axis=-1) > FAR * seen.spread
+        chain = problem.skeleton.pose(state.local, state.shape)
+        uv = problem.project(state, problem.locate_points(chain, state))
+        off = np.linalg.norm(np.where(np.isfinite(seen.spread)[..., None], uv - seen.xy, 0), axis=-1) / seen.spread
         out = np.zeros((len(turn), 2), bool)
         lost = np.zeros_like(out) if missing is None else missing.astype(bool)
         for side in (0, 1):
-            for first, last in bridge(far[:, [ELBOW[side], WRIST[side]]].any(1)):
+            arm = off[:, [ELBOW[side], WRIST[side]]].max(1)
+            for first, last in [*bridge(arm > FAR), *bridge(arm > ASTRAY, 0)]:
                 out[first:last, side] |= last - first >= DOUBTS
             for first, last in bridge(lost[:, side]):
                 others, around = np.delete(lost[:, side], np.s_[first:last]), np.ptp(np.unwrap(turn[first:last]))
-                out[first:last, side] |= len(others) >= DOUBTS and 1 - others.mean() > TRUSTED and around > ARC
+                away = around > ARC or self.has_moved(problem, chain, side, first, last)
+                out[first:last, side] |= len(others) >= DOUBTS and 1 - others.mean() > TRUSTED and away
         return out & ~self.mark(len(turn))
+
+    def has_moved(self, problem: Problem, chain: Chain, side: int, first: int, last: int) -> bool:
+        """Whether a hand lies elsewhere on the trunk before and after frames, `last` exclusive, and nothing tells when it went."""
+        chest, wrist, ends = INDEX["spine3"], ARM_JOINTS[side, 3], [max(first - 1, 0), min(last, len(chain.place) - 1)]
+        before, after = np.einsum("tba,tb->ta", chain.world[ends, chest], chain.place[ends, wrist] - chain.place[ends, chest])
+        unknown = problem.seen.spread[first:last, WRIST[side]].max() > LOST * self.height
+        return bool(unknown and np.linalg.norm(after - before) > MOVED)
 
     def mark(self, frames: int) -> np.ndarray:
         """(T, 2) bool, frames with a hidden hand. frames: T."""
@@ -282,8 +298,8 @@ def hiding_pose(side: int, pose: tuple) -> np.ndarray:
     return np.radians(np.array(pose, float)) * ([1, 1, 1] if side == 0 else [1, -1, -1])
 
 
-def bridge(missing: np.ndarray) -> list[tuple[int, int]]:
-    """First and last frame, exclusive, of each run of missing (T,) bool; gaps of up to `BRIDGED` frames are part of it."""
+def bridge(missing: np.ndarray, bridged: int = BRIDGED) -> list[tuple[int, int]]:
+    """First and last frame, exclusive, of each run of missing (T,) bool; gaps of up to so many frames are part of it."""
     index = np.flatnonzero(missing)
-    parts = np.split(index, np.flatnonzero(np.diff(index) > BRIDGED + 1) + 1)
+    parts = np.split(index, np.flatnonzero(np.diff(index) > bridged + 1) + 1)
     return [(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from gsac.avatar import rotation
 from gsac.avatar.joints import INDEX
 from gsac.avatar.wholebody import INDEX as POINT
 from gsac.stages.findings import Code
@@ -66,6 +69,34 @@ def test_a_wrist_seen_elsewhere_for_some_frames_makes_its_arm_doubtful(fitted):
     found = arms.find_doubtful(problem, state, None)
     problem.seen.xy[:] = kept
     assert np.flatnonzero(found[:, 0]).tolist() == [2, 3, 4, 5, 6] and not found[:, 1].any()
+
+
+def test_an_arm_on_end_beside_its_points_is_doubtful_and_in_single_frames_is_not(fitted):
+    arms, problem, state = fitted
+    xy, spread, elbow = problem.seen.xy, problem.seen.spread, POINT["left_elbow"]
+    problem.seen.xy = problem.project(state, problem.locate_points(problem.skeleton.pose(state.local, state.shape), state))
+    problem.seen.spread = spread.copy()
+    problem.seen.spread[:, elbow] = 2.0
+    problem.seen.xy[[2, 3, 4, 8, 11], elbow] += (6.4, 0)
+    found = arms.find_doubtful(problem, state, None)
+    problem.seen.xy, problem.seen.spread = xy, spread
+    assert np.flatnonzero(found[:, 0]).tolist() == [2, 3, 4] and not found[:, 1].any()
+
+
+@pytest.mark.parametrize("bend, told, doubted", [(1.5, False, True), (1.5, True, False), (0.1, False, False)])
+def test_a_hand_that_moved_while_nothing_told_where_it_was_is_doubted(fitted, bend, told, doubted):
+    arms, problem, state = fitted
+    missing = np.zeros((FRAMES, 2), bool)
+    missing[5:7, 0] = True
+    moved = replace(state, local=state.local.copy())
+    moved.local[6:, INDEX["left_elbow"]] = rotation.exp(np.array([0, -bend, 0])) @ state.local[6:, INDEX["left_elbow"]]
+    xy, spread = problem.seen.xy, problem.seen.spread
+    problem.seen.xy = problem.project(moved, problem.locate_points(problem.skeleton.pose(moved.local, moved.shape), moved))
+    problem.seen.spread = spread.copy()
+    problem.seen.spread[5:7, POINT["left_wrist"]] = 0.01 * arms.height if told else np.inf
+    found = arms.find_doubtful(problem, moved, missing)
+    problem.seen.xy, problem.seen.spread = xy, spread
+    assert np.flatnonzero(found[:, 0]).tolist() == ([5, 6] if doubted else []) and not found[:, 1].any()
 
 
 def test_the_sigma_of_a_doubtful_arm_is_raised_in_its_frames_alone():
