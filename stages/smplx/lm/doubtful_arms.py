@@ -1,8 +1,9 @@
 """Arms that the pictures contradict, or do not tell: they are said, and moved where another pose is clearly right.
 
-An arm is doubtful where its points lie elsewhere, where its hand is seen although it lies inside the trunk, where its hand has
-moved while nothing told where it was, or where its hand is out of sight for more of a turn than a trunk covers. It is then searched
-again from the poses that people take; one that explains points and mask much better takes its place.
+An arm is doubtful where its points lie elsewhere for some frames, or in one in which the mask shows a limb that the body does not
+cover, where its hand is seen although it lies inside the trunk, where its hand has moved while nothing told where it was, or where
+its hand is out of sight for more of a turn than a trunk covers. It is then searched again from the poses that people take; one that
+explains points and mask much better takes its place.
 T frames; sides are 0 left, 1 right.
 """
 
@@ -10,11 +11,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from gsac.avatar import rotation
 from gsac.avatar.joints import INDEX
 from gsac.avatar.yaw import yaw
+from gsac.avatar.zbuffer import silhouette
 from gsac.stages.smplx.jacobians import Chain
 from gsac.stages.smplx.lm.hidden_arms import (
     ARM_JOINTS,
@@ -35,11 +38,15 @@ from gsac.stages.smplx.lm.hidden_arms import (
     isolate_state,
 )
 from gsac.stages.smplx.lm.problem import Problem
-from gsac.stages.smplx.state import State
+from gsac.stages.smplx.state import State, to_params
 
 FAR, ASTRAY, DOUBTS = 4.5, 2.5, 3
 """Of doubtful arms: spreads from a point, in frames that may lie a little apart (3.4 in clean turns) and in frames on end (1.9; 3.2
 with a hand on the back that is taken for one before the belly), and frames."""
+ALONE, BESIDE, UNCOVERED = 3.0, 0.02, 0.0012
+"""Of an arm that is doubtful in one frame: spreads from a point; distance from the body, and area beyond it, of the mask's part
+that the body leaves, as shares of the person's height and its square. An arm on its way to hip or hair is 3.4 on off and leaves
+0.0017 on; in clean turns one may be 3.5 off, or the body leave 0.0015, but not both."""
 ARC = np.radians(90)
 """Turn without the hand: 51 degrees in clean turns, 114 on with a phone."""
 MOVED, LOST = 0.11, 0.03
@@ -57,7 +64,7 @@ at most where nothing tells where a hand is."""
 
 
 def find_contradicted(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray) -> np.ndarray:
-    """(T, 2) bool, arms far from their points, or inside the trunk although their hand is seen.
+    """(T, 2) bool, arms far from their points, or beside the mask too, or inside the trunk although their hand is seen.
 
     missing: (T, 2) bool, hands that were not detected.
     """
@@ -70,7 +77,24 @@ def find_contradicted(arms: HiddenArms, problem: Problem, state: State, missing:
         sunk = ~missing[:, side] & np.isfinite(find_near(arms, state, chain, side))
         for first, last in [*bridge(arm > FAR), *bridge(arm > ASTRAY, 0), *bridge(sunk, 0)]:
             out[first:last, side] |= last - first >= DOUBTS
+        far = np.flatnonzero(arm > ALONE)
+        out[far, side] |= measure_uncovered(arms, problem, state, far) > UNCOVERED
     return out & ~arms.mark(len(out))
+
+
+def measure_uncovered(arms: HiddenArms, problem: Problem, state: State, frames: np.ndarray) -> np.ndarray:
+    """(F,) area of the mask beside the body, as a share of the person's height squared; 0 without a mask. frames: (F,)."""
+    out = np.zeros(len(frames))
+    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
+    for i, t in enumerate(frames.tolist()):
+        outline = problem.seen.outlines[t]
+        h, w = outline.mask.shape
+        camera = params.camera(round(w * outline.scale), round(h * outline.scale)).scaled(w, h)
+        body = silhouette(problem.body.posed(params, [t])[0][0], problem.body.faces, camera)
+        away = cv2.distanceTransform((body == 0).astype(np.uint8), cv2.DIST_L2, 5)
+        pixel = outline.scale / arms.height
+        out[i] = (outline.mask & (away * pixel > BESIDE)).sum() * pixel**2
+    return out
 
 
 def find_untold(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray) -> np.ndarray:
@@ -109,8 +133,8 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     """The state with doubtful arms in poses that explain points and mask clearly better, where there are any; and (T, 2) bool, the
     doubtful arms that no stay has.
 
-    missing: (T, 2) bool, hands that were not detected; None: all were. An arm that is doubtful for much of the clip is left:
-    nothing tells which of its frames are right.
+    missing: (T, 2) bool, hands that were not detected; None: all were. An arm that is doubtful or without a hand for
+    much of the clip is left: nothing tells which of its frames are right.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     wrong = find_contradicted(arms, problem, state, missing)
@@ -118,7 +142,8 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     if problem.seen.seconds is None:
         return state, doubtful
     settled = replace(state, local=state.local.copy())
-    for side in np.flatnonzero(doubtful.any(0) & (1 - doubtful.mean(0) > TRUSTED)).tolist():
+    trusted = 1 - np.maximum(doubtful.mean(0), missing.mean(0)) > TRUSTED
+    for side in np.flatnonzero(doubtful.any(0) & trusted).tolist():
         for first, last in bridge(doubtful[:, side]):
             stay = Stay(side, first, last, *find_around(problem.seen.seconds, first, last))
             shown, contradicted = ~missing[stay.around, side], bool(wrong[first:last, side].any())

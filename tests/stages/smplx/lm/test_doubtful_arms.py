@@ -134,6 +134,22 @@ def test_a_hand_that_is_seen_on_the_back_and_fitted_inside_the_trunk_is_moved_to
     assert before.min() > 0.1 and np.median(after) < 0.08 and after.max() < 0.5 * before.min()
 
 
+@pytest.mark.parametrize("covered", [True, False])
+def test_an_arm_beside_its_points_in_one_frame_is_doubted_only_where_the_body_leaves_a_part_of_the_mask(hand_on_back, covered):
+    arms, problem, truth = hand_on_back
+    state, frame, elbow = replace(truth, local=truth.local.copy()), 13, POINT["left_elbow"]
+    if not covered:
+        state.local[frame, INDEX["left_shoulder"]] = rotation.exp(np.array([0, 0, -1.5]))
+    xy, spread = problem.seen.xy, problem.seen.spread
+    problem.seen.xy = problem.project(state, problem.locate_points(problem.skeleton.pose(state.local, state.shape), state))
+    problem.seen.spread = spread.copy()
+    problem.seen.spread[frame, elbow] = 2.0
+    problem.seen.xy[frame, elbow] += (6.4, 0)
+    found = find_contradicted(arms, problem, state, NONE)
+    problem.seen.xy, problem.seen.spread = xy, spread
+    assert bool(found[frame, 0]) is not covered and not np.delete(found, frame, 0).any()
+
+
 def test_an_arm_as_the_pictures_show_it_keeps_still(hand_on_back):
     state, doubtful = settle_doubtful(*hand_on_back, None)
     assert not doubtful.any() and np.array_equal(state.local, hand_on_back[2].local)
