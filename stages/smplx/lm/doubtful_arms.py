@@ -146,7 +146,7 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     for side in np.flatnonzero(doubtful.any(0) & trusted).tolist():
         for first, last in bridge(doubtful[:, side]):
             stay = Stay(side, first, last, *find_around(problem.seen.seconds, first, last))
-            shown, contradicted = ~missing[stay.around, side], bool(wrong[first:last, side].any())
+            shown, contradicted = ~missing[stay.around, side], wrong[first:last, side].sum() >= DOUBTS
             settled.local[stay.around] = search(arms, problem, settled, stay, shown, contradicted)
     return settled, doubtful
 
@@ -154,8 +154,8 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
 def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, contradicted: bool) -> np.ndarray:
     """Joint rotations (F, J, 3, 3) of the stay's frames: as they are unless others are clearly better.
 
-    shown: (F,) bool, of the hand; contradicted: whether the pictures contradict what is there. Else others must be better than what
-    it comes to when it may move as freely.
+    shown: (F,) bool, of the hand; contradicted: whether the pictures contradict what is there for some frames. Else others must be
+    better than what it comes to when it may move as freely.
     """
     def fit(trials: list[State], steps: int) -> list[tuple[float, State]]:
         found = []
