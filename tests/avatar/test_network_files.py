@@ -5,11 +5,11 @@ import pytest
 from gsac.avatar.network_files import MODELS, ModelMissingError, model_path
 
 
-def test_each_model_names_its_member_digest_and_licence():
+def test_each_model_names_its_wheel_member_digest_and_licence():
     assert len({model.sha256 for model in MODELS.values()}) == len(MODELS)
     for model in MODELS.values():
         assert re.fullmatch(r"[0-9a-f]{64}", model.sha256)
-        assert model.member.endswith(".tflite") and model.licence == "Apache-2.0" and model.what
+        assert model.wheel_member.endswith(".tflite") and model.licence == "Apache-2.0" and model.what
 
 
 def test_a_missing_model_file_says_what_to_run(tmp_path):

@@ -97,8 +97,7 @@ def test_repair_pulls_damaged_model_files_again_also_those_found_before(cache, g
     path = Store(cache).root / "models" / content / "net"
     path.parent.mkdir()
     path.write_bytes(b"weighty")
-    net = network_files.ModelFile(network_files.WHEEL, "net", content, "Apache-2.0", "a test")
-    monkeypatch.setattr(network_files, "MODELS", {"net": net})
+    monkeypatch.setattr(network_files, "MODELS", {"net": network_files.ModelFile("net", content, "Apache-2.0", "a test")})
     pulled = []
     monkeypatch.setattr(ModelStore, "pull", lambda self, names, say: pulled.extend(names))
     if before:

