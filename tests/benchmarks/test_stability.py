@@ -228,7 +228,7 @@ def test_the_check_looks_as_far_as_the_body_and_no_farther_than_there_is_hope(tm
 
     monkeypatch.setattr(trial, "run_stage", run)
     monkeypatch.setattr(trial, "check_clip", lambda clip, points, said: ClipCheck(None, None, said))
-    ports = {port: tmp_path for port in ("split/clip.json", "keypoints/keypoints.npz")}
+    ports = dict.fromkeys(("split/clip.json", "keypoints/keypoints.npz"), tmp_path)
     fails, found = [], [("keypoints", "repeated", "news"), ("smplx", "arm_doubtful", "poorer")]
     assert trial._check(ports, [finding("blurred", [1])], tmp_path) == ["arm_doubtful", "blurred"]
     assert ran[-1] == "smplx" and "train" not in ran
