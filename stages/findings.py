@@ -44,6 +44,9 @@ class Code(Enum):
                                 "Film one whole person from head to feet, in the picture all the time.", Severity.HOPELESS)
     SMALL_PERSON = Wording("The person is only {figure:.0f} px tall in the picture: the avatar will be coarse.",
                            "Go closer, or turn the phone upright, until the person fills most of the picture's height.")
+    LIES_ON_SIDE = Wording("The person lies on the side in {frames}: was the phone held across?",
+                           "Turn the clip by a quarter in the phone's gallery, so that the person stands, and give it again.",
+                           Severity.WRONG)
     SECOND_PERSON = Wording("A second person was seen in {frames}; only the first one is followed.",
                             "Keep others out of the picture or cut these frames.")
     CUT_OFF = Wording("The edge of the picture cuts off {parts}; what lies outside is guessed.",

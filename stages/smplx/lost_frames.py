@@ -9,8 +9,8 @@ from gsac.stages.smplx.state import Fit
 
 POOR_IOU = 0.7
 LOOSE_IOU, LOOSE = 0.87, 3
-"""IoU that is low though the frame is kept, and frames of it that are news: nine clean clips have 0.92 and more in the median and one
-frame of 0.89; pictures that mix two or three moments, 18 degrees of the turn apart, have 0.84 to 0.88 in the median."""
+"""IoU that is low though the frame is kept, and frames of it that are news: seven clean clips have 0.92 and more in the median, and
+one frame of 0.89; pictures that mix two or three moments, 18 degrees of the turn apart, 0.84 to 0.88 in the median."""
 FALL = 0.12
 """A frame's IoU is lost this far below the clip's median: a wide coat lowers it in every frame, a wrong pose in one."""
 REPEATED = "the picture is an earlier frame's"
