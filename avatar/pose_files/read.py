@@ -66,9 +66,12 @@ def read_start(path: Path, frames: int, hand_means: np.ndarray | None = None) ->
 def read_poses(path: Path) -> tuple[Poses, np.ndarray | None]:
     """The poses of n frames, and their numbers (n,) where the file has them. Raises ArtifactError."""
     arrays, numbers = read_frames(path)
+    # Text, such as a gender, and what is empty say nothing of poses.
+    arrays = {name: array for name, array in arrays.items() if array.dtype.kind in "iuf" and array.ndim and array.size}
     read = next((read for takes, read in LAYOUTS.values() if takes(arrays)), None)
     if read is None:
-        raise ArtifactError(f"{path}: its arrays {', '.join(sorted(arrays))} are of none of the layouts {', '.join(LAYOUTS)}")
+        raise ArtifactError(f"{path}: its arrays of numbers ({', '.join(sorted(arrays)) or 'none'}) are of none of the layouts "
+                            f"{', '.join(LAYOUTS)}")
     try:
         poses = read(arrays)
     except (ArtifactError, ValueError) as e:
