@@ -9,7 +9,7 @@ from gsac.avatar.artifacts import frame_paths
 from gsac.avatar.body import Body
 from gsac.avatar.instant_hmr import InstantHmr
 from gsac.avatar.onnx_network import NetworkError
-from gsac.avatar.pose_files.read import Start, read_hand_means, read_start
+from gsac.avatar.pose_files.read import Start, read_start
 from gsac.stages.body_choice import OPEN
 from gsac.stages.brought_file import NONE, read_brought
 from gsac.stages.contract import BadInput, Job
@@ -21,15 +21,15 @@ from gsac.stages.smplx.start.network import look
 def bring_start(job: Job, body: Body, sightings: Sightings, outlines: list[Outline]) -> Start | None:
     """The poses on the clip's frames; None without `smplx.start`. Raises BadInput. outlines: of the T frames.
 
-    The open body has shapes of its own and no mean hand: a file's betas are left out, and its fingers bend from straight ones.
+    Fingers are added to the body's mean hands. The open body has shapes of its own and no mean hand: a file's betas are left out,
+    and its fingers bend from straight ones.
     """
     if job.config.start == NONE:
         return None
     if not zipfile.is_zipfile(job.models[job.config.start]):
         return look(_open(job), body, frame_paths(job.inputs["split/frames"]), outlines, sightings, job.progress)
     own, frames = job.config.body_model == OPEN, len(outlines)
-    means = None if own else read_brought(job, "smplx", "body_model", read_hand_means)
-    start = read_brought(job, "smplx", "start", lambda path: read_start(path, frames, means))
+    start = read_brought(job, "smplx", "start", lambda path: read_start(path, frames, body.hand_means, body.hand_components))
     return replace(start, betas=None) if own else start
 
 
