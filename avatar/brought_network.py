@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.onnx_network import NetworkError, open_network
+from gsac.avatar.onnx_network import NetworkError, open_network, run_checked, run_session
 
 Shape = list[int | str | None]
 """Lengths; a name or None stands for any length."""
@@ -20,7 +20,7 @@ class BroughtNetwork:
     """An open network."""
 
     run: Callable[[np.ndarray], np.ndarray]
-    """(...) float32 -> its output (...) float32."""
+    """(...) float32 -> its output (...) float32. Raises NetworkError where it cannot be run, or gives NaN."""
     given: Shape | None
     """Of its input; None where the file does not tell, as TorchScript."""
     gives: Shape | None
@@ -33,15 +33,14 @@ class BroughtNetwork:
 
 def open_brought(path: Path, name: str) -> BroughtNetwork:
     """Opens the file that was brought under a name. Raises NetworkError where it is neither ONNX nor TorchScript."""
-    return _open_torchscript(path, name) if zipfile.is_zipfile(path) else _open_onnx(path, name)
+    network = _open_torchscript(path, name) if zipfile.is_zipfile(path) else _open_onnx(path, name)
+    return replace(network, run=lambda ready: run_checked(lambda given: [network.run(given)], ready, name)[0])
 
 
 def _open_onnx(path: Path, name: str) -> BroughtNetwork:
     session = open_network(path, name)
     given, gives = session.get_inputs()[0], session.get_outputs()[0]
-    kind = np.float16 if given.type == "tensor(float16)" else np.float32
-    return BroughtNetwork(lambda ready: np.asarray(session.run([gives.name], {given.name: ready.astype(kind)})[0], np.float32),
-                          given.shape, gives.shape)
+    return BroughtNetwork(lambda ready: run_session(session, ready)[0], given.shape, gives.shape)
 
 
 def _open_torchscript(path: Path, name: str) -> BroughtNetwork:

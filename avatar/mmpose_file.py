@@ -16,6 +16,8 @@ import numpy as np
 from gsac.avatar.artifacts import ArtifactError
 
 POINTS = 133
+MOST_BYTES = 512 << 20
+"""Of a file: the key points of a clip have far less."""
 
 
 def read_mmpose(path: Path) -> dict[int, np.ndarray]:
@@ -36,6 +38,9 @@ def read_mmpose(path: Path) -> dict[int, np.ndarray]:
 
 
 def _load(file: Path) -> list:
+    size = file.stat().st_size
+    if size > MOST_BYTES:
+        raise ArtifactError(f"{file}: has {size} bytes; key points of a clip have at most {MOST_BYTES}")
     try:
         content = json.loads(file.read_bytes())
     except (ValueError, RecursionError) as error:

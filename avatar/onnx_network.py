@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -14,6 +17,29 @@ PREFERRED = ("CUDAExecutionProvider", "CPUExecutionProvider")
 
 class NetworkError(ValueError):
     """A brought file is not a network that can be run. The message names it and says what to do."""
+
+
+def run_checked(run: Callable[[np.ndarray], list[np.ndarray]], ready: np.ndarray, name: str) -> list[np.ndarray]:
+    """What the network that was brought under a name makes of an input (...), arrays (...). Raises NetworkError where it cannot be
+    run on it, or gives NaN."""
+    try:
+        outputs = run(ready)
+    except NetworkError:
+        raise
+    except Exception as error:  # onnxruntime's and torch's own classes share no narrower base
+        said = " ".join(str(error).strip().splitlines()[-3:]) or type(error).__name__
+        raise NetworkError(f"model file {name} cannot be run on an input of shape {list(ready.shape)} ({said}); export it for one "
+                           f"picture at a time, then `gsac models add {name} FILE --force`") from error
+    if any(np.isnan(output).any() for output in outputs):
+        raise NetworkError(f"model file {name} gives numbers that are none (NaN); export it again, in 32 bits if it has 16")
+    return outputs
+
+
+def run_session(session: InferenceSession, ready: np.ndarray) -> list[np.ndarray]:
+    """All outputs (...) float32 for the one input (...), in the kind of number that the network takes."""
+    given = session.get_inputs()[0]
+    kind = np.float16 if given.type == "tensor(float16)" else np.float32
+    return [np.asarray(output, np.float32) for output in session.run(None, {given.name: ready.astype(kind)})]
 
 
 def open_network(path: Path, name: str, threads: int = 0) -> InferenceSession:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.onnx_network import NetworkError, open_network
+from gsac.avatar.onnx_network import NetworkError, open_network, run_checked, run_session
 
 MEAN = np.array([123.675, 116.28, 103.53], np.float32)
 DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)
@@ -25,8 +25,7 @@ class SimccNetwork:
 
     def __init__(self, path: Path):
         self._session = open_network(path, "onnx-wholebody")
-        self._input = self._session.get_inputs()[0]
-        shape, outputs = self._input.shape, self._session.get_outputs()
+        shape, outputs = self._session.get_inputs()[0].shape, self._session.get_outputs()
         if len(shape) != 4 or not all(isinstance(n, int) for n in shape[2:]) or len(outputs) != 2:
             raise NetworkError(f"model file onnx-wholebody has input {shape} and {len(outputs)} outputs; expected a SimCC "
                                "network of 133 points: input [N, 3, height, width] and the two outputs simcc_x, simcc_y")
@@ -42,9 +41,11 @@ class SimccNetwork:
         centres[:, 2] += to_frame[:, :2] @ [0.5, 0.5] - 0.5
         crop = cv2.warpAffine(image, centres, (self.width, self.height), flags=cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR)
         ready = ((crop - MEAN) / DEVIATION).transpose(2, 0, 1)[None].astype(np.float32)
-        x, y = map(np.asarray, self._session.run(None, {self._input.name: ready}))
-        if x.shape[1] != POINTS:
-            raise NetworkError(f"model file onnx-wholebody gives {x.shape[1]} points; expected COCO-WholeBody's {POINTS}")
+        x, y = run_checked(lambda given: run_session(self._session, given), ready, "onnx-wholebody")
+        if x.shape[:2] != (1, POINTS) or y.shape[:2] != (1, POINTS) or x.size * self.height != y.size * self.width:
+            raise NetworkError(f"model file onnx-wholebody gives arrays of shapes {x.shape} and {y.shape}; expected simcc_x "
+                               f"(1, {POINTS}, {2 * self.width}) and simcc_y (1, {POINTS}, {2 * self.height}), of "
+                               f"COCO-WholeBody's {POINTS} points")
         xy, peaks = decode(x[0], y[0], self.width, self.height)
         return xy @ to_frame[:, :2].T + to_frame[:, 2], peaks
 

@@ -151,7 +151,7 @@ def _moments_of_correctives(weights: np.ndarray, posedirs: np.ndarray, matrix: s
 
     weights: (V, J); posedirs: (V, 3, 486) m; matrix: (P, V) weights of the points over the vertices.
     """
-    out = np.zeros((matrix.shape[0], weights.shape[1], 3, DIRECTIONS), np.float32)
+    out = np.zeros((len(matrix.indptr) - 1, weights.shape[1], 3, DIRECTIONS), np.float32)
     for p in range(len(out)):
         span = slice(matrix.indptr[p], matrix.indptr[p + 1])
         vertices = matrix.indices[span]

@@ -36,8 +36,12 @@ def cut_fixtures(run: RunFolder, project: Project, folder: Path, frames: int | N
     steps = [step for step in project.graph.steps.values() if all(run.path(port).exists() for port in step.deps)]
     if not steps:
         raise BadInput(f"{run.root} holds neither its clip nor a stage's outputs; `gsac run CLIP --out {run.root}` makes them")
+    ports = dict.fromkeys(port for step in steps for port in step.deps)
+    held = [count for port in ports if port != CLIP and (count := count_frames(run.path(port))) is not None]
+    if frames is not None and held and frames > held[0]:
+        raise BadInput(f"--frames {frames}: the run has {held[0]} frames; leave --frames out to keep all")
     digests = {}
-    for port in dict.fromkeys(port for step in steps for port in step.deps):
+    for port in ports:
         copy_frames(run.require(port), folder / port, None if port == CLIP else frames)
         digests[port] = tree_digest(folder / port)[0]
     configs = resolve(project, run.params)

@@ -34,7 +34,10 @@ def read_frames(path: Path) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
         arrays = read_npz(path)
     except (NpzError, OSError, zipfile.BadZipFile) as e:
         raise ArtifactError(f"{path}: not a readable npz, or zip of one npz or json a frame ({e})") from e
-    return arrays, arrays.pop(FRAME_IDS).ravel().astype(int) if FRAME_IDS in arrays else None
+    numbers = arrays.pop(FRAME_IDS, None)
+    if numbers is not None and (numbers.dtype.kind not in "iu" or not numbers.size):
+        raise ArtifactError(f"{path}: {FRAME_IDS} holds no whole numbers; expected the number of each pose's frame")
+    return arrays, None if numbers is None else numbers.ravel().astype(int)
 
 
 def _stack(path: Path, file: zipfile.ZipFile, names: list[str]) -> tuple[dict[str, np.ndarray], np.ndarray]:

@@ -24,6 +24,7 @@ def assemble(parts: dict[str, np.ndarray], count: int, transl: np.ndarray | None
     """Poses from SMPL-X's parts. Raises ArtifactError.
 
     parts: a name of POSE_PARTS -> (n, k * 3) rad; count: n; transl: (n, 3) m; betas: (n, B) or (B,), of which the mean is taken.
+    Each may have dimensions of length 1 between.
     """
     vectors = np.full((count, J, 3), np.nan)
     for name, values in parts.items():
@@ -32,7 +33,9 @@ def assemble(parts: dict[str, np.ndarray], count: int, transl: np.ndarray | None
         if values.size != count * size * 3:
             raise ArtifactError(f"{name} has {values.size // count} numbers a frame; expected {size * 3}, rotation vectors")
         vectors[:, joints] = values.reshape(count, size, 3)
-    if transl is not None and transl.shape != (count, 3):
+    if transl is not None and (len(transl) != count or transl.size != 3 * count):
         raise ArtifactError(f"the translation has shape {transl.shape}; expected {(count, 3)}")
-    return Poses(vectors, np.full((count, 3), np.nan) if transl is None else transl.astype(float),
-                 None if betas is None else np.atleast_2d(betas).mean(0))
+    if betas is not None and not np.isfinite(betas).all():
+        raise ArtifactError("the shape has a number that is not finite")
+    return Poses(vectors, np.full((count, 3), np.nan) if transl is None else transl.reshape(count, 3).astype(float),
+                 None if betas is None else betas.reshape(-1, betas.shape[-1]).mean(0))

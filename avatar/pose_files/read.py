@@ -69,11 +69,14 @@ def read_poses(path: Path, hand_components: np.ndarray | None = None) -> tuple[P
     hand_components: (2, 45, 45) rad, the body's.
     """
     arrays, numbers = read_frames(path)
+    # Text, such as a gender, and what is empty say nothing of poses.
+    arrays = {name: array for name, array in arrays.items() if array.dtype.kind in "iuf" and array.ndim and array.size}
     if hand_components is not None:
         arrays |= expand_hands(arrays, hand_components)
     read = next((read for takes, read in LAYOUTS.values() if takes(arrays)), None)
     if read is None:
-        raise ArtifactError(f"{path}: its arrays {', '.join(sorted(arrays))} are of none of the layouts {', '.join(LAYOUTS)}")
+        raise ArtifactError(f"{path}: its arrays of numbers ({', '.join(sorted(arrays)) or 'none'}) are of none of the layouts "
+                            f"{', '.join(LAYOUTS)}")
     try:
         poses = read(arrays)
     except (ArtifactError, ValueError) as e:

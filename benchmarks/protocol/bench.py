@@ -14,6 +14,7 @@ from pathlib import Path
 
 from gsac.benchmarks import training
 from gsac.benchmarks.protocol.protocols import PROTOCOLS, Protocol
+from gsac.pipeline.data_sets.write import CAMERAS, SPLIT
 from gsac.stages.contract import BadInput
 
 
@@ -38,6 +39,12 @@ def main(argv: list[str] | None = None) -> int:
     from gsac.pipeline.reporter import PlainReporter
 
     say, protocol = PlainReporter(sys.stderr), PROTOCOLS[options.name]
+    if options.repeats < 1:
+        raise BadInput(f"--repeats {options.repeats}: expected 1 or more")
+    names = [folder.resolve().name for folder in options.clips]
+    if len(set(names)) < len(names):
+        raise BadInput(f"two folders are called {next(n for n in names if names.count(n) > 1)}; each subject's row needs a name of "
+                       "its own")
     clips = {folder.resolve(): read_split(folder) for folder in options.clips}  # a wrong one is told before hours pass
     rows: dict[str, list[dict]] = {}
     values = {"steps": options.steps, "recipe": options.recipe, "device": options.device}
@@ -57,13 +64,23 @@ def main(argv: list[str] | None = None) -> int:
 
 def read_split(folder: Path) -> dict:
     """split.json of a folder that was imported. Raises BadInput where it names no test frames."""
-    path = folder / "split.json"
+    split = read_imported(folder / SPLIT, {"fps": (int, float), "train": list, "test": list})
+    if not split["test"] or not split["train"]:
+        raise BadInput(f"{folder / SPLIT}: names no frames to test; this subject has no published split")
+    return split
+
+
+def read_imported(path: Path, kinds: dict[str, type | tuple[type, ...]]) -> dict:
+    """The content of a JSON file that `gsac data import` wrote. kinds: of its fields. Raises BadInput where it is another."""
     if not path.is_file():
         raise BadInput(f"{path}: is missing; give a folder that `gsac data import` wrote")
-    split = json.loads(path.read_text())
-    if not split["test"] or not split["train"]:
-        raise BadInput(f"{path}: names no frames to test; this subject has no published split")
-    return split
+    try:
+        content = json.loads(path.read_text())
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"{path}: is not readable as JSON ({error}); import the data again") from error
+    if not isinstance(content, dict) or not all(isinstance(content.get(name), kind) for name, kind in kinds.items()):
+        raise BadInput(f"{path}: is not what `gsac data import` writes; expected {', '.join(kinds)}. Import the data again")
+    return content
 
 
 def settings(folder: Path, split: dict, protocol: Protocol) -> tuple[str, ...]:
@@ -71,9 +88,9 @@ def settings(folder: Path, split: dict, protocol: Protocol) -> tuple[str, ...]:
     height = "null" if protocol.height is None else str(protocol.height)
     out = ["segment.method=brought", f"split.photo_fps={split['fps']}", "split.count=null", "split.crop=false",
            f"split.max_height={height}"]
-    cameras = folder / "cameras.json"
+    cameras = folder / CAMERAS
     if cameras.is_file():
-        camera = json.loads(cameras.read_text())
+        camera = read_imported(cameras, {"height": int, "focal": list})
         scale = 1.0 if protocol.height is None else min(1.0, protocol.height / camera["height"])
         out.append(f"smplx.focal_px={scale * sum(camera['focal']) / 2}")
     return tuple(out)
@@ -81,5 +98,5 @@ def settings(folder: Path, split: dict, protocol: Protocol) -> tuple[str, ...]:
 
 def number_test(split: dict) -> str:
     """`train.heldout_frames`: numbers of the test frames among all, as split numbers them."""
-    order = {name: at for at, name in enumerate(sorted({*split["train"], *split["test"]}))}
+    order = {name: at for at, name in enumerate(sorted({*split["train"], *split["test"]}, key=int))}
     return ",".join(str(order[name]) for name in split["test"])

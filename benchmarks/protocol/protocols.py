@@ -75,7 +75,7 @@ PROTOCOLS = {
     "instant-avatar": Protocol(SNAPSHOT, 540, False, True, 1, "lpips_alex_unscaled", {
         "male-3-casual": _instant(29.65, 0.9731, 0.0192), "male-4-casual": _instant(27.97, 0.9649, 0.0346),
         "female-3-casual": _instant(27.90, 0.9722, 0.0249), "female-4-casual": _instant(28.92, 0.9692, 0.0180)}),
-    "3dgs-avatar": Protocol(SNAPSHOT, 540, True, False, 1, "lpips_vgg_black", {
+    "3dgs-avatar": Protocol(SNAPSHOT, 540, True, False, 1, "lpips_alex_black", {
         "male-3-casual": _given((30.57, 0.9581, 0.0209), (30.92, 0.9816, 0.0152)),
         "male-4-casual": _given((33.16, 0.9678, 0.0157), (33.78, 0.9753, 0.0237)),
         "female-3-casual": _given((34.28, 0.9724, 0.0149), (33.89, 0.9854, 0.0142)),

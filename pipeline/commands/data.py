@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
 from gsac.pipeline.commands.options import progress_reporter
 from gsac.pipeline.outcomes import ExitCode
+from gsac.stages.contract import BadInput
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -25,11 +27,19 @@ def do_import(arguments: argparse.Namespace) -> ExitCode:
     from gsac.pipeline.data_sets.read import read_data_set
     from gsac.pipeline.data_sets.write import write_clip
 
-    reporter = progress_reporter(arguments)
+    reporter, there, made = progress_reporter(arguments), [], 0
     for clip in read_data_set(arguments.name, arguments.path):
         folder = arguments.out / clip.name
+        if folder.exists():
+            there.append(folder)
+            reporter.note(f"{folder} is there already and left as it is")
+            continue
         write_clip(clip, folder)
+        made += 1
         test = f", {len(clip.test)} of them to test ({clip.split_source})" if clip.test else ""
         reporter.result(f"{folder}: {len(clip.numbers)} frames with masks{test}")
-        reporter.note(f"gsac run {folder} --set segment.method=brought --set split.photo_fps={clip.fps:g} --set split.count=null")
+        reporter.note(shlex.join(("gsac", "run", str(folder), "--set", "segment.method=brought", "--set",
+                                  f"split.photo_fps={clip.fps:g}", "--set", "split.count=null")))
+    if there and not made:
+        raise BadInput(f"{there[0]}: is there already; remove it or give another --out")
     return ExitCode.OK

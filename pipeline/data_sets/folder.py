@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.pipeline.data_sets.given import GivenClip, list_pictures, need_file, read_grey, read_rgb, same_size
+from gsac.avatar.mask_file import MaskError, read_mask
+from gsac.pipeline.data_sets.given import GivenClip, list_pictures, need_file, read_names, read_rgb, same_size
 from gsac.stages.contract import BadInput
 
 FPS = 30.0
@@ -26,16 +27,10 @@ def read(path: Path) -> Iterator[GivenClip]:
     by_name = {image.name: number for image, number in zip(images, numbers, strict=True)}
     by_name |= {image.stem: number for image, number in zip(images, numbers, strict=True)}
 
-    def listed(name: str) -> list[int]:
-        file = path / name
-        words = file.read_text().split() if file.is_file() else []
-        unknown = [word for word in words if word not in by_name]
-        if unknown:
-            raise BadInput(f"{file}: names {unknown[0]}, which is not in images")
-        return sorted(by_name[word] for word in words)
-
-    test = listed("test_split.txt")
-    train = listed("train_split.txt") or [number for number in numbers if number not in set(test)]
+    files = {part: path / f"{part}_split.txt" for part in ("train", "test")}
+    split = {part: read_names(file, by_name) for part, file in files.items() if file.exists()}
+    test = split.get("test", [])
+    train = split.get("train", [number for number in numbers if number not in set(test)])
     kept = [(image, number) for image, number in zip(images, numbers, strict=True) if number in {*train, *test}]
     yield GivenClip(path.resolve().name, [number for _, number in kept], lambda: (read_frame(image) for image, _ in kept), NOTICE,
                     FPS, train=train, test=test, split_source="the folder's" if test else "",
@@ -45,8 +40,9 @@ def read(path: Path) -> Iterator[GivenClip]:
 def read_frame(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """rgb (H, W, 3) and mask (H, W) of a picture."""
     mask_path = need_file(path.parent.parent / "masks" / f"{path.stem}.png", "the mask")
-    rgb, mask = read_rgb(path), read_grey(mask_path)
-    if mask.dtype != np.uint8:
-        raise BadInput(f"{mask_path}: is no mask of 8 bits; save it as grey, 0 to 255")
+    try:
+        rgb, mask = read_rgb(path), np.rint(read_mask(mask_path) * 255).astype(np.uint8)
+    except MaskError as e:
+        raise BadInput(f"{path.parent.parent}/{e}") from e
     same_size(rgb, mask, mask_path)
     return rgb, mask

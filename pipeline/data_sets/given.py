@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from gsac.stages.contract import BadInput
+from gsac.stages.split.photos import natural_order
 
 PICTURES = (".png", ".jpg", ".jpeg")
 
@@ -35,8 +36,6 @@ class GivenClip:
     notice: str
     """Where the data come from and under which terms."""
     fps: float
-    stem: str = ""
-    """Stands before the number in a frame's name."""
     lens: Lens | None = None
     extrinsics: np.ndarray | None = None  # (T, 3, 4) world -> camera
     """None: the camera stands still, and its axes are the world's."""
@@ -53,7 +52,7 @@ class GivenClip:
 
     def names(self, numbers: list[int]) -> list[str]:
         """Names of frames, without an ending."""
-        return [f"{self.stem}{number:06d}" for number in numbers]
+        return [f"{number:06d}" for number in numbers]
 
 
 def need_file(path: Path, what: str = "") -> Path:
@@ -77,12 +76,40 @@ def _missing(path: Path, what: str) -> BadInput:
                     "its own names")
 
 
+def need_lens(lens: Lens, path: Path) -> Lens:
+    """The lens. Raises BadInput unless it is one. path: the file that it was read from."""
+    if not np.isfinite([*lens.focal, *lens.center]).all() or min(lens.focal) <= 0:
+        raise BadInput(f"{path}: has focal lengths {lens.focal} and centre {lens.center}; expected two lengths above 0 px, and all "
+                       "numbers finite")
+    return lens
+
+
 def list_pictures(folder: Path) -> list[Path]:
-    """The pictures of a folder by name. Raises BadInput where it has none."""
-    found = sorted(p for p in need_folder(folder).iterdir() if p.suffix.lower() in PICTURES and not p.name.startswith("."))
+    """The pictures of a folder in natural order (2 before 10). Raises BadInput where it has none."""
+    found = sorted((p for p in need_folder(folder).iterdir() if p.suffix.lower() in PICTURES and not p.name.startswith(".")),
+                   key=natural_order)
     if not found:
         raise BadInput(f"{folder}: holds no pictures; expected {', '.join(PICTURES)} files")
     return found
+
+
+def read_lines(path: Path, what: str = "") -> list[str]:
+    """The lines of a text file without the empty ones. what: it is, in words."""
+    try:
+        lines = need_file(path, what).read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as e:
+        raise BadInput(f"{path}: is no text in UTF-8 ({e.reason}); download it again, or save it as UTF-8") from e
+    return [line.strip() for line in lines if line.strip()]
+
+
+def read_names(path: Path, numbers: dict[str, int]) -> list[int]:
+    """The numbers, rising, of the frames that a split names, one a line. numbers: of each frame by its name."""
+    names = read_lines(path, "the split")
+    unknown = [name for name in names if name not in numbers]
+    if unknown or not names:
+        raise BadInput(f"{path}: names {unknown[0] if unknown else 'no frame'}{', which is not in images' if unknown else ''}; "
+                       f"expected names such as {next(iter(numbers))}, one a line")
+    return sorted({numbers[name] for name in names})
 
 
 def read_rgb(path: Path) -> np.ndarray:

@@ -13,7 +13,18 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsac.pipeline.data_sets.given import GivenClip, Lens, list_pictures, need_file, read_grey, read_rgb, same_size
+from gsac.pipeline.data_sets.given import (
+    GivenClip,
+    Lens,
+    list_pictures,
+    need_file,
+    need_lens,
+    read_grey,
+    read_lines,
+    read_names,
+    read_rgb,
+    same_size,
+)
 from gsac.stages.contract import BadInput
 
 FPS = 30.0
@@ -36,14 +47,12 @@ def read_scene(folder: Path) -> GivenClip:
     """The clip of one scene."""
     images = list_pictures(folder / "images")
     number = {path.name: number_of(path) for path in images}
-    parts = {part: [number_in(number, name, folder / f"{part}_split.txt")
-                    for name in need_file(folder / f"{part}_split.txt", "the split").read_text().split()]
-             for part in ("train", "test")}
+    parts = {part: read_names(folder / f"{part}_split.txt", number) for part in ("train", "test")}
     chosen = {*parts["train"], *parts["test"]}
     kept = [path for path in images if number[path.name] in chosen]
     lens, turns = read_colmap(folder / "sparse", [path.name for path in kept])
     return GivenClip(folder.name, [number[path.name] for path in kept], lambda: map(read_frame, kept), NOTICE, FPS, lens=lens,
-                     extrinsics=turns, train=sorted(parts["train"]), test=sorted(parts["test"]), split_source="NeuMan")
+                     extrinsics=turns, train=parts["train"], test=parts["test"], split_source="NeuMan")
 
 
 def number_of(path: Path) -> int:
@@ -53,33 +62,27 @@ def number_of(path: Path) -> int:
     return int(path.stem)
 
 
-def number_in(numbers: dict[str, int], name: str, path: Path) -> int:
-    """The number of a frame that a split names. path: of the split."""
-    if name not in numbers:
-        raise BadInput(f"{path}: names {name}, which is not in images")
-    return numbers[name]
-
-
 def read_frame(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """rgb (H, W, 3) and mask (H, W) of a picture."""
     mask_path = need_file(path.parent.parent / "segmentations" / path.name, "the mask")
-    rgb, mask = read_rgb(path), 255 - read_grey(mask_path)
-    same_size(rgb, mask, mask_path)
-    return rgb, mask
+    rgb, grey = read_rgb(path), read_grey(mask_path)
+    if grey.dtype != np.uint8:
+        raise BadInput(f"{mask_path}: has {8 * grey.itemsize} bits a pixel; expected 8, 0 where the person is and 255 elsewhere")
+    same_size(rgb, grey, mask_path)
+    return rgb, 255 - grey
 
 
 def read_colmap(folder: Path, names: list[str]) -> tuple[Lens, np.ndarray]:
     """The lens, and world -> camera (T, 3, 4) of pictures by name, from COLMAP's text files."""
     cameras, images = (need_file(folder / f"{name}.txt", "COLMAP's text file") for name in ("cameras", "images"))
-    lines = [line.split() for line in cameras.read_text().splitlines() if line.strip() and not line.startswith("#")]
+    lines = [line.split() for line in read_lines(cameras) if not line.startswith("#")]
     if len(lines) != 1 or len(lines[0]) < 7 or lines[0][1] not in LENSES:
         raise BadInput(f"{cameras}: expected one camera of {', '.join(LENSES)}, found {len(lines)} lines")
     try:
         values = [float(value) for value in lines[0][4:]]
         fx, fy, cx, cy = (values[at] for at in LENSES[lines[0][1]])
         turns = {}
-        for line in images.read_text().splitlines():
-            row = line.split()
+        for row in map(str.split, read_lines(images)):
             if len(row) == 10 and re.search(r"\.(png|jpe?g)$", row[9], re.IGNORECASE):
                 w, x, y, z, *shift = (float(value) for value in row[1:8])
                 turns[row[9]] = np.column_stack([Rotation.from_quat([x, y, z, w]).as_matrix(), shift])
@@ -88,4 +91,7 @@ def read_colmap(folder: Path, names: list[str]) -> tuple[Lens, np.ndarray]:
     missing = [name for name in names if name not in turns]
     if missing:
         raise BadInput(f"{images}: has no camera of {missing[0]}")
-    return Lens((fx, fy), (cx, cy)), np.stack([turns[name] for name in names])
+    odd = [name for name in names if not np.isfinite(turns[name]).all()]
+    if odd:
+        raise BadInput(f"{images}: the camera of {odd[0]} has a number that is not finite; download it again")
+    return need_lens(Lens((fx, fy), (cx, cy)), cameras), np.stack([turns[name] for name in names])

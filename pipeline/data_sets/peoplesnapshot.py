@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.pipeline.data_sets.given import GivenClip, Lens, need_file, same_size
+from gsac.pipeline.data_sets.given import GivenClip, Lens, need_file, need_lens, same_size
 from gsac.pipeline.data_sets.hdf5 import read_hdf5
 from gsac.pipeline.data_sets.plain_pickle import read_pickle
 from gsac.stages.contract import BadInput
@@ -49,8 +49,8 @@ def read_subject(folder: Path) -> GivenClip:
     train, test = ([t for t in range(first, last + 1, step) if t < count]
                    for first, last, step in SPLITS.get(folder.name, ((0, count - 1, STEP), (0, -1, STEP))))
     numbers = sorted({*train, *test})
-    lens = Lens((float(camera["camera_f"][0]), float(camera["camera_f"][1])),
-                (float(camera["camera_c"][0]), float(camera["camera_c"][1])))
+    (fx, fy), (cx, cy) = camera["camera_f"].tolist(), camera["camera_c"].tolist()
+    lens = need_lens(Lens((fx, fy), (cx, cy)), folder / "camera.pkl")
     return GivenClip(folder.name, numbers, lambda: read_frames(video, masks, numbers, lens, camera["camera_k"]), NOTICE,
                      fps=probe(video).rate or FPS, lens=lens, poses=read_poses(folder, numbers, count), train=train, test=test,
                      split_source="InstantAvatar and HAHA" if test else "")
@@ -64,8 +64,8 @@ def read_camera(path: Path) -> dict[str, np.ndarray]:
         found = {name: np.asarray(values[name], float).reshape(size) for name, size in shapes.items()}
     except (KeyError, TypeError, ValueError) as e:
         raise BadInput(f"{path}: expected {', '.join(f'{name} of {size} numbers' for name, size in shapes.items())} ({e})") from e
-    if not all(np.isfinite(v).all() for v in found.values()) or (found["camera_f"] <= 0).any():
-        raise BadInput(f"{path}: camera_f must be two focal lengths above 0 px, and all numbers finite")
+    if not np.isfinite(found["camera_k"]).all():
+        raise BadInput(f"{path}: camera_k has a number that is not finite; download it again")
     return found
 
 

@@ -16,7 +16,17 @@ import numpy as np
 
 from gsac.avatar import rotation
 from gsac.avatar.npz import NpzError, read_npz
-from gsac.pipeline.data_sets.given import GivenClip, Lens, list_pictures, need_file, need_folder, read_grey, read_rgb, same_size
+from gsac.pipeline.data_sets.given import (
+    GivenClip,
+    Lens,
+    list_pictures,
+    need_file,
+    need_folder,
+    need_lens,
+    read_grey,
+    read_rgb,
+    same_size,
+)
 from gsac.pipeline.data_sets.plain_pickle import read_pickle
 from gsac.stages.contract import BadInput
 
@@ -98,7 +108,10 @@ def read_cameras(path: Path, count: int) -> tuple[Lens, np.ndarray]:
     if k.shape != (3, 3) or turns.ndim != 3 or turns.shape[0] != count or turns.shape[1] < 3 or turns.shape[2] != 4:
         raise BadInput(f"{path}: intrinsic has shape {k.shape}, extrinsic {turns.shape}; expected (3, 3) and ({count}, 3, 4), "
                        "one of each picture in image")
-    return Lens((float(k[0, 0]), float(k[1, 1])), (float(k[0, 2]), float(k[1, 2]))), turns[:, :3].astype(float)
+    if not np.isfinite(turns).all():
+        raise BadInput(f"{path}: extrinsic has a number that is not finite; download it again")
+    lens = Lens((float(k[0, 0]), float(k[1, 1])), (float(k[0, 2]), float(k[1, 2])))
+    return need_lens(lens, path), turns[:, :3].astype(float)
 
 
 def read_frame(path: Path) -> tuple[np.ndarray, np.ndarray]:

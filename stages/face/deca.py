@@ -39,7 +39,10 @@ class DecaEncoder:
     def read(self, image: np.ndarray, points: np.ndarray) -> np.ndarray:
         """The codes (236,) of one face. image: (H, W, 3) uint8 RGB; points: (468, 2 or 3) px, of the face network."""
         ready = (cut_face(image, points[IBUG68, :2]) / np.float32(255)).transpose(2, 0, 1)[None]
-        codes = self._network.run(ready)
+        try:
+            codes = self._network.run(ready)
+        except NetworkError as error:
+            raise BadInput(str(error)) from error
         if codes.shape != (1, CODES):
             raise BadInput(f"model file {ENCODER} gives {codes.shape}; expected (1, {CODES})")
         return codes[0].astype(np.float64)

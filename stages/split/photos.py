@@ -41,7 +41,7 @@ COMPOSITED = "transparency composited over black"
 
 def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
     """Photos in natural order (2 before 10), and the plate if there is one; hidden files and those of other types are skipped."""
-    files = sorted((p for p in folder.iterdir() if p.is_file() and not p.name.startswith(".")), key=_natural)
+    files = sorted((p for p in folder.iterdir() if p.is_file() and not p.name.startswith(".")), key=natural_order)
     refused = [p.name for p in files if p.suffix.lower() in UNSUPPORTED]
     if refused:
         raise BadInput(f"{folder.name}/{refused[0]}: {Path(refused[0]).suffix} photos are not supported "
@@ -264,5 +264,6 @@ def _resize(rgb: np.ndarray, width: int, height: int) -> np.ndarray:
     return cv2.resize(rgb, (width, height), interpolation=cv2.INTER_AREA)
 
 
-def _natural(path: Path) -> list:
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part.lower()) for part in re.split(r"(\d+)", path.name)]
+def natural_order(path: Path) -> list:
+    """A key that sorts paths by name, numbers in it by their value."""
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part.lower()) for part in re.split(r"(\d+)", path.name)]

@@ -28,6 +28,13 @@ def test_ground_pose_and_pooling_are_the_protocols():
     assert table.mean_of_batches([20.0, 30.0], None) == pytest.approx(pooled)
 
 
+def test_lpips_is_of_the_network_that_the_published_scorer_takes():
+    # 3DGS-Avatar's own scorer for PeopleSnapshot takes Alex; that with VGG is for ZJU-MoCap.
+    assert {name: protocol.lpips for name, protocol in PROTOCOLS.items()} == {
+        "gsac": "lpips_alex_black", "haha": "lpips_alex_black", "instant-avatar": "lpips_alex_unscaled",
+        "3dgs-avatar": "lpips_alex_black", "exavatar-xhumans": "lpips_alex", "exavatar-neuman": "lpips_alex"}
+
+
 def test_our_row_stands_beside_the_published_ones_with_their_source():
     words = table.text({"female-4-casual": [metrics(28.0, 29.0), metrics(29.0, 30.0)]}, PROTOCOLS["gsac"])
     ours = next(line for line in words.splitlines() if "ours, recipe" in line)
@@ -48,12 +55,28 @@ def test_every_protocol_is_settings_that_the_stages_take(tmp_path):
 
 def test_test_frames_are_numbered_as_split_numbers_them_and_a_folder_without_a_split_is_named(tmp_path):
     assert number_test({"train": ["000000", "000004", "000012"], "test": ["000008", "000016"]}) == "2,4"
+    assert number_test({"train": ["999999", "1000001"], "test": ["1000000"]}) == "1"
     with pytest.raises(BadInput, match=r"split.json: is missing"):
         read_split(tmp_path)
-    (tmp_path / "split.json").write_text(json.dumps({"train": ["000000"], "test": []}))
+    (tmp_path / "split.json").write_text(json.dumps({"fps": 30, "train": ["000000"], "test": []}))
     with pytest.raises(BadInput, match="names no frames to test"):
         read_split(tmp_path)
     assert parser().parse_args(["gsac", str(tmp_path)]).repeats == 5
+
+
+@pytest.mark.parametrize(("content", "said"), [("{", "not readable as JSON"), ("[]", "not what .* expected fps, train, test"),
+                                                ('{"train": ["000000"]}', "not what .* expected fps, train, test")])
+def test_a_damaged_split_is_named_before_a_training(tmp_path, content, said):
+    (tmp_path / "split.json").write_text(content)
+    with pytest.raises(BadInput, match=rf"split.json: is {said}"):
+        main(["gsac", str(tmp_path)])
+
+
+def test_no_repeats_and_two_subjects_of_one_name_are_refused(tmp_path):
+    with pytest.raises(BadInput, match="--repeats 0: expected 1 or more"):
+        main(["gsac", str(tmp_path), "--repeats", "0"])
+    with pytest.raises(BadInput, match="two folders are called me"):
+        main(["gsac", str(tmp_path / "a/me"), str(tmp_path / "b/me")])
 
 
 @pytest.mark.slow

@@ -42,3 +42,8 @@ def test_a_stage_replays_from_cut_fixtures(small_run, cut, name):
     assert stages[name]["outputs"] is None and stages["split"]["outputs"] is not None
     done = small_run.gsac(*shlex.split(stages[name]["command"])[1:], cwd=cut)
     assert done.code == 0 and done.statuses == {name: "ran"}, done.err
+
+
+def test_more_frames_than_the_run_has_are_refused(small_run, tmp_path):
+    done = small_run.gsac("fixtures", small_run.out, "--out", tmp_path / "more", "--frames", 9)
+    assert done.code == 2 and "--frames 9: the run has 8 frames" in done.err and not (tmp_path / "more").exists()

@@ -148,3 +148,30 @@ def test_poses_are_looked_at_before_they_are_kept(vectors, tmp_path):
     (tmp_path / "short.npz").write_bytes(npz(pose=np.zeros((4, 69)), trans=np.zeros((4, 3))))
     with pytest.raises(BadInput, match="pose has 69 numbers a frame"):
         check_model("poses", tmp_path / "short.npz")
+
+
+@pytest.mark.parametrize("name", ["global_orient", "root_pose", "pose"])
+@pytest.mark.parametrize("values", [np.float64(1), np.zeros((0, 3)), np.array(["a", "b", "c"])])
+def test_an_array_without_a_number_for_each_frame_is_refused(tmp_path, name, values):
+    (tmp_path / "start.npz").write_bytes(npz(**{name: values, "body_pose": np.zeros((FRAMES, 63))}))
+    with pytest.raises(ArtifactError, match=r"start.npz: its arrays of numbers \(body_pose\) are of none of the layouts"):
+        read_start(tmp_path / "start.npz", FRAMES)
+
+
+@pytest.mark.parametrize("ids", [np.array(["0", "1", "2"]), np.full(FRAMES, np.nan), np.zeros(0, int)])
+def test_frame_numbers_that_are_none_are_named(tmp_path, ids):
+    (tmp_path / "start.npz").write_bytes(npz(pose=np.zeros((FRAMES, 72)), frame_ids=ids))
+    with pytest.raises(ArtifactError, match="start.npz: frame_ids holds no whole numbers"):
+        read_start(tmp_path / "start.npz", FRAMES)
+
+
+def test_shape_and_place_may_have_an_axis_of_one_person_and_a_shape_that_is_not_finite_is_named(tmp_path):
+    arrays = {"global_orient": np.zeros((FRAMES, 1, 3)), "body_pose": np.zeros((FRAMES, 21, 3)), "gender": np.array("neutral"),
+              "transl": np.tile([0, 0, 3.0], (FRAMES, 1, 1)), "betas": np.full((FRAMES, 1, 10), 0.5)}
+    (tmp_path / "start.npz").write_bytes(npz(**arrays))
+    start = read_start(tmp_path / "start.npz", FRAMES)
+    np.testing.assert_array_equal(start.betas, np.full(10, 0.5))
+    np.testing.assert_array_equal(start.transl, np.tile([0, 0, 3.0], (FRAMES, 1)))
+    (tmp_path / "start.npz").write_bytes(npz(**arrays | {"betas": np.full((FRAMES, 10), np.nan)}))
+    with pytest.raises(ArtifactError, match=r"start.npz: the shape has a number that is not finite"):
+        read_start(tmp_path / "start.npz", FRAMES)

@@ -104,6 +104,19 @@ def test_the_command_imports_every_subject_of_a_folder_and_tells_how_to_run_it(t
     assert "there already" in "".join(capsys.readouterr())
 
 
+def test_an_import_that_broke_off_goes_on_with_the_subjects_that_lack(tmp_path, capsys):
+    for scene in "bike", "my lab":
+        data_sets.neuman(tmp_path / "in", scene)
+    typed = ["data", "import", "neuman", str(tmp_path / "in"), "--out", str(tmp_path / "out")]
+    (tmp_path / "in/my lab/images").rename(tmp_path / "in/my lab/misnamed")
+    assert execute(typed) == 0  # of the one scene that is whole
+    (tmp_path / "in/my lab/misnamed").rename(tmp_path / "in/my lab/images")
+    assert execute(typed) == 0
+    said = "".join(capsys.readouterr())
+    assert "bike is there already and left as it is" in said and f"gsac run '{tmp_path}/out/my lab' --set" in said
+    assert read_json(tmp_path / "out/my lab/split.json")["test"] == ["000004"]
+
+
 MISSING = {
     "neuman": ["images", "segmentations/00002.png", "sparse/images.txt", "test_split.txt"],
     "xhumans": ["test", "train/Take1/render/depth/depth_000002.tiff", "train/Take2/render/cameras.npz",
@@ -161,3 +174,70 @@ def test_hdf5_that_reaches_into_another_file_is_refused(tmp_path, how):
             file.create_group("masks")
     with pytest.raises(BadInput, match=r"masks.hdf5: masks is no array of this file"):
         read_hdf5(tmp_path / "masks.hdf5", "masks")
+
+
+def test_frames_without_leading_zeros_keep_their_order(tmp_path):
+    source = data_sets.plain_folder(tmp_path / "in", frames=12, test=())
+    (source / "test_split.txt").unlink()
+    for file in [*source.rglob("*.png")]:
+        file.rename(file.with_name(f"{int(file.stem[-4:])}.png"))
+    folder = brought("folder", source, tmp_path / "out")
+    assert read_json(folder / "split.json")["sources"]["000002"] == "2.png"
+    for t in range(12):
+        same_frame(folder, f"{t:06d}", t)
+
+
+def test_a_split_names_a_frame_a_line_spaces_in_the_name_and_all(tmp_path):
+    source = data_sets.plain_folder(tmp_path / "in", test=())
+    for part in "images", "masks":
+        (source / part / "frame_0004.png").rename(source / part / "my frame 0004.png")
+    (source / "test_split.txt").write_text("my frame 0004.png\r\nmy frame 0004.png\r\n", "utf-8-sig")  # as Windows saves it
+    assert read_json(brought("folder", source, tmp_path / "out") / "split.json")["test"] == ["000004"]
+
+
+@pytest.mark.parametrize("content, said", [(b"", "names no frame"), (b"\xff\xfe0\x00", "no text in UTF-8"),
+                                           (b"00009.png\n", "names 00009.png, which is not in images")])
+@pytest.mark.parametrize("name", ["neuman", "plain_folder"])
+def test_a_damaged_split_is_named(tmp_path, name, content, said):
+    source = getattr(data_sets, name)(tmp_path / "in")
+    (source / "test_split.txt").write_bytes(content)
+    with pytest.raises(BadInput, match=rf"test_split.txt: .*{said}"):
+        brought(name.removeprefix("plain_"), source, tmp_path / "out")
+
+
+def test_a_folders_masks_are_read_as_masks_of_ones_own_are(tmp_path):
+    source = data_sets.plain_folder(tmp_path / "in")
+    mask = picture(2)[1]
+    cv2.imwrite(str(source / "masks/frame_0002.png"), mask.astype(np.uint16) * 65535)
+    cv2.imwrite(str(source / "masks/frame_0001.png"), np.dstack([np.zeros((*mask.shape, 3)), picture(1)[1] * 255]).astype(np.uint8))
+    folder = brought("folder", source, tmp_path / "out")
+    same_frame(folder, "000001", 1)
+    same_frame(folder, "000002", 2)
+    cv2.imwrite(str(source / "masks/frame_0003.png"), np.dstack([mask * 0, mask * 0, mask * 255]).astype(np.uint8))
+    with pytest.raises(BadInput, match=r"mine/masks/frame_0003.png: is coloured"):
+        brought("folder", source, tmp_path / "again")
+
+
+def test_a_mask_of_neuman_that_has_16_bits_is_refused(tmp_path):
+    source = data_sets.neuman(tmp_path / "in")
+    cv2.imwrite(str(source / "segmentations/00002.png"), np.zeros((64, 48), np.uint16))
+    with pytest.raises(BadInput, match=r"segmentations/00002.png: has 16 bits a pixel; expected 8, 0 where the person is"):
+        brought("neuman", source, tmp_path / "out")
+
+
+def test_a_camera_that_is_not_finite_is_named(tmp_path):
+    scene = data_sets.neuman(tmp_path / "in")
+    images = (scene / "sparse/images.txt").read_text()
+    (scene / "sparse/images.txt").write_text(images.replace("0.5 0 3 1 00003.png", "nan 0 3 1 00003.png"))
+    with pytest.raises(BadInput, match=r"images.txt: the camera of 00003.png has a number that is not finite"):
+        brought("neuman", scene, tmp_path / "out")
+    (scene / "sparse/images.txt").write_text(images)
+    (scene / "sparse/cameras.txt").write_text("1 PINHOLE 48 64 inf 90 24 32\n")
+    with pytest.raises(BadInput, match=r"cameras.txt: has focal lengths \(inf, 90.0\)"):
+        brought("neuman", scene, tmp_path / "out")
+    take = data_sets.xhumans(tmp_path / "in") / "train/Take1/render/cameras.npz"
+    with np.load(take) as arrays:
+        known = dict(arrays)
+    np.savez(take, **known | {"extrinsic": known["extrinsic"] * np.nan})
+    with pytest.raises(BadInput, match=r"Take1/render/cameras.npz: extrinsic has a number that is not finite"):
+        brought("xhumans", tmp_path / "in/00099", tmp_path / "out")

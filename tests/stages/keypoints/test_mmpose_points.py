@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import check_keypoints
+from gsac.avatar.artifacts import ArtifactError, check_keypoints
+from gsac.avatar.mmpose_file import MOST_BYTES, read_mmpose
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
@@ -109,3 +110,10 @@ def test_the_file_and_the_detector_that_reads_it_are_asked_for_together():
     for config in (KeypointsConfig("mmpose-json"), KeypointsConfig(points="mine")):
         with pytest.raises(BadInput, match="expected mmpose-json with the name of mmpose's file"):
             config.check()
+
+
+def test_a_file_far_larger_than_any_clips_points_is_refused_unread(tmp_path):
+    with (tmp_path / "brought").open("wb") as file:
+        file.truncate(MOST_BYTES + 1)
+    with pytest.raises(ArtifactError, match=f"brought: has {MOST_BYTES + 1} bytes; key points of a clip have at most"):
+        read_mmpose(tmp_path / "brought")
