@@ -50,11 +50,14 @@ def open_trainer(kind: type[Kind], poses: Poses, frames: np.ndarray, levels: lis
 
 
 def body_arrays(poses: Poses, frames: np.ndarray, recipe: Recipe) -> BodyArrays:
-    """The body for frames, (n,) indices: each rest shape once, the first frame's first, with what the recipe learns of it."""
+    """The body for frames, (n,) indices: each rest shape once, the first frame's first, with what the recipe learns of it.
+
+    Pose correctives are part of the rest shape, those of each frame's pose as training starts.
+    """
     body, rests, rest_of, known = poses.body, [], [], {}
     for t in frames:
         vertices, joints = poses.rest(int(t))
-        vertices = vertices + poses.offset
+        vertices = body.correct(vertices + poses.offset, poses.pose[t])
         at = known.setdefault(vertices.tobytes(), len(rests))
         if at == len(rests):
             rests.append(vertices)

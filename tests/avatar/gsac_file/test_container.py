@@ -42,6 +42,14 @@ def data(figure):
     return avatar_bytes(figure)
 
 
+def test_the_correctives_of_a_body_are_written_and_read_and_move_the_mesh_within_a_tenth_of_a_millimetre(bent_arm, figure, data):
+    back, avatar = RiggedAvatar.read(bent_arm.file), bent_arm.avatar
+    np.testing.assert_array_equal(back.correctives.start, avatar.correctives.start)
+    np.testing.assert_array_equal(back.correctives.joint, avatar.correctives.joint)
+    np.testing.assert_allclose(back.posed(bent_arm.pose), bent_arm.vertices, atol=1e-4)
+    assert not any(name.startswith("corrective") for name in head_and_body(data)[0]["blocks"]) and figure.correctives is None
+
+
 def test_what_is_written_is_read(figure, data):
     back = RiggedAvatar.from_bytes(data)
     for name in ("vertices", "faces", "joints", "parents", "skin_index", "expression_start", "expression_vertex"):
