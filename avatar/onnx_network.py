@@ -20,8 +20,8 @@ class NetworkError(ValueError):
 
 
 def run_checked(run: Callable[[np.ndarray], list[np.ndarray]], ready: np.ndarray, name: str) -> list[np.ndarray]:
-    """What the network that was brought under a name makes of an input (...), arrays (...). Raises NetworkError where it cannot be
-    run on it, or gives NaN."""
+    """What the network that was brought under a name makes of an input. Raises NetworkError where it cannot be run on it, or gives
+    NaN. run: (...) -> outputs (...); ready: (...), the input."""
     try:
         outputs = run(ready)
     except NetworkError:
@@ -36,7 +36,7 @@ def run_checked(run: Callable[[np.ndarray], list[np.ndarray]], ready: np.ndarray
 
 
 def run_session(session: InferenceSession, ready: np.ndarray) -> list[np.ndarray]:
-    """All outputs (...) float32 for the one input (...), in the kind of number that the network takes."""
+    """All outputs (...) float32 for the one input, in the kind of number that the network takes. ready: (...), the input."""
     given = session.get_inputs()[0]
     kind = np.float16 if given.type == "tensor(float16)" else np.float32
     return [np.asarray(output, np.float32) for output in session.run(None, {given.name: ready.astype(kind)})]
