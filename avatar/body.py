@@ -2,14 +2,15 @@
 
 B betas, E expression size, J = 55 joints in SMPL-X's order, V vertices, F faces, T frames, K = 133 keypoints.
 Canonical body: metres, right-handed, y up, facing +z, left = +x, T-pose at zero rotation. Linear blend skinning with
-axis-angle joint rotations; `global_orient` turns the body about its pelvis joint, then `transl` moves it.
+axis-angle joint rotations, of a surface that pose correctives bend where the file has them; `global_orient` turns the body about
+its pelvis joint, then `transl` moves it.
 Source: SMPL-X (Pavlakos et al. 2019), eq. 1-7; `tools/open_body/bake.py` bakes the open body.
 """
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from scipy.sparse import csr_matrix
 from gsac.avatar.artifacts import BODY_SHAPES, OCCLUDER_SHAPE, REST_SHAPE, ArtifactError, check_arrays, write_arrays
 from gsac.avatar.body_file import read_body_file
 from gsac.avatar.camera import Camera
+from gsac.avatar.correctives import move_rest
 from gsac.avatar.joints import POSE_PARTS, J
 from gsac.avatar.skinning import joint_transforms, skin
 
@@ -128,10 +130,16 @@ class Body:
     ft: np.ndarray | None  # (F, 3) int32
     digest: str
     """sha256 of the file."""
+    posedirs: np.ndarray | None = None  # (V, 3, 486) m
+    """Pose correctives, as correctives.py takes them; None: the file has none."""
+    hand_means: np.ndarray | None = None  # (30, 3) rad
+    """The mean fingers, left hand first, at which a hand rests; at zero rotation it is flat. None: the file has none."""
+    hand_components: np.ndarray | None = None  # (2, 45, 45) rad
+    """Principal components of the left and the right hand, a row each, that are added to the mean; None: the file has none."""
 
     @classmethod
     def load(cls, path: Path | str | None = None) -> Body:
-        """The open body, or an official `SMPLX_*.npz`, of which the leading shape and expression directions are taken.
+        """The open body, or an official `SMPLX_*.npz`.
 
         Raises `ArtifactError` naming the array that is wrong.
         """
@@ -154,6 +162,12 @@ class Body:
     @property
     def num_betas(self) -> int:
         return self.shapedirs.shape[2]
+
+    def leading(self, betas: int) -> Body:
+        """The same body with no more than that many betas; one that has clothes among them stays as it is."""
+        if self.clothes or self.num_betas <= betas:
+            return self
+        return replace(self, shapedirs=np.ascontiguousarray(self.shapedirs[:, :, :betas]))
 
     @property
     def num_figure(self) -> int:
@@ -182,13 +196,23 @@ class Body:
         """Vertices (T, V, 3) and joints (T, 55, 3), m, camera frame, of all or the named frames."""
         frames = list(range(params.frames)) if frames is None else list(frames)
         shaped, joints = self.rest(params.betas, None, params.joint_offset)
-        transforms = joint_transforms(params.pose[frames], joints, self.parents)
+        pose = params.pose[frames]
+        transforms = joint_transforms(pose, joints, self.parents)
         vertices = np.empty((len(frames), len(shaped), 3), np.float32)
         for i, t in enumerate(frames):
             expression = self.effective_expression(params, t)
             rest = shaped + self.exprdirs @ expression if expression.any() else shaped
-            vertices[i] = skin(rest, transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
+            vertices[i] = skin(self.correct(rest, pose[i]), transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
         return vertices, self._move_joints(transforms, joints) + params.transl[frames][:, None]
+
+    def correct(self, rest: np.ndarray, pose: np.ndarray) -> np.ndarray:
+        """Vertices at rest (V, 3) m with the correctives of a pose (55, 3), axis-angle; the same array where there are none."""
+        return rest if self.posedirs is None else rest + move_rest(self.posedirs, pose)
+
+    def bend(self, rest: np.ndarray, joints: np.ndarray, pose: np.ndarray) -> np.ndarray:
+        """Vertices (V, 3) m, without transl, of those at rest (V, 3) m in a pose (55, 3), axis-angle about joints (55, 3) m."""
+        transforms = joint_transforms(pose[None], joints, self.parents)[0].astype(np.float32)
+        return skin(self.correct(rest, pose), transforms, self.skin_index, self.skin_weight)
 
     def posed_joints(self, params: BodyParams) -> np.ndarray:
         """Joints (T, 55, 3) of all frames, as `posed` gives them."""

@@ -14,14 +14,16 @@ from scipy import sparse
 
 from gsac.avatar import joints, wholebody
 from gsac.avatar.artifacts import ArtifactError
+from gsac.avatar.correctives import DIRECTIONS
 from gsac.avatar.joints import J
 from gsac.avatar.npz import NpzError, read_npz
 from gsac.avatar.wholebody import BODY_NAMES, HAND_POINTS
 
 ALWAYS = {"v_template": 2, "f": 2, "shapedirs": 3, "J_regressor": 2, "weights": 2, "kintree_table": 2}
 """Array -> number of dimensions."""
-SOMETIMES = ("num_betas", "expression_names", "clothes", "jaw_actions", "keypoint_row", "keypoint_vertex", "keypoint_weight",
-             "vt", "ft", "lmk_faces_idx", "lmk_bary_coords")
+SOMETIMES = ("num_betas", "posedirs", "hands_meanl", "hands_meanr", "hands_componentsl", "hands_componentsr", "expression_names",
+             "clothes", "jaw_actions", "keypoint_row", "keypoint_vertex", "keypoint_weight", "vt", "ft", "lmk_faces_idx",
+             "lmk_bary_coords")
 """Arrays that only some body models have."""
 MOST_VERTICES, MOST_DIRECTIONS = 50_000, 500
 SMPLX_KEYPOINT_JOINTS = {keypoint: joints.INDEX[name] for keypoint, name in enumerate(BODY_NAMES) if name in joints.INDEX} | {
@@ -33,11 +35,11 @@ SMPLX_KEYPOINT_VERTICES = {
     95: 5361, 99: 4933, 103: 5058, 107: 5169, 111: 5286, 116: 8079, 120: 7669, 124: 7794, 128: 7905, 132: 8022,
 }
 """COCO-WholeBody keypoint -> vertex of SMPL-X's mesh: nose, eyes, ears, toes, heels and finger tips."""
+INFLUENCES = 4
+"""Joints that move a vertex at most: Unity, glTF and the browser skin with no more, and fit and training see what these show."""
 SMPLX_VERTICES = 10475
 SMPLX_EXPRESSIONS = 100
 """The last shape directions of an official file are expressions: 300 + 100 in v1.1; older files have 10 + 10."""
-MOST_BETAS, MOST_EXPRESSIONS = 20, 10
-"""Directions taken from an official file: the later ones have a small variance, which one clip cannot determine."""
 
 
 def read_body_file(path: Path) -> dict:
@@ -66,13 +68,15 @@ def _fields(path: Path, a: dict[str, np.ndarray]) -> dict:
         shapedirs, exprdirs = np.split(shapes, [int(a["num_betas"])], 2)
     else:
         shapedirs, exprdirs = np.split(shapes, [_official_betas(path, shapes.shape[2])], 2)
-        shapedirs, exprdirs = shapedirs[:, :, :MOST_BETAS], exprdirs[:, :, :MOST_EXPRESSIONS]
     expressions = exprdirs.shape[2]
     return {
         "clothes": tuple(str(n) for n in a.get("clothes", ())),
         "v_template": np.asarray(a["v_template"], np.float32), "faces": np.asarray(a["f"], np.int32),
         "shapedirs": np.ascontiguousarray(shapedirs), "exprdirs": np.ascontiguousarray(exprdirs),
-        "J_regressor": np.asarray(a["J_regressor"], np.float32), "weights": _four_heaviest(np.asarray(a["weights"], np.float32)),
+        "posedirs": _posedirs(path, a, v), "hand_means": _of_both_hands(path, a, "hands_mean", (45,)),
+        "hand_components": _of_both_hands(path, a, "hands_components", (45, 45)),
+        "J_regressor": np.asarray(a["J_regressor"], np.float32),
+        "weights": keep_heaviest(np.asarray(a["weights"], np.float32), INFLUENCES),
         "parents": _parents_of(a["kintree_table"]), "joint_names": joints.NAMES,
         "expression_names": tuple(names or (f"expression{i}" for i in range(expressions))),
         "jaw_actions": np.asarray(a.get("jaw_actions", np.zeros((expressions, 3))), np.float32).reshape(expressions, 3),
@@ -119,6 +123,26 @@ def _official_betas(path: Path, directions: int) -> int:
     return directions - SMPLX_EXPRESSIONS
 
 
+def _posedirs(path: Path, a: dict, v: int) -> np.ndarray | None:
+    """(V, 3, 486); None of a file without pose correctives, or where they are all zero."""
+    if "posedirs" not in a or not a["posedirs"].any():
+        return None
+    if a["posedirs"].shape != (v, 3, DIRECTIONS):
+        raise ArtifactError(f"{path}: array posedirs has shape {a['posedirs'].shape}, expected {(v, 3, DIRECTIONS)}")
+    return np.ascontiguousarray(a["posedirs"], np.float32)
+
+
+def _of_both_hands(path: Path, a: dict, name: str, shape: tuple[int, ...]) -> np.ndarray | None:
+    """`name`l and `name`r one after the other: means as (30, 3), components as (2, 45, 45); None of a file that lacks one."""
+    if not {f"{name}l", f"{name}r"} <= a.keys():
+        return None
+    for side in "lr":
+        if a[name + side].shape != shape:
+            raise ArtifactError(f"{path}: array {name}{side} has shape {a[name + side].shape}, expected {shape}")
+    both = np.stack([a[f"{name}l"], a[f"{name}r"]]).astype(float)
+    return both.reshape(-1, 3) if len(shape) == 1 else both
+
+
 def _parents_of(kintree: np.ndarray) -> np.ndarray:
     """(55,) int; official files write the root's parent as 2**32 - 1."""
     parents = np.asarray(kintree[0], np.int64).copy()
@@ -128,9 +152,9 @@ def _parents_of(kintree: np.ndarray) -> np.ndarray:
     return parents
 
 
-def _four_heaviest(weights: np.ndarray) -> np.ndarray:
-    """(V, 55) with at most four weights a row, renormalised: Unity and the browser skin with no more."""
-    keep = np.argsort(-weights, 1, kind="stable")[:, :4]
+def keep_heaviest(weights: np.ndarray, most: int) -> np.ndarray:
+    """(V, J), the most heavy of weights (V, J) of each row, renormalised."""
+    keep = np.argsort(-weights, 1, kind="stable")[:, :most]
     out = np.zeros_like(weights)
     np.put_along_axis(out, keep, np.take_along_axis(weights, keep, 1), 1)
     return out / out.sum(1, keepdims=True)

@@ -32,6 +32,13 @@ def rotation_matrices(pose: np.ndarray) -> np.ndarray:
     return out.reshape(*pose.shape[:-1], 3, 3)
 
 
+def rotation_matrices_backward(pose: np.ndarray, grad: np.ndarray) -> np.ndarray:
+    """Gradient (J, 3) of pose (J, 3), axis-angle, from that of its rotation matrices, grad (J, 3, 3); float64."""
+    out = np.empty(pose.shape)
+    _rodrigues_backward(np.ascontiguousarray(pose, np.float64), np.ascontiguousarray(grad, np.float64), out)
+    return out
+
+
 def skin(rest: np.ndarray, transforms: np.ndarray, skin_index: np.ndarray, skin_weight: np.ndarray) -> np.ndarray:
     """Vertices (V, 3) of a posed mesh, without transl. rest: (V, 3); transforms: (J, 3, 4); skin_index, skin_weight: (V, K)."""
     out = np.empty_like(rest, order="C")
@@ -60,8 +67,7 @@ def skin_backward(grad: np.ndarray, pose: np.ndarray, rest: np.ndarray, joints: 
     grad_local = np.zeros_like(local)
     grad_joints = np.zeros_like(joints64)
     _chain_backward(local, joints64, parents, transforms, grad_transforms, grad_local, grad_joints)
-    grad_pose = np.empty_like(pose64)
-    _rodrigues_backward(pose64, grad_local, grad_pose)
+    grad_pose = rotation_matrices_backward(pose64, grad_local)
     grad_transl = grad.sum(0, dtype=np.float64)
     return tuple(g.astype(rest.dtype) for g in (grad_pose, grad_transl, grad_rest, grad_joints))
 

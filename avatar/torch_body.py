@@ -13,6 +13,7 @@ import torch
 from scipy import sparse
 
 from gsac.avatar.body import Body
+from gsac.avatar.correctives import DIRECTIONS
 
 
 def to_matrices(six: torch.Tensor) -> torch.Tensor:
@@ -68,6 +69,13 @@ class Kinematics:
         return torch.cat(worlds, 1)[:, self.order], torch.cat(places, 1)[:, self.order]
 
 
+def turn_features(world: torch.Tensor, parents: np.ndarray) -> torch.Tensor:
+    """(T, 486), as correctives.py's: the joints' rotations against their parents less the identity. world: (T, J, 3, 3); parents:
+    (J,)."""
+    local = world[:, parents[1:]].transpose(-1, -2) @ world[:, 1:]
+    return (local - torch.eye(3)).flatten(1)
+
+
 class Points:
     """P points of the body as moments over all joints."""
 
@@ -89,6 +97,10 @@ class Points:
         self.mass = torch.tensor(mass, dtype=torch.float32)  # (P, J)
         self.moment = torch.tensor(moment, dtype=torch.float32).flatten(1)  # (P, 3 J)
         self.dirs = torch.tensor(dirs).flatten(1, 2)  # (P, 3 J, B)
+        self.parents = np.asarray(body.parents)
+        self.turns = None  # (P, 3 J, 486)
+        if body.posedirs is not None:
+            self.turns = torch.tensor(_moments_of_correctives(body.weights, body.posedirs, matrix))
         if head is not None:
             share = matrix[:, head].toarray()
             self.moved = torch.tensor(np.flatnonzero(share.any(0)))  # (M,) of the head's vertices, those that points lie on
@@ -103,8 +115,12 @@ class Points:
         if face_offset is not None:
             moment = moment + (self.carried @ face_offset[self.moved]).flatten(1)
         shift = place - (world @ rest[None, :, :, None])[..., 0]
-        turned = world.transpose(1, 2).flatten(2) @ moment.T  # (T, 3, P)
-        return turned.transpose(1, 2) + self.mass @ shift
+        rows = world.transpose(1, 2).flatten(2)  # (T, 3, 3 J)
+        turned = (rows @ moment.T).transpose(1, 2)  # (T, P, 3)
+        if self.turns is not None:
+            bent = turn_features(world, self.parents) @ self.turns.flatten(0, 1).T
+            turned = turned + torch.einsum("tcm,tpm->tpc", rows, bent.unflatten(1, self.turns.shape[:2]))
+        return turned + self.mass @ shift
 
 
 class Mesh:
@@ -114,10 +130,30 @@ class Mesh:
         self.template = torch.tensor(body.v_template, dtype=torch.float32)  # (V, 3)
         self.dirs = torch.tensor(body.shapedirs, dtype=torch.float32)  # (V, 3, B)
         self.weights = torch.tensor(body.weights.T.copy(), dtype=torch.float32)  # (J, V)
+        self.parents = np.asarray(body.parents)
+        self.turns = None if body.posedirs is None else torch.tensor(body.posedirs.transpose(1, 0, 2).reshape(-1, DIRECTIONS))
 
     def at(self, world: torch.Tensor, place: torch.Tensor, rest: torch.Tensor, betas: torch.Tensor) -> torch.Tensor:
         """Vertices (T, 3, V) m without transl. world: (T, J, 3, 3); place: (T, J, 3) m; rest: (J, 3) m; betas: (B,)."""
         vertices = (self.template + self.dirs @ betas).T  # (3, V)
         moment = (self.weights[:, None] * vertices).flatten(0, 1)  # (3 J, V)
         shift = place - (world @ rest[None, :, :, None])[..., 0]
-        return world.transpose(1, 2).flatten(2) @ moment + shift.transpose(1, 2) @ self.weights
+        rows = world.transpose(1, 2)  # (T, 3, J, 3)
+        skinned = rows.flatten(2) @ moment + shift.transpose(1, 2) @ self.weights
+        if self.turns is None:
+            return skinned
+        bent = (turn_features(world, self.parents) @ self.turns.T).unflatten(1, (3, -1))  # (T, 3, V) at rest
+        return skinned + torch.stack([(rows[..., c] @ self.weights) * bent[:, None, c] for c in range(3)]).sum(0)
+
+
+def _moments_of_correctives(weights: np.ndarray, posedirs: np.ndarray, matrix: sparse.csr_matrix) -> np.ndarray:
+    """(P, 3 J, 486) by the pose correctives' features.
+
+    weights: (V, J); posedirs: (V, 3, 486) m; matrix: (P, V) weights of the points over the vertices.
+    """
+    out = np.zeros((len(matrix.indptr) - 1, weights.shape[1], 3, DIRECTIONS), np.float32)
+    for p in range(len(out)):
+        span = slice(matrix.indptr[p], matrix.indptr[p + 1])
+        vertices = matrix.indices[span]
+        out[p] = np.einsum("vk,vcf->kcf", matrix.data[span, None] * weights[vertices], posedirs[vertices], optimize=True)
+    return out.reshape(len(out), -1, DIRECTIONS)

@@ -9,6 +9,7 @@ import pytest
 
 from support.axe import axe  # noqa: F401
 from support.figure import exported, figure, node_package, person, shadowed  # noqa: F401
+from support.official_body import bent_arm, official_body  # noqa: F401
 from support.toy import Toy
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -25,6 +25,7 @@ SOURCES = (
     "Editor/GsacPoseStreamEditor.cs",
     "Editor/GsacSceneViews.cs",
     "Runtime/Core/GsacContainer.cs",
+    "Runtime/Core/GsacCorrectives.cs",
     "Runtime/Core/GsacData.cs",
     "Runtime/Core/GsacException.cs",
     "Runtime/Core/GsacExtent.cs",

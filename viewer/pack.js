@@ -27,6 +27,21 @@ export function packBody(avatar) {
 }
 
 /**
+ * The pose correctives, none where the body has none.
+ * @param {import("./reader.js").Avatar} avatar
+ * @returns {Object<string, Float32Array | Uint32Array>} by the buffer's name in the shader
+ */
+export function packCorrectives({ correctives }) {
+  if (!correctives) return {};
+  const { start, joint, delta } = correctives, pairs = new Float32Array(joint.length * 28);
+  for (let i = 0; i < joint.length; i++) {
+    pairs.set(delta.subarray(i * 27, i * 27 + 27), i * 28);
+    pairs[i * 28 + 27] = joint[i];
+  }
+  return { GsacPairs: pairs, GsacFirst: Uint32Array.from(start) };
+}
+
+/**
  * A level's gaussians.
  * @param {import("./reader.js").Avatar} avatar
  * @param {import("./reader.js").Level} level

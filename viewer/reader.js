@@ -20,10 +20,11 @@ export function readAvatar(buffer) {
   const expressions = readExpressions(head, arrays, mesh.vertices.length / 3);
   if (mesh.vertices.length === 0) throw new GsacError("value", "the mesh has no vertices");
   const levels = readLevels(head, arrays, mesh.faces.length / 3);
+  const correctives = readCorrectives(arrays, mesh.vertices.length / 3, skeleton.names.length);
   checkPoses(head.poses, skeleton.names);
   checkNumber(head, "ground", -1e6, 1e6);
   return {
-    ...skeleton, ...mesh, ...expressions,
+    ...skeleton, ...mesh, ...expressions, correctives,
     // Of detail, the finest first.
     levels,
     // Name -> joint -> axis-angle.
@@ -113,10 +114,28 @@ function readExpressions(head, arrays, vertexCount) {
   arrays.real("expression.jaw", E, 3);
   const moved = arrays.index("expression.vertex", vertexCount, null), M = moved.length;
   const start = arrays.index("expression.start", M + 1, E + 1);
-  if (start[0] !== 0 || start[E] !== M || !expressions.every((_, e) => start[e] <= start[e + 1])) {
-    throw new GsacError("value", "expression.start must rise from 0 to the number of moved vertices");
-  }
+  checkRise(start, M, "expression.start");
   return { expressions, start, moved, delta: arrays.real("expression.delta", M, 3) };
+}
+
+/**
+ * Pose correctives: a joint's rotation less the identity, row by row, moves vertex v at rest by the three rows of nine numbers of
+ * delta, for each i from start[v] to below start[v + 1] and joint[i]; null where the file has none.
+ * @returns {{start: Uint32Array, joint: Uint8Array | Uint16Array | Uint32Array, delta: Float32Array} | null}
+ */
+function readCorrectives(arrays, vertexCount, jointCount) {
+  if (!arrays.has("corrective.start")) return null;
+  const joint = arrays.index("corrective.joint", jointCount, null), C = joint.length;
+  const start = arrays.index("corrective.start", C + 1, vertexCount + 1);
+  checkRise(start, C, "corrective.start");
+  return { start, joint, delta: arrays.real("corrective.delta", C, 3, 9) };
+}
+
+// Throws unless start rises from 0 to end.
+function checkRise(start, end, what) {
+  if (start[0] !== 0 || start[start.length - 1] !== end || start.some((at, i) => i > 0 && at < start[i - 1])) {
+    throw new GsacError("value", `${what} must rise from 0 to ${end}, the number of its rows`);
+  }
 }
 
 /**

@@ -1,5 +1,5 @@
 // Written by `python -m gsac.viewer.wgsl` from the HLSL of the Unity package and page.hlsl. Do not edit.
-// glslang 11, naga-wasm@30.1.0, HLSL 6e52f82ffb994cacd13f4e1c9f08ef731ddc38cd852d3cca234202137a6a7f3d
+// glslang 11, naga-wasm@30.1.0, HLSL 993557f1535cd45614e23ca54c8f0dce4b6dbfaae3e09e0e046c121aa74b6c95
 
 export const SHADERS = {
   Skin: { bindings: {"parameters": 0, "GsacSkin": 2, "GsacRest": 1, "GsacMoves": 3, "GsacWeights": 4, "GsacBones": 5, "GsacPosed": 6}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
@@ -50,10 +50,10 @@ var<storage, read_write> GsacPosed_1: GsacPosed;
 var<private> id_1: vec3<u32>;
 
 fn Skin_1() {
-var phi_346_: vec3<f32>;
-var phi_342_: u32;
-var phi_344_: vec3<f32>;
-var phi_343_: u32;
+var phi_353_: vec3<f32>;
+var phi_349_: u32;
+var phi_351_: vec3<f32>;
+var phi_350_: u32;
 var local: vec3<f32>;
 var local_1: vec3<f32>;
 var local_2: vec3<f32>;
@@ -71,11 +71,11 @@ break;
 let _e31 = GsacSkin_1.data[_e23.x];
 let _e34 = GsacRest_1.data[_e23.x];
 let _e40 = GsacSkin_1.data[(_e23.x + 1u)][3u];
-phi_346_ = _e34.xyz;
-phi_342_ = _e31.w;
+phi_353_ = _e34.xyz;
+phi_349_ = _e31.w;
 loop {
-let _e43 = phi_346_;
-let _e45 = phi_342_;
+let _e43 = phi_353_;
+let _e45 = phi_349_;
 local = _e43;
 local_1 = _e43;
 local_2 = _e43;
@@ -87,15 +87,15 @@ break;
 continuing {
 let _e49 = GsacMoves.data[_e45];
 let _e54 = GsacWeights_1.data[u32(_e49.w)];
-phi_346_ = (_e43 + (_e49.xyz * _e54));
-phi_342_ = (_e45 + bitcast<u32>(1i));
+phi_353_ = (_e43 + (_e49.xyz * _e54));
+phi_349_ = (_e45 + bitcast<u32>(1i));
 }
 }
-phi_344_ = vec3<f32>(0f, 0f, 0f);
-phi_343_ = 0u;
+phi_351_ = vec3<f32>(0f, 0f, 0f);
+phi_350_ = 0u;
 loop {
-let _e61 = phi_344_;
-let _e63 = phi_343_;
+let _e61 = phi_351_;
+let _e63 = phi_350_;
 local_3 = _e61;
 local_4 = _e61;
 local_5 = _e61;
@@ -113,8 +113,8 @@ let _e91 = vec4<f32>(_e83.x, _e86.y, _e89.z, 1f);
 let _e94 = GsacBones.data[_e70];
 let _e99 = GsacBones.data[(_e70 + 1u)];
 let _e104 = GsacBones.data[(_e70 + 2u)];
-phi_344_ = (_e61 + (vec3<f32>(dot(_e94, _e91), dot(_e99, _e91), dot(_e104, _e91)) * (f32(((select(_e31.z, _e31.y, (_e63 < 2u)) >> bitcast<u32>((16u * (_e63 & 1u)))) & 65535u)) * 0.000015259022f)));
-phi_343_ = (_e63 + bitcast<u32>(1i));
+phi_351_ = (_e61 + (vec3<f32>(dot(_e94, _e91), dot(_e99, _e91), dot(_e104, _e91)) * (f32(((select(_e31.z, _e31.y, (_e63 < 2u)) >> bitcast<u32>((16u * (_e63 & 1u)))) & 65535u)) * 0.000015259022f)));
+phi_350_ = (_e63 + bitcast<u32>(1i));
 }
 }
 let _e112 = local_3;
@@ -173,10 +173,10 @@ var<storage, read_write> GsacSplats: GsacPosed;
 var<private> id_1: vec3<u32>;
 
 fn Bind_1() {
-var phi_1310_: vec3<f32>;
-var phi_1309_: vec3<f32>;
-var phi_1308_: vec3<f32>;
-var phi_1307_: f32;
+var phi_1317_: vec3<f32>;
+var phi_1316_: vec3<f32>;
+var phi_1315_: vec3<f32>;
+var phi_1314_: f32;
 
 let _e31 = id_1;
 switch bitcast<i32>(0u) {
@@ -194,23 +194,23 @@ let _e55 = (_e53.xyz - _e50);
 let _e56 = (_e45.xyz - _e50);
 let _e57 = cross(_e55, _e56);
 let _e58 = length(_e57);
-phi_1310_ = vec3<f32>(1f, 0f, 0f);
-phi_1309_ = vec3<f32>(0f, 1f, 0f);
-phi_1308_ = vec3<f32>(0f, 0f, 1f);
-phi_1307_ = 0f;
+phi_1317_ = vec3<f32>(1f, 0f, 0f);
+phi_1316_ = vec3<f32>(0f, 1f, 0f);
+phi_1315_ = vec3<f32>(0f, 0f, 1f);
+phi_1314_ = 0f;
 if ((_e58 > (0.000001f * (dot(_e55, _e55) + dot(_e56, _e56)))) && (_e58 > 0.000000000000001f)) {
 let _e70 = length((_e56 - _e55));
 let _e73 = (_e55 / vec3(length(_e55)));
 let _e75 = (_e57 / vec3(_e58));
-phi_1310_ = _e73;
-phi_1309_ = _e75;
-phi_1308_ = cross(_e73, _e75);
-phi_1307_ = (10f * ((_e58 / _e70) + _e70));
+phi_1317_ = _e73;
+phi_1316_ = _e75;
+phi_1315_ = cross(_e73, _e75);
+phi_1314_ = (10f * ((_e58 / _e70) + _e70));
 }
-let _e81 = phi_1310_;
-let _e83 = phi_1309_;
-let _e85 = phi_1308_;
-let _e87 = phi_1307_;
+let _e81 = phi_1317_;
+let _e83 = phi_1316_;
+let _e85 = phi_1315_;
+let _e87 = phi_1314_;
 let _e95 = GsacLocal_1.data[(_e31.x * 3u)];
 let _e98 = GsacLocal_1.data[((_e31.x * 3u) + 1u)];
 let _e101 = GsacLocal_1.data[((_e31.x * 3u) + 2u)];
@@ -276,35 +276,35 @@ var<private> group_1: vec3<u32>;
 var<private> id_1: vec3<u32>;
 
 fn SortBlocks_1() {
-var phi_4719_: u32;
-var phi_4744_: u32;
-var phi_4720_: u32;
-var phi_4722_: u32;
-var phi_4727_: vec4<u32>;
-var phi_4726_: vec4<u32>;
-var phi_4725_: vec4<u32>;
-var phi_4724_: vec4<u32>;
-var phi_4731_: vec4<u32>;
-var phi_4730_: vec4<u32>;
-var phi_4729_: vec4<u32>;
-var phi_4728_: vec4<u32>;
-var phi_4735_: vec4<u32>;
+var phi_4726_: u32;
+var phi_4751_: u32;
+var phi_4727_: u32;
+var phi_4729_: u32;
 var phi_4734_: vec4<u32>;
 var phi_4733_: vec4<u32>;
 var phi_4732_: vec4<u32>;
-var phi_4739_: vec4<u32>;
+var phi_4731_: vec4<u32>;
 var phi_4738_: vec4<u32>;
 var phi_4737_: vec4<u32>;
 var phi_4736_: vec4<u32>;
-var phi_4721_: u32;
+var phi_4735_: vec4<u32>;
+var phi_4742_: vec4<u32>;
+var phi_4741_: vec4<u32>;
+var phi_4740_: vec4<u32>;
+var phi_4739_: vec4<u32>;
+var phi_4746_: vec4<u32>;
+var phi_4745_: vec4<u32>;
+var phi_4744_: vec4<u32>;
+var phi_4743_: vec4<u32>;
+var phi_4728_: u32;
 var local: u32;
 
 let _e40 = group_1;
 let _e41 = id_1;
 let _e43 = (_e40.x * 4096u);
-phi_4719_ = 0u;
+phi_4726_ = 0u;
 loop {
-let _e45 = phi_4719_;
+let _e45 = phi_4726_;
 if (_e45 < 4096u) {
 let _e48 = (_e45 + _e41.x);
 let _e55 = ((_e43 + _e45) + _e41.x);
@@ -312,7 +312,7 @@ switch bitcast<i32>(0u) {
 default: {
 let _e58 = unnamed.GsacSplatCount;
 if (_e55 >= _e58) {
-phi_4744_ = 4294967295u;
+phi_4751_ = 4294967295u;
 break;
 }
 let _e61 = unnamed.GsacDepthRow;
@@ -321,18 +321,18 @@ let _e71 = unnamed.GsacDepthRow[3u];
 let _e74 = unnamed.GsacDepthRange;
 let _e76 = unnamed.GsacIndexBits;
 let _e80 = (exp2((32f - f32(_e76))) - 1f);
-phi_4744_ = ((u32((_e80 - floor((clamp((((dot(_e61.xyz, _e66.xyz) + _e71) - _e74.x) * _e74.y), 0f, 1f) * _e80)))) << bitcast<u32>(_e76)) | _e55);
+phi_4751_ = ((u32((_e80 - floor((clamp((((dot(_e61.xyz, _e66.xyz) + _e71) - _e74.x) * _e74.y), 0f, 1f) * _e80)))) << bitcast<u32>(_e76)) | _e55);
 break;
 }
 }
-let _e94 = phi_4744_;
+let _e94 = phi_4751_;
 shared_keys[(_e48 ^ ((_e48 >> bitcast<u32>(4i)) & 15u))] = _e94;
 continue;
 } else {
 break;
 }
 continuing {
-phi_4719_ = (_e45 + 256u);
+phi_4726_ = (_e45 + 256u);
 }
 }
 workgroupBarrier();
@@ -501,13 +501,13 @@ shared_keys[(_e668 ^ ((_e668 >> bitcast<u32>(4i)) & 15u))] = _e570.z;
 let _e675 = (_e98 + 15u);
 shared_keys[(_e675 ^ ((_e675 >> bitcast<u32>(4i)) & 15u))] = _e570.w;
 workgroupBarrier();
-phi_4720_ = 5u;
+phi_4727_ = 5u;
 loop {
-let _e683 = phi_4720_;
+let _e683 = phi_4727_;
 if (_e683 <= 12u) {
-phi_4722_ = _e683;
+phi_4729_ = _e683;
 loop {
-let _e689 = phi_4722_;
+let _e689 = phi_4729_;
 if (_e689 > 0u) {
 let _e693 = (((_e689 - 1u) & 3u) + 1u);
 let _e694 = (_e689 - 4u);
@@ -550,38 +550,38 @@ let _e841 = (vec4<u32>(_e711, _e718, _e726, _e734) ^ _e840);
 let _e842 = (vec4<u32>(_e743, _e750, _e758, _e766) ^ _e840);
 let _e843 = (vec4<u32>(_e775, _e782, _e790, _e798) ^ _e840);
 let _e844 = (vec4<u32>(_e807, _e814, _e822, _e830) ^ _e840);
-phi_4727_ = _e844;
-phi_4726_ = _e843;
-phi_4725_ = _e842;
-phi_4724_ = _e841;
+phi_4734_ = _e844;
+phi_4733_ = _e843;
+phi_4732_ = _e842;
+phi_4731_ = _e841;
 if ((_e835 & 8u) != 0u) {
-phi_4727_ = max(_e842, _e844);
-phi_4726_ = max(_e841, _e843);
-phi_4725_ = min(_e842, _e844);
-phi_4724_ = min(_e841, _e843);
+phi_4734_ = max(_e842, _e844);
+phi_4733_ = max(_e841, _e843);
+phi_4732_ = min(_e842, _e844);
+phi_4731_ = min(_e841, _e843);
 }
-let _e852 = phi_4727_;
-let _e854 = phi_4726_;
-let _e856 = phi_4725_;
-let _e858 = phi_4724_;
-phi_4731_ = _e852;
-phi_4730_ = _e854;
-phi_4729_ = _e856;
-phi_4728_ = _e858;
+let _e852 = phi_4734_;
+let _e854 = phi_4733_;
+let _e856 = phi_4732_;
+let _e858 = phi_4731_;
+phi_4738_ = _e852;
+phi_4737_ = _e854;
+phi_4736_ = _e856;
+phi_4735_ = _e858;
 if ((_e835 & 4u) != 0u) {
-phi_4731_ = max(_e854, _e852);
-phi_4730_ = min(_e854, _e852);
-phi_4729_ = max(_e858, _e856);
-phi_4728_ = min(_e858, _e856);
+phi_4738_ = max(_e854, _e852);
+phi_4737_ = min(_e854, _e852);
+phi_4736_ = max(_e858, _e856);
+phi_4735_ = min(_e858, _e856);
 }
-let _e866 = phi_4731_;
-let _e868 = phi_4730_;
-let _e870 = phi_4729_;
-let _e872 = phi_4728_;
-phi_4735_ = _e866;
-phi_4734_ = _e868;
-phi_4733_ = _e870;
-phi_4732_ = _e872;
+let _e866 = phi_4738_;
+let _e868 = phi_4737_;
+let _e870 = phi_4736_;
+let _e872 = phi_4735_;
+phi_4742_ = _e866;
+phi_4741_ = _e868;
+phi_4740_ = _e870;
+phi_4739_ = _e872;
 if ((_e835 & 2u) != 0u) {
 let _e877 = min(_e872.xy, _e872.zw);
 let _e880 = max(_e872.xy, _e872.zw);
@@ -591,19 +591,19 @@ let _e899 = min(_e868.xy, _e868.zw);
 let _e902 = max(_e868.xy, _e868.zw);
 let _e910 = min(_e866.xy, _e866.zw);
 let _e913 = max(_e866.xy, _e866.zw);
-phi_4735_ = vec4<u32>(_e910.x, _e910.y, _e913.x, _e913.y);
-phi_4734_ = vec4<u32>(_e899.x, _e899.y, _e902.x, _e902.y);
-phi_4733_ = vec4<u32>(_e888.x, _e888.y, _e891.x, _e891.y);
-phi_4732_ = vec4<u32>(_e877.x, _e877.y, _e880.x, _e880.y);
+phi_4742_ = vec4<u32>(_e910.x, _e910.y, _e913.x, _e913.y);
+phi_4741_ = vec4<u32>(_e899.x, _e899.y, _e902.x, _e902.y);
+phi_4740_ = vec4<u32>(_e888.x, _e888.y, _e891.x, _e891.y);
+phi_4739_ = vec4<u32>(_e877.x, _e877.y, _e880.x, _e880.y);
 }
-let _e920 = phi_4735_;
-let _e922 = phi_4734_;
-let _e924 = phi_4733_;
-let _e926 = phi_4732_;
-phi_4739_ = _e926;
-phi_4738_ = _e924;
-phi_4737_ = _e922;
-phi_4736_ = _e920;
+let _e920 = phi_4742_;
+let _e922 = phi_4741_;
+let _e924 = phi_4740_;
+let _e926 = phi_4739_;
+phi_4746_ = _e926;
+phi_4745_ = _e924;
+phi_4744_ = _e922;
+phi_4743_ = _e920;
 if ((_e835 & 1u) != 0u) {
 let _e931 = min(_e926.xz, _e926.yw);
 let _e934 = max(_e926.xz, _e926.yw);
@@ -613,15 +613,15 @@ let _e953 = min(_e922.xz, _e922.yw);
 let _e956 = max(_e922.xz, _e922.yw);
 let _e964 = min(_e920.xz, _e920.yw);
 let _e967 = max(_e920.xz, _e920.yw);
-phi_4739_ = vec4<u32>(_e931.x, _e934.x, _e931.y, _e934.y);
-phi_4738_ = vec4<u32>(_e942.x, _e945.x, _e942.y, _e945.y);
-phi_4737_ = vec4<u32>(_e953.x, _e956.x, _e953.y, _e956.y);
-phi_4736_ = vec4<u32>(_e964.x, _e967.x, _e964.y, _e967.y);
+phi_4746_ = vec4<u32>(_e931.x, _e934.x, _e931.y, _e934.y);
+phi_4745_ = vec4<u32>(_e942.x, _e945.x, _e942.y, _e945.y);
+phi_4744_ = vec4<u32>(_e953.x, _e956.x, _e953.y, _e956.y);
+phi_4743_ = vec4<u32>(_e964.x, _e967.x, _e964.y, _e967.y);
 }
-let _e974 = phi_4739_;
-let _e976 = phi_4738_;
-let _e978 = phi_4737_;
-let _e980 = phi_4736_;
+let _e974 = phi_4746_;
+let _e976 = phi_4745_;
+let _e978 = phi_4744_;
+let _e980 = phi_4743_;
 let _e981 = (_e974 ^ _e840);
 let _e982 = (_e976 ^ _e840);
 let _e983 = (_e978 ^ _e840);
@@ -666,7 +666,7 @@ break;
 }
 continuing {
 let _e1133 = local;
-phi_4722_ = _e1133;
+phi_4729_ = _e1133;
 }
 }
 continue;
@@ -674,12 +674,12 @@ continue;
 break;
 }
 continuing {
-phi_4720_ = (_e683 + bitcast<u32>(1i));
+phi_4727_ = (_e683 + bitcast<u32>(1i));
 }
 }
-phi_4721_ = 0u;
+phi_4728_ = 0u;
 loop {
-let _e1114 = phi_4721_;
+let _e1114 = phi_4728_;
 if (_e1114 < 4096u) {
 continue;
 } else {
@@ -689,7 +689,7 @@ continuing {
 let _e1118 = (_e1114 + _e41.x);
 let _e1124 = shared_keys[(_e1118 ^ ((_e1118 >> bitcast<u32>(4i)) & 15u))];
 GsacKeys_1.data[((_e43 + _e1114) + _e41.x)] = _e1124;
-phi_4721_ = (_e1114 + 256u);
+phi_4728_ = (_e1114 + 256u);
 }
 }
 return;
@@ -728,22 +728,22 @@ var<uniform> unnamed: GsacParams;
 var<private> id_1: vec3<u32>;
 
 fn SortAcross_1() {
-var phi_1314_: vec4<u32>;
-var phi_1313_: vec4<u32>;
-var phi_1312_: vec4<u32>;
-var phi_1311_: vec4<u32>;
-var phi_1318_: vec4<u32>;
-var phi_1317_: vec4<u32>;
-var phi_1316_: vec4<u32>;
-var phi_1315_: vec4<u32>;
-var phi_1322_: vec4<u32>;
 var phi_1321_: vec4<u32>;
 var phi_1320_: vec4<u32>;
 var phi_1319_: vec4<u32>;
-var phi_1326_: vec4<u32>;
+var phi_1318_: vec4<u32>;
 var phi_1325_: vec4<u32>;
 var phi_1324_: vec4<u32>;
 var phi_1323_: vec4<u32>;
+var phi_1322_: vec4<u32>;
+var phi_1329_: vec4<u32>;
+var phi_1328_: vec4<u32>;
+var phi_1327_: vec4<u32>;
+var phi_1326_: vec4<u32>;
+var phi_1333_: vec4<u32>;
+var phi_1332_: vec4<u32>;
+var phi_1331_: vec4<u32>;
+var phi_1330_: vec4<u32>;
 
 let _e17 = id_1;
 let _e19 = unnamed.GsacSortShift;
@@ -776,38 +776,38 @@ let _e121 = (vec4<u32>(_e37, _e41, _e46, _e51) ^ _e120);
 let _e122 = (vec4<u32>(_e57, _e61, _e66, _e71) ^ _e120);
 let _e123 = (vec4<u32>(_e77, _e81, _e86, _e91) ^ _e120);
 let _e124 = (vec4<u32>(_e97, _e101, _e106, _e111) ^ _e120);
-phi_1314_ = _e124;
-phi_1313_ = _e123;
-phi_1312_ = _e122;
-phi_1311_ = _e121;
+phi_1321_ = _e124;
+phi_1320_ = _e123;
+phi_1319_ = _e122;
+phi_1318_ = _e121;
 if ((_e114 & 8u) != 0u) {
-phi_1314_ = max(_e122, _e124);
-phi_1313_ = max(_e121, _e123);
-phi_1312_ = min(_e122, _e124);
-phi_1311_ = min(_e121, _e123);
+phi_1321_ = max(_e122, _e124);
+phi_1320_ = max(_e121, _e123);
+phi_1319_ = min(_e122, _e124);
+phi_1318_ = min(_e121, _e123);
 }
-let _e132 = phi_1314_;
-let _e134 = phi_1313_;
-let _e136 = phi_1312_;
-let _e138 = phi_1311_;
-phi_1318_ = _e132;
-phi_1317_ = _e134;
-phi_1316_ = _e136;
-phi_1315_ = _e138;
+let _e132 = phi_1321_;
+let _e134 = phi_1320_;
+let _e136 = phi_1319_;
+let _e138 = phi_1318_;
+phi_1325_ = _e132;
+phi_1324_ = _e134;
+phi_1323_ = _e136;
+phi_1322_ = _e138;
 if ((_e114 & 4u) != 0u) {
-phi_1318_ = max(_e134, _e132);
-phi_1317_ = min(_e134, _e132);
-phi_1316_ = max(_e138, _e136);
-phi_1315_ = min(_e138, _e136);
+phi_1325_ = max(_e134, _e132);
+phi_1324_ = min(_e134, _e132);
+phi_1323_ = max(_e138, _e136);
+phi_1322_ = min(_e138, _e136);
 }
-let _e146 = phi_1318_;
-let _e148 = phi_1317_;
-let _e150 = phi_1316_;
-let _e152 = phi_1315_;
-phi_1322_ = _e146;
-phi_1321_ = _e148;
-phi_1320_ = _e150;
-phi_1319_ = _e152;
+let _e146 = phi_1325_;
+let _e148 = phi_1324_;
+let _e150 = phi_1323_;
+let _e152 = phi_1322_;
+phi_1329_ = _e146;
+phi_1328_ = _e148;
+phi_1327_ = _e150;
+phi_1326_ = _e152;
 if ((_e114 & 2u) != 0u) {
 let _e157 = min(_e152.xy, _e152.zw);
 let _e160 = max(_e152.xy, _e152.zw);
@@ -817,19 +817,19 @@ let _e179 = min(_e148.xy, _e148.zw);
 let _e182 = max(_e148.xy, _e148.zw);
 let _e190 = min(_e146.xy, _e146.zw);
 let _e193 = max(_e146.xy, _e146.zw);
-phi_1322_ = vec4<u32>(_e190.x, _e190.y, _e193.x, _e193.y);
-phi_1321_ = vec4<u32>(_e179.x, _e179.y, _e182.x, _e182.y);
-phi_1320_ = vec4<u32>(_e168.x, _e168.y, _e171.x, _e171.y);
-phi_1319_ = vec4<u32>(_e157.x, _e157.y, _e160.x, _e160.y);
+phi_1329_ = vec4<u32>(_e190.x, _e190.y, _e193.x, _e193.y);
+phi_1328_ = vec4<u32>(_e179.x, _e179.y, _e182.x, _e182.y);
+phi_1327_ = vec4<u32>(_e168.x, _e168.y, _e171.x, _e171.y);
+phi_1326_ = vec4<u32>(_e157.x, _e157.y, _e160.x, _e160.y);
 }
-let _e200 = phi_1322_;
-let _e202 = phi_1321_;
-let _e204 = phi_1320_;
-let _e206 = phi_1319_;
-phi_1326_ = _e206;
-phi_1325_ = _e204;
-phi_1324_ = _e202;
-phi_1323_ = _e200;
+let _e200 = phi_1329_;
+let _e202 = phi_1328_;
+let _e204 = phi_1327_;
+let _e206 = phi_1326_;
+phi_1333_ = _e206;
+phi_1332_ = _e204;
+phi_1331_ = _e202;
+phi_1330_ = _e200;
 if ((_e114 & 1u) != 0u) {
 let _e211 = min(_e206.xz, _e206.yw);
 let _e214 = max(_e206.xz, _e206.yw);
@@ -839,15 +839,15 @@ let _e233 = min(_e202.xz, _e202.yw);
 let _e236 = max(_e202.xz, _e202.yw);
 let _e244 = min(_e200.xz, _e200.yw);
 let _e247 = max(_e200.xz, _e200.yw);
-phi_1326_ = vec4<u32>(_e211.x, _e214.x, _e211.y, _e214.y);
-phi_1325_ = vec4<u32>(_e222.x, _e225.x, _e222.y, _e225.y);
-phi_1324_ = vec4<u32>(_e233.x, _e236.x, _e233.y, _e236.y);
-phi_1323_ = vec4<u32>(_e244.x, _e247.x, _e244.y, _e247.y);
+phi_1333_ = vec4<u32>(_e211.x, _e214.x, _e211.y, _e214.y);
+phi_1332_ = vec4<u32>(_e222.x, _e225.x, _e222.y, _e225.y);
+phi_1331_ = vec4<u32>(_e233.x, _e236.x, _e233.y, _e236.y);
+phi_1330_ = vec4<u32>(_e244.x, _e247.x, _e244.y, _e247.y);
 }
-let _e254 = phi_1326_;
-let _e256 = phi_1325_;
-let _e258 = phi_1324_;
-let _e260 = phi_1323_;
+let _e254 = phi_1333_;
+let _e256 = phi_1332_;
+let _e258 = phi_1331_;
+let _e260 = phi_1330_;
 let _e261 = (_e254 ^ _e120);
 let _e262 = (_e256 ^ _e120);
 let _e263 = (_e258 ^ _e120);
@@ -908,33 +908,33 @@ var<private> group_1: vec3<u32>;
 var<private> id_1: vec3<u32>;
 
 fn SortMerge_1() {
-var phi_1921_: u32;
-var phi_1922_: u32;
-var phi_1927_: vec4<u32>;
-var phi_1926_: vec4<u32>;
-var phi_1925_: vec4<u32>;
-var phi_1924_: vec4<u32>;
-var phi_1931_: vec4<u32>;
-var phi_1930_: vec4<u32>;
-var phi_1929_: vec4<u32>;
-var phi_1928_: vec4<u32>;
-var phi_1935_: vec4<u32>;
+var phi_1928_: u32;
+var phi_1929_: u32;
 var phi_1934_: vec4<u32>;
 var phi_1933_: vec4<u32>;
 var phi_1932_: vec4<u32>;
-var phi_1939_: vec4<u32>;
+var phi_1931_: vec4<u32>;
 var phi_1938_: vec4<u32>;
 var phi_1937_: vec4<u32>;
 var phi_1936_: vec4<u32>;
-var phi_1923_: u32;
+var phi_1935_: vec4<u32>;
+var phi_1942_: vec4<u32>;
+var phi_1941_: vec4<u32>;
+var phi_1940_: vec4<u32>;
+var phi_1939_: vec4<u32>;
+var phi_1946_: vec4<u32>;
+var phi_1945_: vec4<u32>;
+var phi_1944_: vec4<u32>;
+var phi_1943_: vec4<u32>;
+var phi_1930_: u32;
 var local: u32;
 
 let _e23 = group_1;
 let _e24 = id_1;
 let _e26 = (_e23.x * 4096u);
-phi_1921_ = 0u;
+phi_1928_ = 0u;
 loop {
-let _e28 = phi_1921_;
+let _e28 = phi_1928_;
 if (_e28 < 4096u) {
 continue;
 } else {
@@ -944,14 +944,14 @@ continuing {
 let _e31 = (_e28 + _e24.x);
 let _e41 = GsacKeys_1.data[((_e26 + _e28) + _e24.x)];
 shared_keys[(_e31 ^ ((_e31 >> bitcast<u32>(4i)) & 15u))] = _e41;
-phi_1921_ = (_e28 + 256u);
+phi_1928_ = (_e28 + 256u);
 }
 }
 workgroupBarrier();
 let _e46 = unnamed.GsacSortStage;
-phi_1922_ = 12u;
+phi_1929_ = 12u;
 loop {
-let _e48 = phi_1922_;
+let _e48 = phi_1929_;
 if (_e48 > 0u) {
 let _e52 = (((_e48 - 1u) & 3u) + 1u);
 let _e53 = (_e48 - 4u);
@@ -994,38 +994,38 @@ let _e200 = (vec4<u32>(_e70, _e77, _e85, _e93) ^ _e199);
 let _e201 = (vec4<u32>(_e102, _e109, _e117, _e125) ^ _e199);
 let _e202 = (vec4<u32>(_e134, _e141, _e149, _e157) ^ _e199);
 let _e203 = (vec4<u32>(_e166, _e173, _e181, _e189) ^ _e199);
-phi_1927_ = _e203;
-phi_1926_ = _e202;
-phi_1925_ = _e201;
-phi_1924_ = _e200;
+phi_1934_ = _e203;
+phi_1933_ = _e202;
+phi_1932_ = _e201;
+phi_1931_ = _e200;
 if ((_e194 & 8u) != 0u) {
-phi_1927_ = max(_e201, _e203);
-phi_1926_ = max(_e200, _e202);
-phi_1925_ = min(_e201, _e203);
-phi_1924_ = min(_e200, _e202);
+phi_1934_ = max(_e201, _e203);
+phi_1933_ = max(_e200, _e202);
+phi_1932_ = min(_e201, _e203);
+phi_1931_ = min(_e200, _e202);
 }
-let _e211 = phi_1927_;
-let _e213 = phi_1926_;
-let _e215 = phi_1925_;
-let _e217 = phi_1924_;
-phi_1931_ = _e211;
-phi_1930_ = _e213;
-phi_1929_ = _e215;
-phi_1928_ = _e217;
+let _e211 = phi_1934_;
+let _e213 = phi_1933_;
+let _e215 = phi_1932_;
+let _e217 = phi_1931_;
+phi_1938_ = _e211;
+phi_1937_ = _e213;
+phi_1936_ = _e215;
+phi_1935_ = _e217;
 if ((_e194 & 4u) != 0u) {
-phi_1931_ = max(_e213, _e211);
-phi_1930_ = min(_e213, _e211);
-phi_1929_ = max(_e217, _e215);
-phi_1928_ = min(_e217, _e215);
+phi_1938_ = max(_e213, _e211);
+phi_1937_ = min(_e213, _e211);
+phi_1936_ = max(_e217, _e215);
+phi_1935_ = min(_e217, _e215);
 }
-let _e225 = phi_1931_;
-let _e227 = phi_1930_;
-let _e229 = phi_1929_;
-let _e231 = phi_1928_;
-phi_1935_ = _e225;
-phi_1934_ = _e227;
-phi_1933_ = _e229;
-phi_1932_ = _e231;
+let _e225 = phi_1938_;
+let _e227 = phi_1937_;
+let _e229 = phi_1936_;
+let _e231 = phi_1935_;
+phi_1942_ = _e225;
+phi_1941_ = _e227;
+phi_1940_ = _e229;
+phi_1939_ = _e231;
 if ((_e194 & 2u) != 0u) {
 let _e236 = min(_e231.xy, _e231.zw);
 let _e239 = max(_e231.xy, _e231.zw);
@@ -1035,19 +1035,19 @@ let _e258 = min(_e227.xy, _e227.zw);
 let _e261 = max(_e227.xy, _e227.zw);
 let _e269 = min(_e225.xy, _e225.zw);
 let _e272 = max(_e225.xy, _e225.zw);
-phi_1935_ = vec4<u32>(_e269.x, _e269.y, _e272.x, _e272.y);
-phi_1934_ = vec4<u32>(_e258.x, _e258.y, _e261.x, _e261.y);
-phi_1933_ = vec4<u32>(_e247.x, _e247.y, _e250.x, _e250.y);
-phi_1932_ = vec4<u32>(_e236.x, _e236.y, _e239.x, _e239.y);
+phi_1942_ = vec4<u32>(_e269.x, _e269.y, _e272.x, _e272.y);
+phi_1941_ = vec4<u32>(_e258.x, _e258.y, _e261.x, _e261.y);
+phi_1940_ = vec4<u32>(_e247.x, _e247.y, _e250.x, _e250.y);
+phi_1939_ = vec4<u32>(_e236.x, _e236.y, _e239.x, _e239.y);
 }
-let _e279 = phi_1935_;
-let _e281 = phi_1934_;
-let _e283 = phi_1933_;
-let _e285 = phi_1932_;
-phi_1939_ = _e285;
-phi_1938_ = _e283;
-phi_1937_ = _e281;
-phi_1936_ = _e279;
+let _e279 = phi_1942_;
+let _e281 = phi_1941_;
+let _e283 = phi_1940_;
+let _e285 = phi_1939_;
+phi_1946_ = _e285;
+phi_1945_ = _e283;
+phi_1944_ = _e281;
+phi_1943_ = _e279;
 if ((_e194 & 1u) != 0u) {
 let _e290 = min(_e285.xz, _e285.yw);
 let _e293 = max(_e285.xz, _e285.yw);
@@ -1057,15 +1057,15 @@ let _e312 = min(_e281.xz, _e281.yw);
 let _e315 = max(_e281.xz, _e281.yw);
 let _e323 = min(_e279.xz, _e279.yw);
 let _e326 = max(_e279.xz, _e279.yw);
-phi_1939_ = vec4<u32>(_e290.x, _e293.x, _e290.y, _e293.y);
-phi_1938_ = vec4<u32>(_e301.x, _e304.x, _e301.y, _e304.y);
-phi_1937_ = vec4<u32>(_e312.x, _e315.x, _e312.y, _e315.y);
-phi_1936_ = vec4<u32>(_e323.x, _e326.x, _e323.y, _e326.y);
+phi_1946_ = vec4<u32>(_e290.x, _e293.x, _e290.y, _e293.y);
+phi_1945_ = vec4<u32>(_e301.x, _e304.x, _e301.y, _e304.y);
+phi_1944_ = vec4<u32>(_e312.x, _e315.x, _e312.y, _e315.y);
+phi_1943_ = vec4<u32>(_e323.x, _e326.x, _e323.y, _e326.y);
 }
-let _e333 = phi_1939_;
-let _e335 = phi_1938_;
-let _e337 = phi_1937_;
-let _e339 = phi_1936_;
+let _e333 = phi_1946_;
+let _e335 = phi_1945_;
+let _e337 = phi_1944_;
+let _e339 = phi_1943_;
 let _e340 = (_e333 ^ _e199);
 let _e341 = (_e335 ^ _e199);
 let _e342 = (_e337 ^ _e199);
@@ -1110,12 +1110,12 @@ break;
 }
 continuing {
 let _e488 = local;
-phi_1922_ = _e488;
+phi_1929_ = _e488;
 }
 }
-phi_1923_ = 0u;
+phi_1930_ = 0u;
 loop {
-let _e471 = phi_1923_;
+let _e471 = phi_1930_;
 if (_e471 < 4096u) {
 continue;
 } else {
@@ -1125,7 +1125,7 @@ continuing {
 let _e475 = (_e471 + _e24.x);
 let _e481 = shared_keys[(_e475 ^ ((_e475 >> bitcast<u32>(4i)) & 15u))];
 GsacKeys_1.data[((_e26 + _e471) + _e24.x)] = _e481;
-phi_1923_ = (_e471 + 256u);
+phi_1930_ = (_e471 + 256u);
 }
 }
 return;
@@ -1136,6 +1136,110 @@ fn SortMerge(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
 group_1 = group;
 id_1 = id;
 SortMerge_1();
+}
+` },
+  Correct: { bindings: {"parameters": 0, "GsacRest": 1, "GsacFirst": 3, "GsacPairs": 2, "GsacTurns": 4, "GsacBent": 5}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
+struct GsacParams {
+GsacVertexCount: u32,
+GsacSplatCount: u32,
+GsacIndexBits: u32,
+GsacSortStage: u32,
+GsacSortShift: u32,
+GsacSortStrides: u32,
+GsacDepthRange: vec2<f32>,
+GsacDepthRow: vec4<f32>,
+GsacLightRed: vec4<f32>,
+GsacLightGreen: vec4<f32>,
+GsacLightBlue: vec4<f32>,
+}
+
+struct GsacRest {
+data: array<vec4<f32>>,
+}
+
+struct GsacFirst {
+data: array<u32>,
+}
+
+struct GsacBent {
+data: array<vec4<f32>>,
+}
+
+@group(0) @binding(0)
+var<uniform> unnamed: GsacParams;
+@group(0) @binding(1)
+var<storage> GsacRest_1: GsacRest;
+@group(0) @binding(3)
+var<storage> GsacFirst_1: GsacFirst;
+@group(0) @binding(2)
+var<storage> GsacPairs: GsacRest;
+@group(0) @binding(4)
+var<storage> GsacTurns: GsacRest;
+@group(0) @binding(5)
+var<storage, read_write> GsacBent_1: GsacBent;
+var<private> id_1: vec3<u32>;
+
+fn Correct_1() {
+var phi_461_: vec3<f32>;
+var phi_460_: u32;
+var local: vec3<f32>;
+var local_1: vec3<f32>;
+var local_2: vec3<f32>;
+
+let _e18 = id_1;
+switch bitcast<i32>(0u) {
+default: {
+let _e22 = unnamed.GsacVertexCount;
+if (_e18.x >= _e22) {
+break;
+}
+let _e26 = GsacRest_1.data[_e18.x];
+let _e31 = GsacFirst_1.data[(_e18.x + 1u)];
+let _e34 = GsacFirst_1.data[_e18.x];
+phi_461_ = _e26.xyz;
+phi_460_ = _e34;
+loop {
+let _e36 = phi_461_;
+let _e38 = phi_460_;
+local = _e36;
+local_1 = _e36;
+local_2 = _e36;
+if (_e38 < _e31) {
+continue;
+} else {
+break;
+}
+continuing {
+let _e40 = (_e38 * 7u);
+let _e43 = GsacPairs.data[_e40];
+let _e47 = GsacPairs.data[(_e40 + 1u)];
+let _e51 = GsacPairs.data[(_e40 + 2u)];
+let _e55 = GsacPairs.data[(_e40 + 3u)];
+let _e59 = GsacPairs.data[(_e40 + 4u)];
+let _e63 = GsacPairs.data[(_e40 + 5u)];
+let _e67 = GsacPairs.data[(_e40 + 6u)];
+let _e70 = (u32(_e67.w) * 3u);
+let _e73 = GsacTurns.data[_e70];
+let _e77 = GsacTurns.data[(_e70 + 1u)];
+let _e82 = GsacTurns.data[(_e70 + 2u)][0u];
+phi_461_ = vec3<f32>((_e36.x + fma(_e51.x, _e82, (dot(_e43, _e73) + dot(_e47, _e77)))), (_e36.y + fma(_e59.y, _e82, (dot(vec4<f32>(_e51.y, _e51.z, _e51.w, _e55.x), _e73) + dot(vec4<f32>(_e55.y, _e55.z, _e55.w, _e59.x), _e77)))), (_e36.z + fma(_e67.z, _e82, (dot(vec4<f32>(_e59.z, _e59.w, _e63.x, _e63.y), _e73) + dot(vec4<f32>(_e63.z, _e63.w, _e67.x, _e67.y), _e77)))));
+phi_460_ = (_e38 + bitcast<u32>(1i));
+}
+}
+let _e128 = local;
+let _e131 = local_1;
+let _e134 = local_2;
+GsacBent_1.data[_e18.x] = vec4<f32>(_e128.x, _e131.y, _e134.z, 1f);
+break;
+}
+}
+return;
+}
+
+@compute @workgroup_size(64, 1, 1)
+fn Correct(@builtin(global_invocation_id) id: vec3<u32>) {
+id_1 = id;
+Correct_1();
 }
 ` },
   SplatVertex: { bindings: {"GsacKeys": 3, "parameters": 0, "GsacColours": 2, "GsacSplats": 1}, parameters: {"GsacModel0": 0, "GsacModel1": 16, "GsacModel2": 32, "GsacBlend": 48, "GsacKeepsEnergy": 64, "GsacIndexBits": 68, "PageView0": 80, "PageView1": 96, "PageView2": 112, "PageLens": 128, "PageDisc": 144, "PageInk": 160}, code: `

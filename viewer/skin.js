@@ -77,7 +77,9 @@ export class Skin {
     // (J, 3, 4) [R | t], from the rest place to the posed one.
     this.bones = new Float32Array(avatar.names.length * 12);
     this.local = new Float32Array(9);
-    // (V, 3), m: at rest with the expression, and posed.
+    // (J, 12), nine numbers of each joint's rotation less the identity and three zeros, where the avatar has pose correctives.
+    this.turns = new Float32Array(avatar.correctives ? avatar.names.length * 12 : 0);
+    // (V, 3), m: at rest with the pose's correctives and the expression, and posed.
     this.rest = new Float32Array(avatar.vertices.length);
     this.vertices = new Float32Array(avatar.vertices.length);
   }
@@ -89,7 +91,7 @@ export class Skin {
    */
   update(pose, expression) {
     this.moveBones(pose);
-    this.rest.set(this.avatar.vertices);
+    this.bend(pose);
     const { expressions, start, moved, delta } = this.avatar;
     for (let e = 0; e < expressions.length; e++) {
       const weight = expression[expressions[e]] || 0;
@@ -120,6 +122,34 @@ export class Skin {
         }
         B[o + r * 4 + 3] = place - (B[o + r * 4] * jx + B[o + r * 4 + 1] * jy + B[o + r * 4 + 2] * jz);
       }
+    }
+  }
+
+  // Fills this.turns.
+  turn(pose) {
+    for (let o = 0, j = 0; o < this.turns.length; o += 12, j += 4) {
+      quatToMatrix(this.turns, o, pose.quats, j);
+      for (let c = 0; c < 9; c += 4) this.turns[o + c] -= 1;
+    }
+  }
+
+  // Fills this.rest: the vertices at rest, as the pose's correctives move them.
+  bend(pose) {
+    const { vertices, correctives } = this.avatar, { rest, turns } = this;
+    rest.set(vertices);
+    if (!correctives) return;
+    this.turn(pose);
+    const { start, joint, delta } = correctives;
+    for (let v = 0, n = rest.length / 3; v < n; v++) {
+      let x = rest[v * 3], y = rest[v * 3 + 1], z = rest[v * 3 + 2];
+      for (let i = start[v]; i < start[v + 1]; i++) {
+        const t = joint[i] * 12, d = i * 27;
+        for (let c = 0; c < 9; c++) {
+          const turn = turns[t + c];
+          x += delta[d + c] * turn; y += delta[d + 9 + c] * turn; z += delta[d + 18 + c] * turn;
+        }
+      }
+      rest[v * 3] = x; rest[v * 3 + 1] = y; rest[v * 3 + 2] = z;
     }
   }
 

@@ -197,6 +197,7 @@ export class Viewer {
   move() {
     if (this.renderer && "move" in this.renderer && !this.session) {
       this.skin.moveBones(this.pose);
+      this.skin.turn(this.pose);
       this.renderer.move(this.expression);
     } else {
       this.skin.update(this.pose, this.expression);

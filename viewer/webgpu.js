@@ -3,7 +3,7 @@
 
 import { EVEN_LIGHT } from "./binding.js";
 import { reachDevice } from "./device.js";
-import { indexQuads, packBody, packLevel } from "./pack.js";
+import { indexQuads, packBody, packCorrectives, packLevel } from "./pack.js";
 import { transformPoint } from "./projection.js";
 import { SHADERS } from "./shaders.js";
 
@@ -69,11 +69,18 @@ export class WebgpuRenderer {
     this.buffers = this.upload({ ...packBody(avatar), GsacWeights: this.weights, GsacBones: size(names.length * 48),
       GsacPosed: size(vertices.length / 3 * 16), GsacSplats: size(most * 48),
       GsacKeys: size(Math.max(...sorts.map((sort) => sort.keys)) * 4) });
+    // Where there are pose correctives, Correct makes of the rest places those that Skin takes.
+    if (avatar.correctives) {
+      Object.assign(this.buffers, this.upload({ ...packCorrectives(avatar), GsacTurns: skin.turns,
+        GsacBent: size(vertices.length / 3 * 16) }));
+    }
     this.corners = this.buffer(indexQuads(most), GPUBufferUsage.INDEX);
     // What draws each level of detail.
     this.plans = avatar.levels.map((level, i) => {
+      const skinGroups = Math.ceil(vertices.length / 3 / SKIN_THREADS);
       /** @type {Dispatch[]} */
-      const dispatches = [{ entry: "Skin", groups: Math.ceil(vertices.length / 3 / SKIN_THREADS) },
+      const dispatches = [...(avatar.correctives ? [{ entry: "Correct", groups: skinGroups }] : []),
+        { entry: "Skin", groups: skinGroups },
         { entry: "Bind", groups: Math.ceil(counts[i] / SKIN_THREADS) }, ...sorts[i].steps];
       return { count: counts[i], indexBits: sorts[i].indexBits, dispatches,
         buffers: { ...this.buffers, ...this.upload(packLevel(avatar, level)) } };
@@ -114,7 +121,8 @@ export class WebgpuRenderer {
     this.kernels = this.plans.map(({ dispatches, buffers }) => dispatches.map(({ entry }, i) => {
       const pipeline = kernels[entries.indexOf(entry)], parameters = { buffer: this.dispatchBuffer, offset: i * PARAMETER_BYTES,
         size: PARAMETER_BYTES };
-      return { pipeline, group: this.group(pipeline, entry, { ...buffers, parameters }) };
+      const bent = entry === "Skin" && buffers.GsacBent ? { GsacRest: buffers.GsacBent } : {};
+      return { pipeline, group: this.group(pipeline, entry, { ...buffers, ...bent, parameters }) };
     }));
     const parameters = { buffer: this.eyeBuffer };
     this.splats = this.plans.map(({ buffers }) => ({ pipeline: splats,
@@ -129,10 +137,11 @@ export class WebgpuRenderer {
     return this.device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries });
   }
 
-  // Sends the skin's bones and the expression's weights, by name.
+  // Sends the skin's bones, what the pose's correctives move, and the expression's weights, by name.
   move(expression) {
     this.avatar.expressions.forEach((name, e) => { this.weights[e] = expression[name] || 0; });
     this.device.queue.writeBuffer(this.buffers.GsacBones, 0, this.skin.bones);
+    if (this.avatar.correctives) this.device.queue.writeBuffer(this.buffers.GsacTurns, 0, this.skin.turns);
     this.device.queue.writeBuffer(this.buffers.GsacWeights, 0, this.weights);
   }
 
@@ -237,10 +246,17 @@ function planSort(count) {
 // The greatest distance of gaussians from a joint that moves them, m, by joint: however the joints turn, a skinned vertex stays
 // in the hull of balls around its joints; gaussians are let stand half as far again off the mesh as at rest.
 function jointReach(avatar, bindings) {
-  const { vertices, faces, joints, names, skinIndex, skinWeight, moved, delta } = avatar;
+  const { vertices, faces, joints, names, skinIndex, skinWeight, moved, delta, correctives } = avatar;
   const reach = new Float64Array(names.length), far = new Float64Array(vertices.length / 3);
   const length = (x, y, z) => Math.hypot(x, y, z);
   for (let i = 0; i < moved.length; i++) far[moved[i]] += length(...delta.subarray(i * 3, i * 3 + 3));
+  if (correctives) {
+    const { start, delta } = correctives;
+    // A rotation less the identity has at most the norm of half a turn, the root of 8.
+    for (let v = 0; v < far.length; v++) {
+      for (let i = start[v]; i < start[v + 1]; i++) far[v] += Math.sqrt(8) * Math.hypot(...delta.subarray(i * 27, i * 27 + 27));
+    }
+  }
   for (let k = 0; k < skinIndex.length; k++) {
     if (skinWeight[k] === 0) continue;
     const v = k >> 2, j = skinIndex[k];

@@ -21,7 +21,7 @@ CORE = Path(gsac.unity.__file__).parent / "Runtime" / "Resources" / "Gsac"
 SOURCES = (CORE / "GsacCore.hlsl", CORE / "Gsac.compute", CORE / "GsacDraw.hlsl", HERE / "page.hlsl")
 WRITTEN = HERE / "shaders.js"
 NAGA = "naga-wasm@30.1.0"
-ENTRIES = {"Skin": "comp", "Bind": "comp", "SortBlocks": "comp", "SortAcross": "comp", "SortMerge": "comp",
+ENTRIES = {"Skin": "comp", "Bind": "comp", "SortBlocks": "comp", "SortAcross": "comp", "SortMerge": "comp", "Correct": "comp",
            "SplatVertex": "vert", "SplatFragment": "frag", "FloorVertex": "vert", "FloorFragment": "frag"}
 """Entry point -> kind of shader, as glslangValidator names it."""
 _SIZES = {"u32": 4, "f32": 4, "vec2<f32>": 8, "vec4<f32>": 16}

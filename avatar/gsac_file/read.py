@@ -11,6 +11,7 @@ from gsac.avatar.draw_rule import ADDED, LowPass
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.container import Fault, GsacError
+from gsac.avatar.sparse_correctives import SparseCorrectives
 
 MAX_JOINTS = 256
 MAX_LEVELS = 16
@@ -110,8 +111,7 @@ class Reader:
         names = self.names(self.head, "expressions")
         start = self.block("expression.start", (len(names) + 1,), True)
         moved = self.check_indices(self.block("expression.vertex", (None,), True), V, "expression.vertex")
-        if start[0] != 0 or start[-1] != len(moved) or (np.diff(start) < 0).any():
-            raise self.bad(Fault.VALUE, "expression.start must rise from 0 to the number of moved vertices")
+        self.check_rise(start, len(moved), "expression.start")
         gaussians, *coarser = self.levels(len(faces))
         return dict(
             vertices=vertices, faces=faces, joints=self.block("rest.joints", (J, 3)),
@@ -120,8 +120,22 @@ class Reader:
             expression_names=names, expression_start=start, expression_vertex=moved,
             expression_delta=self.block("expression.delta", (len(moved), 3)),
             jaw_actions=self.block("expression.jaw", (len(names), 3)), gaussians=gaussians, coarser=coarser,
-            poses=self.poses(joint_names), clips=self.clips(joint_names),
+            correctives=self.correctives(V, J), poses=self.poses(joint_names), clips=self.clips(joint_names),
             licence=self.texts("licence"), provenance=self.texts("provenance"))
+
+    def check_rise(self, start: np.ndarray, end: int, what: str) -> None:
+        """Raises unless start (n,) rises from 0 to end."""
+        if start[0] != 0 or start[-1] != end or (np.diff(start) < 0).any():
+            raise self.bad(Fault.VALUE, f"{what} must rise from 0 to {end}, the number of its rows")
+
+    def correctives(self, vertices: int, joints: int) -> SparseCorrectives | None:
+        """The pose correctives; None where the file has none."""
+        if "corrective.start" not in self.blocks:
+            return None
+        joint = self.check_indices(self.block("corrective.joint", (None,), True), joints, "corrective.joint")
+        start = self.block("corrective.start", (vertices + 1,), True)
+        self.check_rise(start, len(joint), "corrective.start")
+        return SparseCorrectives(start, joint, self.block("corrective.delta", (len(joint), 3, 9)))
 
     def levels(self, faces: int) -> list[Gaussians]:
         """The gaussians of each level of detail, finest first."""

@@ -14,6 +14,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.container import read_bytes, unpack
 from gsac.avatar.gsac_file.read import Reader
+from gsac.avatar.sparse_correctives import SparseCorrectives
 
 
 @dataclass
@@ -49,6 +50,8 @@ class RiggedAvatar:
     poses: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     """Still poses: name -> joint name -> axis-angle."""
     clips: dict[str, Animation] = field(default_factory=dict)
+    correctives: SparseCorrectives | None = None
+    """What turned joints add to the vertices at rest beside skinning; None where the body has no such thing."""
     licence: dict[str, str] = field(default_factory=dict)
     provenance: dict[str, str] = field(default_factory=dict)
 
@@ -69,7 +72,8 @@ class RiggedAvatar:
         from gsac.avatar.skinning import joint_transforms, skin  # numba, which a reader of files can do without
 
         transforms = joint_transforms(pose[None].astype(np.float32), self.joints, self.parents)[0]
-        return skin(self.vertices, transforms, self.skin_index, self.skin_weight)
+        rest = self.vertices if self.correctives is None else self.vertices + self.correctives.move_rest(pose)
+        return skin(rest, transforms, self.skin_index, self.skin_weight)
 
     @classmethod
     def from_bytes(cls, data: bytes, where: str = "avatar.gsac") -> RiggedAvatar:

@@ -46,6 +46,12 @@ def avatar_bytes(avatar: RiggedAvatar) -> bytes:
         levels.append({"prefix": prefix, "count": len(g)} | ({} if g.max_height_px is None else {"max_height_px": g.max_height_px}))
     if avatar.gaussians.light is not None:
         blocks["light"] = avatar.gaussians.light.astype(np.float32)
+    if avatar.correctives is not None:
+        blocks |= {
+            "corrective.start": avatar.correctives.start.astype(np.uint32),
+            "corrective.joint": avatar.correctives.joint.astype(np.uint8),
+            "corrective.delta": avatar.correctives.delta.astype(np.float16),
+        }
     for name, clip in avatar.clips.items():
         blocks[f"clip.{name}.rotation"] = clip.rotation.astype(np.float32)
         blocks[f"clip.{name}.transl"] = clip.transl.astype(np.float32)

@@ -11,7 +11,6 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.joints import FINGERS, J
-from gsac.avatar.npz import NpzError, read_npz
 from gsac.avatar.pose_files.exavatar import is_exavatar, read_exavatar
 from gsac.avatar.pose_files.files import read_frames
 from gsac.avatar.pose_files.hand4whole import is_hand4whole, read_hand4whole
@@ -24,8 +23,8 @@ LAYOUTS: dict[str, tuple[Callable[[Arrays], bool], Callable[[Arrays], Poses]]] =
     "ExAvatar": (is_exavatar, read_exavatar), "Hand4Whole": (is_hand4whole, read_hand4whole),
     "SMPLer-X": (is_smpler_x, read_smpler_x), "WHAM": (is_wham, read_wham)}
 """Layout -> whether arrays are of it, and its reader."""
-HAND_MEANS = ("hands_meanl", "hands_meanr")
-"""Arrays of an official SMPL-X file: its mean hands, against which fingers are given."""
+HANDS = ("left_hand_pose", "right_hand_pose")
+"""Arrays of the smplx package that may hold components in place of rotation vectors."""
 
 
 @dataclass
@@ -42,13 +41,14 @@ class Start:
         return np.isfinite(self.rotations[:, 0, 0, 0])
 
 
-def read_start(path: Path, frames: int, hand_means: np.ndarray | None = None) -> Start:
+def read_start(path: Path, frames: int, hand_means: np.ndarray | None = None, hand_components: np.ndarray | None = None) -> Start:
     """The poses on the clip's frames. Raises ArtifactError.
 
-    frames: T; hand_means: (30, 3) rad, the body's mean fingers, to which a file's add; None: fingers are taken as they are. A file
-    of as many frames as the clip has them in order; one of fewer names them by number, from 0 as split/frames.
+    frames: T; hand_means: (30, 3) rad, the body's mean fingers, to which a file's add; None: fingers are taken as they are;
+    hand_components: (2, 45, 45) rad, the body's, of which a file may give the coefficients of the leading ones. A file of as many
+    frames as the clip has them in order; one of fewer names them by number, from 0 as split/frames.
     """
-    poses, numbers = read_poses(path)
+    poses, numbers = read_poses(path, hand_components)
     count = len(poses.vectors)
     if count == frames:
         numbers = np.arange(frames)
@@ -63,11 +63,16 @@ def read_start(path: Path, frames: int, hand_means: np.ndarray | None = None) ->
     return start
 
 
-def read_poses(path: Path) -> tuple[Poses, np.ndarray | None]:
-    """The poses of n frames, and their numbers (n,) where the file has them. Raises ArtifactError."""
+def read_poses(path: Path, hand_components: np.ndarray | None = None) -> tuple[Poses, np.ndarray | None]:
+    """The poses of n frames, and their numbers (n,) where the file has them. Raises ArtifactError.
+
+    hand_components: (2, 45, 45) rad, the body's.
+    """
     arrays, numbers = read_frames(path)
     # Text, such as a gender, and what is empty say nothing of poses.
     arrays = {name: array for name, array in arrays.items() if array.dtype.kind in "iuf" and array.ndim and array.size}
+    if hand_components is not None:
+        arrays |= expand_hands(arrays, hand_components)
     read = next((read for takes, read in LAYOUTS.values() if takes(arrays)), None)
     if read is None:
         raise ArtifactError(f"{path}: its arrays of numbers ({', '.join(sorted(arrays)) or 'none'}) are of none of the layouts "
@@ -84,12 +89,7 @@ def read_poses(path: Path) -> tuple[Poses, np.ndarray | None]:
     return poses, numbers
 
 
-def read_hand_means(path: Path) -> np.ndarray | None:
-    """(30, 3) rad, the mean fingers of an official SMPL-X file, left hand first; None where it has none. Raises ArtifactError."""
-    try:
-        arrays = read_npz(path, HAND_MEANS, objects=False)
-    except NpzError as e:
-        raise ArtifactError(f"{path}: {e}") from e
-    if not arrays.keys() >= {*HAND_MEANS}:
-        return None
-    return np.concatenate([arrays[name].reshape(-1, 3) for name in HAND_MEANS]).astype(float)
+def expand_hands(arrays: Arrays, components: np.ndarray) -> Arrays:
+    """The hands (n, 45) rad, by name, of those that arrays (n, k) hold as coefficients of the leading components (2, 45, 45)."""
+    return {name: arrays[name].reshape(len(arrays[name]), -1) @ side[:arrays[name][0].size]
+            for name, side in zip(HANDS, components, strict=True) if name in arrays and arrays[name][0].size < side.shape[1]}

@@ -14,7 +14,7 @@ from gsac.viewer.wgsl import CORE, compile_spirv
 PROGRAMS = {"glslangValidator": "glslang-tools", "spirv-val": "spirv-tools"}
 STEREO = Path(__file__).parent / "stereo"
 """Folder with a stand-in for Unity's own shader file, as in a headset."""
-KERNELS = ("Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge")
+KERNELS = ("Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct")
 EYES = ("Vertex", "Fragment")
 
 

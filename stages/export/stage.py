@@ -16,6 +16,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.avatar.rotation import to_wxyz
+from gsac.avatar.sparse_correctives import thin_out
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.export.animations import add_motion
@@ -99,7 +100,7 @@ def rig_avatar(body: Body, params: BodyParams, gaussians: Gaussians) -> RiggedAv
         expression_vertex=np.concatenate([*moves, []]).astype(np.int32),
         expression_delta=np.concatenate([*(left[e] * body.exprdirs[v, :, e] for e, v in enumerate(moves)), np.empty((0, 3))]),
         jaw_actions=body.jaw_actions.astype(np.float32),
-        gaussians=gaussians,
+        gaussians=gaussians, correctives=None if body.posedirs is None else thin_out(body.posedirs),
     )
 
 

@@ -51,8 +51,11 @@ class JawedHead:
     def of_body(cls, body: Body, betas: np.ndarray, index: np.ndarray) -> JawedHead:
         """The body's head at the person's shape. betas: (B,); index: (N,) vertices."""
         vertices, joints = body.rest(betas)
+        corrective = np.zeros((len(index), 3, 9))
+        if body.posedirs is not None:
+            corrective += body.posedirs[index, :, 9 * (JAW - 1):9 * JAW]
         return cls(vertices[index].astype(float), body.exprdirs[index].astype(float), body.weights[index, JAW].astype(float),
-                   joints[JAW].astype(float), np.zeros((len(index), 3, 9)))
+                   joints[JAW].astype(float), corrective)
 
     def take(self, index: np.ndarray) -> JawedHead:
         """Some of the vertices. index: (n,)."""

@@ -5,16 +5,20 @@ moment m_k = sum_v a_v w_vk v is linear in the betas: a few 3-vectors a point in
 T frames, J joints, A active joints, P points, M (point, joint) pairs, B betas. The S shape unknowns are the B betas and the K
 person's own offsets of lm/person_offsets.py.
 A step turns joint j by R_j <- R_j exp(delta_j); then dx/ddelta_j = (G_j delta_j) x (the part of x carried by j, about j).
+Of a body with pose correctives the moments are linear in the rotations of the joints, too, and a step moves them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
+from gsac.avatar import rotation
 from gsac.avatar.body import Body
+from gsac.avatar.correctives import DIRECTIONS, turn_features
 from gsac.avatar.numba_kernel import own_kernel
 
 
@@ -27,6 +31,8 @@ class Pairs:
     mass: np.ndarray  # (M,)
     moment: np.ndarray  # (M, 3) at zero betas
     moment_dirs: np.ndarray  # (M, 3, S) by the first S shape unknowns
+    moment_turns: np.ndarray | None = None  # (M, 3, 486) by the pose correctives' features
+    """None where no pose correctives move these points, or where they are part of `moment`."""
 
     @property
     def count(self) -> int:
@@ -35,6 +41,12 @@ class Pairs:
     def moments(self, shape: np.ndarray) -> np.ndarray:
         """Moments (M, 3). shape: (S,); unknowns beyond those that move these points are ignored."""
         return self.moment + self.moment_dirs @ shape[: self.moment_dirs.shape[2]]
+
+    def moments_in(self, chain: Chain, shape: np.ndarray) -> Iterator[np.ndarray]:
+        """Moments (M, 3) in each frame of the chain. shape: (S,)."""
+        moments = self.moments(shape)
+        for local in chain.local:
+            yield moments if self.moment_turns is None else moments + self.moment_turns @ turn_features(local)
 
 
 def make_pairs(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None = None, moves: np.ndarray | None = None) -> Pairs:
@@ -45,7 +57,7 @@ def make_pairs(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None
     """
     matrix = matrix.tocsr()
     moves = np.zeros((matrix.shape[0], 3, body.num_betas)) if moves is None else moves
-    start, joint, mass, moment, dirs, added = [0], [], [], [], [], []
+    start, joint, mass, moment, dirs, turns, added = [0], [], [], [], [], [], []
     for p in range(matrix.shape[0]):
         span = slice(matrix.indptr[p], matrix.indptr[p + 1])
         vertices, a = matrix.indices[span], matrix.data[span].astype(np.float64)
@@ -57,21 +69,28 @@ def make_pairs(body: Body, matrix: sparse.csr_matrix, offsets: np.ndarray | None
             mass.append(w.sum())
             moment.append(w @ body.v_template[vertices] + (offsets[p] if offsets is not None and k == heaviest else 0))
             dirs.append(np.tensordot(w, body.shapedirs[vertices], 1))
+            if body.posedirs is not None:
+                turns.append(np.tensordot(w, body.posedirs[vertices], 1))
             added.append(moves[p] * (k == heaviest))
         start.append(len(joint))
     added = np.array(added).reshape(-1, *moves.shape[1:])
     added[:, :, : body.num_figure] += np.array(dirs).reshape(-1, 3, body.num_betas)[:, :, : body.num_figure]
-    return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), added)
+    return Pairs(np.array(start), np.array(joint, np.int64), np.array(mass), np.array(moment).reshape(-1, 3), added,
+                 None if body.posedirs is None else np.array(turns).reshape(-1, 3, DIRECTIONS))
 
 
-def make_surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray) -> Pairs:
-    """Pairs of points on the surface: face (P,), bary (P, 3). Twelve pairs a point, some of weight 0."""
+def make_surface_pairs(body: Body, face: np.ndarray, bary: np.ndarray, pose: np.ndarray | None = None) -> Pairs:
+    """Pairs of points on the surface: face (P,), bary (P, 3). Twelve pairs a point, some of weight 0.
+
+    pose: (55, 3) axis-angle, the one whose pose correctives the points keep; none unless given.
+    """
+    rest = body.v_template if pose is None else body.correct(body.v_template, pose)
     vertices = body.faces[face]  # (P, 3)
     w = bary[:, :, None] * body.skin_weight[vertices]  # (P, 3, 4)
     mass = w.reshape(-1).astype(np.float64)
     vertex = np.repeat(vertices.reshape(-1), 4)
     return Pairs(np.arange(len(face) + 1) * 12, body.skin_index[vertices].reshape(-1).astype(np.int64), mass,
-                 mass[:, None] * body.v_template[vertex], mass[:, None, None] * body.shapedirs[vertex])
+                 mass[:, None] * rest[vertex], mass[:, None, None] * body.shapedirs[vertex])
 
 
 class Skeleton:
@@ -103,13 +122,14 @@ class Skeleton:
             dirs[:, j] = dirs[:, p] + world[:, p] @ (self.rest_dirs[j] - self.rest_dirs[p])
         shift = place - np.einsum("tjab,jb->tja", world, rest)
         shift_dirs = dirs - np.einsum("tjab,jbc->tjac", world, self.rest_dirs)
-        return Chain(world, place, shift, shift_dirs)
+        return Chain(local, world, place, shift, shift_dirs)
 
 
 @dataclass
 class Chain:
     """T posed skeletons."""
 
+    local: np.ndarray  # (T, J, 3, 3) joint to parent, rotations
     world: np.ndarray  # (T, J, 3, 3) joint to camera, rotations
     place: np.ndarray  # (T, J, 3) m, joints without transl
     shift: np.ndarray  # (T, J, 3): skinned = world @ rest + shift
@@ -117,12 +137,16 @@ class Chain:
 
     def frame(self, t: int) -> Chain:
         """The chain of one frame alone."""
-        return Chain(self.world[t: t + 1], self.place[t: t + 1], self.shift[t: t + 1], self.shift_dirs[t: t + 1])
+        one = slice(t, t + 1)
+        return Chain(self.local[one], self.world[one], self.place[one], self.shift[one], self.shift_dirs[one])
 
 
 def place_points(chain: Chain, pairs: Pairs, shape: np.ndarray) -> np.ndarray:
     """The pairs' points (T, P, 3) m in every frame, without transl. shape: (S,)."""
-    return _place_points(pairs.start, pairs.joint, pairs.mass, pairs.moments(shape), chain.world, chain.shift)
+    if pairs.moment_turns is None:
+        return _place_points(pairs.start, pairs.joint, pairs.mass, pairs.moments(shape), chain.world, chain.shift)
+    return np.concatenate([_place_points(pairs.start, pairs.joint, pairs.mass, moment, chain.world[t:t + 1], chain.shift[t:t + 1])
+                           for t, moment in enumerate(pairs.moments_in(chain, shape))])
 
 
 def pull_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray, covectors: np.ndarray) -> np.ndarray:
@@ -130,13 +154,27 @@ def pull_back(skeleton: Skeleton, chain: Chain, pairs: Pairs, shape: np.ndarray,
 
     shape: (S,); covectors: (T, P, R, 3). Returns (T, P, R, 3 A + 3 + S): by joint steps, transl and the shape unknowns that move x.
     """
-    moment = pairs.moments(shape)
     size = max(pairs.moment_dirs.shape[2], chain.shift_dirs.shape[3])
     rows = np.zeros((*covectors.shape[:3], 3 * len(skeleton.active) + 3 + size))
-    for t, g in enumerate(covectors):
+    for t, (g, moment) in enumerate(zip(covectors, pairs.moments_in(chain, shape), strict=True)):
         _pull_back(pairs.start, pairs.joint, pairs.mass, moment, pairs.moment_dirs, chain.world[t], chain.place[t],
                      chain.shift[t], chain.shift_dirs[t], skeleton.active, skeleton.carries, g, rows[t])
+        if pairs.moment_turns is not None:
+            rows[t, ..., : 3 * len(skeleton.active)] += g @ _slopes_of_correctives(skeleton, chain.local[t], chain.world[t], pairs)
     return rows
+
+
+def _slopes_of_correctives(skeleton: Skeleton, local: np.ndarray, world: np.ndarray, pairs: Pairs) -> np.ndarray:
+    """(P, 3, 3 A) by joint steps, of the points as their pose correctives alone move. local, world: (J, 3, 3), of one frame."""
+    turned = (world[pairs.joint] @ pairs.moment_turns).reshape(-1, 3, len(local) - 1, 9)
+    by_feature = np.zeros((pairs.count, *turned.shape[1:]))
+    np.add.at(by_feature, np.repeat(np.arange(pairs.count), np.diff(pairs.start)), turned)
+    by_step = np.einsum("jab,dbc->jacd", local, rotation.hat(np.eye(3))).reshape(-1, 9, 3)
+    out = np.zeros((pairs.count, 3, len(skeleton.active), 3))
+    bends = skeleton.active > 0  # the root has no correctives
+    joints = skeleton.active[bends]
+    out[:, :, bends] = np.einsum("pcaf,afd->pcad", by_feature[:, :, joints - 1], by_step[joints])
+    return out.reshape(pairs.count, 3, -1)
 
 
 @own_kernel(nogil=True)

@@ -28,8 +28,11 @@ CURL = np.radians(15)
 """Bend of resting fingers about z, towards the palm."""
 
 
-def pose_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (A, 3) and spread (A, 3) of the joints' rotation vectors, rad. joints: (A,) indices."""
+def pose_prior(joints: np.ndarray, hand_means: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (A, 3) and spread (A, 3) of the joints' rotation vectors, rad.
+
+    joints: (A,) indices; hand_means: (30, 3) rad, the body's own mean fingers, which take the place of ours.
+    """
     mean, spread = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
     for i, j in enumerate(joints):
         name = NAMES[j]
@@ -37,6 +40,8 @@ def pose_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         part = part or name
         if j >= FINGERS.start:
             mean[i], spread[i] = finger_prior(side, part)
+            if hand_means is not None:
+                mean[i] = hand_means[j - FINGERS.start]
             continue
         mean[i] = np.radians(MEAN.get(name, (0, 0, 0)))
         spread[i] = np.radians(SPREAD[part])

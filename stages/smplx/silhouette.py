@@ -84,13 +84,13 @@ def read_outlines(paths: list[Path]) -> list[Outline]:
 def sample_outlines(body: Body, params: BodyParams, width: int, height: int,
                     outlines: list[Outline]) -> tuple[list[Pairs | None], np.ndarray]:
     """Outline points of each posed frame, None where there are none, and the IoU (T,) of body and alpha, NaN without alpha."""
-    camera = params.camera(width, height)
+    camera, pose = params.camera(width, height), params.pose
     pairs: list[Pairs | None] = [None] * params.frames
     iou = np.full(params.frames, np.nan)
 
     def sample(t: int, vertices: np.ndarray) -> None:
         if outlines[t].area > 0:
-            points, iou[t] = sample_outline(body, vertices, camera, outlines[t], t)
+            points, iou[t] = sample_outline(body, vertices, camera, outlines[t], t, pose[t])
             pairs[t] = points if points.count else None
 
     with ThreadPoolExecutor(THREADS) as pool:
@@ -100,8 +100,12 @@ def sample_outlines(body: Body, params: BodyParams, width: int, height: int,
     return pairs, iou
 
 
-def sample_outline(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int) -> tuple[Pairs, float]:
-    """Outline points of one posed body, and the IoU of body and alpha. vertices: (V, 3) m, camera frame."""
+def sample_outline(body: Body, vertices: np.ndarray, camera: Camera, outline: Outline, seed: int,
+                   pose: np.ndarray | None = None) -> tuple[Pairs, float]:
+    """Outline points of one posed body, and the IoU of body and alpha.
+
+    vertices: (V, 3) m, camera frame, in pose (55, 3), axis-angle, whose pose correctives the points keep.
+    """
     h, w = outline.field.shape
     face, bary, _ = rasterise(vertices, body.faces, camera.scaled(w, h))
     covered = face >= 0
@@ -114,4 +118,4 @@ def sample_outline(body: Body, vertices: np.ndarray, camera: Camera, outline: Ou
     if len(y) > POINTS:
         pick = ((np.arange(POINTS) + np.random.default_rng(seed).random(POINTS)) * len(y) / POINTS).astype(int)  # evenly by height
         y, x = y[pick], x[pick]
-    return make_surface_pairs(body, face[y, x], bary[y, x].astype(np.float64)), float(overlap)
+    return make_surface_pairs(body, face[y, x], bary[y, x].astype(np.float64), pose), float(overlap)

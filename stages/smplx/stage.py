@@ -42,6 +42,9 @@ KEPT = 0.05
 """Relative difference up to which the fit has a given focal length: its prior is 0.2 % wide."""
 METHODS = {"lm": fit_under_clothes, "paper": fit_as_published, "brought": take_as_fit}
 """smplx.method -> fit; config.METHODS are the same names."""
+BETAS = {"lm": 20, "paper": 100}
+"""Leading betas that a method solves: later ones have a small variance, which one clip cannot determine, and the paper's fit has as
+many. `brought` takes all that the file has."""
 
 
 def run(job: Job) -> None:
@@ -54,7 +57,7 @@ def run(job: Job) -> None:
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
                           clip.focal_px, find_errors(job, body, str(points["detector"])), face, points["missing"],
-                          clip.principal_point, clip.longer_side, bring_start(job, len(points["xy"])))
+                          clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
@@ -63,6 +66,7 @@ def run(job: Job) -> None:
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     own = clip.shows_own_moment(len(outlines))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
+    sightings = replace(sightings, start=bring_start(job, body, sightings, outlines))
     sightings = leave_out_outside(sightings)
     occluder, hidden = find_occluder(sightings, outlines), []
     if occluder is not None:
@@ -70,7 +74,8 @@ def run(job: Job) -> None:
         sightings, behind = hide(sightings, occluder, outlines[0].scale)
         hidden = describe_hidden(behind)
     with threadpool_limits(1, "blas"):  # blocks of 140 x 140: threads cost more than they give
-        fit = METHODS[job.config.method](body, sightings, outlines, job.config, job.progress)
+        shaped = body.leading(BETAS.get(job.config.method, body.num_betas))
+        fit = METHODS[job.config.method](shaped, sightings, outlines, job.config, job.progress)
     expression, jaw, silent = translate_expression(body, fit.state.betas, face, shared)
     if silent is not None:
         job.warn(silent)

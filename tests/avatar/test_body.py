@@ -144,14 +144,36 @@ def test_where_something_hides_the_person_is_kept_and_files_of_clear_views_stay_
 
 def test_a_file_of_the_official_keys_drops_in(tmp_path):
     body = Body.load(official_file(tmp_path / "SMPLX_NEUTRAL.npz", directions=400))
-    assert (body.num_betas, body.exprdirs.shape[2]) == (20, 10) and body.parents[0] == -1 and body.clothes == ()
+    assert (body.num_betas, body.exprdirs.shape[2]) == (300, 100) and body.parents[0] == -1 and body.clothes == ()
+    assert body.posedirs is None, "all zero"
+    assert body.leading(20).num_betas == 20 and np.array_equal(body.leading(20).shapedirs, body.shapedirs[:, :, :20])
     vertices, joints = body.rest(np.zeros(10))
     assert vertices.shape == (400, 3) and joints.shape == (55, 3)
-    assert Body.load(official_file(tmp_path / "old.npz")).num_betas == 10
+    old = Body.load(official_file(tmp_path / "old.npz"))
+    assert (old.num_betas, old.exprdirs.shape[2]) == (10, 10) and old.hand_means is None
+
+
+def test_the_mean_hands_and_their_components_are_read_left_first(tmp_path):
+    rng = np.random.default_rng(4)
+    hands = {name + side: rng.normal(size=shape) for name, shape in (("hands_mean", 45), ("hands_components", (45, 45)))
+             for side in "lr"}
+    body = Body.load(official_file(tmp_path / "whole.npz", **hands))
+    np.testing.assert_array_equal(body.hand_means[:15].ravel(), hands["hands_meanl"])
+    np.testing.assert_array_equal(body.hand_means[15:].ravel(), hands["hands_meanr"])
+    np.testing.assert_array_equal(body.hand_components, [hands["hands_componentsl"], hands["hands_componentsr"]])
+
+
+def test_the_open_body_has_neither_correctives_nor_mean_hands_and_keeps_its_betas(body):
+    assert body.posedirs is None and body.hand_means is None and body.hand_components is None
+    assert body.leading(5) is body, "clothes are among its betas"
+    rest = body.rest(np.zeros(3))[0]
+    assert body.correct(rest, np.ones((55, 3))) is rest
 
 
 @pytest.mark.parametrize("changes,named", [({"weights": None}, "weights"), ({"J_regressor": np.zeros((24, 400))}, "J_regressor"),
                                            ({"shapedirs": np.zeros((400, 3, 50))}, "shapedirs"),
+                                           ({"posedirs": np.ones((400, 3, 207))}, "posedirs"),
+                                           ({"hands_meanl": np.zeros(12), "hands_meanr": np.zeros(12)}, "hands_meanl"),
                                            ({"weights": np.ones((400, 55))}, "weights"),
                                            ({"f": np.full((300, 3), 9999)}, "f names vertex")])
 def test_a_wrong_body_file_is_refused_by_the_array_that_is_wrong(tmp_path, changes, named):
@@ -162,7 +184,7 @@ def test_a_wrong_body_file_is_refused_by_the_array_that_is_wrong(tmp_path, chang
 def test_an_official_file_is_as_good_under_a_name_without_suffix(tmp_path):
     """The model store keeps files under the user's own names."""
     kept = official_file(tmp_path / "SMPLX_NEUTRAL.npz", directions=400).rename(tmp_path / "my-body")
-    assert Body.load(kept).num_betas == 20
+    assert Body.load(kept).num_betas == 300
     (tmp_path / "pickled").write_bytes(b"\x80\x04.")
     with pytest.raises(ArtifactError, match="run code"):
         Body.load(tmp_path / "pickled")

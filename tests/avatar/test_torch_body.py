@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from gsac.avatar import rotation
-from gsac.avatar.body import Body
+from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.torch_body import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from support.turning_person import facing_person
 
@@ -50,3 +52,23 @@ def test_every_vertex_lies_where_the_posed_body_has_it(body):
     rest = kinematics.joints(betas, torch.zeros(55, 3))
     found = Mesh(body).at(*kinematics.pose(local, rest), rest, betas)
     np.testing.assert_allclose(found.numpy().transpose(0, 2, 1), body.posed(params)[0], atol=1e-5)
+
+
+def test_points_and_vertices_are_bent_by_the_correctives_of_a_body_that_has_them(official_body):
+    body, rng = official_body.leading(20), np.random.default_rng(3)
+    params = BodyParams.from_pose(rng.normal(0, 0.7, (3, 55, 3)), np.zeros((3, 3)), rng.normal(0, 1, 20), np.zeros((3, 100)), 500.0,
+                                  (0, 0))
+    vertices = body.posed(params)[0]
+    known = np.flatnonzero(body.known_keypoints)
+    betas, local = torch.tensor(params.betas), torch.tensor(rotation.exp(params.pose.astype(np.float64)), dtype=torch.float32)
+    local.requires_grad_()
+    kinematics = Kinematics(body)
+    rest = kinematics.joints(betas, torch.zeros(55, 3))
+    world, place = kinematics.pose(local, rest)
+    found = Mesh(body).at(world, place, rest, betas)
+    points = Points(body, body.keypoint_matrix[known]).at(world, place, rest, betas)
+    np.testing.assert_allclose(found.detach().numpy().transpose(0, 2, 1), vertices, atol=2e-5)
+    np.testing.assert_allclose(points.detach().numpy(), body.keypoints(vertices)[:, known], atol=2e-5)
+    plain = replace(body, posedirs=None)
+    assert np.abs(body.keypoints(plain.posed(params)[0]) - body.keypoints(vertices))[:, known].max() > 5e-3
+    assert torch.autograd.grad(points.sum(), local)[0].isfinite().all()

@@ -91,6 +91,7 @@ def files(data):
     out["light_whole"] = with_block(data, "light", np.full((4, 3), .5, np.float32)), {"ok"}
     out["light_f16"] = with_block(data, "light", np.full((4, 3), .5, np.float16)), {"ok"}
     out["light_scaled"] = with_block(data, "light", np.full((4, 3), -7, np.int16), 1e-2), {"ok"}
+    out |= corrected(data, head)
     out["unknown_block"] = with_block(data, "mirror", np.full((2, 2), np.nan, np.float32)), {"ok"}
     joints = head["joints"]
     for n, change in enumerate([
@@ -121,6 +122,30 @@ def files(data):
                                 {"x": {"__proto__": [1e308, -10 ** 400]}}]):
         out[f"odd{n}"] = built(head | change, body), {"ok"}
     out["no_drawing"] = built({k: v for k, v in head.items() if k not in ("ground", "blend")}, body), {"ok"}
+    return out
+
+
+def corrected(data, head):
+    """Files with pose correctives, whole and broken."""
+    V, joint = head["blocks"]["rest.vertices"]["shape"][0], np.array([3, 18, 54], np.uint8)
+    start, delta = np.array([*[0] * V, 3], np.uint32), np.zeros((3, 3, 9), np.float16)
+    good = {"start": start, "joint": joint, "delta": delta}
+    wide = {"joint": joint.astype(np.uint32), "delta": delta.astype(np.float32)}
+    falls = np.where(np.arange(V + 1) == V // 2, 2, start).astype(np.uint32)
+    bad = {"good": ({}, {"ok"}), "root": ({"joint": joint * 0}, {"ok"}), "wide": (wide, {"ok"}),
+           "joint": ({"joint": joint + 1}, {"value"}), "real": ({"joint": joint.astype(np.float32)}, {"block"}),
+           "lacks": ({"joint": None}, {"block"}), "short": ({"start": start[1:]}, {"block"}),
+           "falls": ({"start": falls}, {"value"}), "ends": ({"start": start - (start > 0)}, {"value"}),
+           "begins": ({"start": np.maximum(start, 1)}, {"value"}),
+           "huge": ({"start": start * 2**30}, {"value"}), "fewer": ({"delta": delta[1:]}, {"block"}),
+           "flat": ({"delta": delta.reshape(3, 27)}, {"block"}), "nan": ({"delta": delta * np.float16(np.nan)}, {"value"}),
+           "whole": ({"delta": delta.astype(np.uint8)}, {"block"})}
+    out = {}
+    for name, (change, words) in bad.items():
+        made = data
+        for block, array in (good | change).items():
+            made = made if array is None else with_block(made, f"corrective.{block}", array)
+        out[f"corrective_{name}"] = made, words
     return out
 
 

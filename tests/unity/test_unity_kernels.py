@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gsac.avatar import rotation
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.skinning import joint_transforms, skin
@@ -12,6 +13,10 @@ from gsac.benchmarks.unity.frame import EVEN, index_bits, sort_steps
 from gsac.benchmarks.unity.packing import pack_avatar
 
 pytestmark = pytest.mark.slow
+UNSORTED = EVEN | {"GsacSplatCount": 0, "GsacIndexBits": 0, "GsacSortStage": 0, "GsacSortShift": 0, "GsacSortStrides": 0,
+                   "GsacDepthRange": np.zeros(2), "GsacDepthRow": np.zeros(4)}
+"""Parameters of a kernel that does not sort; it still wants how many vertices there are."""
+
 
 @pytest.fixture(scope="module")
 def avatar(exported):
@@ -43,8 +48,7 @@ def on_gpu(gpu, kernels, avatar, frame):
     gpu.put("GsacPosed", np.zeros((V, 4), np.float32))
     gpu.put("GsacSplats", np.zeros((N, 12), np.float32))
     gpu.put("Parts", np.zeros((-(-N // 64) * 64, 20), np.float32))
-    parameters = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacIndexBits": 0, "GsacSortStage": 0, "GsacSortShift": 0,
-                         "GsacSortStrides": 0, "GsacDepthRange": np.zeros(2), "GsacDepthRow": np.zeros(4)}
+    parameters = UNSORTED | {"GsacVertexCount": V, "GsacSplatCount": N}
     gpu.run([(kernels["Skin"], parameters, -(-V // 64)), (kernels["Bind"], parameters, -(-N // 64)),
              (kernels["BindParts"], parameters, -(-N // 64))])
     return parameters
@@ -61,6 +65,22 @@ def bound(gpu, on_gpu, avatar):
 def test_skin_and_expression_agree_with_the_trainer(gpu, on_gpu, frame):
     posed = gpu.get("GsacPosed").reshape(-1, 4)[:, :3]
     assert abs(posed - frame["vertices"]).max() < 1e-5
+
+
+def test_pose_correctives_move_the_rest_as_python_moves_it(gpu, kernels, bent_arm):
+    avatar, V = bent_arm.avatar, len(bent_arm.avatar.vertices)
+    turns = np.zeros((55, 12), np.float32)
+    turns[:, :9] = (rotation.exp(bent_arm.pose.astype(float)) - np.eye(3)).reshape(-1, 9)
+    pairs = np.concatenate([avatar.correctives.delta.reshape(-1, 27), avatar.correctives.joint[:, None]], 1)
+    gpu.put("GsacRest", pack_avatar(avatar)["GsacRest"])
+    gpu.put("GsacPairs", pairs.astype(np.float32).reshape(-1, 4))
+    gpu.put("GsacFirst", avatar.correctives.start.astype(np.uint32))
+    gpu.put("GsacTurns", turns.reshape(-1, 4))
+    gpu.put("GsacBent", np.zeros((V, 4), np.float32))
+    gpu.run([(kernels["Correct"], UNSORTED | {"GsacVertexCount": V}, -(-V // 64))])
+    bent = gpu.get("GsacBent").reshape(-1, 4)
+    np.testing.assert_allclose(bent[:, :3], avatar.vertices + avatar.correctives.move_rest(bent_arm.pose), atol=1e-6)
+    assert (bent[:, 3] == 1).all()
 
 
 def test_bound_means_rotations_and_scales_agree_with_the_trainer(gpu, bound, avatar):

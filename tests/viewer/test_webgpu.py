@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer import wgsl
@@ -125,3 +126,29 @@ def test_a_webgpu_that_does_not_begin_makes_room_for_webgl(page, address, broken
         assert (np.abs(page.picture().astype(int) - (0xA0, 0xB0, 0xC0)).max(-1) > 20).mean() > 0.03 and page.errors == []
     finally:
         page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=got["identifier"])
+
+
+@needs_chromium
+@pytest.mark.slow
+def test_the_correctives_of_a_bent_elbow_are_drawn_alike_with_and_without_a_graphics_card(page, bent_arm, tmp_path, shadowed):
+    avatar, place = RiggedAvatar.read(bent_arm.file), "pose=A&bg=a0b0c0&dist=1.6&joints=left_elbow:0,-103,0;left_knee:90,0,0"
+    avatar.gaussians.rgb = np.random.default_rng(0).random(avatar.gaussians.rgb.shape).astype(np.float32)
+    avatar.correctives.delta = 3 * avatar.correctives.delta
+    (tmp_path / "bent.html").write_bytes(page_bytes(avatar_bytes(avatar)))
+    avatar.correctives = None
+    (tmp_path / "plain.html").write_bytes(page_bytes(avatar_bytes(avatar)))
+    seen = {}
+    for name in ("bent", "plain"):
+        for kind in ("webgpu", "webgl", "software"):
+            page.open(f"{(tmp_path / name).as_uri()}.html?{kind}#draw={kind}&{place}")
+            if kind == "webgpu" and not page.has_webgpu():
+                pytest.skip("this chromium has no WebGPU")
+            assert page.run("gsac.renderer.kind") == kind
+            seen[name, kind] = picture(page, shadowed)
+
+    def off(one, other):
+        return np.abs(seen[one] - seen[other]).mean()
+
+    for kind in ("webgl", "software"):
+        assert off(("bent", "webgpu"), ("bent", kind)) < 1.5 * off(("plain", "webgpu"), ("plain", kind)) + 0.1
+    assert off(("bent", "webgpu"), ("plain", "webgpu")) > 0.7, "they are seen"

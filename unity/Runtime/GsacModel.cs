@@ -25,6 +25,10 @@ namespace Gsac
         public GraphicsBuffer Skin { get; private set; }
         public GraphicsBuffer Moves { get; private set; }
         public GraphicsBuffer Quads { get; private set; }
+
+        /// <summary>Pose correctives and where those of a vertex begin; null where the body has none.</summary>
+        public GraphicsBuffer Pairs { get; private set; }
+        public GraphicsBuffer First { get; private set; }
         public Level[] Levels { get; private set; }
 
         /// <summary>Keys to sort at the finest level.</summary>
@@ -62,6 +66,12 @@ namespace Gsac
             Skin.Dispose();
             Moves.Dispose();
             Quads.Dispose();
+            if (Pairs != null)
+            {
+                Pairs.Dispose();
+                First.Dispose();
+                Pairs = First = null;
+            }
             foreach (Level level in Levels)
             {
                 level.Corners.Dispose();
@@ -80,6 +90,11 @@ namespace Gsac
             Rest = Structured(GsacPacking.Rest(Data), 4);
             Moves = Structured(moves, 4);
             Skin = Structured(GsacPacking.Skin(Data, first), 4);
+            if (Data.Correctives != null)
+            {
+                Pairs = Structured(GsacPacking.Pairs(Data.Correctives), 4);
+                First = Structured(Data.Correctives.Start, 1);
+            }
             Levels = new Level[Data.Levels.Length];
             int most = 0;
             for (int i = 0; i < Levels.Length; i++)

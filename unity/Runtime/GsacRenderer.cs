@@ -19,6 +19,10 @@ namespace Gsac
         static readonly int VertexCountId = Shader.PropertyToID("GsacVertexCount");
         static readonly int SplatCountId = Shader.PropertyToID("GsacSplatCount");
         static readonly int RestId = Shader.PropertyToID("GsacRest");
+        static readonly int PairsId = Shader.PropertyToID("GsacPairs");
+        static readonly int FirstId = Shader.PropertyToID("GsacFirst");
+        static readonly int TurnsId = Shader.PropertyToID("GsacTurns");
+        static readonly int BentId = Shader.PropertyToID("GsacBent");
         static readonly int SkinId = Shader.PropertyToID("GsacSkin");
         static readonly int MovesId = Shader.PropertyToID("GsacMoves");
         static readonly int WeightsId = Shader.PropertyToID("GsacWeights");
@@ -47,9 +51,11 @@ namespace Gsac
         GsacAvatar avatar;
         GsacModel model;
         ComputeShader kernels;
-        int skinKernel, bindKernel;
+        int correctKernel, skinKernel, bindKernel;
         Material material;
         GraphicsBuffer bones, weights, posed, splats;
+        GraphicsBuffer turns, bent; // null where the body has no pose correctives
+        float[] turnRows;
         Vector4[] boneRows;
         int drawn;
         string trouble;
@@ -88,7 +94,12 @@ namespace Gsac
             weights.Dispose();
             posed.Dispose();
             splats.Dispose();
-            bones = null;
+            if (bent != null)
+            {
+                turns.Dispose();
+                bent.Dispose();
+            }
+            bones = turns = bent = null;
         }
 
         void LateUpdate()
@@ -143,7 +154,14 @@ namespace Gsac
             posed = GsacModel.Empty(V, 4);
             splats = GsacModel.Empty(most * 3, 4);
             boneRows = new Vector4[model.Data.JointCount * 3];
+            if (model.Data.Correctives != null)
+            {
+                turns = GsacModel.Empty(model.Data.JointCount * 3, 4);
+                bent = GsacModel.Empty(V, 4);
+                turnRows = new float[model.Data.JointCount * 12];
+            }
             kernels = Resources.Load<ComputeShader>("Gsac/Gsac");
+            correctKernel = kernels.FindKernel("Correct");
             skinKernel = kernels.FindKernel("Skin");
             bindKernel = kernels.FindKernel("Bind");
             if (material == null) material = new Material(Resources.Load<Shader>("Gsac/GsacSplats")) { hideFlags = HideFlags.HideAndDontSave };
@@ -163,7 +181,8 @@ namespace Gsac
             if (avatar.DrawnWeights.Length > 0) weights.SetData(avatar.DrawnWeights);
             kernels.SetInt(VertexCountId, model.Data.VertexCount);
             kernels.SetInt(SplatCountId, level.Count);
-            kernels.SetBuffer(skinKernel, RestId, model.Rest);
+            if (bent != null) Correct();
+            kernels.SetBuffer(skinKernel, RestId, bent ?? model.Rest);
             kernels.SetBuffer(skinKernel, SkinId, model.Skin);
             kernels.SetBuffer(skinKernel, MovesId, model.Moves);
             kernels.SetBuffer(skinKernel, WeightsId, weights);
@@ -177,6 +196,23 @@ namespace Gsac
             kernels.SetBuffer(bindKernel, PosedId, posed);
             kernels.SetBuffer(bindKernel, SplatsId, splats);
             kernels.Dispatch(bindKernel, Groups(level.Count), 1, 1);
+        }
+
+        /// <summary>Fills `bent`: the vertices at rest, as the pose's correctives move them.</summary>
+        void Correct()
+        {
+            for (int j = 0; j < avatar.Joints.Length; j++)
+            {
+                Quaternion q = avatar.Joints[j].localRotation;
+                GsacCorrectives.SetTurn(turnRows, j, q.x, q.y, q.z, q.w);
+            }
+            turns.SetData(turnRows);
+            kernels.SetBuffer(correctKernel, RestId, model.Rest);
+            kernels.SetBuffer(correctKernel, PairsId, model.Pairs);
+            kernels.SetBuffer(correctKernel, FirstId, model.First);
+            kernels.SetBuffer(correctKernel, TurnsId, turns);
+            kernels.SetBuffer(correctKernel, BentId, bent);
+            kernels.Dispatch(correctKernel, Groups(model.Data.VertexCount), 1, 1);
         }
 
         /// <summary>A channel's factors of a normal's x, y, |z| and of 1, between even light and the clip's.</summary>

@@ -16,7 +16,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
 from gsac.avatar.light import shade
 from gsac.avatar.rotation import about_y
-from gsac.avatar.skinning import joint_transforms, skin
+from gsac.avatar.skinning import joint_transforms
 from gsac.stages.train.poses.poses import Poses
 
 BENDS = (
@@ -56,7 +56,7 @@ def hold_at_joints(gaussians: Gaussians, poses: Poses, frames: np.ndarray) -> Ga
 
     def carry(pose: np.ndarray) -> tuple[np.ndarray, FaceFrames]:
         transforms = joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32)
-        return transforms, face_frames(skin(rest, transforms, body.skin_index, body.skin_weight), body.faces)
+        return transforms, face_frames(body.bend(rest, joints, pose), body.faces)
 
     usual = np.median(poses.pose[frames], 0)
     usual[0] = 0

@@ -14,7 +14,6 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
 from gsac.avatar.raster import render_backward, render_bound
-from gsac.avatar.skinning import joint_transforms, skin
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.config import FULL_SIZE
@@ -83,6 +82,4 @@ def find_reach(gaussians: Gaussians, posed: np.ndarray, faces: np.ndarray) -> np
 
 def put_in_pose(poses: Poses, t: int, pose: np.ndarray) -> np.ndarray:
     """(V, 3) m, the body of frame t in another pose, (55, 3) axis-angle."""
-    body, (rest, joints) = poses.body, poses.rest(t)
-    transforms = joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32)
-    return skin(rest, transforms, body.skin_index, body.skin_weight)
+    return poses.body.bend(*poses.rest(t), pose)

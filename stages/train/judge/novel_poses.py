@@ -15,7 +15,6 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import J, turn_joints
 from gsac.avatar.raster import render_bound
 from gsac.avatar.rotation import about_y
-from gsac.avatar.skinning import joint_transforms, skin
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.poses.poses import Poses
@@ -76,10 +75,7 @@ def disc(radius: int) -> np.ndarray:
 
 def pose_body(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.ndarray:
     """(V, 3) m, the canonical body with some joints turned, as `turn_joints` takes them."""
-    body, (rest, joints) = poses.body, poses.rest(0)
-    pose = turn_joints(np.zeros((J, 3)), turns)
-    transforms = joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32)
-    return skin(rest, transforms, body.skin_index, body.skin_weight)
+    return poses.body.bend(*poses.rest(0), turn_joints(np.zeros((J, 3)), turns))
 
 
 def turn_before_camera(vertices: np.ndarray, degrees: float) -> tuple[np.ndarray, Camera, float]:

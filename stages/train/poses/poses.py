@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from gsac.avatar.body import Body, BodyParams, split_pose
+from gsac.avatar.correctives import move_rest_backward
 from gsac.avatar.joints import BODY, JAW, JAW_EYES
-from gsac.avatar.skinning import joint_transforms, skin, skin_backward
+from gsac.avatar.skinning import joint_transforms, skin_backward
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.choose_heldout import carry_corrections
 from gsac.stages.train.poses.interpolate import follow_neighbours
@@ -133,9 +134,7 @@ class Poses:
     def vertices(self, t: int) -> np.ndarray:
         """(V, 3) float32 m, camera frame, in the frame's pose as it is now."""
         rest, joints = self.rest(t)
-        transforms = joint_transforms(self.pose[t:t + 1], joints, self.body.parents)[0].astype(np.float32)
-        posed = skin(rest + self.offset, transforms, self.body.skin_index, self.body.skin_weight)
-        return posed + self.transl[t].astype(np.float32)
+        return self.body.bend(rest + self.offset, joints, self.pose[t]) + self.transl[t].astype(np.float32)
 
     def settle(self) -> None:
         """Makes the poses as they stand the base that single frames are corrected from; Adam starts anew."""
@@ -150,8 +149,13 @@ class Poses:
     def gradients(self, t: int, grad_vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Gradients of pose (55, 3), transl (3,), rest vertices (V, 3) and joints (55, 3) from grad_vertices (V, 3)."""
         rest, joints = self.rest(t)
-        return skin_backward(np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest + self.offset, joints,
-                             self.body.parents, self.body.skin_index, self.body.skin_weight)
+        body, rest = self.body, self.body.correct(rest + self.offset, self.pose[t])
+        grad_pose, grad_transl, grad_rest, grad_joints = skin_backward(
+            np.ascontiguousarray(grad_vertices, np.float32), self.pose[t], rest, joints, body.parents, body.skin_index,
+            body.skin_weight)
+        if body.posedirs is not None:
+            grad_pose = grad_pose + move_rest_backward(body.posedirs, self.pose[t], grad_rest)
+        return grad_pose, grad_transl, grad_rest, grad_joints
 
     def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> tuple[np.ndarray, np.ndarray]:
         """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradients of rest vertices (V, 3) and joints (55, 3)."""

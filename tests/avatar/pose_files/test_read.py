@@ -11,9 +11,9 @@ import pytest
 
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import ArtifactError
-from gsac.avatar.joints import LEFT_HAND, POSE_PARTS
+from gsac.avatar.joints import LEFT_HAND, POSE_PARTS, RIGHT_HAND
 from gsac.avatar.pose_files.exavatar import PARTS
-from gsac.avatar.pose_files.read import read_hand_means, read_start
+from gsac.avatar.pose_files.read import read_start
 from gsac.pipeline.model_check import check_model
 from gsac.stages.contract import BadInput
 
@@ -94,12 +94,25 @@ def test_whams_arrays_give_their_body_and_no_shape_for_theirs_is_smpls(vectors, 
 
 
 def test_fingers_bend_from_the_bodys_mean_hand(vectors, tmp_path):
-    (tmp_path / "body.npz").write_bytes(npz(hands_meanl=np.full(45, 0.1), hands_meanr=np.full(45, -0.1)))
-    means = read_hand_means(tmp_path / "body.npz")
+    means = np.repeat([[0.1], [-0.1]], 15, 0) * np.ones(3)
     path = zip_of(tmp_path / "start", {f"{t}.json": exavatar(vectors, t) for t in range(FRAMES)})
     start = read_start(path, FRAMES, means)
     np.testing.assert_allclose(start.rotations[:, LEFT_HAND], rotation.exp(vectors[:, LEFT_HAND] + 0.1), atol=1e-4)
     np.testing.assert_allclose(start.rotations[:, 40:], rotation.exp(vectors[:, 40:] - 0.1), atol=1e-4)
+
+
+def test_coefficients_of_the_hands_components_are_added_to_the_mean_as_the_smplx_package_does(tmp_path):
+    rng = np.random.default_rng(3)
+    components, means = rng.normal(0, 0.2, (2, 45, 45)), rng.normal(0, 0.3, (30, 3))
+    left, right = rng.normal(0, 1, (FRAMES, 12)), rng.normal(0, 1, (FRAMES, 12))
+    (tmp_path / "start.npz").write_bytes(npz(global_orient=np.zeros((FRAMES, 3)), body_pose=np.zeros((FRAMES, 63)),
+                                             left_hand_pose=left, right_hand_pose=right))
+    start = read_start(tmp_path / "start.npz", FRAMES, means, components)
+    for hand, given, side in ((LEFT_HAND, left, 0), (RIGHT_HAND, right, 1)):
+        fingers = sum(given[:, i, None] * components[side, i] for i in range(12)).reshape(FRAMES, 15, 3) + means[15 * side:][:15]
+        np.testing.assert_allclose(start.rotations[:, hand], rotation.exp(fingers), atol=1e-4)
+    with pytest.raises(ArtifactError, match="left_hand_pose has 12 numbers a frame; expected 45"):
+        read_start(tmp_path / "start.npz", FRAMES, means)
 
 
 def test_a_wrong_number_of_frames_is_named(vectors, tmp_path):

@@ -1,12 +1,14 @@
 """FLAME's expression in an SMPL-X body whose expressions mean something else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
 from gsac.avatar import rotation
 from gsac.avatar.artifacts import ArtifactError
-from gsac.avatar.body import Body
+from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.flame_file import EXPRESSIONS, Flame, read_flame_ids
 from gsac.avatar.joints import JAW, J
 from gsac.avatar.joints import NAMES as JOINTS
@@ -77,6 +79,16 @@ def test_a_head_moves_as_the_whole_body_does(official, ids):
     turn = rotation.exp(jaw)
     skinned = vertices + official.weights[:, JAW, None] * ((vertices - joints[JAW]) @ (turn - np.eye(3)).T)
     np.testing.assert_allclose(head.moves(expression, jaw), (skinned - official.v_template)[ids], atol=1e-6)
+
+
+def test_a_head_takes_the_jaws_correctives_of_the_body_along(official, ids):
+    posedirs, pose = np.zeros((len(official.v_template), 3, 486), np.float32), np.zeros((1, J, 3), np.float32)
+    posedirs[ids, :, 9 * (JAW - 1):9 * JAW] = np.random.default_rng(11).normal(0, 0.003, (5023, 3, 9))
+    pose[0, JAW] = 0.3, 0.1, 0
+    bent = replace(official, posedirs=posedirs)
+    posed = bent.posed(BodyParams.from_pose(pose, np.zeros((1, 3)), np.zeros(4), np.zeros((1, USED)), 500.0, (0, 0)))[0][0]
+    moves = JawedHead.of_body(bent, np.zeros(4), ids).moves(np.zeros(USED), pose[0, JAW].astype(float))
+    np.testing.assert_allclose(moves, (posed - official.v_template)[ids], atol=1e-5)
 
 
 def test_the_slopes_are_those_of_the_moves(official, ids):

@@ -72,11 +72,13 @@ public static class Play
         Camera camera = Player.AddCamera("eye");
         camera.transform.SetPositionAndRotation(new Vector3(1.5f, 1.6f, 2.5f), Quaternion.Euler(12, 215, 2));
         string[] names = { "GsacVertexCount", "GsacSplatCount", "GsacIndexBits", "GsacSortStage", "GsacSortShift", "GsacSortStrides" };
-        string[] buffers = { "GsacRest", "GsacSkin", "GsacMoves", "GsacWeights", "GsacBones", "GsacPosed", "GsacCorners", "GsacLocal", "GsacSplats", "GsacKeys" };
+        string[] buffers = { "GsacRest", "GsacSkin", "GsacMoves", "GsacWeights", "GsacBones", "GsacPosed", "GsacCorners", "GsacLocal", "GsacSplats", "GsacKeys",
+                             "GsacPairs", "GsacFirst", "GsacTurns" };
         using (var dump = new Dump(path))
         {
             var written = new HashSet<string>();
             var steps = new List<float>();
+            GraphicsBuffer bent = null;
             Player.OnDispatch = (shader, kernel, groups) =>
             {
                 steps.Add(kernel);
@@ -94,6 +96,9 @@ public static class Play
                     GraphicsBuffer buffer = Player.Buffer(shader, kernel, Shader.PropertyToID(name));
                     if (buffer != null && written.Add(name)) dump.Put(name, Player.Words(buffer));
                 }
+                GraphicsBuffer rest = Player.Buffer(shader, kernel, Shader.PropertyToID("GsacRest"));
+                if (rest != null && bent != null) dump.Put("skins_bent", new[] { ReferenceEquals(rest, bent) ? 1 : 0 });
+                bent = Player.Buffer(shader, kernel, Shader.PropertyToID("GsacBent")) ?? bent;
             };
             Player.OnDraw = (asked, indices, count) =>
             {

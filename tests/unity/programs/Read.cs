@@ -38,6 +38,12 @@ public static class Read
         dump.Put("skin_index", data.SkinIndex);
         dump.Put("skin_weight", data.SkinWeight);
         dump.Put("expression_start", data.ExpressionStart);
+        if (data.Correctives != null)
+        {
+            dump.Put("corrective_start", data.Correctives.Start);
+            dump.Put("corrective_joint", data.Correctives.Joint);
+            dump.Put("corrective_delta", data.Correctives.Delta);
+        }
         dump.Put("expression_vertex", data.ExpressionVertex);
         dump.Put("expression_delta", data.ExpressionDelta);
         dump.Put("jaw_actions", data.ExpressionJaw);

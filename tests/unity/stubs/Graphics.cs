@@ -69,10 +69,10 @@ namespace UnityEngine
 
     public sealed class ComputeShader : Object
     {
-        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge" };
+        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct" };
         // by property, and by property and kernel
         internal readonly Vector4[] Values = new Vector4[64];
-        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[5, 64];
+        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 64];
         public int FindKernel(string name)
         {
             int kernel = Array.IndexOf(Kernels, name);

@@ -48,6 +48,7 @@ namespace Gsac
         public int[] ExpressionVertex;   // M
         public float[] ExpressionDelta;  // M x 3, m at weight 1
         public float[] ExpressionJaw;    // E x 3, weights for a rotation of the jaw, per rad
+        public GsacCorrectives Correctives; // null: the body has none
         public GsacLevel[] Levels;       // finest first
         public float[] Light;            // 4 x 3: the colours' factor by the face's normal, of 1, x, y, z; null: 1
         public Dictionary<string, GsacClip> Poses = new Dictionary<string, GsacClip>(); // of one key each
@@ -117,6 +118,7 @@ namespace Gsac
             Flip(Vertices, -1, 1, 1);
             Flip(ExpressionDelta, -1, 1, 1);
             Flip(ExpressionJaw, 1, -1, -1);
+            if (Correctives != null) Correctives.Mirror();
             foreach (GsacLevel level in Levels)
             {
                 Flip(level.Mu, 1, -1, 1);

@@ -22,6 +22,7 @@ namespace Gsac
             Radius = new float[data.JointCount];
             var moved = new float[data.VertexCount];
             for (int m = 0; m < data.ExpressionVertex.Length; m++) moved[data.ExpressionVertex[m]] += Length(data.ExpressionDelta, m * 3);
+            for (int v = 0; data.Correctives != null && v < data.VertexCount; v++) moved[v] += data.Correctives.Reach(v);
             float low = float.MaxValue, high = float.MinValue;
             for (int v = 0; v < data.VertexCount; v++)
             {

@@ -56,6 +56,18 @@ namespace Gsac
             return rows;
         }
 
+        /// <summary>C x 28: how a joint's turn moves a vertex, three rows of nine numbers, and which joint.</summary>
+        public static float[] Pairs(GsacCorrectives correctives)
+        {
+            var rows = new float[correctives.Joint.Length * 28];
+            for (int i = 0; i < correctives.Joint.Length; i++)
+            {
+                Array.Copy(correctives.Delta, i * 27, rows, i * 28, 27);
+                rows[i * 28 + 27] = correctives.Joint[i];
+            }
+            return rows;
+        }
+
         /// <summary>N x 4: the three vertices of a gaussian's face.</summary>
         public static uint[] Corners(GsacData data, GsacLevel level)
         {

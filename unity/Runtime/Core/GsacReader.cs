@@ -28,6 +28,7 @@ namespace Gsac
             data.SkinWeight = file.Reals("skin.weight", V, 4);
             CheckWeights(data.SkinWeight);
             ReadExpressions(data);
+            if (file.Has("corrective.start")) ReadCorrectives(data);
             ReadLevels(data);
             if (file.Has("light")) data.Light = file.Reals("light", 4, 3);
             ReadPoses(data);
@@ -74,9 +75,23 @@ namespace Gsac
             int M = data.ExpressionVertex.Length;
             data.ExpressionDelta = file.Reals("expression.delta", M, 3);
             data.ExpressionJaw = file.Reals("expression.jaw", E, 3);
-            bool rises = data.ExpressionStart[0] == 0 && data.ExpressionStart[E] == M;
-            for (int e = 0; e < E; e++) rises &= data.ExpressionStart[e] <= data.ExpressionStart[e + 1];
-            if (!rises) throw Bad(GsacFault.Value, "expression.start must rise from 0 to the number of moved vertices");
+            CheckRise(data.ExpressionStart, M, "expression.start");
+        }
+
+        void ReadCorrectives(GsacData data)
+        {
+            var read = new GsacCorrectives { Joint = file.Indices("corrective.joint", data.JointCount, -1) };
+            read.Start = file.Indices("corrective.start", 1L << 31, data.VertexCount + 1);
+            CheckRise(read.Start, read.Joint.Length, "corrective.start");
+            read.Delta = file.Reals("corrective.delta", read.Joint.Length, 3, 9);
+            data.Correctives = read;
+        }
+
+        static void CheckRise(int[] start, int end, string what)
+        {
+            bool rises = start[0] == 0 && start[start.Length - 1] == end;
+            for (int i = 1; i < start.Length; i++) rises &= start[i - 1] <= start[i];
+            if (!rises) throw Bad(GsacFault.Value, what + " must rise from 0 to " + end + ", the number of its rows");
         }
 
         void ReadLevels(GsacData data)

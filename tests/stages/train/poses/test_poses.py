@@ -42,6 +42,25 @@ def test_gradients_of_expression_and_joints_are_those_of_finite_differences(pose
         np.testing.assert_allclose(measured, expected, rtol=2e-3, atol=2e-3 * np.abs(expected).max())
 
 
+def test_gradients_of_a_pose_count_what_the_correctives_move(official_body):
+    rng = np.random.default_rng(6)
+    poses = Poses(official_body, BodyParams.from_pose(rng.normal(0, 0.5, (1, 55, 3)), np.zeros((1, 3)), rng.normal(0, 1, 8),
+                                                      np.zeros((1, 100)), 500.0, (0, 0)))
+    poses.offset[:] = rng.normal(0, 2e-3, poses.offset.shape)
+    weights = rng.normal(size=poses.offset.shape)
+    told = poses.gradients(0, weights)[0]
+    start = poses.pose[0].copy()
+
+    def value(pose):
+        poses.pose[0] = pose
+        return float((weights * poses.vertices(0)).sum(dtype=np.float64))
+
+    for _ in range(5):
+        step = rng.normal(size=start.shape)
+        slope = (value(start + 1e-3 * step) - value(start - 1e-3 * step)) / 2e-3
+        assert (told * step).sum() == pytest.approx(slope, abs=2e-3 * np.linalg.norm(told) * np.linalg.norm(step))
+
+
 def test_steps_lead_to_the_expression_and_the_joints_that_were_and_what_is_written_wears_them(poses):
     body, wanted = poses.body, poses.copy()
     wanted.expression, wanted.joint_offset = poses.expression.copy(), poses.joint_offset.copy()
