@@ -91,7 +91,8 @@ class FeatureDistance:
         return value.item(), torch.autograd.grad(value, moved)[0].numpy()
 
     def _distance(self, a, b):
-        return sum(self.weigh(k, (x - y) ** 2) for k, (x, y) in enumerate(zip(a, b, strict=True)))
+        parts = [self.weigh(k, (x - y) ** 2) for k, (x, y) in enumerate(zip(a, b, strict=True))]
+        return sum(parts[1:], parts[0])
 
     def _features(self, x) -> list:
         """Of the taps, (C, h, w) each of length one. x: (3, H, W) about -1..1."""

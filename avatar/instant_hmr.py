@@ -48,8 +48,11 @@ class InstantHmr:
         crop, corner, side = cut_person(image, box)
         ready = ((crop / np.float32(255) - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
         beside = {"cliff_cond": _condition(image, box)[None]}
-        xy, points = run_checked(lambda given: self._session.run(list(GIVES), {"image": given} | beside), ready.astype(np.float32),
-                                 self._name)
+
+        def run(given: np.ndarray) -> list[np.ndarray]:
+            return [np.asarray(output, np.float32) for output in self._session.run(list(GIVES), {"image": given} | beside)]
+
+        xy, points = run_checked(run, ready.astype(np.float32), self._name)
         return corner + (xy[0].astype(float) + 1) / 2 * side, points[0].astype(float)
 
 
