@@ -98,7 +98,9 @@ class Points:
         self.moment = torch.tensor(moment, dtype=torch.float32).flatten(1)  # (P, 3 J)
         self.dirs = torch.tensor(dirs).flatten(1, 2)  # (P, 3 J, B)
         self.parents = np.asarray(body.parents)
-        self.turns = None if body.posedirs is None else torch.tensor(_moments_of_correctives(body, matrix))  # (P, 3 J, 486)
+        self.turns = None  # (P, 3 J, 486)
+        if body.posedirs is not None:
+            self.turns = torch.tensor(_moments_of_correctives(body.weights, body.posedirs, matrix))
         if head is not None:
             share = matrix[:, head].toarray()
             self.moved = torch.tensor(np.flatnonzero(share.any(0)))  # (M,) of the head's vertices, those that points lie on
@@ -144,11 +146,14 @@ class Mesh:
         return skinned + torch.stack([(rows[..., c] @ self.weights) * bent[:, None, c] for c in range(3)]).sum(0)
 
 
-def _moments_of_correctives(body: Body, matrix: sparse.csr_matrix) -> np.ndarray:
-    """(P, 3 J, 486) by the pose correctives' features. matrix: (P, V) weights of the points over the vertices."""
-    out = np.zeros((matrix.shape[0], body.weights.shape[1], 3, DIRECTIONS), np.float32)
+def _moments_of_correctives(weights: np.ndarray, posedirs: np.ndarray, matrix: sparse.csr_matrix) -> np.ndarray:
+    """(P, 3 J, 486) by the pose correctives' features.
+
+    weights: (V, J); posedirs: (V, 3, 486) m; matrix: (P, V) weights of the points over the vertices.
+    """
+    out = np.zeros((len(matrix.indptr) - 1, weights.shape[1], 3, DIRECTIONS), np.float32)
     for p in range(len(out)):
         span = slice(matrix.indptr[p], matrix.indptr[p + 1])
         vertices = matrix.indices[span]
-        out[p] = np.einsum("vk,vcf->kcf", matrix.data[span, None] * body.weights[vertices], body.posedirs[vertices], optimize=True)
+        out[p] = np.einsum("vk,vcf->kcf", matrix.data[span, None] * weights[vertices], posedirs[vertices], optimize=True)
     return out.reshape(len(out), -1, DIRECTIONS)

@@ -84,8 +84,9 @@ def find_contradicted(arms: HiddenArms, problem: Problem, state: State, missing:
 
 def measure_uncovered(arms: HiddenArms, problem: Problem, state: State, frames: np.ndarray) -> np.ndarray:
     """(F,) area of the mask beside the body, as a share of the person's height squared; 0 without a mask. frames: (F,)."""
-    out = np.zeros(len(frames))
-    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
+    out, offsets = np.zeros(len(frames)), problem.person_offsets
+    assert offsets is not None  # only an arm's or a hand's own problem may lack them
+    params = to_params(problem.body, state, problem.seen.center, joint_offset=offsets.joint_offset(state.own))
     for i, t in enumerate(frames.tolist()):
         outline = problem.seen.outlines[t]
         h, w = outline.mask.shape
