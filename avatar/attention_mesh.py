@@ -87,7 +87,7 @@ def take_apart(path: Path) -> tuple[bytes, bytes, tuple[Part, ...]]:
     from ai_edge_litert import schema_py_generated as schema
     from flatbuffers import flexbuffers
 
-    model = schema.ModelT.InitFromObj(schema.Model.GetRootAs(path.read_bytes()))
+    model: Any = schema.ModelT.InitFromObj(schema.Model.GetRootAs(path.read_bytes()))
     [graph] = model.subgraphs
 
     def custom(op: Any) -> bytes | None:

@@ -16,7 +16,8 @@ class Network:
     def __init__(self, file: Path | bytes, threads: int | None = None):
         """file: or its content; threads: of each interpreter; all available cores unless given, at most four: more do not speed up
         nets this small."""
-        self._model = {"model_content": file} if isinstance(file, bytes) else {"model_path": str(file)}
+        self._content = file if isinstance(file, bytes) else None
+        self._path = None if isinstance(file, bytes) else str(file)
         self._threads, self._own = threads or min(4, available_cores()), local()
         interpreter = self._interpreter()
         self._inputs = [d["index"] for d in interpreter.get_input_details()]
@@ -28,7 +29,7 @@ class Network:
         if not hasattr(self._own, "interpreter"):
             from ai_edge_litert.interpreter import Interpreter
 
-            self._own.interpreter = Interpreter(**self._model, num_threads=self._threads)
+            self._own.interpreter = Interpreter(self._path, self._content, num_threads=self._threads)
             self._own.interpreter.allocate_tensors()
         return self._own.interpreter
 

@@ -33,7 +33,8 @@ BODY = slice(0, 23)
 
 def main() -> None:
     """Prints a row for each clip and each of the three fits."""
-    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.eyes", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.eyes",
+                                     description="Whether another body network gives a better body.")
     parser.add_argument("network", type=Path, help="a .tflite with the interface of pose_landmark_full")
     parser.add_argument("offsets", type=Path, help="its errors, by tools/detector_offsets.py")
     parser.add_argument("--seeds", type=int, nargs="*", default=[101, 102, 103], help="turntable clips (default: 101 102 103)")

@@ -13,14 +13,14 @@ from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.lm.joint_sigma import estimate_sigma
 from gsac.stages.smplx.sightings import Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
-from gsac.stages.smplx.start.begin import POINTS, describe, lay_out, locate, place
+from gsac.stages.smplx.start.begin import NEAREST, POINTS, describe, lay_out, locate, place
 from gsac.stages.smplx.state import Fit, to_params
 
 
 def take_as_fit(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
                 progress: Callable[[int, int, str], None]) -> Fit:
     """The brought poses as the fit. The file's translation holds where it gives the body's shape too, for a body of another shape
-    stands elsewhere; otherwise it is solved from the seen points."""
+    stands elsewhere, and puts it before the camera; otherwise it is solved from the seen points."""
     start, center, focal = sightings.start, sightings.center, focal_prior(sightings, config)[0]
     assert start is not None, "SmplxConfig.check asks for it"
     ours = estimate_start(body, sightings, focal, center)
@@ -28,7 +28,8 @@ def take_as_fit(body: Body, sightings: Sightings, outlines: list[Outline], confi
     solved = place(body, sightings, state, focal, center).transl
     transl = np.where(np.isfinite(solved), solved, ours.transl)
     if start.betas is not None:
-        transl = np.where(np.isfinite(start.transl), start.transl, transl)
+        placed = np.isfinite(start.transl).all(1, keepdims=True) & (start.transl[:, 2:] > NEAREST)
+        transl = np.where(placed, start.transl, transl)
     state = replace(state, transl=transl, stance=np.zeros(0))
     iou = sample_outlines(body, to_params(body, state, center), sightings.width, sightings.height, outlines)[1]
     x = locate(body, state) + transl[:, None]

@@ -98,6 +98,16 @@ def test_brought_poses_are_the_result_where_the_user_says_so(body):
     assert np.median(fit.reprojection) < 3 and np.isfinite(fit.sigma_joints).all()
 
 
+def test_a_brought_place_behind_the_camera_or_at_no_end_is_solved_from_the_points(body):
+    params = hard_person(body)
+    start = start_of(params)
+    start.betas, start.transl[:] = params.betas, params.transl
+    start.transl[1], start.transl[3] = -params.transl[1], np.inf
+    fit = take_as_fit(body, seen(body, params, start), [], SmplxConfig(method="brought", start="poses"), lambda *done: None)
+    np.testing.assert_allclose(fit.state.transl[[1, 3]], params.transl[[1, 3]], atol=0.1)
+    assert fit.reprojection.max() < 6
+
+
 def test_a_result_to_be_brought_needs_a_name():
     with pytest.raises(BadInput, match="smplx.start names no poses"):
         SmplxConfig(method="brought").check()
