@@ -6,8 +6,10 @@ its own points give. Crop factors are those of the networks' training.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -63,6 +65,17 @@ class Face:
         return np.clip(toward / 0.3 + 1, 0, 1)
 
 
+class MeshNetwork(Protocol):
+    """Anything that reads a face's points off a crop."""
+
+    width: int
+    """px of the crop."""
+
+    def __call__(self, image: np.ndarray, /) -> Sequence[np.ndarray]:
+        """Points, 468 times x, y, z px of the crop, and the presence before the sigmoid. image: (width, width, 3) in 0..1."""
+        ...
+
+
 class FaceMesh:
     """Detector and mesh network."""
 
@@ -85,8 +98,8 @@ class FaceMesh:
             region = self.detect(image, look, threshold)
             if region is None:
                 continue
-            first = self.read(image, region)
-            again = self.read(image, self.region_of(first.points))
+            first = read_face(self._mesh, image, region)
+            again = read_face(self._mesh, image, region_of(first.points))
             for face in (again, first):
                 if face.presence >= threshold and (yaw is None or abs(_wrap(face.yaw - yaw)) < YAW_DOUBT):
                     return face
@@ -103,26 +116,27 @@ class FaceMesh:
         right, left = points[0], points[1]
         return around_points(points, upright_angle(right, left, 0.0)).scaled(2.0).moved(0.0, -0.1)
 
-    def read(self, image: np.ndarray, region: Region, mirror: np.ndarray | None = None) -> Face:
-        """Runs the mesh network on one crop.
 
-        image: (H, W, 3) uint8; mirror: (468,) index of each point's mirror image, to run it on the mirrored crop.
-        """
-        size = self._mesh.width
-        seen = crop(image, region, size)
-        raw, presence = self._mesh(seen if mirror is None else seen[:, ::-1])
-        points = raw.reshape(POINTS, 3).astype(np.float64) / size
-        if mirror is not None:
-            points = points[mirror]
-            points[:, 0] = 1 - points[:, 0]
-        xy = region.to_frame(points[:, :2])
-        return Face(np.hstack([xy, points[:, 2:] * region.side]), float(clipped_sigmoid(presence.reshape(-1)[0])))
+def read_face(network: MeshNetwork, image: np.ndarray, region: Region, mirror: np.ndarray | None = None) -> Face:
+    """Runs a mesh network on one crop.
 
-    @staticmethod
-    def region_of(points: np.ndarray) -> Region:
-        """The region that centres the points (468, 2 or 3), px, as in the network's training."""
-        angle = upright_angle(points[RIGHT_EYE, :2], points[LEFT_EYE, :2], 0.0)
-        return around_points(points[:, :2], angle).scaled(1.5)
+    image: (H, W, 3) uint8; mirror: (468,) index of each point's mirror image, to run it on the mirrored crop.
+    """
+    size = network.width
+    seen = crop(image, region, size)
+    raw, presence = network(seen if mirror is None else seen[:, ::-1])
+    points = raw.reshape(POINTS, 3).astype(np.float64) / size
+    if mirror is not None:
+        points = points[mirror]
+        points[:, 0] = 1 - points[:, 0]
+    xy = region.to_frame(points[:, :2])
+    return Face(np.hstack([xy, points[:, 2:] * region.side]), float(clipped_sigmoid(presence.reshape(-1)[0])))
+
+
+def region_of(points: np.ndarray) -> Region:
+    """The region that centres the points (468, 2 or 3), px, as in the networks' training."""
+    angle = upright_angle(points[RIGHT_EYE, :2], points[LEFT_EYE, :2], 0.0)
+    return around_points(points[:, :2], angle).scaled(1.5)
 
 
 def _wrap(angle: float) -> float:

@@ -55,6 +55,9 @@ MODELS: dict[str, ModelFile] = {
     "face_landmark": _mediapipe(
         "face_landmark/face_landmark", "1055cb9d4a9ca8b8c688902a3a5194311138ba256bcc94e336d8373a5f30c814",
         "192x192 RGB in 0..1 of one face: 468 points, presence"),
+    "face_landmark_with_attention": _mediapipe(
+        "face_landmark/face_landmark_with_attention", "e06a804e0144f9929eda782122916b35d60c697c3c9344013ca2bbe76a6ce2b4",
+        "192x192 RGB in 0..1 of one face: 468 points, lips and eyes more exactly, irises, presence"),
     "iris_landmark": _mediapipe(
         "iris_landmark/iris_landmark", "d1744d2a09c25f501d39eba4faff47e53ecca8852c5ce19bce8eeac39357521f",
         "64x64 RGB in 0..1 of one eye: 71 points of the lids and brow, 5 of the iris"),

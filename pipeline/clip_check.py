@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame
-from gsac.avatar.camera_motion import View, find_moved, make_view, measure_sway
-from gsac.avatar.threads import available_cores
+from gsac.avatar.artifacts import Clip, check_keypoints
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.findings import Code, Finding
 from gsac.stages.first_look import LEAST_TURN, FirstLook
@@ -23,8 +17,10 @@ MOST = 6
 """Most stretches of time that are named."""
 FRAMES = 32
 """Looked at; a video's are spread evenly."""
-MARGIN = 0.15
-"""Room about the person's points, as a share of their extent, for hair and clothes."""
+LAST = "smplx"
+"""The stage up to which they are looked at: only a body shows an arm that no pose explains."""
+PARAMS: dict[str, dict[str, Any]] = {"split": {"count": FRAMES}, "segment": {"use_plate": False}}
+"""Stage -> parameters. To learn the empty scene takes half of segment's time, and the outline serves without."""
 
 
 class Prospect(Enum):
@@ -88,33 +84,11 @@ class ClipCheck:
         return f" (at {', '.join(spans)}{', ...' if len(runs) > MOST else ''} s)"
 
 
-def check_clip(frames: Path, clip: Path, keypoints: Path, findings: list[tuple[str, dict[str, Any]]]) -> ClipCheck:
-    """The check by outputs of split and keypoints, and by what these stages found: sentences with their entries."""
-    times, points, found = Clip.read(clip).timestamps_s, check_keypoints(keypoints), []
-    look = FirstLook.of(points)
+def check_clip(clip: Path, keypoints: Path, findings: list[tuple[str, dict[str, Any]]]) -> ClipCheck:
+    """The check by outputs of split and keypoints, and by what the stages up to LAST found: sentences with their entries."""
+    found, look = list(findings), FirstLook.of(check_keypoints(keypoints))
     turn = look.turn * look.frames / max(look.frames - 1, 1)  # the clip shows what lies between those frames, too
     if look.frames > 1 and turn < LEAST_TURN:
-        found.append(Finding.of(Code.PART_OF_TURN, figure=turn))
-    if times is not None:
-        sway = measure_sway(backgrounds(frames, points["xy"], points["score"]))
-        longer = max(read_frame(frame_paths(frames)[0]).shape)
-        if (moved := find_moved(sway, longer)).any():
-            found.append(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
-    return ClipCheck(look, times, [*findings, *((finding.message, finding.to_json()) for finding in found)])
-
-
-def backgrounds(frames: Path, xy: np.ndarray, score: np.ndarray) -> Iterator[View]:
-    """Yields each frame without the box about the person's points. xy: (T, 133, 2) px; score: (T, 133)."""
-    paths = frame_paths(frames)
-
-    def view(t: int) -> View:
-        image = read_frame(paths[t])
-        person, seen = np.zeros(image.shape[:2], np.float32), xy[t, score[t] > 0]
-        if len(seen):
-            room = MARGIN * np.ptp(seen, axis=0).max()
-            (left, top), (right, bottom) = np.maximum(seen.min(0) - room, 0).astype(int), (seen.max(0) + room).astype(int)
-            person[top:bottom, left:right] = 1
-        return make_view(image, person)
-
-    with ThreadPoolExecutor(available_cores()) as pool:
-        yield from pool.map(view, range(len(paths)))
+        part = Finding.of(Code.PART_OF_TURN, figure=turn)
+        found.append((part.message, part.to_json()))
+    return ClipCheck(look, Clip.read(clip).timestamps_s, found)

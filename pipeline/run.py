@@ -45,6 +45,10 @@ RECALLED = 110
 """Characters of a cached stage's warning at most."""
 
 
+class HopelessClipError(BadInput):
+    """A stage has found that nothing can come of the clip."""
+
+
 @dataclass
 class StageResult:
     """One row of run.json and --json."""
@@ -310,10 +314,10 @@ class ClipRun:
 
 
 def refuse_hopeless(record: Record) -> None:
-    """BadInput where the stage has found that nothing can come of the clip."""
+    """HopelessClipError where the stage has found that nothing can come of the clip."""
     for message, finding in zip(record.info.warnings, record.info.findings, strict=False):  # old records have none
         if finding["severity"] == Severity.HOPELESS:
-            raise BadInput(f"{message} (--anyway goes on)")
+            raise HopelessClipError(f"{message} (--anyway goes on)")
 
 
 def first_sentence(message: str) -> str:

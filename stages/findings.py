@@ -44,6 +44,9 @@ class Code(Enum):
                                 "Film one whole person from head to feet, in the picture all the time.", Severity.HOPELESS)
     SMALL_PERSON = Wording("The person is only {figure:.0f} px tall in the picture: the avatar will be coarse.",
                            "Go closer, or turn the phone upright, until the person fills most of the picture's height.")
+    LIES_ON_SIDE = Wording("The person lies on the side in {frames}: was the phone held across?",
+                           "Turn the clip by a quarter in the phone's gallery, so that the person stands, and give it again.",
+                           Severity.WRONG)
     SECOND_PERSON = Wording("A second person was seen in {frames}; only the first one is followed.",
                             "Keep others out of the picture or cut these frames.")
     CUT_OFF = Wording("The edge of the picture cuts off {parts}; what lies outside is guessed.",
@@ -80,8 +83,9 @@ class Code(Enum):
     NOT_FITTED = Wording("Not fitted, and not learned from: {frames}; {reason}.", severity=Severity.WRONG)
     PART_HIDDEN = Wording("Something that stands before the person hides {parts}; what is behind it is not fitted to the pictures.",
                           "Film where nothing stands between the person and the camera.")
-    POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}, as in the clip's other "
-                             "frames: wide clothes, or a mask that holds more than the person.")
+    POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}: wide clothes, a mask that "
+                             "holds more than the person, or several moments in one picture.",
+                             "Wear clothes that lie close to the body, and turn slower.")
     CLOTHES_HIDE_SHAPE = Wording("Clothes hide the body's shape: they stand up to {figure:.0f} cm off it.",
                                  "Wear clothes that lie close to the body.")
     HAND_HIDDEN = Wording("The {side} hand is hidden in {frames}, behind the body as the camera sees it; where it lies is a guess.",

@@ -23,7 +23,8 @@ from gsac.avatar.wholebody import INDEX
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.benchmarks.face.drawing import SMALLEST, Head, Portrait
 from gsac.benchmarks.perception import video_frames
-from gsac.stages.face.landmarks import read_averaged
+from gsac.stages.face.config import ATTENTIVE, PLAIN
+from gsac.stages.face.landmarks import TwoMeshes, read_averaged
 from gsac.turntable.clip import FEET, VideoWriter, develop, make_studio, make_view, place_person, pose_person, studio_rng
 from gsac.turntable.motion import make_motion
 from gsac.turntable.options import TurntableOptions
@@ -60,6 +61,7 @@ class Reader:
 
     def __init__(self, store: Path):
         self.mesh = FaceMesh({name: model_path(name, store) for name in MODELS}, threads=1)
+        self.network = TwoMeshes({name: model_path(name, store) for name in (PLAIN, ATTENTIVE)})
         self.mirror: np.ndarray | None = None
 
     def read(self, seed: int, folder: Path) -> dict[str, np.ndarray]:
@@ -106,7 +108,7 @@ class Reader:
 
     def _look(self, image: np.ndarray, face: Face) -> np.ndarray:
         """Landmarks (468, 3) px, NaN where the network finds no face. image: (H, W, 3) uint8."""
-        seen = read_averaged(self.mesh, image, face.points, self.mirror)
+        seen = read_averaged(self.network, image, face.points, self.mirror)
         return seen.points if seen.presence >= 0.5 else np.full((POINTS, 3), np.nan)
 
     def _find(self, images: list[np.ndarray], scene: Scene, t: int) -> Face | None:

@@ -25,7 +25,7 @@ from gsac.benchmarks.stability.faults import FAULTS
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
 from gsac.benchmarks.stability.take import Take, read_take
-from gsac.pipeline.clip_check import check_clip
+from gsac.pipeline.clip_check import LAST, PARAMS, check_clip
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.severity import Severity
@@ -46,8 +46,6 @@ WORST = 5
 """A joint's worst frames."""
 CLIP = (Origin.TAKE, Origin.FILM, Origin.PERSON)
 """Origins of faults that are in the clip's file, as `gsac check` gets it."""
-CHECKED = "keypoints"
-"""The stage after which `gsac check` judges."""
 CRF = 4
 """Of persons who are rendered anew; their file is read once more before it is a clip."""
 
@@ -213,12 +211,12 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
         trial.touched = take.number[touched].tolist()
     ports, said, take = _split(film, folder)
     trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in said]
+    if trial.checked is not None:
+        trial.checked = _check(dict(ports), said, folder)
     for name in stages_until(task.until):
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
         found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
         trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in found]
-        if name == CHECKED and trial.checked is not None:
-            trial.checked = _check(ports, [*said, *found])
         if fault and fault.origin.startswith(f"{name}/"):
             port, folder = fault.origin.value, task.folder
             value, touched = fault.inject(read_artifact(fault.origin, ports[port]), task.severity, task.seed)
@@ -245,10 +243,19 @@ def _split(film: Film, folder: Path) -> tuple[dict[str, Path], list[Finding], Ta
     return ports, said, take
 
 
-def _check(ports: dict[str, Path], said: list[Finding]) -> list[str]:
-    """Codes of `gsac check`, mere news left out, by all of the trial's frames; said: by split and keypoints."""
-    check = check_clip(ports["split/frames"], ports["split/clip.json"], ports["keypoints/keypoints.npz"],
-                       [(finding["message"], finding) for finding in said])
+def _check(ports: dict[str, Path], said: list[Finding], folder: Path) -> list[str]:
+    """Codes of `gsac check`, mere news left out, by all of the trial's frames; said: by split."""
+    found = list(said)
+    try:
+        for name in stages_until(LAST):
+            shared = name in BEFORE and name not in PARAMS
+            found += run_stage(name, PARAMS.get(name, {}), ports, folder / name if shared else folder / "check" / name)
+            if any(finding["severity"] == Severity.HOPELESS for finding in found):
+                break
+    except (StageError, ArtifactError):
+        return [End.REFUSED.value]
+    check = check_clip(ports["split/clip.json"], ports["keypoints/keypoints.npz"],
+                       [(finding["message"], finding) for finding in found])
     return sorted({entry["code"] for _, entry in check.findings if entry["severity"] != Severity.NEWS})
 
 

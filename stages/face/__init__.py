@@ -1,5 +1,7 @@
 """face: the expression in each frame in which the face is seen, as the open body's 52 facial actions.
 
+Lips and lids are read by the network with attention, all else by the plain face network.
+
 takes  split/frames, split/clip.json, keypoints/keypoints.npz
 gives  face.npz: valid (T,) bool, expression (T,52) in 0..1 in the order of the body's expression_names, jaw (T,3) zeros
        (the open body opens its mouth by jawOpen), shape (1404,) m the person's resting points less the average ones,
@@ -18,6 +20,7 @@ STAGE = Stage(
     inputs=("split/frames", "split/clip.json", "keypoints/keypoints.npz"),
     outputs=(Output("face.npz", check_face),),
     config=FaceConfig,
-    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "onnxruntime", "torch", "scipy", "numba", "llvmlite"),
+    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "flatbuffers", "onnxruntime", "torch", "scipy", "numba",
+              "llvmlite"),
     models=lambda config: config.models(),
 )

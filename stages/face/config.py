@@ -8,7 +8,7 @@ from typing import Literal
 from gsac.stages.brought_file import NONE
 from gsac.stages.contract import BadInput
 
-ENCODER = "deca-encoder"
+ENCODER, PLAIN, ATTENTIVE = "deca-encoder", "face_landmark", "face_landmark_with_attention"
 
 
 @dataclass
@@ -47,7 +47,7 @@ class FaceConfig:
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
         own = () if self.flame == NONE else (self.flame, self.flame_points)
-        return ("face_detection_short_range", "face_landmark", *own, *((ENCODER,) if self.method == "deca" else ()))
+        return (PLAIN, ATTENTIVE, *own, *((ENCODER,) if self.method == "deca" else ()))
 
     def check(self) -> None:
         if not 90 <= self.angle < 180:

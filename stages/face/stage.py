@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_arrays
-from gsac.avatar.facemesh import POINTS, FaceMesh
+from gsac.avatar.facemesh import POINTS
 from gsac.avatar.threads import available_cores
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.contract import Job, StageError
@@ -17,7 +17,7 @@ from gsac.stages.face.config import ENCODER
 from gsac.stages.face.deca import EXPRESSION, JAW, SHAPE, DecaEncoder
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.head import HeadModel
-from gsac.stages.face.landmarks import align, read_averaged
+from gsac.stages.face.landmarks import TwoMeshes, align, read_averaged
 from gsac.stages.face.resting_face import find_resting_face
 from gsac.stages.findings import Code, Finding
 
@@ -98,7 +98,7 @@ def read_clip(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], act
     Returns landmarks (T, 468, 3) px, NaN where the face is turned away or too uncertain, and for the other frames the aligned
     points (T, 468, 3) m and where the face looks (T, 3); zeros elsewhere.
     """
-    mesh = FaceMesh(job.models, threads=1)
+    network = TwoMeshes(job.models)
     T = len(paths)
     landmarks = np.full((T, POINTS, 3), np.nan)
     points, direction = np.zeros((T, POINTS, 3)), np.zeros((T, 3))
@@ -107,7 +107,7 @@ def read_clip(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], act
     def frame(t: int) -> None:
         seen = keypoints["face_mesh"][t]
         if np.isfinite(seen[0, 0]) and not turned_away(keypoints["world"][t], least):
-            face = read_averaged(mesh, read_frame(paths[t]), seen, actions.mirror)
+            face = read_averaged(network, read_frame(paths[t]), seen, actions.mirror)
             aligned, toward = align(face.points, actions.neutral, face.facing())
             if face.presence >= job.config.threshold and toward[2] >= least:
                 landmarks[t], points[t], direction[t] = face.points, aligned, toward

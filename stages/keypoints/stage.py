@@ -22,6 +22,7 @@ from gsac.stages.keypoints.config import DetectorName
 from gsac.stages.keypoints.cut_off import Cut, find_cuts, name_cuts
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
+from gsac.stages.keypoints.lying import find_lying
 from gsac.stages.keypoints.mediapipe import Mediapipe
 from gsac.stages.keypoints.mmpose_points import MmposePoints
 from gsac.stages.keypoints.second_look import look_again
@@ -85,6 +86,8 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
         job.warn(Finding.of(Code.HARDLY_ANY_PERSON, ~seen, figure=seen.sum(), given=len(seen)))
     elif not seen.all():
         job.warn(Finding.of(Code.NO_PERSON, ~seen))
+    if (lying := find_lying(frames)).any():
+        job.warn(Finding.of(Code.LIES_ON_SIDE, lying))
     second = np.array([f.second_person for f in frames])
     if second.any():
         job.warn(Finding.of(Code.SECOND_PERSON, second))

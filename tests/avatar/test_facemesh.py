@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.facemesh import IBUG68, LEFT_SIDE, POINTS, RIGHT_SIDE, Face, FaceMesh, head_yaw
+from gsac.avatar.facemesh import IBUG68, LEFT_SIDE, POINTS, RIGHT_SIDE, Face, head_yaw, region_of
 from support.regions import to_region
 
 
@@ -38,7 +38,7 @@ def test_yaw_of_the_bodys_head_points_to_where_the_nose_goes():
 
 def test_the_meshs_own_region_levels_the_eyes_and_holds_every_point():
     face = ball(0.2)
-    region = FaceMesh.region_of(face.points)
+    region = region_of(face.points)
     inside = to_region(region, face.points[:, :2])
     assert inside.min() > 0 and inside.max() < 1
     eyes = to_region(region, face.points[[33, 263], :2])

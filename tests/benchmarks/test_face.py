@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body
-from gsac.avatar.facemesh import MODELS, Face, FaceMesh
+from gsac.avatar.facemesh import MODELS, Face
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.avatar.region import Region
 from gsac.benchmarks.face import people as face_people
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.slow
 def store() -> Path:
     root = Path(os.environ.get("GSAC_CACHE", "~/.cache/gsac")).expanduser()
     try:
-        for name in MODELS:
+        for name in {*MODELS, *FaceConfig().models()}:
             model_path(name, root)
     except ModelMissingError as missing:
         pytest.skip(str(missing))
@@ -52,7 +52,7 @@ def people(tmp_path_factory, store) -> list[dict]:
         return [reader.read(seed, tmp_path_factory.mktemp("people")) for seed in UNKNOWN]
 
 
-def drawn_clip(mesh: FaceMesh, mirror: np.ndarray, seed: int) -> dict[str, np.ndarray]:
+def drawn_clip(reader: Reader, mirror: np.ndarray, seed: int) -> dict[str, np.ndarray]:
     """A drawn head that turns past the camera, 50 to 110 px between the eyes' outer corners, with a truth clip's expressions."""
     body, rng = Body.load(), np.random.default_rng([seed, 78])
     head, share = Head(body, rng.normal(0, 1, body.num_figure), Portrait.sample(rng)), rng.uniform(0.45, 1)
@@ -62,9 +62,9 @@ def drawn_clip(mesh: FaceMesh, mirror: np.ndarray, seed: int) -> dict[str, np.nd
     landmarks = np.full((LENGTH, 468, 3), np.nan)
     for t in range(LENGTH):
         image = head.draw(turn[t], expression[t], share, rng)
-        face = mesh.find(image, Region((len(image) / 2,) * 2, float(len(image))))
+        face = reader.mesh.find(image, Region((len(image) / 2,) * 2, float(len(image))))
         if face is not None:
-            landmarks[t] = read_averaged(mesh, image, face.points, mirror).points
+            landmarks[t] = read_averaged(reader.network, image, face.points, mirror).points
     return {"landmarks": landmarks, "expression": expression}
 
 
@@ -100,10 +100,10 @@ def test_the_large_face_of_someone_it_never_saw_is_read(people):
 
 def test_faces_of_another_renderer_are_read_as_well(store):
     """Three clips of people whom the table never saw, each less its own mean: what moves is right, brows too."""
-    actions, config, mesh = Actions.load(), FaceConfig(), Reader(store).mesh
+    actions, config, reader = Actions.load(), FaceConfig(), Reader(store)
     said, true = [], []
     for seed in FILMED:
-        clip = drawn_clip(mesh, actions.mirror, seed)
+        clip = drawn_clip(reader, actions.mirror, seed)
         seen = np.isfinite(clip["landmarks"][:, 0, 0])
         assert seen.sum() >= 24
         times = np.flatnonzero(seen) / RATE

@@ -18,6 +18,7 @@ from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.take import Take
 from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, PAPER, End, Task, Trial
 from gsac.cache.code import code_parts
+from gsac.pipeline.clip_check import ClipCheck
 from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput, StageError
 from gsac.turntable.options import TurntableOptions
@@ -214,6 +215,27 @@ def test_the_check_agrees_where_it_and_the_run_find_something_or_neither_does():
     assert foretold(["cut_off"], mm=115.0) and not foretold(["far_away"], mm=115.0)
     assert foretold([End.REFUSED.value], end=End.REFUSED)
     assert foretold(None) is None and foretold(["cut_off"], end=End.CRASHED) is None
+
+
+def test_the_check_looks_as_far_as_the_body_and_no_farther_than_there_is_hope(tmp_path, monkeypatch):
+    ran = []
+
+    def run(name, values, ports, folder):
+        ran.append(name)
+        if name in fails:
+            raise StageError("no")
+        return [finding(code, [], severity) for stage, code, severity in found if stage == name]
+
+    monkeypatch.setattr(trial, "run_stage", run)
+    monkeypatch.setattr(trial, "check_clip", lambda clip, points, said: ClipCheck(None, None, said))
+    ports = dict.fromkeys(("split/clip.json", "keypoints/keypoints.npz"), tmp_path)
+    fails, found = [], [("keypoints", "repeated", "news"), ("smplx", "arm_doubtful", "poorer")]
+    assert trial._check(ports, [finding("blurred", [1])], tmp_path) == ["arm_doubtful", "blurred"]
+    assert ran[-1] == "smplx" and "train" not in ran
+    fails, found = ["segment"], [("keypoints", "hardly_any_person", "hopeless")]
+    assert trial._check(ports, [], tmp_path) == ["hardly_any_person"]
+    found = []
+    assert trial._check(ports, [], tmp_path) == [End.REFUSED.value]
 
 
 TRIALS = [one(), one("pole", 3, mm=115.0), one("pole", 5, end=End.CRASHED, message="ValueError"), one("blur", 3, mm=25.0),

@@ -21,6 +21,7 @@ from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
+from gsac.stages.smplx.lm.doubtful_arms import settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import HiddenArms, describe_arms, widen_arm
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
@@ -70,11 +71,11 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         state, more = problem.minimise(state, config.iterations)
         steps += more
     cost = problem.cost(state)
+    state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing)
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     sigma = estimate_joint_sigma(problem, state)
     hidden.widen(sigma)
-    doubtful = hidden.find_doubtful(problem, state, sightings.missing)
     for side in (0, 1):
         widen_arm(sigma, side, doubtful[:, [side]])
     said += describe_arms(Code.HAND_HIDDEN, hidden.mark(len(sigma))) + describe_arms(Code.ARM_DOUBTFUL, doubtful)

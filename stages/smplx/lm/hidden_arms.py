@@ -17,7 +17,6 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, J
 from gsac.avatar.wholebody import INDEX as POINT
-from gsac.avatar.yaw import yaw
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.jacobians import Chain, Pairs, make_surface_pairs, place_points
 from gsac.stages.smplx.lm.problem import ROBUST, Problem
@@ -63,8 +62,6 @@ FAR_OFF = 5.0
 """Factor on the robust limit in the search."""
 STEPS = 12
 """Steps of each search, at most."""
-FAR, DOUBTS, ARC = 4.5, 3, np.radians(90)
-"""Of doubtful arms: spreads of a point (3.4 in clean turns), frames, turn without the hand (51 degrees; 114 on with a phone)."""
 SIGMA = {"elbow": 0.05, "wrist": 0.1}
 """m, added to the standard deviation of a hidden arm's joints; a hand's joints have the wrist's."""
 
@@ -119,8 +116,7 @@ class HiddenArms:
                 lost = first + np.flatnonzero(missing[first:last, side])
                 against = sum(self.contradict(problem, state, chain.frame(t), t, side) for t in lost.tolist() if len(lost) >= least)
                 if against >= least:
-                    near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
-                    found.append(Stay(side, first, last, int(near[0]), int(near[-1]) + 1))
+                    found.append(Stay(side, first, last, *find_around(seconds, first, last)))
             if found and self.is_detected(state, chain, missing[:, side], side):
                 self.stays += found
 
@@ -186,23 +182,19 @@ class HiddenArms:
 
         start: (F, J, 3, 3) joint rotations.
         """
-        around, arm = stay.around, ARM_JOINTS[stay.side]
-        assert problem.seen.seconds is not None  # without times `find` finds no stay
-        seen = replace(problem.seen, xy=problem.seen.xy[around], spread=problem.seen.spread[around],
-                       depth=problem.seen.depth[around].copy(), seconds=problem.seen.seconds[around],
-                       outlines=problem.seen.outlines[around])
-        alone = Problem(problem.body, problem.pairs, problem.hips, seen, arm, problem.smoothness, problem.person_offsets)
-        alone.loose[:], alone.limit = QUICK, FAR_OFF * ROBUST
-        alone.spread *= FREE
-        inner = replace(stay, first=stay.first - stay.start, last=stay.last - stay.start, start=0, stop=stay.stop - stay.start)
-        hidden = replace(self, stays=[inner])
-        trial = State(start, state.transl[around], state.betas, state.log_focal, np.zeros(0), state.own)
-        place = np.arange(alone.size) >= alone.size - 3
+        alone = isolate_arm(problem, stay)
+        hidden, trial = replace(self, stays=[stay]).cut(stay), isolate_state(state, stay, start)
         for _ in range(2):
             hidden.hold(alone, trial)
-            trial, _ = alone.minimise(trial, STEPS, place, np.ones(trial.shared, bool))
+            trial = bend_arm(alone, trial, STEPS)
         hidden.hold(alone, trial)
         return alone.cost(trial), trial.local
+
+    def cut(self, window: Stay) -> HiddenArms:
+        """The same with the stays of a window's arm alone, in frames of the window."""
+        own = [np.clip(np.array([s.first, s.last, s.start, s.stop]) - window.start, 0, window.stop - window.start).tolist()
+               for s in self.stays if s.side == window.side]
+        return replace(self, stays=[Stay(window.side, *frames) for frames in own])
 
     def hold(self, problem: Problem, state: State) -> None:
         """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight."""
@@ -234,28 +226,43 @@ class HiddenArms:
             share = np.minimum(1, np.minimum((frame - stay.start + 1) / before, (stay.stop - frame) / after))[:, None]
             widen_arm(sigma[stay.around], stay.side, share)
 
-    def find_doubtful(self, problem: Problem, state: State, missing: np.ndarray | None) -> np.ndarray:
-        """(T, 2) bool, arms far from their points, or without a hand for more of the turn than a trunk covers it, that no stay has.
-        missing: (T, 2) bool, hands that were not detected; None: all were."""
-        seen, turn = problem.seen, yaw(state.local[:, 0])
-        uv = problem.project(state, problem.locate_points(problem.skeleton.pose(state.local, state.shape), state))
-        far = np.linalg.norm(np.where(np.isfinite(seen.spread)[..., None], uv - seen.xy, 0), axis=-1) > FAR * seen.spread
-        out = np.zeros((len(turn), 2), bool)
-        lost = np.zeros_like(out) if missing is None else missing.astype(bool)
-        for side in (0, 1):
-            for first, last in bridge(far[:, [ELBOW[side], WRIST[side]]].any(1)):
-                out[first:last, side] |= last - first >= DOUBTS
-            for first, last in bridge(lost[:, side]):
-                others, around = np.delete(lost[:, side], np.s_[first:last]), np.ptp(np.unwrap(turn[first:last]))
-                out[first:last, side] |= len(others) >= DOUBTS and 1 - others.mean() > TRUSTED and around > ARC
-        return out & ~self.mark(len(turn))
-
     def mark(self, frames: int) -> np.ndarray:
         """(T, 2) bool, frames with a hidden hand. frames: T."""
         out = np.zeros((frames, 2), bool)
         for stay in self.stays:
             out[stay.first:stay.last, stay.side] = True
         return out
+
+
+def isolate_arm(problem: Problem, stay: Stay) -> Problem:
+    """The problem of the stay's arm alone, in its frames, with a motion as quick as a gesture; all else keeps still."""
+    around, seen = stay.around, problem.seen
+    assert seen.seconds is not None  # without times there are no stays
+    cut = replace(seen, xy=seen.xy[around], spread=seen.spread[around], depth=seen.depth[around].copy(),
+                  depth_spread=np.broadcast_to(seen.depth_spread, seen.depth.shape)[around], seconds=seen.seconds[around],
+                  outlines=seen.outlines[around])
+    alone = Problem(problem.body, problem.pairs, problem.hips, cut, ARM_JOINTS[stay.side], problem.smoothness,
+                    problem.person_offsets)
+    alone.loose[:], alone.limit = QUICK, FAR_OFF * ROBUST
+    alone.spread *= FREE
+    return alone
+
+
+def isolate_state(state: State, stay: Stay, start: np.ndarray) -> State:
+    """The state of the stay's frames, of body and camera as they are. start: (F, J, 3, 3) joint rotations."""
+    return State(start, state.transl[stay.around], state.betas, state.log_focal, np.zeros(0), state.own)
+
+
+def bend_arm(alone: Problem, state: State, steps: int) -> State:
+    """The state after so many steps in which only the problem's joints turn."""
+    place = np.arange(alone.size) >= alone.size - 3
+    return alone.minimise(state, steps, place, np.ones(state.shared, bool))[0]
+
+
+def find_around(seconds: np.ndarray, first: int, last: int) -> tuple[int, int]:
+    """First and last frame, exclusive, within `AROUND_S` of frames, `last` exclusive. seconds: (T,)."""
+    near = np.flatnonzero((seconds > seconds[first] - AROUND_S) & (seconds < seconds[last - 1] + AROUND_S))
+    return int(near[0]), int(near[-1]) + 1
 
 
 def describe_arms(code: Code, arms: np.ndarray) -> list[Finding]:
@@ -282,8 +289,8 @@ def hiding_pose(side: int, pose: tuple) -> np.ndarray:
     return np.radians(np.array(pose, float)) * ([1, 1, 1] if side == 0 else [1, -1, -1])
 
 
-def bridge(missing: np.ndarray) -> list[tuple[int, int]]:
-    """First and last frame, exclusive, of each run of missing (T,) bool; gaps of up to `BRIDGED` frames are part of it."""
+def bridge(missing: np.ndarray, bridged: int = BRIDGED) -> list[tuple[int, int]]:
+    """First and last frame, exclusive, of each run of missing (T,) bool; gaps of up to so many frames are part of it."""
     index = np.flatnonzero(missing)
-    parts = np.split(index, np.flatnonzero(np.diff(index) > BRIDGED + 1) + 1)
+    parts = np.split(index, np.flatnonzero(np.diff(index) > bridged + 1) + 1)
     return [(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]

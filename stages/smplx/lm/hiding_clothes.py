@@ -18,8 +18,9 @@ from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.state import Fit
 
-NO_CLOTHES, THICK = ("hair", "nape", "soles"), 4.0
-"""Of clothes that hide a figure, cm: six clean clips have 2.5 at most, skirts and hoodies 2 or 3 times too thick 4 to 6.5."""
+NO_CLOTHES, THICK = ("hair", "nape", "soles"), 3.3
+"""Of clothes that hide a figure, cm: six clean clips have 2.5 at most, skirts and hoodies 2 or 3 times too thick 4 to 6.5, a shirt
+4 times too thick 3.96."""
 STRANGE = 1.5
 """Root mean square of a figure's betas, in spreads, that one person in a thousand exceeds (20 betas, chi-squared). Under skirts and
 hoodies three times too thick it is 1.8 to 2.0; below, the outline serves all the same."""

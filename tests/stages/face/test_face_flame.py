@@ -76,7 +76,7 @@ def test_an_opening_mouth_opens_flames_mouth_and_rest_is_rest(head, actions):
 
 
 def test_only_who_asks_for_flame_needs_its_files():
-    assert STAGE.models(FaceConfig()) == ("face_detection_short_range", "face_landmark")
+    assert STAGE.models(FaceConfig()) == ("face_landmark", "face_landmark_with_attention")
     assert STAGE.models(FaceConfig(flame="mine"))[2:] == ("mine", "flame-points")
     assert FlameHead.of(Job({}, None, FaceConfig())) is None
 

@@ -113,6 +113,19 @@ def test_parts_that_were_never_seen_are_warned_of():
                                                    "The face was never seen from the front"]
 
 
+def test_who_lies_on_the_side_is_told_to_turn_the_clip_and_who_bows_is_not():
+    def lean(degrees):
+        frame = seen(**HANDS, face=FACE)
+        frame.score[[5, 6, 11, 12]], frame.xy[[5, 6]] = 1, (50, 50)
+        frame.xy[[11, 12]] = 50 + 40 * np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
+        return frame
+
+    lying = warnings_of([lean(90), lean(-80), lean(5), Frame(), lean(-100)])
+    assert any("lies on the side in 3 of 5 frames (0-1, 4)" in said and "Turn the clip by a quarter" in said for said in lying)
+    for standing in ([lean(90), lean(0), lean(30), lean(70)], [lean(180)] * 4):
+        assert not any("lies on the side" in said for said in warnings_of(standing))
+
+
 def test_head_feet_and_sides_at_the_edge_are_told_apart_up_to_the_crown():
     def cuts(at, points=(31,)):
         frame = seen()

@@ -68,6 +68,15 @@ def test_wide_clothes_in_every_frame_are_told_but_nothing_is_lost(good):
     assert len(words) == 1 and "wide clothes" in words[0] and "10 of 10 frames (0-9)" in words[0]
 
 
+def test_pictures_that_mix_several_moments_of_a_fast_turn_are_named(good):
+    iou = good.iou.copy()
+    iou[[2, 5]] = 0.8
+    assert said(replace(good, iou=iou))[1] == [], "single ones are no news"
+    iou[[6, 9]] = 0.85
+    lost, words = said(replace(good, iou=iou))
+    assert not lost.any() and len(words) == 1 and "4 of 10 frames (2, 5-6, 9)" in words[0] and "turn slower" in words[0]
+
+
 def test_the_mark_is_read_back_from_the_joints_spread():
     body = Body.load()
     still = np.zeros((3, 52))

@@ -36,8 +36,9 @@ def test_a_skirt_that_makes_a_figure_no_person_has_is_named_and_its_outline_hard
     assert note.code is Code.CLOTHES_HIDE_SHAPE and note.figure == pytest.approx(5.3) and weights[1] < 0.2 * weights[0]
 
 
-def test_thick_clothes_over_a_usual_figure_are_named_and_fitted_once(fit_dressed):
-    fit, weights = fit_dressed(0.8, THICK + 1)
+@pytest.mark.parametrize(("thick", "name"), [(THICK + 1, "thighs"), (3.9, "feet")])
+def test_thick_clothes_over_a_usual_figure_are_named_and_fitted_once(fit_dressed, thick, name):
+    fit, weights = fit_dressed(0.8, thick, name)
     assert [note.code for note in fit.notes] == [Code.CLOTHES_HIDE_SHAPE] and len(weights) == 1
 
 

@@ -1,0 +1,209 @@
+"""Arms that the pictures contradict, or do not tell: they are said, and moved where another pose is clearly right.
+
+An arm is doubtful where its points lie elsewhere for some frames, or in one in which the mask shows a limb that the body does not
+cover, where its hand is seen although it lies inside the trunk, where its hand has moved while nothing told where it was, or where
+its hand is out of sight for more of a turn than a trunk covers. It is then searched again from the poses that people take; one that
+explains points and mask much better takes its place.
+T frames; sides are 0 left, 1 right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.avatar.joints import INDEX
+from gsac.avatar.yaw import yaw
+from gsac.avatar.zbuffer import silhouette
+from gsac.stages.smplx.jacobians import Chain
+from gsac.stages.smplx.lm.hidden_arms import (
+    ARM_JOINTS,
+    BEHIND_SPREAD,
+    ELBOW,
+    HIDES,
+    ROUGH_DEPTH,
+    SKIN,
+    TRUSTED,
+    WRIST,
+    HiddenArms,
+    Stay,
+    bend_arm,
+    bridge,
+    find_around,
+    hiding_pose,
+    isolate_arm,
+    isolate_state,
+)
+from gsac.stages.smplx.lm.problem import Problem
+from gsac.stages.smplx.state import State, to_params
+
+FAR, ASTRAY, DOUBTS = 4.5, 2.5, 3
+"""Of doubtful arms: spreads from a point, in frames that may lie a little apart (3.4 in clean turns) and in frames on end (1.9; 3.2
+with a hand on the back that is taken for one before the belly), and frames."""
+ALONE, BESIDE, UNCOVERED = 3.0, 0.02, 0.0012
+"""Of an arm that is doubtful in one frame: spreads from a point; distance from the body, and area beyond it, of the mask's part
+that the body leaves, as shares of the person's height and its square. An arm on its way to hip or hair is 3.4 on off and leaves
+0.0017 on; in clean turns one may be 3.5 off, or the body leave 0.0015, but not both."""
+ARC = np.radians(90)
+"""Turn without the hand: 51 degrees in clean turns, 114 on with a phone."""
+MOVED, LOST = 0.11, 0.03
+"""m by which a hand has moved on the trunk while it was not detected, and a share of the person's height, the spread of a wrist
+that nothing tells. Hanging arms move by 83 mm in turns of 20 frames, hands that went to the hips or the back by 138 on."""
+DEEP = 0.03
+"""m inside the trunk from which on a hand would not be seen."""
+POSES = (*HIDES, ((20, 30, -40), (0, -95, 0)), ((0, -40, 40), (0, -125, 0)), ((0, -55, -62), (0, -100, 0)))
+"""Rotation vectors, degrees, of the left shoulder and elbow: hidden, on the hip, at the hair, before the chest."""
+FIRST_STEPS, MORE_STEPS, LEFT = 6, 18, 2
+"""Steps of each search, and more of those that are best by then."""
+CLEARLY = 20.0
+"""By how much the cost must fall: by 73 on where a hand is seen on the back and fitted inside the trunk or before the belly, by 6
+at most where nothing tells where a hand is."""
+
+
+def find_contradicted(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray) -> np.ndarray:
+    """(T, 2) bool, arms far from their points, or beside the mask too, or inside the trunk although their hand is seen.
+
+    missing: (T, 2) bool, hands that were not detected.
+    """
+    seen, chain = problem.seen, problem.skeleton.pose(state.local, state.shape)
+    uv = problem.project(state, problem.locate_points(chain, state))
+    off = np.linalg.norm(np.where(np.isfinite(seen.spread)[..., None], uv - seen.xy, 0), axis=-1) / seen.spread
+    out = np.zeros(missing.shape, bool)
+    for side in (0, 1):
+        arm = off[:, [ELBOW[side], WRIST[side]]].max(1)
+        sunk = ~missing[:, side] & np.isfinite(find_near(arms, state, chain, side))
+        for first, last in [*bridge(arm > FAR), *bridge(arm > ASTRAY, 0), *bridge(sunk, 0)]:
+            out[first:last, side] |= last - first >= DOUBTS
+        far = np.flatnonzero(arm > ALONE)
+        out[far, side] |= measure_uncovered(arms, problem, state, far) > UNCOVERED
+    return out & ~arms.mark(len(out))
+
+
+def measure_uncovered(arms: HiddenArms, problem: Problem, state: State, frames: np.ndarray) -> np.ndarray:
+    """(F,) area of the mask beside the body, as a share of the person's height squared; 0 without a mask. frames: (F,)."""
+    out, offsets = np.zeros(len(frames)), problem.person_offsets
+    assert offsets is not None  # only an arm's or a hand's own problem may lack them
+    params = to_params(problem.body, state, problem.seen.center, joint_offset=offsets.joint_offset(state.own))
+    for i, t in enumerate(frames.tolist()):
+        outline = problem.seen.outlines[t]
+        h, w = outline.mask.shape
+        camera = params.camera(round(w * outline.scale), round(h * outline.scale)).scaled(w, h)
+        body = silhouette(problem.body.posed(params, [t])[0][0], problem.body.faces, camera)
+        away = cv2.distanceTransform((body == 0).astype(np.uint8), cv2.DIST_L2, 5)
+        pixel = outline.scale / arms.height
+        out[i] = (outline.mask & (away * pixel > BESIDE)).sum() * pixel**2
+    return out
+
+
+def find_untold(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray) -> np.ndarray:
+    """(T, 2) bool, arms whose hand moved while nothing told where it was, or for more of the turn than a trunk covers a hand.
+
+    missing: (T, 2) bool, hands that were not detected.
+    """
+    chain, turn, out = problem.skeleton.pose(state.local, state.shape), yaw(state.local[:, 0]), np.zeros(missing.shape, bool)
+    for side in (0, 1):
+        for first, last in bridge(missing[:, side]):
+            others, around = np.delete(missing[:, side], np.s_[first:last]), np.ptp(np.unwrap(turn[first:last]))
+            away = around > ARC or has_moved(arms, problem, chain, side, first, last)
+            out[first:last, side] |= len(others) >= DOUBTS and 1 - others.mean() > TRUSTED and away
+    return out & ~arms.mark(len(out))
+
+
+def find_near(arms: HiddenArms, state: State, chain: Chain, side: int) -> np.ndarray:
+    """(T,) m, depth of the trunk's near surface where a wrist lies inside the trunk; NaN where it does not."""
+    out = np.full(len(state.local), np.nan)
+    for t, wrist in enumerate(chain.place[:, ARM_JOINTS[side, 3]] + state.transl):
+        near, far = arms.measure_trunk(state, chain.frame(t), t, wrist)
+        if near + DEEP < wrist[2] < far + BEHIND_SPREAD:
+            out[t] = near
+    return out
+
+
+def has_moved(arms: HiddenArms, problem: Problem, chain: Chain, side: int, first: int, last: int) -> bool:
+    """Whether a hand lies elsewhere on the trunk before and after frames, `last` exclusive, and nothing tells when it went."""
+    chest, wrist, ends = INDEX["spine3"], ARM_JOINTS[side, 3], [max(first - 1, 0), min(last, len(chain.place) - 1)]
+    before, after = np.einsum("tba,tb->ta", chain.world[ends, chest], chain.place[ends, wrist] - chain.place[ends, chest])
+    unknown = problem.seen.spread[first:last, WRIST[side]].max() > LOST * arms.height
+    return bool(unknown and np.linalg.norm(after - before) > MOVED)
+
+
+def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None) -> tuple[State, np.ndarray]:
+    """The state with doubtful arms in poses that explain points and mask clearly better, where there are any; and (T, 2) bool, the
+    doubtful arms that no stay has.
+
+    missing: (T, 2) bool, hands that were not detected; None: all were. An arm that is doubtful or without a hand for
+    much of the clip is left: nothing tells which of its frames are right.
+    """
+    missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
+    wrong = find_contradicted(arms, problem, state, missing)
+    doubtful = wrong | find_untold(arms, problem, state, missing)
+    if problem.seen.seconds is None:
+        return state, doubtful
+    settled = replace(state, local=state.local.copy())
+    trusted = 1 - np.maximum(doubtful.mean(0), missing.mean(0)) > TRUSTED
+    for side in np.flatnonzero(doubtful.any(0) & trusted).tolist():
+        for first, last in bridge(doubtful[:, side]):
+            stay = Stay(side, first, last, *find_around(problem.seen.seconds, first, last))
+            shown, contradicted = ~missing[stay.around, side], wrong[first:last, side].sum() >= DOUBTS
+            settled.local[stay.around] = search(arms, problem, settled, stay, shown, contradicted)
+    return settled, doubtful
+
+
+def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, contradicted: bool) -> np.ndarray:
+    """Joint rotations (F, J, 3, 3) of the stay's frames: as they are unless others are clearly better.
+
+    shown: (F,) bool, of the hand; contradicted: whether the pictures contradict what is there for some frames. Else others must be
+    better than what it comes to when it may move as freely.
+    """
+    def fit(trials: list[State], steps: int) -> list[tuple[float, State]]:
+        found = []
+        for trial in trials:
+            alone = isolate_arm(problem, stay)
+            hold(arms.cut(stay), alone, trial, stay.side, shown)
+            bent = bend_arm(alone, trial, steps)
+            alone.seen.depth = problem.seen.depth[stay.around].copy()
+            hold(arms.cut(stay), alone, bent, stay.side, shown)
+            found.append((alone.cost(bent), bent))
+        return found
+
+    asis, *others = [isolate_state(state, stay, start) for start in list_starts(state, stay)]
+    likely = sorted(fit(others, FIRST_STEPS), key=lambda entry: entry[0])[:LEFT]
+    freed, *found = fit([asis, *(trial for _, trial in likely)], FIRST_STEPS + MORE_STEPS)
+    (before, _), found = (*fit([asis], 0), [freed, *found]) if contradicted else (freed, found)
+    lowest, best = min(found, key=lambda entry: entry[0])
+    return best.local if lowest < before - CLEARLY else asis.local
+
+
+def hold(arms: HiddenArms, alone: Problem, state: State, side: int, shown: np.ndarray) -> None:
+    """Tells the arm's problem that it lies inside the mask, and its hand before the trunk where it is seen, and not inside it.
+
+    shown: (F,) bool, of the hand.
+    """
+    arms.hold(alone, state)
+    alone.inside = [(t, arms.forearm[side]) for t, outline in enumerate(alone.seen.outlines) if outline.area > 0]
+    seen, wrist, hidden = alone.seen, WRIST[side], arms.mark(len(shown))[:, side]
+    spread = np.broadcast_to(seen.depth_spread, seen.depth.shape).copy()
+    spread[~hidden, ELBOW[side]] = spread[~hidden, wrist] = ROUGH_DEPTH
+    chain = alone.skeleton.pose(state.local, state.shape)
+    hips = alone.locate_points(chain, state)[:, list(alone.hips), 2].mean(1)
+    near = find_near(arms, state, chain, side)
+    sunk = shown & ~hidden & np.isfinite(near)
+    seen.depth[sunk, wrist], spread[sunk, wrist] = (near - SKIN - hips)[sunk], BEHIND_SPREAD
+    seen.depth_spread = spread
+
+
+def list_starts(state: State, stay: Stay) -> list[np.ndarray]:
+    """Joint rotations (F, J, 3, 3) to search from: as they are, as just before and after the stay, and in each of `POSES`."""
+    asis, joints = state.local[stay.around], ARM_JOINTS[stay.side, 1:3]
+    frame = np.arange(stay.start, stay.stop)
+    held = np.flatnonzero((frame >= stay.first - 1) & (frame <= stay.last))
+    ends = [state.local[t, joints] for t in (max(stay.first - 2, 0), min(stay.last + 1, len(state.local) - 1))]
+    out = [asis]
+    for goal in [*ends, *(rotation.exp(hiding_pose(stay.side, pose)) for pose in POSES)]:
+        start = asis.copy()
+        start[np.ix_(held, joints)] = goal
+        out.append(start)
+    return out
