@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.cuda import is_forbidden
 from gsac.avatar.onnx_network import NetworkError, open_network, run_checked, run_session
 
 Shape = list[int | str | None]
@@ -28,7 +29,7 @@ class BroughtNetwork:
 
     def may_be(self, given: Shape, gives: Shape) -> bool:
         """Whether these may be its shapes, as far as the file tells."""
-        return all(told is None or _fits(told, wanted) for told, wanted in ((self.given, given), (self.gives, gives)))
+        return all(told is None or shape_fits(told, wanted) for told, wanted in ((self.given, given), (self.gives, gives)))
 
 
 def open_brought(path: Path, name: str) -> BroughtNetwork:
@@ -46,7 +47,7 @@ def _open_onnx(path: Path, name: str) -> BroughtNetwork:
 def _open_torchscript(path: Path, name: str) -> BroughtNetwork:
     import torch
 
-    device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = "cuda" if torch.cuda.is_available() and not is_forbidden() else "cpu"
     try:
         network = torch.jit.load(str(path), map_location=device).eval()
     except (RuntimeError, ValueError) as e:
@@ -64,6 +65,7 @@ def _open_torchscript(path: Path, name: str) -> BroughtNetwork:
     return BroughtNetwork(run, None, None)
 
 
-def _fits(told: Shape, wanted: Shape) -> bool:
+def shape_fits(told: Shape, wanted: Shape) -> bool:
+    """Whether a shape that a file tells may be the wanted one."""
     return len(told) == len(wanted) and all(
         have == want for have, want in zip(told, wanted, strict=True) if isinstance(have, int) and want is not None)

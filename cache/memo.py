@@ -49,9 +49,9 @@ class Memo:
             return None
         return row[0] if row else None
 
-    def put(self, kind: str, stat: os.stat_result, value: str) -> None:
-        """Remembers a value; not of a file that was touched just now."""
-        if is_settled(stat):
+    def put(self, kind: str, stat: os.stat_result, value: str, sealed: bool = False) -> None:
+        """Remembers a value; not of a file that was touched just now, unless it is sealed, the store's own that nobody changes."""
+        if sealed or is_settled(stat):
             self._pending.append((kind, *identity(stat), value))
 
     def flush(self) -> None:

@@ -38,7 +38,7 @@ def find_clips(source: Path) -> list[Path]:
 
 
 def is_clip(path: Path) -> bool:
-    """A video by its ending, or a folder with photos in it, or with one video and its masks."""
+    """A video by its ending, or a folder with photos in it, or with one video and its masks or plate."""
     if path.is_dir():
         return any(photo.suffix.lower() in PHOTOS for photo in path.iterdir()) or find_film(path) is not None
     return path.suffix.lower() in VIDEOS

@@ -22,6 +22,10 @@ LAST = "smplx"
 PARAMS: dict[str, dict[str, Any]] = {"split": {"count": FRAMES}, "segment": {"use_plate": False}}
 """Stage -> parameters. To learn the empty scene takes half of segment's time, and the outline serves without."""
 
+SPARSE_S = 0.35
+"""Between frames, beyond which a hand that moves, as in squats, looks lost or misplaced against its neighbours."""
+BY_NEIGHBOURS = (Code.HAND_MISPLACED.word, Code.HAND_HIDDEN.word)
+
 
 class Prospect(Enum):
     """What would come of a clip."""
@@ -86,9 +90,11 @@ class ClipCheck:
 
 def check_clip(clip: Path, keypoints: Path, findings: list[tuple[str, dict[str, Any]]]) -> ClipCheck:
     """The check by outputs of split and keypoints, and by what the stages up to LAST found: sentences with their entries."""
-    found, look = list(findings), FirstLook.of(check_keypoints(keypoints))
+    times, look = Clip.read(clip).timestamps_s, FirstLook.of(check_keypoints(keypoints))
+    sparse = times is not None and len(times) > 1 and (times[-1] - times[0]) / (len(times) - 1) > SPARSE_S
+    found = [pair for pair in findings if not (sparse and pair[1]["code"] in BY_NEIGHBOURS)]
     turn = look.turn * look.frames / max(look.frames - 1, 1)  # the clip shows what lies between those frames, too
     if look.frames > 1 and turn < LEAST_TURN:
         part = Finding.of(Code.PART_OF_TURN, figure=turn)
         found.append((part.message, part.to_json()))
-    return ClipCheck(look, Clip.read(clip).timestamps_s, found)
+    return ClipCheck(look, times, found)

@@ -54,7 +54,10 @@ def footage_of_result(frames: Path | None, clip: Path | None) -> Footage | None:
 
 
 def expect_footage(clip: Path, split: Any) -> Footage:
-    """What split will keep of a clip, a video or a folder of photos or of a video with masks. split: its config, or None."""
+    """What split will keep of a clip: a video, a folder of photos, or one of a video with masks or plate.
+
+    split: its config, or None.
+    """
     clip = find_film(clip) or clip
     fps, count, most = (getattr(split, name, None) for name in ("fps", "count", "max_height"))
     height = most or LIKELY_HEIGHT

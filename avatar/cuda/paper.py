@@ -10,9 +10,9 @@ from gsac.avatar.cuda.arrays import Shot
 from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, rates_of
 from gsac.avatar.cuda.trainer import CudaTrainer, opacity_logit
 from gsac.avatar.draw_rule import ADDED, LowPass
+from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import sigmoid
-from gsac.avatar.lpips import Lpips
 
 NEAREST = 3
 """Gaussians of a neighbourhood, the gaussian itself included."""
@@ -128,7 +128,7 @@ class PaperTrainer(CudaTrainer):
                             ("scale_limit", recipe.scale_limit), ("masked", recipe.masked)):
             setattr(self.scene, name, value)
 
-    def _open_window(self, network: Lpips) -> None:
+    def _open_window(self, network: FeatureDistance) -> None:
         super()._open_window(network, self.batch, "float32")
         self.arrays.upload("centres", self.recipe.centre, np.int32)
         self.scene.perceptual = self.recipe.perceptual

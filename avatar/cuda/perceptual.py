@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import cache
 
 from gsac.avatar.cuda.device import Device
-from gsac.avatar.lpips import Lpips
+from gsac.avatar.feature_distance import FeatureDistance
 
 SIDE = 256
 """px, side of the window at most; a smaller frame is taken whole."""
@@ -30,7 +30,7 @@ class Windows:
     """images: (count, 2, height, width, 3), renders and targets in 0..1; values: (count,) LPIPS; slopes, by the renders:
     (count, height, width, 3)."""
 
-    def __init__(self, device: Device, network: Lpips, size: tuple[int, int, int], precision: str = "bfloat16"):
+    def __init__(self, device: Device, network: FeatureDistance, size: tuple[int, int, int], precision: str = "bfloat16"):
         """size: count, height and width, px; precision: torch's name of the convolutions' type."""
         import torch
 

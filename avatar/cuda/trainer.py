@@ -12,9 +12,9 @@ from gsac.avatar.cuda.device import Device
 from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, draw_plan
 from gsac.avatar.cuda.structs import State
 from gsac.avatar.cuda.uploads import make_pairs, make_scratch, upload_body, upload_gaussians, upload_shots
+from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import logit, sigmoid
-from gsac.avatar.lpips import Lpips
 
 REPLAY = 10
 """Steps of one graph."""
@@ -27,7 +27,8 @@ class CudaTrainer:
     """
 
     def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: OnFaces,
-                 recipe: Recipe, device: Device | None = None, pair_room: int | None = None, network: Lpips | None = None):
+                 recipe: Recipe, device: Device | None = None, pair_room: int | None = None,
+                 network: FeatureDistance | None = None):
         """levels: one or two lists of T shots, coarse first; pose: (T, 55, 3) rad; transl: (T, 3) m.
 
         pair_room: (tile, gaussian) pairs that there is memory for at first; network: for LPIPS in the loss of the recipe's last
@@ -238,7 +239,7 @@ class CudaTrainer:
                      "offset_every", "expression_unit", "joint_unit", "fresh", "tiny"):
             setattr(scene, name, getattr(recipe, name))
 
-    def _open_window(self, network: Lpips, windows: int = 1, precision: str = "bfloat16") -> None:
+    def _open_window(self, network: FeatureDistance, windows: int = 1, precision: str = "bfloat16") -> None:
         """Prepares LPIPS of windows of a step's first frames for the last steps. precision: of `perceptual.Windows`."""
         from gsac.avatar.cuda.perceptual import SIDE, Windows
 

@@ -1,8 +1,8 @@
 """gsac bench protocol: trains and scores as another system was published, and prints our row beside the published ones.
 
 Frames, masks and split are those that `gsac data import` wrote. Test frames train no gaussian and no pose; the body fit sees their
-key points and masks, as the published fits did. The row is mean and spread of the trainings with several seeds. LPIPS is a dash
-without its weights (`gsac models add`).
+key points and masks, as the published fits did, or the poses that came with the data take its place. The row is mean and spread of
+the trainings with several seeds. LPIPS is a dash without its weights (`gsac models add`).
 """
 
 from __future__ import annotations
@@ -15,13 +15,18 @@ from pathlib import Path
 from gsac.benchmarks import training
 from gsac.benchmarks.protocol.protocols import PROTOCOLS, Protocol
 from gsac.pipeline.data_sets.write import CAMERAS, SPLIT
+from gsac.pipeline.model_check import check_model
 from gsac.stages.contract import BadInput
+
+GIVEN = "\nAll poses, of the test frames too, are those that came with the data."
 
 
 def parser() -> argparse.ArgumentParser:
     out = argparse.ArgumentParser(prog="gsac bench protocol", description=(__doc__ or "").partition("\n")[0])
     out.add_argument("name", choices=sorted(PROTOCOLS), metavar="NAME", help=f"one of: {', '.join(sorted(PROTOCOLS))}")
     out.add_argument("clips", type=Path, nargs="+", metavar="DIR", help="folders that `gsac data import` wrote, one a subject")
+    out.add_argument("--poses", default="fitted", choices=["fitted", "given"],
+                     help="given: those that came with the data, in place of our body fit (default: fitted)")
     out.add_argument("--recipe", default="fast", choices=["fast", "paper"], help="recipe of the trainings (default: fast)")
     out.add_argument("--device", default="cpu", choices=["cpu", "cuda"], help="where training runs (default: cpu)")
     out.add_argument("--repeats", type=int, default=5, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 5)")
@@ -49,16 +54,20 @@ def main(argv: list[str] | None = None) -> int:
     rows: dict[str, list[dict]] = {}
     values = {"steps": options.steps, "recipe": options.recipe, "device": options.device}
     values |= {} if options.gaussians is None else {"gaussians": options.gaussians}
+    given = options.poses == "given"
+    taken = {folder: take_poses(folder) if given else () for folder in clips}
+    variant = f"{options.name}-{options.poses}" if given else options.name
     for folder, split in clips.items():
-        case = training.fit_clip(options.out, folder, options.name, say, (*settings(folder, split, protocol), *options.sets))
+        case = training.fit_clip(options.out, folder, variant, say,
+                                 (*settings(folder, split, protocol), *taken[folder], *options.sets))
         for seed in range(options.repeats):
             out = options.out / "trainings" / f"{case.name}_{seed}"
             found = training.train(case, out, seed=seed, heldout_frames=number_test(split), **values)
             rows.setdefault(folder.name, []).append(found)
             say.note(f"{folder.name}, seed {seed}: {table.cells([found], protocol)}")
-    words = table.text(rows, protocol)
+    words = table.text(rows, protocol) + (GIVEN if given else "")
     print(words)
-    (options.out / f"{options.name}.txt").write_text(words + "\n")
+    (options.out / f"{variant}.txt").write_text(words + "\n")
     return 0
 
 
@@ -94,6 +103,20 @@ def settings(folder: Path, split: dict, protocol: Protocol) -> tuple[str, ...]:
         scale = 1.0 if protocol.height is None else min(1.0, protocol.height / camera["height"])
         out.append(f"smplx.focal_px={scale * sum(camera['focal']) / 2}")
     return tuple(out)
+
+
+def take_poses(folder: Path) -> tuple[str, ...]:
+    """Adds the poses of a folder that was imported to the model files; returns the settings that take them as the body fit. Raises
+    BadInput where none were given."""
+    from gsac.cache.store import Store
+    from gsac.pipeline.model_store import ModelStore
+
+    path, name = folder / "poses.npz", f"{folder.name}-poses"
+    if not path.is_file():
+        raise BadInput(f"{path}: is missing; no poses came with these data, use --poses fitted")
+    check_model(name, path)
+    ModelStore(Store.open()).add(name, path, force=True)
+    return f"smplx.start={name}", "smplx.method=brought"
 
 
 def number_test(split: dict) -> str:

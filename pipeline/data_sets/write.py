@@ -25,14 +25,15 @@ def write_clip(clip: GivenClip, folder: Path) -> None:
     folder.parent.mkdir(parents=True, exist_ok=True)
     with half_made(folder.parent) as (temp, _):
         made = temp / folder.name
-        (made / MASKS).mkdir(parents=True)
+        (made / MASKS if clip.masked else made).mkdir(parents=True)
         size, names = None, clip.names(clip.numbers)
         for name, (rgb, mask) in zip(names, clip.frames(), strict=True):
             size = size or (rgb.shape[1], rgb.shape[0])
             if (rgb.shape[1], rgb.shape[0]) != size:
                 raise BadInput(f"{clip.name}: frame {name} has {rgb.shape[1]}x{rgb.shape[0]} px, those before {size[0]}x{size[1]}")
             write_frame(made / f"{name}.png", rgb)
-            write_image(made / MASKS / f"{name}.png", mask)
+            if mask is not None:
+                write_image(made / MASKS / f"{name}.png", mask)
         assert size is not None
         write_json(made / SPLIT, describe_split(clip))
         if clip.lens is not None:

@@ -305,12 +305,13 @@ def heldout_figures(results: Results) -> dict[str, str]:
     except AbsentError:
         return {}
     width, height = metrics.get("image_size") or (None, None)
-    lpips = metrics.get("lpips")
+    lpips, vgg_hed = metrics.get("lpips"), metrics.get("vgg_hed")
     lit = "drawn in the clip's own" if metrics.get("light") else "even"
     figures = {"Size judged": f"{width} x {height} px" if width else None,
                "Light": lit, "Trained on": metrics.get("trained_frames"),
                "Held out": len(metrics.get("heldout_frames") or []) or None,
-               "LPIPS": "not measured (no weights)" if lpips is None else f"{lpips:.3f} ({metrics.get('lpips_net')})"}
+               "LPIPS": "not measured (no weights)" if lpips is None else f"{lpips:.3f} ({metrics.get('lpips_net')})",
+               "VGG features (HED)": None if vgg_hed is None else f"{vgg_hed:.3f} (no LPIPS)"}
     return {name: f"{value} frames" if isinstance(value, int) else value for name, value in figures.items() if value}
 
 

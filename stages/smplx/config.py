@@ -18,7 +18,7 @@ class SmplxConfig:
     and less exact; `brought`: the poses of `start` as they are."""
     start: str = NONE
     """Name of a file of poses that the fit starts from, or none: ExAvatar's, SMPLer-X's, Hand4Whole's or WHAM's, as docs/models.md
-    tells. A frame whose trunk it puts in a wrong place starts in closed form."""
+    tells, or InstantHMR's network, which sees the frames. A frame whose trunk it puts in a wrong place starts in closed form."""
     body_model: str = OPEN
     """Body model: `open`, or the name under which `gsac models add NAME SMPLX_NEUTRAL.npz` keeps your own; train and export must be
     given the same."""

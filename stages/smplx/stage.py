@@ -57,7 +57,7 @@ def run(job: Job) -> None:
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
                           None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
                           clip.focal_px, find_errors(job, body, str(points["detector"])), face, points["missing"],
-                          clip.principal_point, clip.longer_side, bring_start(job, body, len(points["xy"])))
+                          clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
@@ -66,6 +66,7 @@ def run(job: Job) -> None:
         raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
     own = clip.shows_own_moment(len(outlines))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
+    sightings = replace(sightings, start=bring_start(job, body, sightings, outlines))
     sightings = leave_out_outside(sightings)
     occluder, hidden = find_occluder(sightings, outlines), []
     if occluder is not None:

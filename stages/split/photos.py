@@ -17,16 +17,12 @@ from gsac.stages.findings import Code, Finding
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import plan_crop, principal_point
-from gsac.stages.split.film import MASKS, VIDEO_SUFFIXES
+from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, PLATE, VIDEO_SUFFIXES, find_plates
 from gsac.stages.split.people import People, find_extent
 from gsac.stages.split.pick import fit_size, pick_evenly
 from gsac.stages.split.picture_quality import HEIGHT, judge_pictures, look_at
 
-HEIC = {".heic", ".heif"}
-"""As iPhones write them."""
-SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"} | HEIC
 UNSUPPORTED = {".dng", ".raw", ".cr2", ".nef"}
-PLATE = "plate"
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
 """What Pillow may take a photo's content for, whatever its name says. It knows others that are programs: EPS runs Ghostscript."""
 MOST_PIXELS, LONGEST_SIDE = 1 << 26, 65535
@@ -46,16 +42,21 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
     if refused:
         raise BadInput(f"{folder.name}/{refused[0]}: {Path(refused[0]).suffix} photos are not supported "
                        f"({len(refused)} of them). Export them as JPEG or PNG.")
-    images = [p for p in files if p.suffix.lower() in SUFFIXES]
-    plates = [p for p in images if p.stem.lower() == PLATE]
-    if len(plates) > 1:
-        raise BadInput(f"{folder.name}: has {len(plates)} plates ({', '.join(p.name for p in plates)}); keep one.")
+    images = [p for p in files if p.suffix.lower() in PHOTO_SUFFIXES]
     photos = [p for p in images if p.stem.lower() != PLATE]
     if not photos:
         videos = [p.name for p in files if p.suffix.lower() in VIDEO_SUFFIXES]
         hint = f"or give one of its {len(videos)} videos, such as {folder.name}/{videos[0]}" if videos else "or give a video file"
-        raise BadInput(f"{folder.name}: holds no photos; expected {', '.join(sorted(SUFFIXES))} files of one person, {hint}.")
-    return photos, plates[0] if plates else None
+        raise BadInput(f"{folder.name}: holds no photos; expected {', '.join(sorted(PHOTO_SUFFIXES))} files of one person, {hint}.")
+    return photos, list_plate(folder)
+
+
+def list_plate(folder: Path) -> Path | None:
+    """The plate of a folder if there is one. Raises BadInput where there are several."""
+    plates = find_plates(folder)
+    if len(plates) > 1:
+        raise BadInput(f"{folder.name}: has {len(plates)} plates ({', '.join(p.name for p in plates)}); keep one.")
+    return plates[0] if plates else None
 
 
 def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: SplitConfig, people: People | None,
@@ -72,11 +73,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
     width, height = fit_size(*usual if crop is None else (crop.width, crop.height), config.max_height)
 
     def fit(rgb: np.ndarray, exif: Image.Exif) -> tuple[np.ndarray, float | None]:
-        if crop is None:
-            return fit_photo(rgb, exif, width, height)
-        shown, focal_px = fit_photo(rgb, exif, *usual)
-        part = shown[crop.y: crop.y + crop.height, crop.x: crop.x + crop.width]
-        return _resize(part, width, height), None if focal_px is None else focal_px * crop.scale
+        return place_photo(rgb, exif, usual, crop, (width, height))
 
     if mask_of is not None:
         (frames / MASKS).mkdir()
@@ -181,6 +178,28 @@ def fit_photo(rgb: np.ndarray, exif: Image.Exif, width: int, height: int) -> tup
     if inner != (width, height):
         shown = cv2.copyMakeBorder(shown, top, height - inner[1] - top, left, width - inner[0] - left, cv2.BORDER_REPLICATE)
     return shown, focal.from_exif(exif, *inner)
+
+
+def place_photo(rgb: np.ndarray, exif: Image.Exif, usual: tuple[int, int], crop: Crop | None,
+                size: tuple[int, int]) -> tuple[np.ndarray, float | None]:
+    """The photo rgb (H, W, 3) as a frame, cut as all are, and its focal length there, px. usual, size: width and height of the
+    footage and of the frames, px."""
+    if crop is None:
+        return fit_photo(rgb, exif, *size)
+    shown, focal_px = fit_photo(rgb, exif, *usual)
+    part = shown[crop.y: crop.y + crop.height, crop.x: crop.x + crop.width]
+    return _resize(part, *size), None if focal_px is None else focal_px * crop.scale
+
+
+def write_plate_of_video(plate: Path, frames: Path, footage: tuple[int, int], crop: Crop | None, size: tuple[int, int]) -> None:
+    """Writes plate.png as the frames of a video are made. Raises BadInput where it is no picture of the video's aspect. footage,
+    size: width and height of the video and of the frames, px."""
+    rgb = read_photo(plate)[0]
+    height, width = rgb.shape[:2]
+    if abs(width / height * footage[1] / footage[0] - 1) >= SAME_ASPECT:
+        raise BadInput(f"{plate.name}: has {width}x{height} px, the video {footage[0]}x{footage[1]}; a plate beside a video is a "
+                       "picture of the empty scene out of a video by the same camera from the same stand, or remove it")
+    write_frame(frames / f"{PLATE}.png", place_photo(rgb, Image.Exif(), footage, crop, size)[0])
 
 
 def open_image(path: Path) -> Image.Image:

@@ -11,10 +11,10 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.split.config import NETWORKS
 from gsac.stages.split.crop import describe_crop
-from gsac.stages.split.film import find_film
+from gsac.stages.split.film import PHOTO_SUFFIXES, find_film
 from gsac.stages.split.masks import list_masks, match_photos
 from gsac.stages.split.people import People
-from gsac.stages.split.photos import SUFFIXES, list_photos, split_photos
+from gsac.stages.split.photos import list_photos, list_plate, split_photos
 from gsac.stages.split.video import split_video
 
 
@@ -23,7 +23,8 @@ def run(job: Job) -> None:
     frames = job.out / "frames"
     frames.mkdir()
     masks = list_masks(source)
-    source = find_film(source) or source
+    film = find_film(source)
+    plate, source = (None, source) if film is None else (list_plate(source), film)
     if source.is_dir():
         photos, plate = list_photos(source)
     elif not source.is_file():
@@ -31,16 +32,16 @@ def run(job: Job) -> None:
     elif source.stat().st_size == 0:
         raise BadInput(f"{source.name}: the file is empty; expected a video or a folder of photos.")
     else:
-        photos, plate = ([source], None) if source.suffix.lower() in SUFFIXES else ([], None)
+        photos = [source] if source.suffix.lower() in PHOTO_SUFFIXES else []
     people = People(job.models) if job.config.crop and all(name in job.models for name in NETWORKS) else None
     if photos:
         fields: dict[str, Any] = split_photos(photos, plate, frames, job.config, people, job.warn, job.progress,
                                               match_photos(masks, photos))
     else:
-        fields = split_video(source, frames, job.config, people, job.warn, job.progress, masks)
+        fields = split_video(source, frames, job.config, people, job.warn, job.progress, masks, plate)
 
     # clip.json holds no file name: equal content must give equal bytes.
-    clip = Clip(source_sha256=_digest(photos + [plate] * (plate is not None) if photos else [source]), **fields)
+    clip = Clip(source_sha256=_digest([*(photos or [source]), *([] if plate is None else [plate])]), **fields)
     kept = len(frame_paths(frames))
     if clip.timestamps_s is not None and len(clip.timestamps_s) != kept:
         raise StageError(f"{source.name}: {kept} frames and {len(clip.timestamps_s)} timestamps")

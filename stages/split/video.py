@@ -25,6 +25,7 @@ from gsac.stages.split.keyframes import read_key_frames
 from gsac.stages.split.masks import match_frames, write_masks
 from gsac.stages.split.mirrored import find_mirrored, turn_back
 from gsac.stages.split.people import People, find_extent
+from gsac.stages.split.photos import write_plate_of_video
 from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
 from gsac.stages.split.picture_quality import HEIGHT, Look, judge_pictures, look_at
 from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, LIMITS, PQ, UNSPECIFIED, Video, file_url, probe
@@ -39,9 +40,13 @@ LOOKS, CHECKS, TRIES = 12, 30, 3
 
 
 def split_video(path: Path, frames: Path, config: SplitConfig, people: People | None, warn: Callable[[Finding], None],
-                progress: Callable[[int, int, str], None], masks: Sequence[Path] = ()) -> dict:
-    """Writes frames/%06d.png, and frames/masks/%06d.exr where there are masks. people: who finds the person, None: the frames stay
-    whole. Returns the Clip fields fps, timestamps_s, width, height, focal_px, notes, crop, center, repeated."""
+                progress: Callable[[int, int, str], None], masks: Sequence[Path] = (),
+                plate: Path | None = None) -> dict:
+    """Writes frames/%06d.png, frames/masks/%06d.exr where there are masks, and frames/plate.png where there is a plate. Returns the
+    Clip fields fps, timestamps_s, width, height, focal_px, notes, crop, center, repeated.
+
+    people: who finds the person, None: the frames stay whole.
+    """
     video = probe(path)
     base = video.time_base
     if not len(video.ticks):
@@ -109,6 +114,8 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         notes.append("transparency composited over black")
     span = float(times[-1])
     width, height = frame_size(video, config, crop)
+    if plate is not None:
+        write_plate_of_video(plate, frames, (video.width, video.height), crop, (width, height))
     whole_width, whole_height = (width, height) if crop is None else (video.width * crop.scale, video.height * crop.scale)
     return {
         "fps": (len(times) - 1) / span if span > 0 else video.rate,

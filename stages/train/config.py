@@ -25,8 +25,10 @@ SIZES = 3000, 30000
 MORE_ON_CUDA = 1.5
 """Factor on them on the GPU, where they cost least."""
 DEVICES = (AUTO, "cpu", "cuda")
-LPIPS = (AUTO, "none", "judge", "loss")
+LPIPS = (AUTO, "none", "judge", "loss", "vgg-hed")
 NETWORKS = ("lpips-vgg", "lpips-alex")
+VGG_HED = "vgg-hed"
+"""The network whose features take the place of LPIPS in the loss; it is no LPIPS, and its figure has its own name."""
 MOST_FRAMES = 10**6
 """Largest number of a frame."""
 
@@ -134,33 +136,37 @@ class TrainConfig:
     """Whether to judge held-out frames by FLIP, too, at 67 pixels a degree."""
     lpips: str = AUTO
     """Where LPIPS is used, with weights that `gsac models add` brought: none; judge: metrics only; loss: also in the training loss
-    (on the CPU only recipe paper, takes hours); auto: with weights, loss for recipe paper, otherwise judge."""
+    (on the CPU only recipe paper, takes hours); vgg-hed: judge, and in its place in the loss the VGG features of HED; auto: with
+    weights, loss for recipe paper, otherwise judge. Those VGG features are measured wherever LPIPS may be, once they are pulled."""
 
     def models(self) -> tuple[str, ...]:
         """Names of the model files that this configuration needs."""
-        return (*brought_files(self.body_model), *(NETWORKS[:1] if self.lpips == "loss" else ()))
+        return *brought_files(self.body_model), *(NETWORKS[:1] if self.lpips == "loss" else ()), *(
+            (VGG_HED,) if self.lpips == VGG_HED else ())
 
     def wishes(self) -> tuple[str, ...]:
         """Names of the model files that are used where the user has brought them."""
-        return () if self.lpips == "none" else NETWORKS
+        return () if self.lpips == "none" else (*NETWORKS, VGG_HED)
 
     def any_of(self) -> tuple[str, ...]:
         """Names of the model files of which one must be there."""
         return NETWORKS if self.lpips == "judge" else ()
 
-    def in_loss(self) -> bool:
-        """Whether LPIPS is to be in the loss, where it can."""
-        return self.lpips == "loss" or self.lpips == AUTO and self.recipe == "paper"
+    def in_loss(self) -> str | None:
+        """The network that is to be in the loss, where it can; None: none."""
+        if self.lpips == VGG_HED:
+            return VGG_HED
+        return NETWORKS[0] if self.lpips == "loss" or self.lpips == AUTO and self.recipe == "paper" else None
 
     def searches_size(self) -> bool:
         """Whether held-out frames choose the number of gaussians."""
         return self.recipe == "fast" and self.gaussians == AUTO
 
     def check_on(self, device: str) -> None:
-        """Raises BadInput where LPIPS is asked for in a loss that the device (cpu, cuda) has none of."""
-        if self.lpips == "loss" and self.recipe != "paper" and device == "cpu":
-            raise BadInput("train.lpips is loss, but on the CPU recipe paper alone has LPIPS in its loss; set train.lpips to "
-                           "judge, or train.recipe to paper")
+        """Raises BadInput where a network is asked for in a loss that the device (cpu, cuda) has none of."""
+        if self.lpips in ("loss", VGG_HED) and self.recipe != "paper" and device == "cpu":
+            raise BadInput(f"train.lpips is {self.lpips}, but on the CPU recipe paper alone has LPIPS in its loss; set train.lpips "
+                           "to judge, or train.recipe to paper")
 
     def check(self) -> None:
         """Raises BadInput that names the first value that cannot be."""

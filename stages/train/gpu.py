@@ -14,9 +14,9 @@ from gsac.avatar.cuda.kernels import CompileError
 from gsac.avatar.cuda.paper import PaperGaussians, PaperRecipe
 from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.trainer import CudaTrainer
+from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import JAW
-from gsac.avatar.lpips import Lpips
 from gsac.stages.contract import StageError
 from gsac.stages.train.finite import require_finite
 from gsac.stages.train.poses.poses import Poses
@@ -31,7 +31,7 @@ Kind = TypeVar("Kind", bound=CudaTrainer)
 
 @contextmanager
 def open_trainer(kind: type[Kind], poses: Poses, frames: np.ndarray, levels: list[dict[int, View]],
-                 gaussians: Gaussians | PaperGaussians, recipe: Recipe, network: Lpips | None = None) -> Iterator[Kind]:
+                 gaussians: Gaussians | PaperGaussians, recipe: Recipe, network: FeatureDistance | None = None) -> Iterator[Kind]:
     """A trainer over frames, (n,) indices, that is closed at the end. Raises StageError where the GPU fails.
 
     levels: frame -> view, coarse first; network: for the loss.

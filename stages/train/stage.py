@@ -18,10 +18,12 @@ from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
+from gsac.avatar.feature_distance import LEAST_SIDE
 from gsac.avatar.files import write_file
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.lpips import LEAST_SIDE, Lpips
+from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import figures, mean_psnr, summary
+from gsac.avatar.vgg_hed import VggHed
 from gsac.avatar.yaw import turn_seen
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import BadInput, Job, StageError
@@ -29,7 +31,7 @@ from gsac.stages.findings import Code, Finding
 from gsac.stages.first_look import LEAST_TURN
 from gsac.stages.train.checkpoint import Checkpoints, State
 from gsac.stages.train.choose_heldout import hold_out, hold_out_for_choosing, hold_out_named
-from gsac.stages.train.config import NETWORKS, TrainConfig, read_numbers
+from gsac.stages.train.config import AUTO, NETWORKS, VGG_HED, TrainConfig, read_numbers
 from gsac.stages.train.fast.lod import judge_levels
 from gsac.stages.train.finite import named_result, named_values, require_finite
 from gsac.stages.train.judge.coverage import unseen_parts
@@ -103,9 +105,9 @@ def run(job: Job) -> None:
     if turn < LEAST_TURN:
         job.warn(Finding.of(Code.PART_OF_TURN, figure=turn))
 
-    if config.in_loss() and NETWORKS[0] in job.models and (why := without_lpips(config, job.device, views[0].frame)):
-        if config.lpips == "loss":
-            raise BadInput(f"train.lpips is loss, but {why}; set train.lpips to judge")
+    if config.in_loss() in job.models and (why := without_lpips(config, job.device, views[0].frame)):
+        if config.lpips != AUTO:
+            raise BadInput(f"train.lpips is {config.lpips}, but {why}; set train.lpips to judge")
         job.warn(Finding.of(Code.NO_LPIPS, why=why))
 
     run = Run(job, Poses(body, params), camera, views, trained, held, choosing)
@@ -175,9 +177,12 @@ class Run:
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
         self.checkpoints = Checkpoints(job.scratch, job.warn)
         self.resumed_at: int | None = None
-        self.lpips = {name: Lpips.read(name, job.models[name]) for name in job.config.wishes() if name in job.models}
-        in_loss = job.config.in_loss() and not without_lpips(job.config, job.device, views[0].frame)
-        self.in_loss = self.lpips.get(NETWORKS[0]) if in_loss else None
+        here = [name for name in job.config.wishes() if name in job.models]
+        self.networks = {name: VggHed.read(job.models[name]) if name == VGG_HED else Lpips.read(name, job.models[name])
+                         for name in here}
+        self.in_loss = job.config.in_loss()
+        if self.in_loss not in here or without_lpips(job.config, job.device, views[0].frame):
+            self.in_loss = None
 
     @cached_property
     def filmed(self) -> dict[int, View]:
@@ -196,7 +201,8 @@ class Run:
             chosen_by = self.filmed if self.choosing is self.held else self.read(self.choosing)
         self.began = read_clocks()
         task = Task(self.views, self.trained, self.choosing, self.poses, config, self.job.progress, self.checkpoint,
-                    self.marks, self.keep, filmed=chosen_by, lpips=self.in_loss)
+                    self.marks, self.keep, filmed=chosen_by,
+                    network=self.networks[self.in_loss] if self.in_loss else None)
         state = self.checkpoints.read()
         if state is not None:
             self.restore(state)
@@ -259,7 +265,7 @@ class Run:
     def judge_both(self, gaussians: Gaussians, poses: Poses, small: dict[int, View],
                    folder: Path | None = None) -> tuple[list[dict], list[dict]]:
         """Scores of the held-out frames as filmed and in their small views. folder: for the images as filmed."""
-        rows = judge(gaussians, poses, self.held, self.filmed, folder, self.job.config.flip, self.lpips)
+        rows = judge(gaussians, poses, self.held, self.filmed, folder, self.job.config.flip, self.networks)
         return rows, rows if self.camera.height <= SMALL else judge(gaussians, poses, self.held, small)
 
     def judge_aligned(self, gaussians: Gaussians, poses: Poses, small: dict[int, View]) -> tuple[list[dict], list[dict]]:
@@ -269,7 +275,7 @@ class Run:
             return self.judge_both(gaussians, poses, small)
         small_rows = judge(gaussians, poses, self.held, small)
         converge(gaussians, poses, self.held, self.filmed, LAST_ROUNDS)
-        return judge(gaussians, poses, self.held, self.filmed, None, self.job.config.flip, self.lpips), small_rows
+        return judge(gaussians, poses, self.held, self.filmed, None, self.job.config.flip, self.networks), small_rows
 
     def write(self) -> None:
         """Writes the stage's outputs."""
@@ -329,7 +335,7 @@ class Run:
                          **at_test(figures(other))}
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
-            "lpips_in_loss": self.in_loss is not None,
+            "lpips_in_loss": self.in_loss == NETWORKS[0], **({"vgg_hed_in_loss": True} if self.in_loss == VGG_HED else {}),
             "levels": judge_levels(gaussians, self.result.coarser, poses,
                                    {t: view.reduced(trained.height) for t, view in self.filmed.items()}),
             "likeness": judge_likeness(gaussians, aligned, held, small, self.camera.height),

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.lpips import Lpips
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
 LPIPS_WEIGHT = 0.01
-"""Of LPIPS in the loss, in every recipe that has it there."""
+"""Of LPIPS in the loss, or of what takes its place, in every recipe that has it there."""
 
 
 @dataclass
@@ -43,8 +43,8 @@ class Task:
     """The state that a stopped run gave to `keep`; poses are as they were then."""
     filmed: Mapping[int, View] = field(default_factory=dict)
     """Frame of `choosing` -> its view, whole and as large as it was filmed, to judge by."""
-    lpips: Lpips | None = None
-    """The network (VGG) in the loss, where LPIPS is wanted there and the user has brought the weights."""
+    network: FeatureDistance | None = None
+    """The network in the loss, where LPIPS or VGG features are wanted there and the weights are here."""
     gpu_seconds: float = 0.0
     """Seconds on the GPU before the steps: the rounds that move the poses."""
 

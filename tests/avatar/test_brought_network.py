@@ -1,11 +1,13 @@
 """Networks that users bring: what keeps one from running is told with its name, whichever kind it is."""
 
+import zipfile
+
 import numpy as np
 import pytest
 from onnx import helper
 
 from gsac.avatar.brought_network import open_brought
-from gsac.avatar.onnx_network import NetworkError
+from gsac.avatar.onnx_network import PREFERRED, NetworkError, open_network
 from gsac.avatar.simcc import SimccNetwork
 from gsac.stages.contract import BadInput
 from gsac.stages.face.deca import CODES, DecaEncoder
@@ -59,3 +61,20 @@ def test_outputs_that_are_no_simcc_of_the_input_are_named_with_their_shapes(tmp_
     network = SimccNetwork(write_means(tmp_path / "other.onnx", **shapes))
     with pytest.raises(NetworkError, match=r"onnx-wholebody gives arrays of shapes .*expected simcc_x \(1, 133, 576\)"):
         network.read(np.zeros((500, 400, 3), np.uint8), WHOLE)
+
+
+def test_brought_networks_keep_off_a_gpu_that_the_user_forbids(monkeypatch, tmp_path):
+    onnxruntime, torch = pytest.importorskip("onnxruntime"), pytest.importorskip("torch")
+    with zipfile.ZipFile(tmp_path / "net.pt2", "w") as file:
+        file.writestr("x", "")
+    opened: list = []
+    monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: list(PREFERRED))
+    monkeypatch.setattr(onnxruntime, "InferenceSession", lambda path, options, providers: opened.append(providers))
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.jit, "load", lambda path, map_location: opened.append(map_location) or torch.nn.Identity())
+    for device in ("cpu", "cuda", None):
+        monkeypatch.setenv("GSAC_DEVICE", device) if device else monkeypatch.delenv("GSAC_DEVICE", raising=False)
+        open_network(tmp_path / "net.onnx", "mine")
+        open_brought(tmp_path / "net.pt2", "mine")
+    on_gpu = [list(PREFERRED), "cuda"]
+    assert [list(each) if not isinstance(each, str) else each for each in opened] == [[PREFERRED[-1]], "cpu", *on_gpu, *on_gpu]

@@ -134,7 +134,19 @@ def test_the_papers_ssim_and_lpips_are_of_images_on_black_and_lpips_of_0_to_1():
             return float(len(self.calls))
 
     render, truth = square(0.5, size=80), square(0.6, size=80)
-    told = summary([score(*render, *truth, lpips={"lpips-vgg": Network()})])
+    told = summary([score(*render, *truth, networks={"lpips-vgg": Network()})])
     assert Network.calls == [(1.0, True), (0.0, False)]
     assert told["lpips"] == told["lpips_vgg"] == 1 and told["lpips_black"] == told["lpips_vgg_black"] == 2
     assert told["lpips_net"] == "lpips-vgg" and told["lpips_alex_black"] is None
+
+
+def test_vgg_features_are_a_figure_of_their_own_never_lpips_and_only_where_their_network_is():
+    class Network:
+        def distance(self, a, b, scaled):
+            assert not scaled and a[0, 0, 0] == 1
+            return 0.25
+
+    render, truth = square(0.5, size=80), square(0.6, size=80)
+    told = summary([score(*render, *truth, networks={"vgg-hed": Network()})])
+    assert told["vgg_hed"] == 0.25 and told["lpips"] is told["lpips_net"] is told["lpips_black"] is told["lpips_vgg"] is None
+    assert "vgg_hed" not in summary([score(*render, *truth)]) | summary([])

@@ -5,12 +5,19 @@ import json
 import numpy as np
 import pytest
 
+from gsac.avatar import rotation
+from gsac.avatar.pose_files.read import read_start
 from gsac.benchmarks.protocol import table
-from gsac.benchmarks.protocol.bench import main, number_test, parser, read_split, settings
+from gsac.benchmarks.protocol.bench import main, number_test, parser, read_split, settings, take_poses
 from gsac.benchmarks.protocol.protocols import PROTOCOLS
+from gsac.cache.store import Store
+from gsac.pipeline.data_sets.read import read_data_set
+from gsac.pipeline.data_sets.write import write_clip
+from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 from gsac.stages.contract import BadInput
+from support import data_sets
 
 
 def metrics(*psnr):
@@ -62,6 +69,25 @@ def test_test_frames_are_numbered_as_split_numbers_them_and_a_folder_without_a_s
     with pytest.raises(BadInput, match="names no frames to test"):
         read_split(tmp_path)
     assert parser().parse_args(["gsac", str(tmp_path)]).repeats == 5
+
+
+@pytest.mark.parametrize("name", ["peoplesnapshot", "xhumans"])
+def test_poses_that_came_with_the_data_take_the_place_of_the_body_fit_frame_by_frame(tmp_path, monkeypatch, name):
+    pytest.importorskip("h5py")
+    monkeypatch.setenv("GSAC_CACHE", str(tmp_path / "cache"))
+    clip, = read_data_set(name, getattr(data_sets, name)(tmp_path / "in"))
+    write_clip(clip, tmp_path / clip.name)
+    configs = resolve(Project.at_hand(), sets=take_poses(tmp_path / clip.name))
+    start = read_start(ModelStore(Store.open()).path(configs["smplx"].start), len(clip.numbers))
+    given = np.load(tmp_path / clip.name / "poses.npz")
+    root = given["pose"][:, :3] if name == "peoplesnapshot" else given["global_orient"]
+    np.testing.assert_allclose(start.rotations[:, 0], rotation.exp(root), atol=1e-6)
+    assert configs["smplx"].method == "brought" and start.given.all() and np.isfinite(start.rotations[:, :22]).all()
+
+
+def test_data_without_poses_are_named(tmp_path):
+    with pytest.raises(BadInput, match=r"poses.npz: is missing; no poses came with these data, use --poses fitted"):
+        take_poses(tmp_path)
 
 
 @pytest.mark.parametrize(("content", "said"), [("{", "not readable as JSON"), ("[]", "not what .* expected fps, train, test"),

@@ -32,6 +32,8 @@ def clip(tmp_path, monkeypatch):
     (["face.flame=head"], "face.flame is head: unknown model file head"),
     (["train.lpips=loss", "train.recipe=paper"], "train.lpips is loss: unknown model file lpips-vgg"),
     (["train.lpips=loss"], "train.lpips is loss, but on the CPU recipe paper alone"),
+    (["train.lpips=vgg-hed", "train.recipe=paper"], "vgg-hed is not here; `gsac models pull vgg-hed`"),
+    (["train.lpips=vgg-hed"], "train.lpips is vgg-hed, but on the CPU recipe paper alone"),
     (["train.lpips=judge"], "train.lpips is judge: none of lpips-vgg and lpips-alex is here"),
 ])
 def test_a_wish_that_cannot_be_met_is_refused_at_once_and_leaves_no_folder(clip, capsys, command, sets, words):

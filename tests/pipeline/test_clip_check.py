@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gsac.avatar.artifacts import Clip
+from gsac.pipeline import clip_check
 from gsac.pipeline.clip_check import ClipCheck, Prospect
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.findings import Code, Finding
@@ -34,6 +36,16 @@ def test_what_to_film_again_is_said_with_the_times_at_which_it_went_wrong():
     lines = checked(Finding.of(Code.BLURRED, np.array([1, 0, 1, 1], bool), figure=0.5)).lines
     assert lines[0] == Prospect.POORER.sentence and "The clip lasts 1.5 s." in lines[1]
     assert lines[2].startswith("- The picture is blurred") and "turn slower. (at 0.0, 1.0 to 1.5 s)" in lines[2]
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(0.2, ["hand_hidden"]), (0.4, [])])
+def test_hands_are_not_blamed_by_neighbours_that_lie_far_apart(tmp_path, monkeypatch, seconds, said):
+    monkeypatch.setattr(FirstLook, "of", lambda points: LOOK)
+    monkeypatch.setattr(clip_check, "check_keypoints", lambda path: {})
+    Clip(30.0, [seconds * t for t in range(4)], 90, 160, None, "0" * 64).write(tmp_path / "clip.json")
+    hidden = Finding.of(Code.HAND_HIDDEN, np.array([0, 1, 1, 0], bool), figure=2, side="left")
+    found = clip_check.check_clip(tmp_path / "clip.json", tmp_path, [(hidden.message, hidden.to_json())]).findings
+    assert [entry["code"] for _, entry in found] == said
 
 
 def test_a_run_stops_where_nothing_can_come_of_the_clip_and_goes_on_anyway(toy):

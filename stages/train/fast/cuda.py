@@ -50,7 +50,7 @@ class Cuda(Backend):
         steps = task.config.steps or FAST_STEPS["cuda"]
         recipe = make_recipe(task.config, count, coarse_share=coarse_steps(schedule.person_pixels(task), steps) / steps,
                              least=schedule.shortest_axis(task), **lpips_options(task))
-        with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.lpips) as trainer:
+        with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer:
             if task.config.pose_rounds:
                 correct_midway(trainer, task, coarse if recipe.coarse_share > schedule.MIDWAY else fine)
             train_until(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
@@ -76,7 +76,7 @@ class Cuda(Backend):
                              **lpips_options(task))
         first = int(task.trained[0])
         whole = views[first].camera.focal == task.views[first].camera.focal  # smaller images of coarser levels have no windows
-        network = task.lpips if whole else None
+        network = task.network if whole else None
         with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, views] if coarse else [views], gaussians, recipe,
                           network) as on_gpu:
             on_gpu.replace(gaussians, ~trainer.seen, trainer.reach)

@@ -12,8 +12,8 @@ import numpy as np
 from gsac.avatar import wholebody
 from gsac.avatar.artifacts import write_frame
 from gsac.avatar.camera import Camera
+from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import WHITE, composite, find_shown, score, score_person
 from gsac.avatar.raster import render_bound, render_bound_backward
 from gsac.avatar.rotation import about_y
@@ -58,20 +58,20 @@ class Candidate(NamedTuple):
 
 
 def judge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: Views, folder: Path | None = None,
-          flip: bool = False, lpips: Mapping[str, Lpips] | None = None) -> list[dict]:
+          flip: bool = False, networks: Mapping[str, FeatureDistance] | None = None) -> list[dict]:
     """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
-    return judge_all([Candidate(gaussians, poses, frames, views)], folder, flip, lpips)[0]
+    return judge_all([Candidate(gaussians, poses, frames, views)], folder, flip, networks)[0]
 
 
 def judge_all(candidates: list[Candidate], folder: Path | None = None, flip: bool = False,
-              lpips: Mapping[str, Lpips] | None = None) -> list[list[dict]]:
+              networks: Mapping[str, FeatureDistance] | None = None) -> list[list[dict]]:
     """`judge` of each candidate, all their frames side by side."""
 
     def row(candidate: Candidate, t: int, workspace: Workspace) -> dict:
         images, boxes = draw(candidate, t, workspace), find_boxes(candidate.poses, t, candidate.views[t].camera)
         if folder is not None:
             write_pictures(folder, t, *images)
-        return score(*images, boxes, flip, lpips)
+        return score(*images, boxes, flip, networks)
 
     return _of_each_frame(candidates, row)
 

@@ -19,7 +19,7 @@ def fit(task: Task) -> Fit:
     rng, recipe = np.random.default_rng(task.config.seed), make_recipe(task)
     gaussians = init_gaussians(len(task.poses.body.faces), rng)
     densifier, views = densify.Densifier(len(gaussians)), paper.crop_views(task)
-    with open_trainer(PaperTrainer, task.poses, task.trained, [views], gaussians, recipe, task.lpips) as trainer:
+    with open_trainer(PaperTrainer, task.poses, task.trained, [views], gaussians, recipe, task.network) as trainer:
         for event in filter(densify.due, range(recipe.steps)):
             train_until(trainer, task, event + 1)
             densifier.length, densifier.hits = trainer.pulls()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsac.avatar import losses
-from gsac.avatar.lpips import Lpips
+from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.gaussians.kernels import on_background, through_background
@@ -51,7 +51,7 @@ class Picture:
         return self.pixels[..., 3] * np.float32(1 / 255)
 
 
-def picture_loss(picture: Picture, share: float, text: bool, workspace: Workspace, network: Lpips | None = None,
+def picture_loss(picture: Picture, share: float, text: bool, workspace: Workspace, network: FeatureDistance | None = None,
                  centre: np.ndarray | None = None) -> tuple[float, np.ndarray, np.ndarray]:
     """share * the losses of a frame but Dice, and their gradients by the render's rgb (h, w, 3) and alpha (h, w).
 
@@ -119,7 +119,7 @@ def _surrounded(image: np.ndarray, picture: Picture) -> np.ndarray:
     return grey
 
 
-def perceptual(network: Lpips, image: np.ndarray, target: np.ndarray, picture: Picture, centre: np.ndarray, weight: float,
+def perceptual(network: FeatureDistance, image: np.ndarray, target: np.ndarray, picture: Picture, centre: np.ndarray, weight: float,
                gradient: np.ndarray) -> float:
     """weight * LPIPS of a window of the square, WINDOW px or less a side, around `centre` and moved to lie inside the square.
 

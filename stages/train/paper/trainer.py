@@ -94,7 +94,7 @@ class Trainer:
         self.values = {name: value.astype(np.float32) for name, value in self.values.items()}
         self.first = {name: np.zeros_like(v) for name, v in self.values.items()}
         self.second = {name: np.zeros_like(v) for name, v in self.values.items()}
-        self.side, self.lpips = side_of(task.views), task.lpips
+        self.side, self.network = side_of(task.views), task.network
         self.densifier, self.body = Densifier(count), BodyAdam(task.poses)
         self.workspaces = [Workspace() for _ in range(min(BATCH, len(task.trained)))]
         self.losses = Workspace()
@@ -169,7 +169,7 @@ class Trainer:
                    number: int) -> tuple[float, BoundGradients]:
         """Loss of one frame times its share of the batch, and its gradients and those of the batch's Dice (slope)."""
         state = rendering.state
-        loss, grad_rgb, grad_alpha = picture_loss(picture, share, self.text, self.losses, self.lpips, centre)
+        loss, grad_rgb, grad_alpha = picture_loss(picture, share, self.text, self.losses, self.network, centre)
         grad_alpha += np.float32(slope) * (1 - picture.mask)
         grads = render_backward(state, grad_rgb, grad_alpha)
         places, visible = screen_gradients(state)

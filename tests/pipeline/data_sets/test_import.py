@@ -93,6 +93,24 @@ def test_a_folder_of_images_and_masks_is_taken_with_its_split(tmp_path):
     same_frame(folder, "000002", 2)
 
 
+@pytest.mark.parametrize("masked", [True, False])
+def test_a_plain_folder_of_frames_is_taken_with_or_without_masks_and_the_command_says_which(tmp_path, capsys, masked):
+    source = data_sets.plain_folder(tmp_path / "in")
+    for image in (source / "images").iterdir():
+        image.rename(source / image.name)
+    (source / "images").rmdir()
+    if not masked:
+        (source / "masks").rename(tmp_path / "elsewhere")
+    assert execute(["data", "import", "folder", str(source), "--out", str(tmp_path / "out")]) == 0
+    said, folder = "".join(capsys.readouterr()), tmp_path / "out" / "mine"
+    assert ("5 frames with masks, 1" in said) == ("segment.method=brought" in said) == masked
+    assert ("5 frames without masks, which stage segment will make, 1 of them to test" in said) is not masked
+    assert len(frame_paths(folder)) == 5 and (folder / "masks").is_dir() == masked
+    if masked:
+        same_frame(folder, "000002", 2)
+    np.testing.assert_allclose(read_frame(folder / "000003.png"), picture(3)[0], atol=2)
+
+
 def test_the_command_imports_every_subject_of_a_folder_and_tells_how_to_run_it(tmp_path, capsys):
     for scene in "bike", "lab":
         data_sets.neuman(tmp_path / "in", scene)

@@ -99,7 +99,9 @@ def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_a
 
     told = {(recipe, lpips): TrainConfig(recipe=recipe, lpips=lpips).in_loss()
             for recipe in config.RECIPES for lpips in config.LPIPS}
-    assert {wish for wish, it_is in told.items() if it_is} == {("paper", "auto"), ("paper", "loss"), ("fast", "loss")}
+    assert {wish: name for wish, name in told.items() if name} == {
+        ("paper", "auto"): "lpips-vgg", ("paper", "loss"): "lpips-vgg", ("fast", "loss"): "lpips-vgg",
+        ("paper", "vgg-hed"): "vgg-hed", ("fast", "vgg-hed"): "vgg-hed"}
     frames, small = Camera((500, 500), (150, 200), 300, 400), Camera((50, 50), (31, 40), 63, 80)
     paper, fast = (TrainConfig(recipe=recipe, lpips="loss") for recipe in ("paper", "fast"))
     assert without_lpips(paper, "cpu", frames) is None and "recipe paper" in without_lpips(fast, "cpu", frames)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import write_alpha
+from gsac.avatar.artifacts import read_alpha, write_alpha
 from gsac.avatar.joints import INDEX
 from gsac.avatar.wholebody import INDEX as POINT
 from gsac.avatar.wholebody import LEFT_HAND
@@ -125,3 +126,36 @@ def test_runs_of_missing_hands_bridge_short_sightings():
     missing = np.zeros(12, bool)
     missing[[1, 2, 5, 9]] = True
     assert bridge(missing) == [(1, 6), (9, 10)]
+
+
+@pytest.fixture(scope="module")
+def without_forearm(body, tmp_path_factory):
+    """The start of a person who stands with hanging arms, and of whom the mask lacks the left forearm with its hand."""
+    truth = turning_person(body, FRAMES)
+    truth.global_orient[:] = (np.pi, 0, 0)
+    seen = sightings_of(body, truth)
+    folder = tmp_path_factory.mktemp("alpha")
+    outlines_of(body, truth, folder)
+    outlines = []
+    for t, path in enumerate(sorted(folder.glob("*.exr"))):
+        alpha = read_alpha(path)
+        points = seen.xy[t, [POINT["left_elbow"], POINT["left_wrist"], *range(LEFT_HAND.start, LEFT_HAND.stop)]].astype(np.int32)
+        cv2.polylines(alpha, [points[:2]], False, 0, 40)
+        cv2.fillConvexPoly(alpha, cv2.convexHull(points[1:]), 0)
+        for point in points[1:]:
+            cv2.circle(alpha, point.tolist(), 16, 0, -1)
+        write_alpha(path, alpha)
+        outlines.append(read_outline(path))
+    return HiddenArms.of(body, seen.person_height), *start_of(body, seen, outlines, SmplxConfig(height_m=height_of(body, truth)))
+
+
+@pytest.mark.parametrize("lost, noticed", [(6, True), (4, False)])
+def test_a_forearm_beside_the_body_and_outside_the_mask_counts_for_half_a_frame(without_forearm, lost, noticed):
+    arms, problem, state = without_forearm
+    missing = np.zeros((FRAMES, 2), bool)
+    missing[3:3 + lost, 0] = True
+    found = HiddenArms(arms.trunk, arms.forearm, arms.height, [])
+    found.find(problem, state, missing)
+    assert [(stay.side, stay.first, stay.last) for stay in found.stays] == ([(0, 3, 3 + lost)] if noticed else [])
+    chain = problem.skeleton.pose(state.local, state.shape)
+    assert [arms.contradict(problem, state, chain.frame(4), 4, side) for side in (0, 1)] == [0.5, 0.0]

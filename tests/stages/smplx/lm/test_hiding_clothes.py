@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.lm import hiding_clothes
-from gsac.stages.smplx.lm.hiding_clothes import STRANGE, THICK, fit_under_clothes
-from gsac.stages.smplx.state import Fit, State
+from gsac.stages.smplx.lm.hiding_clothes import NO_CLOTHES, STRANGE, THICK, fit_under_clothes
+from gsac.stages.smplx.state import Fit, State, to_params
+from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
 
 
 @pytest.fixture
@@ -46,3 +50,18 @@ def test_thick_clothes_over_a_usual_figure_are_named_and_fitted_once(fit_dressed
 def test_usual_clothes_an_unusual_figure_and_much_hair_are_not_accused(fit_dressed, figure, thick, name):
     fit, weights = fit_dressed(figure, thick, name)
     assert not fit.notes and len(weights) == 1
+
+
+def test_under_clothes_ten_centimetres_thick_the_points_shape_the_figure(body, tmp_path):
+    bare = turning_person(body, 5)
+    betas = bare.betas.copy()
+    betas[body.num_figure:] = [0 if name in NO_CLOTHES or name == "feet" else 10 for name in body.clothes]
+    outlines = outlines_of(body, replace(bare, betas=betas), tmp_path)
+    config = SmplxConfig(height_m=height_of(body, bare), rounds=1)
+    with threadpool_limits(1, "blas"):
+        fit = fit_under_clothes(body, sightings_of(body, bare), outlines, config, lambda *a: None)
+    assert Code.CLOTHES_HIDE_SHAPE in [note.code for note in fit.notes]
+    off = (fit.state.betas - bare.betas)[:body.num_figure]
+    assert np.sqrt(np.mean(off**2)) < 0.8, "by the outline alone it is 1.95"
+    found = to_params(body, fit.state, np.array([WIDTH / 2, HEIGHT / 2]))
+    assert joint_error_mm(body, found, bare).mean() < 18

@@ -42,10 +42,13 @@ def test_backs_taken_for_fronts_are_exchanged_and_named(body, truth):
     assert error[BACK].mean() < 40
 
 
-def test_of_pictures_in_no_order_none_is_exchanged(body, truth):
-    order = np.random.default_rng(1).permutation(FRAMES)
+@pytest.mark.parametrize("seed", [0, 3])
+def test_of_pictures_in_no_order_none_is_exchanged(body, seed):
+    """Of trunk and limbs alone: then the points hardly tell a back from a front, and the exchanged ones jump less."""
+    truth, order = turning_person(body, 8), np.random.default_rng(seed).permutation(8)
     shuffled = replace(truth, global_orient=truth.global_orient[order], body_pose=truth.body_pose[order])
-    seen = sightings_of(body, shuffled)
+    seen = sightings_of(body, shuffled, noise=2.0)
+    seen.score[:, [*range(5), *range(17, 133)]] = 0
     assert propose_swapped(seen).any(), "the turn alone accuses some"
     with threadpool_limits(1, "blas"):
         fit = fit_clip(body, seen, [], SmplxConfig(height_m=height_of(body, truth), silhouette=0), lambda *a: None)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from gsac.avatar import binding
+from gsac.avatar import binding, vgg_hed
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
@@ -26,6 +26,7 @@ from gsac.stages.train.stage import run
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
 from support import haha
+from support.vgg_hed import write_hed
 
 SIDE = 60
 BOXES = ((0, 13, 31, 47), (22, 0, 38, 29))
@@ -453,16 +454,23 @@ def networks(tmp_path):
 @pytest.mark.slow
 def test_brought_networks_are_judged_by_and_take_part_in_the_loss_of_the_paper(job, networks, monkeypatch):
     monkeypatch.setattr(trainer, "BATCH", 1)
-    seen = []
-    for name, models, lpips in (("with", networks, "loss"), ("judged", networks, "judge"), ("without", {}, "loss")):
+    seen, h5 = [], networks["lpips-vgg"].parent / "hed.h5"
+    write_hed(h5)
+    np.savez(h5.with_suffix(".npz"), **vgg_hed.convert(h5))
+    features = {vgg_hed.NAME: h5.with_suffix(".npz")}
+    for name, models, lpips in (("with", networks, "loss"), ("judged", networks, "judge"), ("without", {}, "loss"),
+                                ("features", features, "vgg-hed")):
         made = job(name, frames=6, recipe="paper", steps=2, pose_test_steps=2, lpips=lpips)
         made.models = models
         run(made)
         seen.append(json.loads((made.out / "metrics.json").read_text()))
-    one, judged, two = seen
+    one, judged, two, three = seen
     assert judged["lpips_vgg"] > 0 and not judged["lpips_in_loss"] and judged["curve"][0]["loss"] == two["curve"][0]["loss"]
     assert one["lpips_in_loss"] and not two["lpips_in_loss"]
     assert one["lpips"] == one["lpips_alex"] > 0 and one["lpips_net"] == "lpips-alex" and one["lpips_vgg_ttpo"] > 0
     assert one["lpips_alex_unscaled"] != one["lpips_alex"] and all(row["lpips_vgg"] > 0 for row in one["heldout"])
     assert one["curve"][0]["loss"] > two["curve"][0]["loss"]
+    assert three["vgg_hed_in_loss"] and not three["lpips_in_loss"] and three["curve"][0]["loss"] > two["curve"][0]["loss"]
+    assert three["vgg_hed"] > 0 and three["vgg_hed_ttpo"] > 0 and all(row["vgg_hed"] > 0 for row in three["heldout"])
+    assert three["lpips"] is None and not any("vgg_hed" in name for name in one)
     assert two["lpips"] is two["lpips_net"] is two["lpips_vgg"] is two["lpips_ttpo"] is None
