@@ -89,7 +89,7 @@ def measure_uncovered(arms: HiddenArms, problem: Problem, state: State, frames: 
         return out
     assert offsets is not None  # only an arm's or a hand's own problem may lack them
     params = to_params(problem.body, state, problem.seen.center, joint_offset=offsets.joint_offset(state.own))
-    for i, t in enumerate(frames.tolist() if problem.seen.outlines else ()):
+    for i, t in enumerate(frames.tolist()):
         outline = problem.seen.outlines[t]
         h, w = outline.mask.shape
         camera = params.camera(round(w * outline.scale), round(h * outline.scale)).scaled(w, h)
