@@ -45,6 +45,7 @@ SOURCES = (
     "Runtime/GsacAsset.cs",
     "Runtime/GsacAvatar.cs",
     "Runtime/GsacBenchmark.cs",
+    "Runtime/GsacCameras.cs",
     "Runtime/GsacDemo.cs",
     "Runtime/GsacHumanoid.cs",
     "Runtime/GsacLoader.cs",

@@ -24,50 +24,76 @@ namespace Gsac
             Shader.PropertyToID("GsacModel0"), Shader.PropertyToID("GsacModel1"), Shader.PropertyToID("GsacModel2"),
         };
         static readonly string[] SortNames = { "SortBlocks", "SortAcross", "SortMerge" };
+        const float Slack = 0.9f;
+        const float UsualLens = 1.7320508f; // m11 of a projection that sees 60 degrees
 
         public readonly Camera Camera;
-        readonly Material material;
         readonly MaterialPropertyBlock properties = new MaterialPropertyBlock();
         readonly int[] sortKernels = new int[3];
+        readonly Matrix4x4[] toEye = new Matrix4x4[2], lens = new Matrix4x4[2]; // of each eye: the avatar's space to the eye's, projection
+        int eyes;
+        float nearest; // m from an eye to a joint
         GraphicsBuffer keys;
         bool found;
         Vector4 depthRow;
+        float low, high; // depths that the avatar can have
         Bounds bounds;
+        int drawn; // level
+        int sortedShape, sortedLevel;
+        Vector4 sortedRow;
+        float sortedLow, sortedHigh;
 
-        public GsacView(Camera camera, Material material)
+        public GsacView(Camera camera)
         {
             Camera = camera;
-            this.material = material;
         }
 
         public void Dispose()
         {
             if (keys != null) keys.Dispose();
             keys = null;
+            sortedShape = 0;
         }
 
         /// <summary>
-        /// Nearest and farthest depth that the avatar can have for this camera's centre eye, from its joints alone.
-        /// False where all of it lies behind.
+        /// Takes where the camera is and how far the avatar can reach there, from its joints alone. False where no eye sees any of it.
         /// </summary>
-        public bool Depths(Transform root, Vector4[] bones, GsacModel model, out float low, out float high)
+        public bool Look(Transform root, Vector4[] bones, GsacModel model)
         {
-            Transform eye = Camera.transform;
-            Vector3 ahead = eye.forward, at = eye.position;
             Matrix4x4 m = root.localToWorldMatrix;
-            depthRow = new Vector4(ahead.x * m.m00 + ahead.y * m.m10 + ahead.z * m.m20, ahead.x * m.m01 + ahead.y * m.m11 + ahead.z * m.m21,
-                                   ahead.x * m.m02 + ahead.y * m.m12 + ahead.z * m.m22,
-                                   ahead.x * (m.m03 - at.x) + ahead.y * (m.m13 - at.y) + ahead.z * (m.m23 - at.z));
+            eyes = Camera.stereoEnabled ? 2 : 1;
+            for (int e = 0; e < eyes; e++)
+            {
+                var eye = (Camera.StereoscopicEye)e;
+                toEye[e] = (eyes == 2 ? Camera.GetStereoViewMatrix(eye) : Camera.worldToCameraMatrix) * m;
+                lens[e] = eyes == 2 ? Camera.GetStereoProjectionMatrix(eye) : Camera.projectionMatrix;
+            }
+            // of two eyes the middle
+            Vector4 one = toEye[0].GetRow(2), other = toEye[eyes - 1].GetRow(2);
+            depthRow = new Vector4(-(one.x + other.x) / 2, -(one.y + other.y) / 2, -(one.z + other.z) / 2, -(one.w + other.w) / 2);
+            Measure(bones, model, m);
+            if (!(high > low)) return false;
+            for (int e = 0; e < eyes; e++)
+            {
+                if (Sees(lens[e] * toEye[e], bones, model)) return true;
+            }
+            return false;
+        }
+
+        /// <summary>Fills low, high, nearest and bounds.</summary>
+        void Measure(Vector4[] bones, GsacModel model, Matrix4x4 m)
+        {
             float size = Mathf.Sqrt(depthRow.x * depthRow.x + depthRow.y * depthRow.y + depthRow.z * depthRow.z);
-            low = float.MaxValue;
+            low = nearest = float.MaxValue;
             high = float.MinValue;
             Vector3 least = new Vector3(float.MaxValue, float.MaxValue, float.MaxValue), most = -least;
             for (int j = 0; j < model.Data.JointCount; j++)
             {
+                Vector3 place = GsacSkeleton.Posed(model.Data, bones, j);
+                for (int e = 0; e < eyes; e++) nearest = Math.Min(nearest, toEye[e].MultiplyPoint3x4(place).magnitude);
                 float radius = model.Extent.Radius[j];
                 if (radius == 0) continue;
                 radius += model.Extent.Pad;
-                Vector3 place = GsacSkeleton.Posed(model.Data, bones, j);
                 float depth = depthRow.x * place.x + depthRow.y * place.y + depthRow.z * place.z + depthRow.w;
                 low = Math.Min(low, depth - radius * size);
                 high = Math.Max(high, depth + radius * size);
@@ -77,37 +103,92 @@ namespace Gsac
             }
             bounds = WorldBounds(m, least, most);
             // keys are spent on what lies before the eye
-            low = Math.Max(low, 0);
-            return high > low;
+            if (!IsFlat(lens[0])) low = Math.Max(low, 0);
+        }
+
+        static bool IsFlat(Matrix4x4 projection)
+        {
+            return projection.m33 > 0.5f;
+        }
+
+        /// <summary>Whether a ball about a joint reaches into the frustum's each plane. toClip: from the avatar's space.</summary>
+        static bool Sees(Matrix4x4 toClip, Vector4[] bones, GsacModel model)
+        {
+            Vector4 w = toClip.GetRow(3);
+            for (int side = 0; side < 6; side++)
+            {
+                Vector4 row = toClip.GetRow(side / 2);
+                float sign = side % 2 == 0 ? 1 : -1;
+                if (!Reaches(new Vector4(w.x + sign * row.x, w.y + sign * row.y, w.z + sign * row.z, w.w + sign * row.w), bones, model)) return false;
+            }
+            return true;
+        }
+
+        /// <summary>Whether some of the avatar lies before a plane.</summary>
+        static bool Reaches(Vector4 plane, Vector4[] bones, GsacModel model)
+        {
+            float size = Mathf.Sqrt(plane.x * plane.x + plane.y * plane.y + plane.z * plane.z);
+            for (int j = 0; j < model.Data.JointCount; j++)
+            {
+                float radius = model.Extent.Radius[j];
+                if (radius == 0) continue;
+                Vector3 place = GsacSkeleton.Posed(model.Data, bones, j);
+                // what is not a number is seen
+                if (!(plane.x * place.x + plane.y * place.y + plane.z * place.z + plane.w < -(radius + model.Extent.Pad) * size)) return true;
+            }
+            return false;
+        }
+
+        /// <summary>
+        /// The level of detail by the person's height in this camera's picture; the one of before while that is about where they change.
+        /// finestWithin: m, for files that say no heights.
+        /// </summary>
+        public int Level(GsacModel model, float finestWithin)
+        {
+            if (model.Data.HasHeights)
+            {
+                float height = Height(model);
+                return drawn = Math.Min(Math.Max(drawn, model.Data.LevelAt(height / Slack)), model.Data.LevelAt(height));
+            }
+            float distance = Distance();
+            int most = model.Levels.Length - 1;
+            return drawn = Math.Min(Math.Max(drawn, LevelAt(distance * Slack, finestWithin, most)), LevelAt(distance, finestWithin, most));
+        }
+
+        static int LevelAt(float distance, float finestWithin, int most)
+        {
+            int level = 0;
+            for (float within = finestWithin; level < most && distance > within; within *= 2) level++;
+            return level;
         }
 
         /// <summary>
         /// Height of the person in the camera's picture, px: of the rest mesh, where the joint nearest to the eye is. Of the
         /// two eyes of a headset the larger.
         /// </summary>
-        public float Height(Transform root, Vector4[] bones, GsacModel model)
+        float Height(GsacModel model)
         {
-            Matrix4x4 m = root.localToWorldMatrix;
-            if (!Camera.stereoEnabled) return Height(Camera.projectionMatrix, Camera.worldToCameraMatrix * m, bones, model);
-            return Math.Max(Height(Camera.StereoscopicEye.Left, m, bones, model), Height(Camera.StereoscopicEye.Right, m, bones, model));
-        }
-
-        float Height(Camera.StereoscopicEye eye, Matrix4x4 m, Vector4[] bones, GsacModel model)
-        {
-            return Height(Camera.GetStereoProjectionMatrix(eye), Camera.GetStereoViewMatrix(eye) * m, bones, model);
-        }
-
-        float Height(Matrix4x4 projection, Matrix4x4 toEye, Vector4[] bones, GsacModel model)
-        {
-            float size = Mathf.Sqrt(toEye.m01 * toEye.m01 + toEye.m11 * toEye.m11 + toEye.m21 * toEye.m21);
-            float height = Math.Abs(projection.m11) * Camera.pixelHeight / 2 * size * model.Extent.Stature;
-            if (Camera.orthographic) return height;
-            float nearest = float.MaxValue;
-            for (int j = 0; j < model.Data.JointCount; j++)
+            float largest = 0;
+            for (int e = 0; e < eyes; e++)
             {
-                nearest = Math.Min(nearest, toEye.MultiplyPoint3x4(GsacSkeleton.Posed(model.Data, bones, j)).magnitude);
+                Matrix4x4 m = toEye[e];
+                float size = Mathf.Sqrt(m.m01 * m.m01 + m.m11 * m.m11 + m.m21 * m.m21);
+                float height = Math.Abs(lens[e].m11) * Camera.pixelHeight / 2 * size * model.Extent.Stature;
+                largest = Math.Max(largest, IsFlat(lens[e]) ? height : height / nearest);
             }
-            return height / nearest;
+            return largest;
+        }
+
+        /// <summary>m: from where a lens of 60 degrees would show the person as large. Of the two eyes of a headset the nearer.</summary>
+        float Distance()
+        {
+            float least = float.MaxValue;
+            for (int e = 0; e < eyes; e++)
+            {
+                float away = IsFlat(lens[e]) ? 1 : toEye[e].MultiplyPoint3x4(Vector3.zero).magnitude;
+                least = Math.Min(least, away * UsualLens / Math.Abs(lens[e].m11));
+            }
+            return least;
         }
 
         static Bounds WorldBounds(Matrix4x4 m, Vector3 least, Vector3 most)
@@ -119,11 +200,14 @@ namespace Gsac
             return new Bounds(m.MultiplyPoint3x4((most + least) * 0.5f), extents * 2);
         }
 
-        /// <summary>Sorts for this camera and asks Unity to draw.</summary>
-        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, GsacModel model, Transform root, float low, float high)
+        /// <summary>
+        /// Sorts for this camera, unless it stands and looks as before at the same, and asks Unity to draw. n: the level's number;
+        /// shape: of the splats, other than 0.
+        /// </summary>
+        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, int n, GsacModel model, Transform root, int shape)
         {
             if (keys == null || keys.count != model.KeyCount) Resize(model.KeyCount);
-            Sort(kernels, splats, level, low, high);
+            if (!IsSorted(n, shape)) Sort(kernels, splats, level);
             Matrix4x4 m = root.localToWorldMatrix;
             for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], m.GetRow(r));
             bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
@@ -133,7 +217,7 @@ namespace Gsac
             properties.SetBuffer(SplatsId, splats);
             properties.SetBuffer(ColoursId, level.Colours);
             properties.SetBuffer(KeysId, keys);
-            var draw = new RenderParams(material)
+            var draw = new RenderParams(GsacCameras.Material)
             {
                 camera = Camera, worldBounds = bounds, matProps = properties, layer = root.gameObject.layer,
                 shadowCastingMode = ShadowCastingMode.Off, receiveShadows = false,
@@ -147,7 +231,20 @@ namespace Gsac
             keys = GsacModel.Empty(count, 1);
         }
 
-        void Sort(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, float low, float high)
+        /// <summary>Whether the keys are already those of this moment; from here on they are.</summary>
+        bool IsSorted(int n, int shape)
+        {
+            bool same = shape == sortedShape && n == sortedLevel && low == sortedLow && high == sortedHigh && depthRow.x == sortedRow.x
+                && depthRow.y == sortedRow.y && depthRow.z == sortedRow.z && depthRow.w == sortedRow.w;
+            sortedShape = shape;
+            sortedLevel = n;
+            sortedLow = low;
+            sortedHigh = high;
+            sortedRow = depthRow;
+            return same;
+        }
+
+        void Sort(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level)
         {
             if (!found)
             {
