@@ -1,5 +1,8 @@
 """The shader that Unity draws splats with: it compiles for every render pipeline, and its picture is the trainer's."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -52,8 +55,8 @@ def true_picture(scene, low_pass, camera=None, back=0):
     return np.concatenate([truth.rgb, truth.alpha[..., None]], 2)
 
 
-def picture(gpu, passes, scene, pipeline, matrix=None, linear=0, low_pass=PIXEL, size=None, screen=None):
-    """matrix: projection, the camera's if None; size, screen: width and height of the picture and as told to the shader."""
+def picture(gpu, passes, scene, pipeline, matrix=None, linear=0, low_pass=PIXEL, size=None, screen=None, **more):
+    """matrix: projection, the camera's if None; size, screen: width and height of the picture and as told to the shader; more: parameters."""
     g, bound = scene["avatar"].gaussians, scene["bound"]
     N = len(g)
     half = bound.rotations * bound.scales[:, None]
@@ -75,7 +78,7 @@ def picture(gpu, passes, scene, pipeline, matrix=None, linear=0, low_pass=PIXEL,
     parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": matrix.T,
                   "_ScreenParams": screen, "_ScaledScreenParams": screen, "_ScreenSize": screen,
                   "_WorldSpaceCameraPos": [*eye, 0], "GsacIndexBits": 13, **draw_rule(low_pass, linear),
-                  **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
+                  **{f"GsacModel{r}": scene["model"][r] for r in range(3)}, **more}
     return Painting(gpu, *passes[pipeline], *size, N).draw(parameters)
 
 
@@ -119,6 +122,39 @@ def test_with_energy_kept_the_person_looks_alike_at_half_and_at_two_and_four_tim
 def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, passes, scene):
     got = picture(gpu, passes, scene, "", projection(scene["camera"], flipped=True))[::-1]
     assert psnr(got, scene["truth"]) > 55
+
+
+@pytest.mark.parametrize("pipeline", PIPELINES)
+def test_a_tint_multiplies_every_colour(gpu, passes, scene, pipeline):
+    tint = np.array([.5, 1, .25, 1])
+    assert psnr(picture(gpu, passes, scene, pipeline, GsacTint=tint), scene["truth"] * tint) > 55
+
+
+@pytest.mark.parametrize("share", [0, .25, .5, .9])
+def test_a_fading_person_loses_pixels_evenly_and_nothing_shines_through_those_that_stay(gpu, passes, scene, share):
+    got = picture(gpu, passes, scene, "", GsacTint=[1, 1, 1, share])
+    there = np.abs(got - scene["truth"]).max(2) < .02
+    assert (there | (got[..., 3] == 0)).all(), "a pixel is there as ever or not at all"
+    inside = scene["truth"][..., 3] > .9
+    assert abs(got[inside][:, 3].mean() / scene["truth"][inside][:, 3].mean() - share) < .02
+    for row in np.array_split(inside.nonzero()[0], 6):
+        part = inside & np.isin(np.arange(SIZE), np.unique(row))[:, None]
+        assert abs((got[part][:, 3] > 0).mean() - share) < .08, "top to bottom"
+
+
+@pytest.mark.parametrize("pipeline", ["", "UniversalPipeline"])
+def test_the_scenes_fog_lies_over_the_person_by_depth_unless_switched_off(gpu, hlsl, scene, pipeline, tmp_path):
+    text = "#define FOG_EXP2\n" + hlsl.shader_passes()[pipeline]
+    foggy = {pipeline: hlsl.compile_pass(text, tmp_path, Path(__file__).parent / "shims")}
+    fog = {"unity_FogColor": [.2, .4, .6, 1], "unity_FogParams": [.25, 0, 0, 0]}
+    z = (scene["bound"].means @ scene["total"].T + scene["place"])[:, 2]
+    share = np.exp2(-(.25 * np.maximum(z - .02, 0)) ** 2)[:, None]  # clip space's z of this projection
+    colours = share * scene["avatar"].gaussians.rgb + (1 - share) * fog["unity_FogColor"][:3]
+    assert np.ptp(share) > .1
+    g = scene["avatar"].gaussians
+    wanted = true_picture(scene | {"avatar": replace(scene["avatar"], gaussians=replace(g, rgb=colours.astype(np.float32)))}, PIXEL)
+    assert psnr(picture(gpu, foggy, scene, pipeline, GsacFog=1, **fog), wanted) > 55
+    assert psnr(picture(gpu, foggy, scene, pipeline, GsacFog=0, **fog), scene["truth"]) > 55
 
 
 WIDE = Camera((240.0, 240.0), (149.0, 101.5), 320, 192)
@@ -202,6 +238,4 @@ def test_in_a_linear_project_an_opaque_colour_is_the_lit_display_colour_made_lin
 
 
 def _first(avatar):
-    from dataclasses import replace
-
     return replace(avatar, gaussians=avatar.gaussians[:1])

@@ -42,6 +42,18 @@ namespace Gsac
         [SerializeField, Tooltip("0..1: how far the avatar stands in the light of the room in which its clip was filmed; 0 is even light.")]
         float clipLight = 1;
 
+        [SerializeField, Tooltip("A material with the shader Gsac/Splats, for a render queue, stencil or depth test of its own; the package's where this is empty.")]
+        Material material;
+
+        [SerializeField, Tooltip("Multiplies the colours.")]
+        Color tint = Color.white;
+
+        [SerializeField, Tooltip("0..1: how much of the person is there; less fades her by pixels.")]
+        float opacity = 1;
+
+        [SerializeField, Tooltip("Whether the scene's fog lies over the person; not in HDRP.")]
+        bool fog = true;
+
         readonly List<GsacView> views = new List<GsacView>();
         GsacAvatar avatar;
         GsacModel model;
@@ -74,6 +86,34 @@ namespace Gsac
         {
             get { return clipLight; }
             set { clipLight = value; }
+        }
+
+        /// <summary>A material with the shader Gsac/Splats, for a render queue, stencil or depth test of its own; null: the package's.</summary>
+        public Material Material
+        {
+            get { return material; }
+            set { material = value; }
+        }
+
+        /// <summary>Multiplies the colours; its alpha counts for nothing.</summary>
+        public Color Tint
+        {
+            get { return tint; }
+            set { tint = value; }
+        }
+
+        /// <summary>0..1: how much of the person is there. Less fades her by pixels; at 0 she costs nothing.</summary>
+        public float Opacity
+        {
+            get { return opacity; }
+            set { opacity = value; }
+        }
+
+        /// <summary>Whether the scene's fog lies over the person; not in HDRP, whose fog knows no such things.</summary>
+        public bool Fog
+        {
+            get { return fog; }
+            set { fog = value; }
         }
 
         void OnEnable()
@@ -124,7 +164,7 @@ namespace Gsac
         internal void Draw(Camera camera)
         {
             if (avatar == null) avatar = GetComponent<GsacAvatar>();
-            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null) return;
+            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null || opacity <= 0) return;
             try
             {
                 if (!Ready()) return;
@@ -141,7 +181,17 @@ namespace Gsac
             GsacModel.Level level = model.Levels[n];
             if (level.Count == 0) return;
             Pose(level, n);
-            view.Draw(kernels, splats[n], level, n, model, transform, shape);
+            view.Draw(kernels, splats[n], level, n, model, transform, shape, Finish());
+        }
+
+        GsacFinish Finish()
+        {
+            Color shown = QualitySettings.activeColorSpace == ColorSpace.Linear ? tint.linear : tint;
+            return new GsacFinish
+            {
+                Material = material != null ? material : GsacCameras.Material, Tint = new Vector4(shown.r, shown.g, shown.b, Mathf.Clamp(opacity, 0, 1)),
+                Fog = fog, Layer = gameObject.layer,
+            };
         }
 
         /// <summary>Takes the joints, weights and light of this frame; `shape` counts on where they differ from those before.</summary>

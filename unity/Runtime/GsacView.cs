@@ -1,47 +1,22 @@
 using System;
 using UnityEngine;
-using UnityEngine.Rendering;
 
 namespace Gsac
 {
     /// <summary>What one camera sees of one avatar: its own sorted order, its own draw, both eyes of a headset included.</summary>
     public sealed class GsacView : IDisposable
     {
-        static readonly int SplatCountId = Shader.PropertyToID("GsacSplatCount");
-        static readonly int IndexBitsId = Shader.PropertyToID("GsacIndexBits");
-        static readonly int SortStageId = Shader.PropertyToID("GsacSortStage");
-        static readonly int SortShiftId = Shader.PropertyToID("GsacSortShift");
-        static readonly int SortStridesId = Shader.PropertyToID("GsacSortStrides");
-        static readonly int DepthRangeId = Shader.PropertyToID("GsacDepthRange");
-        static readonly int DepthRowId = Shader.PropertyToID("GsacDepthRow");
-        static readonly int SplatsId = Shader.PropertyToID("GsacSplats");
-        static readonly int KeysId = Shader.PropertyToID("GsacKeys");
-        static readonly int ColoursId = Shader.PropertyToID("GsacColours");
-        static readonly int BlendId = Shader.PropertyToID("GsacBlend");
-        static readonly int KeepsEnergyId = Shader.PropertyToID("GsacKeepsEnergy");
-        static readonly int[] ModelIds =
-        {
-            Shader.PropertyToID("GsacModel0"), Shader.PropertyToID("GsacModel1"), Shader.PropertyToID("GsacModel2"),
-        };
-        static readonly string[] SortNames = { "SortBlocks", "SortAcross", "SortMerge" };
         const float Slack = 0.9f;
         const float UsualLens = 1.7320508f; // m11 of a projection that sees 60 degrees
 
         public readonly Camera Camera;
-        readonly MaterialPropertyBlock properties = new MaterialPropertyBlock();
-        readonly int[] sortKernels = new int[3];
+        readonly GsacSorted sorted = new GsacSorted();
         readonly Matrix4x4[] toEye = new Matrix4x4[2], lens = new Matrix4x4[2]; // of each eye: the avatar's space to the eye's, projection
         int eyes;
         float nearest; // m from an eye to a joint
-        GraphicsBuffer keys;
-        bool found;
-        Vector4 depthRow;
-        float low, high; // depths that the avatar can have
+        GsacDepths depths; // that the avatar can have
         Bounds bounds;
         int drawn; // level
-        int sortedShape, sortedLevel;
-        Vector4 sortedRow;
-        float sortedLow, sortedHigh;
 
         public GsacView(Camera camera)
         {
@@ -50,9 +25,7 @@ namespace Gsac
 
         public void Dispose()
         {
-            if (keys != null) keys.Dispose();
-            keys = null;
-            sortedShape = 0;
+            sorted.Dispose();
         }
 
         /// <summary>
@@ -70,9 +43,9 @@ namespace Gsac
             }
             // of two eyes the middle
             Vector4 one = toEye[0].GetRow(2), other = toEye[eyes - 1].GetRow(2);
-            depthRow = new Vector4(-(one.x + other.x) / 2, -(one.y + other.y) / 2, -(one.z + other.z) / 2, -(one.w + other.w) / 2);
+            depths.Row = new Vector4(-(one.x + other.x) / 2, -(one.y + other.y) / 2, -(one.z + other.z) / 2, -(one.w + other.w) / 2);
             Measure(bones, model, m);
-            if (!(high > low)) return false;
+            if (!(depths.High > depths.Low)) return false;
             for (int e = 0; e < eyes; e++)
             {
                 if (Sees(lens[e] * toEye[e], bones, model)) return true;
@@ -80,12 +53,13 @@ namespace Gsac
             return false;
         }
 
-        /// <summary>Fills low, high, nearest and bounds.</summary>
+        /// <summary>Fills depths, nearest and bounds.</summary>
         void Measure(Vector4[] bones, GsacModel model, Matrix4x4 m)
         {
-            float size = Mathf.Sqrt(depthRow.x * depthRow.x + depthRow.y * depthRow.y + depthRow.z * depthRow.z);
-            low = nearest = float.MaxValue;
-            high = float.MinValue;
+            Vector4 row = depths.Row;
+            float size = Mathf.Sqrt(row.x * row.x + row.y * row.y + row.z * row.z);
+            depths.Low = nearest = float.MaxValue;
+            depths.High = float.MinValue;
             Vector3 least = new Vector3(float.MaxValue, float.MaxValue, float.MaxValue), most = -least;
             for (int j = 0; j < model.Data.JointCount; j++)
             {
@@ -94,16 +68,16 @@ namespace Gsac
                 float radius = model.Extent.Radius[j];
                 if (radius == 0) continue;
                 radius += model.Extent.Pad;
-                float depth = depthRow.x * place.x + depthRow.y * place.y + depthRow.z * place.z + depthRow.w;
-                low = Math.Min(low, depth - radius * size);
-                high = Math.Max(high, depth + radius * size);
+                float depth = row.x * place.x + row.y * place.y + row.z * place.z + row.w;
+                depths.Low = Math.Min(depths.Low, depth - radius * size);
+                depths.High = Math.Max(depths.High, depth + radius * size);
                 var ball = new Vector3(radius, radius, radius);
                 least = Vector3.Min(least, place - ball);
                 most = Vector3.Max(most, place + ball);
             }
             bounds = WorldBounds(m, least, most);
             // keys are spent on what lies before the eye
-            if (!IsFlat(lens[0])) low = Math.Max(low, 0);
+            if (!IsFlat(lens[0])) depths.Low = Math.Max(depths.Low, 0);
         }
 
         static bool IsFlat(Matrix4x4 projection)
@@ -200,72 +174,12 @@ namespace Gsac
             return new Bounds(m.MultiplyPoint3x4((most + least) * 0.5f), extents * 2);
         }
 
-        /// <summary>
-        /// Sorts for this camera, unless it stands and looks as before at the same, and asks Unity to draw. n: the level's number;
-        /// shape: of the splats, other than 0.
-        /// </summary>
-        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, int n, GsacModel model, Transform root, int shape)
+        /// <summary>Sorts for this camera where that is not done, and asks Unity to draw. n: the level's number; shape: of the splats, other than 0.</summary>
+        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, int n, GsacModel model, Transform root, int shape,
+                         GsacFinish finish)
         {
-            if (keys == null || keys.count != model.KeyCount) Resize(model.KeyCount);
-            if (!IsSorted(n, shape)) Sort(kernels, splats, level);
-            Matrix4x4 m = root.localToWorldMatrix;
-            for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], m.GetRow(r));
-            bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
-            properties.SetVector(BlendId, new Vector4(model.Data.LowPass, model.Data.AlphaMax, model.Data.AlphaMin, linear ? 1 : 0));
-            properties.SetInteger(KeepsEnergyId, model.Data.KeepsEnergy ? 1 : 0);
-            properties.SetInteger(IndexBitsId, level.Sort.IndexBits);
-            properties.SetBuffer(SplatsId, splats);
-            properties.SetBuffer(ColoursId, level.Colours);
-            properties.SetBuffer(KeysId, keys);
-            var draw = new RenderParams(GsacCameras.Material)
-            {
-                camera = Camera, worldBounds = bounds, matProps = properties, layer = root.gameObject.layer,
-                shadowCastingMode = ShadowCastingMode.Off, receiveShadows = false,
-            };
-            Graphics.RenderPrimitivesIndexed(draw, MeshTopology.Triangles, model.Quads, level.Count * 6);
-        }
-
-        void Resize(int count)
-        {
-            Dispose();
-            keys = GsacModel.Empty(count, 1);
-        }
-
-        /// <summary>Whether the keys are already those of this moment; from here on they are.</summary>
-        bool IsSorted(int n, int shape)
-        {
-            bool same = shape == sortedShape && n == sortedLevel && low == sortedLow && high == sortedHigh && depthRow.x == sortedRow.x
-                && depthRow.y == sortedRow.y && depthRow.z == sortedRow.z && depthRow.w == sortedRow.w;
-            sortedShape = shape;
-            sortedLevel = n;
-            sortedLow = low;
-            sortedHigh = high;
-            sortedRow = depthRow;
-            return same;
-        }
-
-        void Sort(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level)
-        {
-            if (!found)
-            {
-                for (int i = 0; i < 3; i++) sortKernels[i] = kernels.FindKernel(SortNames[i]);
-                found = true;
-            }
-            kernels.SetInt(SplatCountId, level.Count);
-            kernels.SetInt(IndexBitsId, level.Sort.IndexBits);
-            kernels.SetVector(DepthRangeId, new Vector4(low, 1 / (high - low), 0, 0));
-            kernels.SetVector(DepthRowId, depthRow);
-            kernels.SetBuffer(sortKernels[(int)GsacSortKernel.Blocks], SplatsId, splats);
-            GsacSortStep[] steps = level.Sort.Steps;
-            for (int i = 0; i < steps.Length; i++)
-            {
-                int kernel = sortKernels[(int)steps[i].Kernel];
-                kernels.SetInt(SortStageId, steps[i].Stage);
-                kernels.SetInt(SortShiftId, steps[i].Shift);
-                kernels.SetInt(SortStridesId, steps[i].Strides);
-                kernels.SetBuffer(kernel, KeysId, keys);
-                kernels.Dispatch(kernel, steps[i].Groups, 1, 1);
-            }
+            sorted.Sort(kernels, splats, level.Count, level.Sort, model.KeyCount, depths, shape, n);
+            sorted.Draw(Camera, finish, model.Data, root.localToWorldMatrix, splats, level.Colours, model.Quads, level.Count, level.Sort, bounds);
         }
     }
 }

@@ -71,8 +71,8 @@ namespace UnityEngine
     {
         internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct" };
         // by property, and by property and kernel
-        internal readonly Vector4[] Values = new Vector4[64];
-        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 64];
+        internal readonly Vector4[] Values = new Vector4[96];
+        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 96];
         public int FindKernel(string name)
         {
             int kernel = Array.IndexOf(Kernels, name);
@@ -87,8 +87,8 @@ namespace UnityEngine
 
     public sealed class MaterialPropertyBlock
     {
-        internal readonly Vector4[] Values = new Vector4[64];
-        internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[64];
+        internal readonly Vector4[] Values = new Vector4[96];
+        internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[96];
         public void SetVector(int nameID, Vector4 value) { Values[nameID] = value; }
         public void SetInteger(int nameID, int value) { Values[nameID] = new Vector4(value, 0, 0, 0); }
         public void SetBuffer(int nameID, GraphicsBuffer value) { Buffers[nameID] = value; }

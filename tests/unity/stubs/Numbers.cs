@@ -42,6 +42,15 @@ namespace UnityEngine
         public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
     }
 
+    public struct Color
+    {
+        public float r, g, b, a;
+        public Color(float r, float g, float b, float a) { this.r = r; this.g = g; this.b = b; this.a = a; }
+        public static Color white { get { return new Color(1, 1, 1, 1); } }
+        public Color linear { get { return new Color(Linear(r), Linear(g), Linear(b), a); } }
+        static float Linear(float x) { return x <= 0.04045f ? x / 12.92f : (float)Math.Pow((x + 0.055) / 1.055, 2.4); }
+    }
+
     public struct Rect
     {
         public Rect(float x, float y, float width, float height) { }
