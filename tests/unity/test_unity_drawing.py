@@ -15,8 +15,8 @@ def told(play, files):
     return {what: tuple(map(int, said.split())) if said[0].isdigit() else said for what, said in lines.items()}
 
 
-@pytest.mark.parametrize("where", ["out of view 265", "out of view 95", "out of view 0", "above", "beyond the far plane", "layer culled",
-                                   "headset looks away"])
+@pytest.mark.parametrize("where", ["out of view 265", "out of view 95", "out of view 0", "above", "beyond the far plane",
+                                   "layer culled", "headset looks away"])
 def test_a_person_out_of_view_costs_no_dispatch_and_no_draw(told, where):
     assert told[where] == (0, 0)
 

@@ -56,7 +56,7 @@ def true_picture(scene, low_pass, camera=None, back=0):
 
 
 def picture(gpu, passes, scene, pipeline, matrix=None, linear=0, low_pass=PIXEL, size=None, screen=None, **more):
-    """matrix: projection, the camera's if None; size, screen: width and height of the picture and as told to the shader; more: parameters."""
+    """matrix: projection, the camera's if None; size, screen: width and height of the picture, and as told; more: parameters."""
     g, bound = scene["avatar"].gaussians, scene["bound"]
     N = len(g)
     half = bound.rotations * bound.scales[:, None]
@@ -183,7 +183,8 @@ FAR = 2000.0
 def test_a_camera_without_perspective_gives_the_picture_of_the_trainers_from_far_away(gpu, passes, scene, pipeline, span, back):
     """span: m of the picture's height; back: m by which the person goes towards the eye, and behind it."""
     focal = WIDE.height / span
-    wanted = true_picture(scene, PIXEL, Camera((focal * FAR, focal * FAR), WIDE.center, WIDE.width, WIDE.height), FAR - scene["place"][2])
+    away = Camera((focal * FAR, focal * FAR), WIDE.center, WIDE.width, WIDE.height)
+    wanted = true_picture(scene, PIXEL, away, FAR - scene["place"][2])
     flat = np.diag([2 * focal / WIDE.width, 2 * focal / WIDE.height, -.02, 1])
     flat[:2, 3] = 2 * WIDE.center[0] / WIDE.width - 1, 1 - 2 * WIDE.center[1] / WIDE.height
     flat[2, 3] = .5
@@ -203,27 +204,27 @@ def test_each_eye_of_a_headset_is_drawn_by_its_own_matrices_in_one_pass(gpu, pas
     shifted = scene | {"view": scene["view"] + [[0, 0, 0, .25], [0, 0, 0, 0], [0, 0, 0, 0]]}
     alone = [picture(gpu, passes, s, "") for s in (shifted, scene)]  # the last leaves the buffers
     assert abs(alone[0] - alone[1]).max() > .3, "the eyes see different things"
-    views = [np.vstack([s["view"], [0, 0, 0, 1]]).T for s in (shifted, scene)]
-    parameters = {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(scene["camera"]).T] * 2,
-                  "_ScreenParams": [SIZE, SIZE, 0, 0], "GsacIndexBits": 13, **draw_rule(PIXEL),
-                  **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
-    painting = Painting(gpu, *passes["stereo"], SIZE, SIZE, len(scene["bound"].means))
-    for eye in (0, 1):
-        assert abs(painting.draw(parameters, instance=eye) - alone[eye]).max() < 1e-3
+    for got, wanted in zip(both_eyes(gpu, passes, scene, [shifted["view"], scene["view"]], [scene["camera"]] * 2), alone, strict=True):
+        assert abs(got - wanted).max() < 1e-3
 
 
 def test_each_eyes_picture_is_the_trainers_though_its_lens_looks_aside(gpu, passes, scene):
     picture(gpu, passes, scene, "")  # leaves the buffers
     apart = np.array([.032, 0, 0])
     cameras = [Camera((200.0, 200.0), (128 + side, 120.0), SIZE, SIZE) for side in (18.0, -18.0)]
-    views = [np.vstack([np.column_stack([scene["view"][:, :3], scene["view"][:, 3] + side * apart]), [0, 0, 0, 1]]) for side in (1, -1)]
-    parameters = {"unity_StereoMatrixV": [v.T for v in views], "unity_StereoMatrixP": [projection(c).T for c in cameras],
+    views = [np.column_stack([scene["view"][:, :3], scene["view"][:, 3] + side * apart]) for side in (1, -1)]
+    for got, camera, side in zip(both_eyes(gpu, passes, scene, views, cameras), cameras, (1, -1), strict=True):
+        assert psnr(got, true_picture(scene | {"place": scene["place"] + side * apart}, PIXEL, camera)) > 55
+
+
+def both_eyes(gpu, passes, scene, views, cameras):
+    """The two pictures of a headset's one pass, of the buffers that `picture` left. views: (3, 4) of each eye."""
+    parameters = {"unity_StereoMatrixV": [np.vstack([view, [0, 0, 0, 1]]).T for view in views],
+                  "unity_StereoMatrixP": [projection(camera).T for camera in cameras],
                   "_ScreenParams": [SIZE, SIZE, 0, 0], "GsacIndexBits": 13, **draw_rule(PIXEL),
                   **{f"GsacModel{r}": scene["model"][r] for r in range(3)}}
     painting = Painting(gpu, *passes["stereo"], SIZE, SIZE, len(scene["bound"].means))
-    for eye, side in enumerate((1, -1)):
-        wanted = true_picture(scene | {"place": scene["place"] + side * apart}, PIXEL, cameras[eye])
-        assert psnr(painting.draw(parameters, instance=eye), wanted) > 55
+    return [painting.draw(parameters, instance=eye) for eye in (0, 1)]
 
 
 def test_in_a_linear_project_an_opaque_colour_is_the_lit_display_colour_made_linear(gpu, passes, scene):
