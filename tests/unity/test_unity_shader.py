@@ -204,7 +204,8 @@ def test_each_eye_of_a_headset_is_drawn_by_its_own_matrices_in_one_pass(gpu, pas
     shifted = scene | {"view": scene["view"] + [[0, 0, 0, .25], [0, 0, 0, 0], [0, 0, 0, 0]]}
     alone = [picture(gpu, passes, s, "") for s in (shifted, scene)]  # the last leaves the buffers
     assert abs(alone[0] - alone[1]).max() > .3, "the eyes see different things"
-    for got, wanted in zip(both_eyes(gpu, passes, scene, [shifted["view"], scene["view"]], [scene["camera"]] * 2), alone, strict=True):
+    together = both_eyes(gpu, passes, scene, [shifted["view"], scene["view"]], [scene["camera"]] * 2)
+    for got, wanted in zip(together, alone, strict=True):
         assert abs(got - wanted).max() < 1e-3
 
 
