@@ -46,6 +46,7 @@ SOURCES = (
     "Runtime/GsacAvatar.cs",
     "Runtime/GsacBenchmark.cs",
     "Runtime/GsacCameras.cs",
+    "Runtime/GsacCrowd.cs",
     "Runtime/GsacDemo.cs",
     "Runtime/GsacDepths.cs",
     "Runtime/GsacFinish.cs",
@@ -61,6 +62,7 @@ SOURCES = (
     "Runtime/Resources/Gsac/Gsac.compute",
     "Runtime/Resources/Gsac/GsacCore.hlsl",
     "Runtime/Resources/Gsac/GsacDraw.hlsl",
+    "Runtime/Resources/Gsac/GsacJoin.compute",
     "Runtime/Resources/Gsac/GsacPass.hlsl",
     "Runtime/Resources/Gsac/GsacSplats.shader",
 )

@@ -19,7 +19,9 @@ MIRROR = np.diag([-1.0, 1, 1])
 ONCE = {
     "GsacAvatar.Open": "a file is read", "GsacAvatar.Unknown": "an error", "GsacRenderer.Prepare": "a model's first frame",
     "GsacRenderer.Complain": "an error", "GsacCameras.get_Material": "the first draw",
-    "GsacRenderer.NewView": "a camera's first frame", "GsacSorted.Resize": "another file", "GsacPoseStream.Prepare": "another file", "GsacBenchmark.Finish": "the end"}
+    "GsacRenderer.NewView": "a camera's first frame", "GsacSorted.Resize": "another file",
+    "GsacCameras.Grow": "more people than ever", "GsacCameras.NewCrowd": "people meet", "GsacCrowd.Reserve": "more of them",
+    "GsacCrowd.Plan": "others of them", "GsacPoseStream.Prepare": "another file", "GsacBenchmark.Finish": "the end"}
 """What a frame may call and most frames do not: why."""
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
 

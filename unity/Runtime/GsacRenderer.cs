@@ -160,28 +160,25 @@ namespace Gsac
             gathered = false;
         }
 
-        /// <summary>Draws the avatar where this camera sees it; called just before the camera culls.</summary>
-        internal void Draw(Camera camera)
+        /// <summary>What this camera sees of the avatar, null where that is nothing; called just before the camera culls.</summary>
+        internal GsacView See(Camera camera)
         {
             if (avatar == null) avatar = GetComponent<GsacAvatar>();
-            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null || opacity <= 0) return;
+            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null || opacity <= 0) return null;
             try
             {
-                if (!Ready()) return;
+                if (!Ready()) return null;
             }
             catch (GsacException e)
             {
                 Complain(e.Message);
-                return;
+                return null;
             }
             Gather();
             GsacView view = View(camera);
-            if (!view.Look(transform, boneRows, model)) return;
-            int n = view.Level(model, finestWithin);
-            GsacModel.Level level = model.Levels[n];
-            if (level.Count == 0) return;
-            Pose(level, n);
-            view.Draw(kernels, splats[n], level, n, model, transform, shape, Finish());
+            if (!view.Look(transform, boneRows, model)) return null;
+            view.Choose(finestWithin, Finish());
+            return view.Level.Count > 0 ? view : null;
         }
 
         GsacFinish Finish()
@@ -280,12 +277,15 @@ namespace Gsac
             Debug.LogError(name + ": the avatar cannot be drawn: " + what, this);
         }
 
-        /// <summary>Skins and binds what is not yet of this shape.</summary>
-        void Pose(GsacModel.Level level, int n)
+        /// <summary>Skins and binds what is not yet of this moment's shape, for the level that the view has chosen.</summary>
+        internal void Pose(GsacView view)
         {
+            int n = view.LevelNumber;
             if (skinned != shape) Skin();
-            if (bound[n] != shape) Bind(level, splats[n]);
+            if (bound[n] != shape) Bind(view.Level, splats[n]);
             skinned = bound[n] = shape;
+            view.Shape = shape;
+            view.Splats = splats[n];
         }
 
         void Skin()
@@ -358,7 +358,7 @@ namespace Gsac
 
         GsacView NewView(Camera camera)
         {
-            var view = new GsacView(camera);
+            var view = new GsacView(camera, this);
             views.Add(view);
             return view;
         }

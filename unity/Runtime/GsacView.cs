@@ -10,17 +10,45 @@ namespace Gsac
         const float UsualLens = 1.7320508f; // m11 of a projection that sees 60 degrees
 
         public readonly Camera Camera;
+        public readonly GsacRenderer Renderer;
         readonly GsacSorted sorted = new GsacSorted();
         readonly Matrix4x4[] toEye = new Matrix4x4[2], lens = new Matrix4x4[2]; // of each eye: the avatar's space to the eye's, projection
+        readonly ComputeShader kernels;
         int eyes;
-        float nearest; // m from an eye to a joint
-        GsacDepths depths; // that the avatar can have
-        Bounds bounds;
-        int drawn; // level
+        int drawn; // level of before
 
-        public GsacView(Camera camera)
+        public GsacModel Model { get; private set; }
+        public GsacFinish Finish { get; private set; }
+
+        /// <summary>Of the splats, to the world.</summary>
+        public Matrix4x4 Space { get; private set; }
+
+        /// <summary>Depth of a point of the world before the camera: dot(xyz, point) + w.</summary>
+        public Vector4 WorldRow { get; private set; }
+
+        /// <summary>Depths that the avatar can have.</summary>
+        public GsacDepths Depths { get { return depths; } }
+        GsacDepths depths;
+
+        /// <summary>In the world.</summary>
+        public Bounds Bounds { get; private set; }
+
+        /// <summary>m from an eye to a joint.</summary>
+        public float Nearest { get; private set; }
+
+        public int LevelNumber { get; private set; }
+        public GsacModel.Level Level { get { return Model.Levels[LevelNumber]; } }
+        public bool CanBeCoarser { get { return LevelNumber + 1 < Model.Levels.Length; } }
+
+        /// <summary>The gaussians of the level, bound; and of which pose, other than 0.</summary>
+        public GraphicsBuffer Splats { get; internal set; }
+        public int Shape { get; internal set; }
+
+        public GsacView(Camera camera, GsacRenderer renderer)
         {
             Camera = camera;
+            Renderer = renderer;
+            kernels = Resources.Load<ComputeShader>("Gsac/Gsac");
         }
 
         public void Dispose()
@@ -33,41 +61,46 @@ namespace Gsac
         /// </summary>
         public bool Look(Transform root, Vector4[] bones, GsacModel model)
         {
-            Matrix4x4 m = root.localToWorldMatrix;
+            Model = model;
+            Matrix4x4 m = Space = root.localToWorldMatrix;
             eyes = Camera.stereoEnabled ? 2 : 1;
+            WorldRow = new Vector4(0, 0, 0, 0);
             for (int e = 0; e < eyes; e++)
             {
                 var eye = (Camera.StereoscopicEye)e;
-                toEye[e] = (eyes == 2 ? Camera.GetStereoViewMatrix(eye) : Camera.worldToCameraMatrix) * m;
+                Matrix4x4 view = eyes == 2 ? Camera.GetStereoViewMatrix(eye) : Camera.worldToCameraMatrix;
+                WorldRow -= view.GetRow(2) * (1f / eyes); // of two eyes the middle
+                toEye[e] = view * m;
                 lens[e] = eyes == 2 ? Camera.GetStereoProjectionMatrix(eye) : Camera.projectionMatrix;
             }
-            // of two eyes the middle
-            Vector4 one = toEye[0].GetRow(2), other = toEye[eyes - 1].GetRow(2);
-            depths.Row = new Vector4(-(one.x + other.x) / 2, -(one.y + other.y) / 2, -(one.z + other.z) / 2, -(one.w + other.w) / 2);
-            Measure(bones, model, m);
+            Vector4 w = WorldRow;
+            depths.Row = new Vector4(w.x * m.m00 + w.y * m.m10 + w.z * m.m20, w.x * m.m01 + w.y * m.m11 + w.z * m.m21,
+                                     w.x * m.m02 + w.y * m.m12 + w.z * m.m22, w.x * m.m03 + w.y * m.m13 + w.z * m.m23 + w.w);
+            Measure(bones, m);
             if (!(depths.High > depths.Low)) return false;
             for (int e = 0; e < eyes; e++)
             {
-                if (Sees(lens[e] * toEye[e], bones, model)) return true;
+                if (Sees(lens[e] * toEye[e], bones)) return true;
             }
             return false;
         }
 
-        /// <summary>Fills depths, nearest and bounds.</summary>
-        void Measure(Vector4[] bones, GsacModel model, Matrix4x4 m)
+        /// <summary>Fills Depths, Nearest and Bounds.</summary>
+        void Measure(Vector4[] bones, Matrix4x4 m)
         {
             Vector4 row = depths.Row;
             float size = Mathf.Sqrt(row.x * row.x + row.y * row.y + row.z * row.z);
-            depths.Low = nearest = float.MaxValue;
+            float nearest = float.MaxValue;
+            depths.Low = float.MaxValue;
             depths.High = float.MinValue;
             Vector3 least = new Vector3(float.MaxValue, float.MaxValue, float.MaxValue), most = -least;
-            for (int j = 0; j < model.Data.JointCount; j++)
+            for (int j = 0; j < Model.Data.JointCount; j++)
             {
-                Vector3 place = GsacSkeleton.Posed(model.Data, bones, j);
+                Vector3 place = GsacSkeleton.Posed(Model.Data, bones, j);
                 for (int e = 0; e < eyes; e++) nearest = Math.Min(nearest, toEye[e].MultiplyPoint3x4(place).magnitude);
-                float radius = model.Extent.Radius[j];
+                float radius = Model.Extent.Radius[j];
                 if (radius == 0) continue;
-                radius += model.Extent.Pad;
+                radius += Model.Extent.Pad;
                 float depth = row.x * place.x + row.y * place.y + row.z * place.z + row.w;
                 depths.Low = Math.Min(depths.Low, depth - radius * size);
                 depths.High = Math.Max(depths.High, depth + radius * size);
@@ -75,7 +108,8 @@ namespace Gsac
                 least = Vector3.Min(least, place - ball);
                 most = Vector3.Max(most, place + ball);
             }
-            bounds = WorldBounds(m, least, most);
+            Nearest = nearest;
+            Bounds = WorldBounds(m, least, most);
             // keys are spent on what lies before the eye
             if (!IsFlat(lens[0])) depths.Low = Math.Max(depths.Low, 0);
         }
@@ -86,47 +120,59 @@ namespace Gsac
         }
 
         /// <summary>Whether a ball about a joint reaches into the frustum's each plane. toClip: from the avatar's space.</summary>
-        static bool Sees(Matrix4x4 toClip, Vector4[] bones, GsacModel model)
+        bool Sees(Matrix4x4 toClip, Vector4[] bones)
         {
             Vector4 w = toClip.GetRow(3);
             for (int side = 0; side < 6; side++)
             {
                 Vector4 row = toClip.GetRow(side / 2);
                 float sign = side % 2 == 0 ? 1 : -1;
-                if (!Reaches(new Vector4(w.x + sign * row.x, w.y + sign * row.y, w.z + sign * row.z, w.w + sign * row.w), bones, model)) return false;
+                if (!Reaches(new Vector4(w.x + sign * row.x, w.y + sign * row.y, w.z + sign * row.z, w.w + sign * row.w), bones)) return false;
             }
             return true;
         }
 
         /// <summary>Whether some of the avatar lies before a plane.</summary>
-        static bool Reaches(Vector4 plane, Vector4[] bones, GsacModel model)
+        bool Reaches(Vector4 plane, Vector4[] bones)
         {
             float size = Mathf.Sqrt(plane.x * plane.x + plane.y * plane.y + plane.z * plane.z);
-            for (int j = 0; j < model.Data.JointCount; j++)
+            for (int j = 0; j < Model.Data.JointCount; j++)
             {
-                float radius = model.Extent.Radius[j];
+                float radius = Model.Extent.Radius[j];
                 if (radius == 0) continue;
-                Vector3 place = GsacSkeleton.Posed(model.Data, bones, j);
+                Vector3 place = GsacSkeleton.Posed(Model.Data, bones, j);
                 // what is not a number is seen
-                if (!(plane.x * place.x + plane.y * place.y + plane.z * place.z + plane.w < -(radius + model.Extent.Pad) * size)) return true;
+                if (!(plane.x * place.x + plane.y * place.y + plane.z * place.z + plane.w < -(radius + Model.Extent.Pad) * size)) return true;
             }
             return false;
         }
 
         /// <summary>
-        /// The level of detail by the person's height in this camera's picture; the one of before while that is about where they change.
+        /// Takes the level of detail by the person's height in this camera's picture; the one of before while that is about where they change.
         /// finestWithin: m, for files that say no heights.
         /// </summary>
-        public int Level(GsacModel model, float finestWithin)
+        public void Choose(float finestWithin, GsacFinish finish)
         {
-            if (model.Data.HasHeights)
+            Finish = finish;
+            LevelNumber = drawn = Wanted(finestWithin);
+        }
+
+        int Wanted(float finestWithin)
+        {
+            if (Model.Data.HasHeights)
             {
-                float height = Height(model);
-                return drawn = Math.Min(Math.Max(drawn, model.Data.LevelAt(height / Slack)), model.Data.LevelAt(height));
+                float height = Height();
+                return Math.Min(Math.Max(drawn, Model.Data.LevelAt(height / Slack)), Model.Data.LevelAt(height));
             }
             float distance = Distance();
-            int most = model.Levels.Length - 1;
-            return drawn = Math.Min(Math.Max(drawn, LevelAt(distance * Slack, finestWithin, most)), LevelAt(distance, finestWithin, most));
+            int most = Model.Levels.Length - 1;
+            return Math.Min(Math.Max(drawn, LevelAt(distance * Slack, finestWithin, most)), LevelAt(distance, finestWithin, most));
+        }
+
+        /// <summary>Takes the next coarser level this time.</summary>
+        public void Coarsen()
+        {
+            LevelNumber++;
         }
 
         static int LevelAt(float distance, float finestWithin, int most)
@@ -140,15 +186,15 @@ namespace Gsac
         /// Height of the person in the camera's picture, px: of the rest mesh, where the joint nearest to the eye is. Of the
         /// two eyes of a headset the larger.
         /// </summary>
-        float Height(GsacModel model)
+        float Height()
         {
             float largest = 0;
             for (int e = 0; e < eyes; e++)
             {
                 Matrix4x4 m = toEye[e];
                 float size = Mathf.Sqrt(m.m01 * m.m01 + m.m11 * m.m11 + m.m21 * m.m21);
-                float height = Math.Abs(lens[e].m11) * Camera.pixelHeight / 2 * size * model.Extent.Stature;
-                largest = Math.Max(largest, IsFlat(lens[e]) ? height : height / nearest);
+                float height = Math.Abs(lens[e].m11) * Camera.pixelHeight / 2 * size * Model.Extent.Stature;
+                largest = Math.Max(largest, IsFlat(lens[e]) ? height : height / Nearest);
             }
             return largest;
         }
@@ -174,12 +220,11 @@ namespace Gsac
             return new Bounds(m.MultiplyPoint3x4((most + least) * 0.5f), extents * 2);
         }
 
-        /// <summary>Sorts for this camera where that is not done, and asks Unity to draw. n: the level's number; shape: of the splats, other than 0.</summary>
-        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, int n, GsacModel model, Transform root, int shape,
-                         GsacFinish finish)
+        /// <summary>Sorts for this camera where that is not done, and asks Unity to draw the avatar by itself.</summary>
+        public void Draw()
         {
-            sorted.Sort(kernels, splats, level.Count, level.Sort, model.KeyCount, depths, shape, n);
-            sorted.Draw(Camera, finish, model.Data, root.localToWorldMatrix, splats, level.Colours, model.Quads, level.Count, level.Sort, bounds);
+            sorted.Sort(kernels, Splats, Level.Count, Level.Sort, Model.KeyCount, depths, Shape, LevelNumber);
+            sorted.Draw(Camera, Finish, Model.Data, Space, Splats, Level.Colours, Model.Quads, Level.Count, Level.Sort, Bounds);
         }
     }
 }

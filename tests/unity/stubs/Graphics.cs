@@ -69,7 +69,7 @@ namespace UnityEngine
 
     public sealed class ComputeShader : Object
     {
-        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct" };
+        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct", "Join" };
         // by property, and by property and kernel
         internal readonly Vector4[] Values = new Vector4[96];
         internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 96];
