@@ -5,6 +5,8 @@
 
 float4 GsacTint; // factor of the colours, how much of the person is there
 uint GsacFog;    // 1: the scene's fog lies over the person
+uint GsacNumber; // of this draw
+StructuredBuffer<uint> GsacLatest; // 1: the draw that counts
 
 struct GsacInput
 {
@@ -26,7 +28,7 @@ GsacVaryings Vertex(GsacInput input)
     UNITY_SETUP_INSTANCE_ID(input);
     UNITY_INITIALIZE_VERTEX_OUTPUT_STEREO(output);
     GsacCorner corner = GsacSplatCorner(input.vertex, UNITY_MATRIX_V, UNITY_MATRIX_P, GSAC_SCREEN, GSAC_ORIGIN);
-    output.clip = corner.clip;
+    output.clip = GsacLatest[0] == GsacNumber ? corner.clip : float4(2, 2, 2, 1);
     output.sigmas = corner.sigmas;
     output.colour = float4(corner.colour.rgb * GsacTint.rgb, corner.colour.a);
 #ifdef GSAC_FOGGED
