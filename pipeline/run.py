@@ -113,13 +113,14 @@ class Options:
 class ClipRun:
     """The stages of one clip, their results shown in one folder and kept in one store."""
 
-    def __init__(self, project: Project, configs: dict[str, Any], store: Store, folder: RunFolder, reporter: PlainReporter):
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, folder: RunFolder, reporter: PlainReporter,
+                 keys: Keys | None = None):
         self.graph = project.graph
         self.configs = configs
         self.store = store
         self.folder = folder
         self.reporter = reporter
-        self.keys = Keys(project, configs, store)
+        self.keys = keys or Keys(project, configs, store)
         self.results: list[StageResult] = []
         self.metrics: dict[str, Any] = {}
         self.forecast: Forecast | None = None
