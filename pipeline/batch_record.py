@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -62,7 +62,8 @@ class Entry:
     def read(cls, raw: Any) -> Entry | None:
         """Of a file's object; None where it is none."""
         try:
-            return cls(**{name: raw[name] for name in cls.__dataclass_fields__ if name in raw} | {"status": Status(raw["status"])})
+            known: dict[str, Any] = {name: raw[name] for name in cls.__dataclass_fields__ if name in raw}
+            return cls(**known | {"status": Status(raw["status"])})
         except (TypeError, KeyError, ValueError):
             return None
 
@@ -103,7 +104,7 @@ class BatchRecord:
 
     def keep(self, job: ClipJob, earlier: Entry, status: Status) -> None:
         """Notes that a clip is left as the batch before has left it."""
-        self.entries[job] = Entry(**earlier.__dict__ | {"status": status})
+        self.entries[job] = replace(earlier, status=status)
 
     def write(self, now: bool = False) -> None:
         """Writes the file whole or not at all, every few seconds while clips end."""
