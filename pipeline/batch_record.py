@@ -63,7 +63,8 @@ class Entry:
         """Of a file's object; None where it is none."""
         try:
             known: dict[str, Any] = {name: raw[name] for name in cls.__dataclass_fields__ if name in raw}
-            return cls(**known | {"status": Status(raw["status"])})
+            known["status"] = Status(raw["status"])
+            return cls(**known)
         except (TypeError, KeyError, ValueError):
             return None
 

@@ -143,6 +143,13 @@ def test_everybody_can_read_the_page_and_its_avatars_turn_under_the_pointer(out,
         assert browser.picture()[int(y), int(x), 0] > 150 > browser.picture()[int(y), int(x), 1], "the front is red"
         browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         assert browser.run(f"getComputedStyle({front}).animationName") == "turn"
+        shown = "[...document.querySelectorAll('.card:not([hidden]) h3')].map(e => e.textContent)"
+        choose = ("((id, to) => {{let e = document.getElementById(id); e.value = to; e.dispatchEvent(new Event('input'))}})"
+                  "('{}', '{}');")
+        assert browser.run(choose.format("show", "failed") + shown)[:2] == ["eva.mp4", "gone.mp4"]
+        assert "ada.mp4" not in browser.run(shown)
+        by_name = browser.run(choose.format("show", "") + choose.format("sort", "clip") + shown)
+        assert by_name[:3] == ["ada.mp4", "bob.mp4", "eva.mp4"]
         assert not browser.errors and {address.partition(":")[0] for address in browser.requests} <= {"file", "data"}
     finally:
         browser.close()
