@@ -2,8 +2,9 @@
 
 Mesh: 55 joints with identity rest rotations, at most 4 weights a vertex, y up, facing +z, feet at y = 0; expressions are
 morph targets by their ARKit names.
-Gaussians: a POINTS primitive in T-pose with KHR_gaussian_splatting (its release candidate: linear scales, opacities after the
-sigmoid), on the same skin, each with the mesh face that it is bound to in `_GSAC_FACE`.
+Gaussians: in a scene of their own, so that what shows the file shows one person: a POINTS primitive in T-pose with
+KHR_gaussian_splatting (its release candidate: linear scales, opacities after the sigmoid). They have no skin, which readers of
+splats ignore; `_GSAC_FACE` holds the mesh face that each is bound to.
 """
 
 from __future__ import annotations
@@ -60,7 +61,6 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
     if avatar.expression_names:
         mesh["primitives"][0]["targets"] = _targets(file, avatar)
         mesh |= {"weights": [0.0] * len(avatar.expression_names), "extras": {"targetNames": avatar.expression_names}}
-    corners = avatar.faces[g.face]
     rgb = np.clip(g.rgb, 0, 1)
     points = {"primitives": [{
         "mode": POINTS, "attributes": {
@@ -71,15 +71,14 @@ def glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales
             f"{SPLATS}:OPACITY": file.add(g.opacity.astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:SH_DEGREE_0_COEF_0": file.add(((g.rgb - 0.5) / SH0).astype("<f4"), ARRAY_BUFFER),
             "_GSAC_FACE": file.add(g.face.astype("<f4"), ARRAY_BUFFER),
-            **_skin_attributes(file, *_point_skin(avatar, corners)),
         }, "extensions": {SPLATS: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display",
                                    "projection": "perspective", "sortingMethod": "cameraDistance"}}}],
         "name": "gaussians"}
-    nodes += [{"name": "body", "mesh": 0, "skin": 0}, {"name": "gaussians", "mesh": 1, "skin": 0}]
+    nodes += [{"name": "body", "mesh": 0, "skin": 0}, {"name": "gaussians", "mesh": 1}]
     document = {
         "asset": {"version": "2.0", "generator": "gsac", "copyright": "; ".join(avatar.licence.values())},
         "extensionsUsed": [SPLATS], "scene": 0,
-        "scenes": [{"name": "avatar", "nodes": [root, J, J + 1]}], "nodes": nodes, "meshes": [mesh, points],
+        "scenes": [{"name": "avatar", "nodes": [root, J]}, {"name": "gaussians", "nodes": [J + 1]}], "nodes": nodes, "meshes": [mesh, points],
         "skins": [skin],
         "materials": [{"name": "vertex colours",
                        "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.9}}],
@@ -113,16 +112,6 @@ def _skin_attributes(file: _Buffer, index: np.ndarray, weight: np.ndarray) -> di
     weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
     return {"JOINTS_0": file.add(np.where(weight > 0, index, 0).astype("u1"), ARRAY_BUFFER),
             "WEIGHTS_0": file.add(weight, ARRAY_BUFFER)}
-
-
-def _point_skin(avatar: RiggedAvatar, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """corners: (N, 3) vertices of each gaussian's face. Returns index and weight (N, 4): the four largest of their mean weights."""
-    dense = np.zeros((len(corners), len(avatar.joints)))
-    rows = np.arange(len(corners))[:, None]
-    for corner in corners.T:
-        np.add.at(dense, (rows, avatar.skin_index[corner]), avatar.skin_weight[corner])
-    index = np.argsort(-dense, axis=1, kind="stable")[:, :4]
-    return index, np.take_along_axis(dense, index, axis=1)
 
 
 def _targets(file: _Buffer, avatar: RiggedAvatar) -> list[dict[str, int]]:
