@@ -11,6 +11,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from gsac.avatar.artifacts import ArtifactError
+
 AXES = np.float64([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
 FLAT = np.array([(2, 1), (2, 1), (0, 2), (0, 2), (0, 1), (0, 1)])
 """The coordinates that remain when a chart is flattened along each of `AXES`."""
@@ -120,7 +122,7 @@ def _pack(spans: np.ndarray, part: np.ndarray, size: int) -> tuple[float, np.nda
         else:
             low, best = scale, corner
     if best is None:
-        raise ValueError(f"{len(spans)} charts find no room in {size} x {size} texels")
+        raise ArtifactError(f"the mesh falls apart into {len(spans)} pieces, which find no room in {size} x {size} texels")
     out = np.empty_like(spans)
     out[order] = best
     return low, out

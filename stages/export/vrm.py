@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.stages.export.gltf_body import body_document
 from gsac.stages.export.gltf_file import GltfFile
@@ -54,7 +55,9 @@ GLANCE_DEGREES = 30.0
 
 
 def vrm_bytes(avatar: RiggedAvatar, surface: Surface) -> bytes:
-    """The file's bytes; without the clips, for which VRM has files of their own."""
+    """The file's bytes; without the clips, for which VRM has files of their own. ArtifactError where a bone has no joint."""
+    if missing := BONES.keys() - set(avatar.joint_names):
+        raise ArtifactError(f"the avatar has no joint {', '.join(sorted(missing))}, which a VRM file needs")
     file = GltfFile()
     document = body_document(file, replace(avatar, clips={}), surface)
     mesh, joint = len(avatar.joints), avatar.joint_names.index
