@@ -2,6 +2,7 @@
 
 import { GsacError } from "./container.js";
 import { beginFilm, takePicture } from "./film.js";
+import { openKit } from "./kit.js";
 import { keyActions, listenForKeys } from "./keys.js";
 import { MotionError } from "./motion.js";
 import { addMotions, findAvatar, listenForDrops, readFile } from "./motion_files.js";
@@ -31,6 +32,9 @@ export class Controls {
     // The film that is being made.
     /** @type {ReturnType<typeof beginFilm> | null} */
     this.film = null;
+    // The networks of the mirror, once the user has given them.
+    /** @type {import("./mirror.js").Kit | null} */
+    this.kit = null;
     // Drawer -> what makes it show the viewer's state.
     /** @type {Object<string, () => void>} */
     this.drawers = { joints: () => {}, faces: () => {} };
@@ -53,6 +57,9 @@ export class Controls {
     this.onClick("open", () => find("file").click());
     this.onClick("picture", () => this.savePicture());
     this.onClick("film", () => this.saveFilm());
+    this.onClick("mirror", () => this.mirror());
+    find("choose-kit").addEventListener("click", () => find("kit-files").click());
+    find("kit-files").addEventListener("change", () => this.takeKit([...find("kit-files").files]));
     find("background").addEventListener("input", () => { viewer.background = find("background").value; });
     find("time").addEventListener("input", () => viewer.seek(Number(find("time").value) * viewer.length));
     find("file").addEventListener("change", async () => {
@@ -169,6 +176,35 @@ export class Controls {
     return `${this.name} ${playing.clip ?? `${playing.pose}-pose`}`;
   }
 
+  // Begins the mirror or ends it; before the first time the user is asked for its networks.
+  async mirror() {
+    const { person } = this;
+    if (!this.kit) {
+      find("kit").showModal();
+      return;
+    }
+    try {
+      await person.mirror(person.reflection ? null : this.kit);
+    } catch (error) {
+      this.note(`No mirror: ${error.message}`);
+    }
+    this.show();
+  }
+
+  // Takes the networks of the mirror from the user, and begins it.
+  async takeKit(files) {
+    find("kit-files").value = "";
+    find("kit").close();
+    this.note("Mirror: opening the networks…");
+    try {
+      this.kit = await openKit(files);
+      await this.mirror();
+    } catch (error) {
+      if (!(error instanceof MotionError)) throw error;
+      this.note(error.message);
+    }
+  }
+
   // Offers what is seen as a PNG file.
   async savePicture() {
     const name = `${this.title}.png`;
@@ -237,6 +273,7 @@ export class Controls {
     for (const button of find("poses").querySelectorAll("button")) {
       button.setAttribute("aria-pressed", String(button.dataset.pose === playing.pose && button.dataset.clip === playing.clip));
     }
+    find("mirror").setAttribute("aria-pressed", String(this.person.reflection !== null));
     find("film").setAttribute("aria-pressed", String(this.film !== null));
     find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
     find("light").setAttribute("aria-pressed", String(viewer.levels.lit));

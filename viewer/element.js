@@ -6,6 +6,7 @@ import { beginFilm, takePicture } from "./film.js";
 import { keyActions, listenForKeys } from "./keys.js";
 import { pickJoint } from "./limb.js";
 import { MARKUP } from "./markup.js";
+import { Mirror } from "./mirror.js";
 import { readAvatar } from "./reader.js";
 import { describeView } from "./share.js";
 import { Viewer } from "./viewer.js";
@@ -34,6 +35,9 @@ export class GsacAvatar extends Element {
     // What fills the screen.
     /** @type {HTMLElement} */
     this.screen = this;
+    // The user's mirror, while there is one.
+    /** @type {Mirror | null} */
+    this.reflection = null;
     // Counts what was opened: only the last is shown.
     this.calls = 0;
     this.watch = new IntersectionObserver((seen) => { this.viewer.hidden = !seen.at(-1).isIntersecting; });
@@ -89,6 +93,7 @@ export class GsacAvatar extends Element {
 
   disconnectedCallback() {
     this.watch.disconnect();
+    this.mirror(null);
     this.viewer.stop();
     // An element that is only moved comes back at once.
     queueMicrotask(() => this.isConnected || this.viewer.dispose());
@@ -131,6 +136,7 @@ export class GsacAvatar extends Element {
    */
   async open(bytes, options = readOptions(this.given)) {
     const call = ++this.calls, avatar = readAvatar(bytes);
+    await this.mirror(null);
     await this.viewer.show(avatar, options.draw);
     if (call !== this.calls) return;
     this.file = bytes;
@@ -160,6 +166,7 @@ export class GsacAvatar extends Element {
   // Shows in the bar what is so, and tells the page.
   changed() {
     const { viewer } = this, { playing } = viewer, moves = viewer.length > 0;
+    if (!viewer.avatar) return;
     this.inside("toggle").textContent = (moves ? viewer.paused : !viewer.turntable) ? "Play" : "Pause";
     this.inside("motion").value = playing.clip ?? playing.pose;
     this.inside("time").disabled = !moves;
@@ -281,6 +288,17 @@ export class GsacAvatar extends Element {
     const film = beginFilm(this.viewer);
     setTimeout(film.stop, seconds * 1000);
     return film.done;
+  }
+
+  /**
+   * The avatar does what the user does before the camera, as in a mirror, until it is called with null.
+   * @param {import("./mirror.js").Kit | null} kit
+   */
+  async mirror(kit) {
+    this.reflection?.end();
+    this.reflection = null;
+    if (kit) this.reflection = await Mirror.start(this.viewer, kit);
+    this.changed();
   }
 
   // Fills the screen with the element, or goes back.

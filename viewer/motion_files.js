@@ -55,7 +55,7 @@ export async function addMotions(avatar, files) {
     if (files.some((file) => SPLATS.includes(kindOf(file)))) {
       throw new MotionError(`${names}: gaussians without a body, which a splat viewer shows; drop the avatar itself, its .gsac`);
     }
-    throw new MotionError(`${names}: an avatar is read from .gsac, a motion from .bvh, .fbx, .glb, .gltf and .vrma`);
+    throw new MotionError(`${names}: a motion is read from .bvh, .fbx, .glb, .gltf and .vrma, an avatar from .gsac`);
   }
   const size = files.reduce((sum, file) => sum + file.size, 0);
   if (size > MOST_BYTES) throw new MotionError(`${files[0].name}: it has ${size} bytes; at most ${MOST_BYTES} are read`);

@@ -168,7 +168,7 @@ export class Viewer {
 
   // Of the clip that plays, s; 0 for a pose.
   get length() {
-    const clip = this.avatar.clips[this.playing.clip];
+    const clip = this.avatar?.clips[this.playing.clip];
     return clip ? (clip.loop ? clip.keys : clip.keys - 1) / clip.fps : 0;
   }
 
