@@ -36,13 +36,14 @@ export async function openKit(files) {
   const address = (pattern, type) => URL.createObjectURL(new Blob([find(pattern)], { type }));
   const vision = await importModule(address(KIT_PARTS.bundle[0], "text/javascript"));
   const loader = address(KIT_PARTS.loader[0], "text/javascript"), binary = address(KIT_PARTS.binary[0], "application/wasm");
-  const set = { wasmLoaderPath: loader, wasmBinaryPath: binary };
+  // The loader takes an address only if it ends in the file's name.
+  const set = { wasmLoaderPath: loader, wasmBinaryPath: `${binary}#/${KIT_PARTS.binary[1]}` };
   const make = async (kind, pattern, more) => {
     const model = find(pattern);
     if (!model) return null;
     const baseOptions = { modelAssetBuffer: new Uint8Array(await model.arrayBuffer()) };
     return kind.createFromOptions(set, { baseOptions, runningMode: "VIDEO", ...more }).catch((error) => {
-      throw new MotionError(`Mirror: a network cannot be read (${error.message})`);
+      throw new MotionError(`Mirror: a network cannot be read (${error.message.split("\n")[0]})`);
     });
   };
   const actions = { outputFaceBlendshapes: true, outputFacialTransformationMatrixes: true };

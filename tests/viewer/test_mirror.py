@@ -21,6 +21,7 @@ CAMERA = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"
 BUNDLE = """
 const kind = (answer) => class {
   static async createFromOptions(set, options) {
+    if (!set.wasmBinaryPath.endsWith("/vision_wasm_internal.wasm")) throw new Error("MediaPipe's loader asks for the name");
     const loaded = await Promise.all([fetch(set.wasmLoaderPath), fetch(set.wasmBinaryPath)]);
     window.asked = [...(window.asked ?? []), [...await Promise.all(loaded.map((it) => it.text())),
       new TextDecoder().decode(options.baseOptions.modelAssetBuffer), options.runningMode]];
