@@ -73,9 +73,9 @@ class Results:
             if over or not self.bucket.has(last):
                 for number, part in enumerate(pack_parts(path, digest)):
                     self._put(part_name(digest, number), part, over)
-        self._put(name, record.to_json().encode(), over)
+        new = self._put(name, record.to_json().encode(), over)
         self.wrong.discard(record.key)
-        return Pushed.NEW
+        return Pushed.NEW if new else Pushed.THERE
 
     def keys(self) -> Iterator[tuple[str, str]]:
         """Stage and key of every record there."""
@@ -109,11 +109,12 @@ class Results:
             yield part.data
             number += 1
 
-    def _put(self, name: str, data: bytes, over: bool) -> None:
-        if over:
-            self.bucket.put(name, data)
-        else:
-            self.bucket.put_new(name, data)
+    def _put(self, name: str, data: bytes, over: bool) -> bool:
+        """Whether it was put: over one that is there, or where none is."""
+        if not over:
+            return self.bucket.put_new(name, data)
+        self.bucket.put(name, data)
+        return True
 
 
 def record_name(stage: str, key: str) -> str:
