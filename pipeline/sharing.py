@@ -142,7 +142,7 @@ class Sharing:
         try:
             return ask()
         except RemoteError as error:
-            bucket.fails()
+            bucket.fails(error)
             if not bucket.said_failing:
                 bucket.said_failing = True
                 self.reporter.note(f"gsac: warning: {error}; the run goes on without it")
@@ -165,6 +165,6 @@ class Sharing:
                 return
         except (CacheError, OSError) as error:
             if isinstance(error, RemoteError):
-                bucket.fails()
+                bucket.fails(error)
             self._error = self._error or str(error)
         self._missed.append(record.parts.stage)

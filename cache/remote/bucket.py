@@ -23,7 +23,7 @@ from gsac.cache.root import REMOTE
 INSTALL = "pip install 'gsac[s3]'"
 SCHEMES = ("s3", "file")
 CONNECT_S = 5.0
-SMALL_S = 10.0
+SMALL_S = 6.0
 """For the whole answer to a question about a record or a lease; for a part of a pack LARGE_S."""
 LARGE_S = 60.0
 SMALL = 1 << 20
@@ -35,7 +35,11 @@ STAGED = re.compile(r".*#\d+")
 
 
 class RemoteError(CacheError):
-    """The shared store did not do what it was asked; it may later."""
+    """The shared store did not do what it was asked; it may later. silent: it gave no answer at all."""
+
+    def __init__(self, message: str, silent: bool = False) -> None:
+        super().__init__(message)
+        self.silent = silent
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,8 @@ class Bucket:
         self.folder = Path(unquote(parts.path)) if parts.scheme == "file" else None
         self.rests_until = 0.0
         """By the monotonic clock."""
+        self.silent = False
+        """Whether it gave no answer when it failed last."""
         self.said_failing = False
         self._small, self._large = (self._open(seconds) for seconds in (SMALL_S, LARGE_S))
 
@@ -96,13 +102,13 @@ class Bucket:
             raise CacheSetupError(f"{REMOTE}={self.url} cannot be opened with these AWS_* variables "
                                    f"({type(error).__name__})") from None
 
-    def read(self, name: str, limit: int) -> Content | None:
-        """An object of at most `limit` bytes; None where there is none."""
+    def read(self, name: str, limit: int, large: bool = False) -> Content | None:
+        """An object of at most `limit` bytes; None where there is none. large: it may take LARGE_S to come."""
         import obstore
 
         with self._failing(f"read {name}"):
             try:
-                answer = obstore.get(self._store(limit), name)
+                answer = obstore.get(self._large if large else self._small, name)
             except FileNotFoundError:
                 return None
             size = answer.meta["size"]
@@ -199,9 +205,9 @@ class Bucket:
         """Whether it failed a short while ago."""
         return time.monotonic() < self.rests_until
 
-    def fails(self) -> None:
+    def fails(self, error: RemoteError) -> None:
         """Notes that it has just failed."""
-        self.rests_until = time.monotonic() + REST_S
+        self.rests_until, self.silent = time.monotonic() + REST_S, error.silent
 
     def _store(self, size: int) -> Any:
         return self._small if size <= SMALL else self._large
@@ -216,16 +222,18 @@ class Bucket:
         except (PermissionDeniedError, UnauthenticatedError, PermissionError):
             raise RemoteError(f"{self.url} does not allow these credentials to {what}") from None
         except (BaseError, OSError, ValueError, NotImplementedError) as error:
-            raise RemoteError(f"{self.url} failed to {what} ({_reason(str(error))})") from None
+            reason = _reason(str(error))
+            raise RemoteError(f"{self.url} failed to {what} ({reason})", reason == SILENT) from None
 
 
+SILENT = "no connection, or no answer in time"
 REASONS: tuple[tuple[str, Callable[[re.Match], str]], ...] = (
     (r"non-2xx status code: (\d{3})", lambda found: f"HTTP status {found[1]}"),
     (r"No such file|not found", lambda found: "it is not there"),
-    (r"timed out|deadline", lambda found: "no answer in time"),
+    (r"timed out|deadline", lambda found: SILENT),
     (r"request or response body|decoding|unexpected end", lambda found: "the answer was cut"),
     (r"169\.254\.|metadata", lambda found: "no credentials: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"),
-    (r"HTTP error|sending request|connect", lambda found: "no connection, or no answer in time"),
+    (r"HTTP error|sending request|connect", lambda found: SILENT),
 )
 """What the text of an error shows, and our words for it."""
 

@@ -58,7 +58,7 @@ class Claim:
         if self._thread is not None:
             self._thread.join()
         with contextlib.suppress(RemoteError):
-            if not self.bucket.rests and self._is_mine():
+            if not (self.bucket.rests and self.bucket.silent) and self._is_mine():
                 self.bucket.delete([self.name])
 
     def _keep(self) -> None:

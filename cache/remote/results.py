@@ -103,7 +103,7 @@ class Results:
     def _parts(self, digest: str) -> Iterator[bytes]:
         number = 0
         while True:
-            part = self.bucket.read(part_name(digest, number), PART)
+            part = self.bucket.read(part_name(digest, number), PART, large=True)
             if part is None:
                 return
             yield part.data

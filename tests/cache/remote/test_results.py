@@ -16,7 +16,7 @@ from gsac.cache.verify import verify
 from support.s3 import SECRET
 
 
-def test_a_result_comes_to_another_machine_as_it_was_with_the_figures_of_its_run(store, make, parts_of, shared, elsewhere, contents):
+def test_a_result_comes_to_another_machine_as_it_was_with_its_figures(store, make, parts_of, shared, elsewhere, contents):
     record = make(parts_of())
     assert shared().push(store, record) is Pushed.NEW
     other, said = elsewhere()
@@ -158,7 +158,7 @@ def test_a_record_under_another_key_or_of_other_outputs_is_not_believed(store, m
 
 
 @pytest.mark.parametrize("name", ["../../evil", "frames/../../evil"])
-def test_a_hostile_record_and_pack_that_agree_write_nothing_outside_of_the_private_folder(parts_of, shared, elsewhere, server, name):
+def test_a_hostile_record_and_pack_that_agree_write_nothing_outside_of_it(parts_of, shared, elsewhere, server, name):
     parts, text = parts_of(), canonical({name: ["e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855", 0]})
     digest = typed_digest("tree 1", text)
     record = Record(parts.key, parts, {"frames": digest}, RunInfo(), {"frames": Footprint(1, 0, "")})
