@@ -195,7 +195,11 @@ class ClipRun:
                 inputs = self.graph.step(name).deps
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
                 lease.add(parts.key)
-                plan = plans[name] = self._plan(parts, options)
+                plan = self._plan(parts, options)
+                with self._recording_failure(plan, parts.key, runner):
+                    if plan.cached is None and name not in options.force and runner.fetch(parts):
+                        plan = self._plan(parts, options)
+                plans[name] = plan
                 outcome, record = Outcome.CACHED, plan.cached
                 if record is None:
                     if name in required:
