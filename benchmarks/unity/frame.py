@@ -150,14 +150,13 @@ class Crowd:
         gpu.buffers["GsacSplats"] = gpu.buffers["GsacJoined"]
         gpu.put("GsacKeys", np.zeros(sort_steps(self.count)[0], np.uint32))
         sort, order = sort_passes(gpu, programs, frame.base, self.count)
-        self.keys = gpu.buffers["GsacKeys"]
-        gpu.buffers |= {name: alone[name] for name in ("GsacSplats", "GsacKeys")}
+        gpu.buffers |= {"CrowdKeys": gpu.buffers["GsacKeys"]} | {name: alone[name] for name in ("GsacSplats", "GsacKeys")}
         self.passes = [Pass("Join", joins, 2 * (48 + 16) * self.count), *sort]
         self.order = joins + order
 
     def is_sorted(self) -> bool:
         """Whether the last joined frame has each gaussian once, from far to near."""
-        keys = np.frombuffer(self.gpu.device.queue.read_buffer(self.keys), np.uint32)
+        keys = self.gpu.get("CrowdKeys", np.uint32)
         order = keys[:self.count] & ((1 << index_bits(self.count)) - 1)
         depth = -self.gpu.get("GsacJoined").reshape(-1, 12)[order, 2]
         return bool((np.sort(order) == np.arange(self.count)).all() and np.diff(depth).max() < 2e-4)
