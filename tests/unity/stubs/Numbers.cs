@@ -58,7 +58,17 @@ namespace UnityEngine
         public float x, y, z, w;
         public Quaternion(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
         public static Quaternion identity { get { return new Quaternion(0, 0, 0, 1); } }
-        public Vector3 eulerAngles { get { return Vector3.zero; } }
+        public Vector3 eulerAngles
+        {
+            get
+            {
+                Matrix4x4 m = Matrix4x4.TRS(Vector3.zero, this, new Vector3(1, 1, 1));
+                double x = Math.Asin(Math.Min(Math.Max(-m.m12, -1), 1)), y = Math.Atan2(m.m02, m.m22), z = Math.Atan2(m.m10, m.m11);
+                return new Vector3(Positive(x), Positive(y), Positive(z));
+            }
+        }
+        static float Positive(double radians) { return (float)(radians * 180 / Math.PI + (radians < 0 ? 360 : 0)); }
+        public static Quaternion Inverse(Quaternion rotation) { return new Quaternion(-rotation.x, -rotation.y, -rotation.z, rotation.w); }
 
         // Unity turns about z, then x, then y
         public static Quaternion Euler(float x, float y, float z)
@@ -126,6 +136,14 @@ namespace UnityEngine
                 m20 = a.m20 * b.m00 + a.m21 * b.m10 + a.m22 * b.m20, m21 = a.m20 * b.m01 + a.m21 * b.m11 + a.m22 * b.m21,
                 m22 = a.m20 * b.m02 + a.m21 * b.m12 + a.m22 * b.m22, m23 = a.m20 * b.m03 + a.m21 * b.m13 + a.m22 * b.m23 + a.m23,
             };
+        }
+
+        // for the stub of Transform
+        internal Quaternion Turn()
+        {
+            double w = Math.Sqrt(Math.Max(0, 1.0 + m00 + m11 + m22)) / 2, x = Math.Sqrt(Math.Max(0, 1.0 + m00 - m11 - m22)) / 2;
+            double y = Math.Sqrt(Math.Max(0, 1.0 - m00 + m11 - m22)) / 2, z = Math.Sqrt(Math.Max(0, 1.0 - m00 - m11 + m22)) / 2;
+            return new Quaternion((float)(m21 < m12 ? -x : x), (float)(m02 < m20 ? -y : y), (float)(m10 < m01 ? -z : z), (float)w);
         }
 
         // for the stub of Transform: inverse of an affine matrix

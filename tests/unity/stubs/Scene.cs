@@ -11,7 +11,19 @@ namespace UnityEngine
         public string name { get; set; }
         public HideFlags hideFlags { get; set; }
         internal bool Destroyed;
-        public static void Destroy(Object o) { o.Destroyed = true; }
+        public static void Destroy(Object o)
+        {
+            var thing = o as GameObject;
+            if (thing != null) foreach (Transform child in thing.transform.Children) Destroy(child.gameObject);
+            if (thing != null) foreach (Component part in thing.Components) part.Destroyed = true;
+            o.Destroyed = true;
+        }
+        public static void DestroyImmediate(Object o)
+        {
+            var thing = o as GameObject;
+            if (thing != null) thing.transform.SetParent(null, false);
+            Destroy(o);
+        }
         public static bool operator ==(Object a, Object b)
         {
             bool noA = ReferenceEquals(a, null) || a.Destroyed, noB = ReferenceEquals(b, null) || b.Destroyed;
@@ -91,6 +103,7 @@ namespace UnityEngine
         Quaternion turn = Quaternion.identity;
         public Transform parent { get; private set; }
         public int childCount { get { return Children.Count; } }
+        public Transform GetChild(int index) { return Children[index]; }
         public Vector3 localPosition { get { return place; } set { place = value; } }
         public Quaternion localRotation { get { return turn; } set { turn = value; } }
         public Vector3 localScale { get { return scale; } set { scale = value; } }
@@ -101,6 +114,11 @@ namespace UnityEngine
                 Matrix4x4 m = localToWorldMatrix;
                 return new Vector3(m.m03, m.m13, m.m23);
             }
+        }
+        public Quaternion rotation
+        {
+            get { return parent == null ? turn : parent.rotation * turn; }
+            set { turn = parent == null ? value : Quaternion.Inverse(parent.rotation) * value; }
         }
         public Vector3 forward
         {
@@ -122,16 +140,15 @@ namespace UnityEngine
         public Matrix4x4 worldToLocalMatrix { get { return localToWorldMatrix.Inverted(); } }
         public void SetParent(Transform to, bool worldPositionStays)
         {
-            if (worldPositionStays) throw new NotImplementedException();
+            Matrix4x4 there = localToWorldMatrix;
             if (parent != null) parent.Children.Remove(this);
             parent = to;
             if (to != null) to.Children.Add(this);
-        }
-        public int GetSiblingIndex() { return parent == null ? 0 : parent.Children.IndexOf(this); }
-        public void SetSiblingIndex(int index)
-        {
-            parent.Children.Remove(this);
-            parent.Children.Insert(index, this);
+            if (!worldPositionStays) return;
+            // of transforms without scale
+            if (to != null) there = to.worldToLocalMatrix * there;
+            place = new Vector3(there.m03, there.m13, there.m23);
+            turn = there.Turn();
         }
         public void SetPositionAndRotation(Vector3 position, Quaternion rotation)
         {
@@ -148,7 +165,15 @@ namespace UnityEngine
 
     public class TextAsset : Object
     {
-        public byte[] bytes { get; internal set; }
+        internal byte[] Bytes;
+        public byte[] bytes
+        {
+            get
+            {
+                Player.FilesRead++;
+                return Bytes;
+            }
+        }
     }
 
     public sealed class Avatar : Object

@@ -85,14 +85,20 @@ namespace Gsac
             Transl[2] = -(Transl[2] + pelvisZ) - pelvisZ;
         }
 
-        /// <summary>A clip at a time; joints that it does not name do not turn.</summary>
+        /// <summary>A clip at a time, as often as it says; joints that it does not name do not turn.</summary>
         public void Sample(GsacClip clip, float seconds)
+        {
+            Sample(clip, seconds, clip.Loop);
+        }
+
+        /// <summary>A clip at a time; loop: whether it begins anew after its end, else the last key stands.</summary>
+        public void Sample(GsacClip clip, float seconds, bool loop)
         {
             Reset();
             double at = (double)seconds * clip.Fps;
             double step = Math.Floor(at);
             float t = (float)(at - step);
-            int k0 = Key(clip, step), k1 = Key(clip, step + 1), width = clip.Joints.Length * 3;
+            int k0 = Key(clip, step, loop), k1 = Key(clip, step + 1, loop), width = clip.Joints.Length * 3;
             for (int n = 0; n < clip.Joints.Length; n++)
             {
                 int o = clip.Joints[n] * 4, i = k0 * width + n * 3, j = k1 * width + n * 3;
@@ -104,9 +110,15 @@ namespace Gsac
             for (int i = 0; i < 3; i++) Transl[i] = clip.Transl[k0 * 3 + i] * (1 - t) + clip.Transl[k1 * 3 + i] * t;
         }
 
-        static int Key(GsacClip clip, double step)
+        /// <summary>s: until a clip is at its last key, or where it loops until it begins anew.</summary>
+        public static float Length(GsacClip clip, bool loop)
         {
-            if (!clip.Loop) return (int)Math.Min(Math.Max(step, 0), clip.Keys - 1);
+            return (loop ? clip.Keys : clip.Keys - 1) / clip.Fps;
+        }
+
+        static int Key(GsacClip clip, double step, bool loop)
+        {
+            if (!loop) return (int)Math.Min(Math.Max(step, 0), clip.Keys - 1);
             double turns = Math.Floor(step / clip.Keys);
             return (int)Math.Min(Math.Max(step - turns * clip.Keys, 0), clip.Keys - 1);
         }
@@ -119,12 +131,23 @@ namespace Gsac
             for (int i = 0; i < 3; i++) Transl[i] = other.Transl[i] * (1 - t) + Transl[i] * t;
         }
 
-        /// <summary>A part of the way to another pose: exponential smoothing with a time constant, the same at every frame rate.</summary>
-        public void Approach(GsacPose goal, float seconds, float timeConstant)
+        /// <summary>What is left of a way after some time: exponential smoothing, the same at every frame rate.</summary>
+        public static float Stay(float seconds, float timeConstant)
         {
-            float stay = timeConstant > 0 ? (float)Math.Exp(-seconds / timeConstant) : 0;
+            return timeConstant > 0 ? (float)Math.Exp(-seconds / timeConstant) : 0;
+        }
+
+        /// <summary>A joint goes to its turn in another pose; stay: the part of the way that is left.</summary>
+        public void Approach(GsacPose goal, int joint, float stay)
+        {
             float[] r = goal.Rotation;
-            for (int o = 0; o < Rotation.Length; o += 4) Mix(Rotation, o, r[o], r[o + 1], r[o + 2], r[o + 3], stay);
+            int o = joint * 4;
+            Mix(Rotation, o, r[o], r[o + 1], r[o + 2], r[o + 3], stay);
+        }
+
+        /// <summary>As Approach, of the shift of the whole.</summary>
+        public void ApproachTransl(GsacPose goal, float stay)
+        {
             for (int i = 0; i < 3; i++) Transl[i] = goal.Transl[i] + (Transl[i] - goal.Transl[i]) * stay;
         }
 

@@ -1,0 +1,47 @@
+using System;
+using UnityEngine;
+
+namespace Gsac
+{
+    /// <summary>
+    /// Expression weights where they stand: on the blend shapes of the body's mesh. So whatever moves blend shapes moves the face:
+    /// Timeline, Animators, face trackers; and the scene saves them.
+    /// </summary>
+    public sealed class GsacShapes
+    {
+        const float Whole = 100; // Unity's weight of a whole shape
+
+        readonly SkinnedMeshRenderer body;
+        readonly int[] shapes;
+
+        /// <summary>body: null where there is none; then every weight is 0.</summary>
+        public GsacShapes(SkinnedMeshRenderer body, string[] expressions)
+        {
+            this.body = body;
+            shapes = new int[expressions.Length];
+            for (int e = 0; e < shapes.Length; e++)
+            {
+                shapes[e] = body == null || body.sharedMesh == null ? -1 : body.sharedMesh.GetBlendShapeIndex(expressions[e]);
+            }
+        }
+
+        public int Count { get { return shapes.Length; } }
+
+        /// <summary>0..1: the weight of an expression.</summary>
+        public float this[int expression]
+        {
+            get { return body == null || shapes[expression] < 0 ? 0 : body.GetBlendShapeWeight(shapes[expression]) / Whole; }
+            set { if (body != null && shapes[expression] >= 0) body.SetBlendShapeWeight(shapes[expression], value * Whole); }
+        }
+
+        public void Read(float[] weights)
+        {
+            for (int e = 0; e < weights.Length; e++) weights[e] = this[e];
+        }
+
+        public void Clear()
+        {
+            for (int e = 0; e < shapes.Length; e++) this[e] = 0;
+        }
+    }
+}
