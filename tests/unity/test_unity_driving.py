@@ -187,6 +187,16 @@ def test_the_clips_of_the_file_become_humanoid_animation_clips(play, mono, files
         assert ((q[1:] * q[:-1]).sum(1) > 0).all(), "the turn's sign does not flip from key to key"
 
 
+def test_hands_and_feet_reach_places_and_bend_as_people_do(play, files):
+    got = told(play("reach", files / "figure.gsac"))
+    for end, side in (("LeftHand", -1), ("RightHand", -1), ("LeftFoot", 1), ("RightFoot", 1)):
+        off, stretched, shrunk, bent = got[f"{end} True"]
+        assert off < 1e-3 and stretched < 1e-3 and shrunk < 1e-4 and bent == side, end
+    np.testing.assert_allclose(got["goal"], [0, 1], atol=1e-3)
+    assert got["free"] == pytest.approx(60, abs=.01), "the Animator's again"
+    np.testing.assert_allclose(got["handles"], [4, 0, 0], atol=1e-3)
+
+
 def depth_first(parents):
     """Joints in the order in which they hang: each before its children, these one after the other."""
     order, waiting = [], [0]

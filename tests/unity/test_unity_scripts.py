@@ -21,6 +21,7 @@ ONCE = {
     "GsacRenderer.Prepare": "a model's first frame", "GsacRenderer.Complain": "an error",
     "GsacRenderer.Grow": "more cameras than ever",
     "GsacRenderer.NewView": "a camera's first frame", "GsacView.Resize": "another file", "GsacPoseStream.Prepare": "another file",
+    "GsacReach.Prepare": "another file",
     "GsacBenchmark.Finish": "the end"}
 """What a frame may call and most frames do not: why."""
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
@@ -67,7 +68,7 @@ def test_the_compiled_code_of_a_frame_makes_no_object(play):
     lines = [line.split(" ", 1) for line in play("allocations", *ONCE).splitlines()]
     assert {name for kind, name in lines if kind == "frame"} == {
         "GsacAvatar.LateUpdate", "GsacRenderer.LateUpdate", "GsacPoseStream.LateUpdate", "GsacPoseStream.Listen",
-        "GsacBenchmark.Update", "GsacDemo.LateUpdate"}
+        "GsacBenchmark.Update", "GsacDemo.LateUpdate", "GsacReach.LateUpdate"}
     assert {name for kind, name in lines if kind == "once"} == ONCE.keys()
     assert [name for kind, name in lines if kind == "makes"] == []
     assert int(lines[-1][1]) > 80, "methods walked"

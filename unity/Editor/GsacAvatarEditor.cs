@@ -5,7 +5,10 @@ using UnityEngine;
 
 namespace Gsac
 {
-    /// <summary>Inspector with a pose controller: clips, still poses, each joint, each expression; of several avatars at once too.</summary>
+    /// <summary>
+    /// Inspector with a pose controller: clips, still poses, each joint, each expression, of several avatars at once too; and handles
+    /// in the scene view that take hands and feet along.
+    /// </summary>
     [CustomEditor(typeof(GsacAvatar))]
     [CanEditMultipleObjects]
     public sealed class GsacAvatarEditor : Editor
@@ -15,6 +18,7 @@ namespace Gsac
         int joint = 1;
         int expression;
         Vector3 degrees;
+        bool handles = true;
 
         public override void OnInspectorGUI()
         {
@@ -28,11 +32,26 @@ namespace Gsac
                 EditorGUILayout.Space();
                 Poses(avatar);
                 Joint(avatar);
+                handles = EditorGUILayout.Toggle("Handles at hands and feet", handles);
                 Expression(avatar);
             }
             catch (GsacException e)
             {
                 EditorGUILayout.HelpBox(e.Message, MessageType.Error);
+            }
+        }
+
+        public void OnSceneGUI()
+        {
+            var avatar = (GsacAvatar)target;
+            if (!handles || !avatar.CanOpen || !avatar.IsOpen) return;
+            foreach (GsacEnd end in GsacLimb.Ends)
+            {
+                GsacLimb limb = GsacLimb.Find(avatar.Data, avatar.Joints, end);
+                if (limb == null) continue;
+                EditorGUI.BeginChangeCheck();
+                Vector3 place = Handles.PositionHandle(limb.Tip.position, Quaternion.identity);
+                if (EditorGUI.EndChangeCheck()) Change(avatar, () => avatar.Reach(end, place));
             }
         }
 

@@ -31,7 +31,8 @@ namespace Gsac
             Avatar humanoid = GsacHumanoid.Build(data, root.name);
             Mesh mesh = GsacMesh.Build(data);
             GsacMesh.Attach(mesh, new GsacExtent(data), root.transform, joints);
-            if (!humanoid.isValid || !humanoid.isHuman)
+            bool human = humanoid.isValid && humanoid.isHuman;
+            if (!human)
             {
                 context.LogImportWarning(context.assetPath + ": Unity takes the skeleton not as Humanoid; scripted poses work, Humanoid clips do not");
             }
@@ -46,7 +47,7 @@ namespace Gsac
             context.AddObjectToAsset("humanoid", humanoid);
             foreach (GsacClip clip in data.Clips.Values)
             {
-                if (humanoid.isHuman) context.AddObjectToAsset("clip " + clip.Name, GsacHumanClip.Build(data, clip, humanoid, root.transform, joints));
+                if (human) context.AddObjectToAsset("clip " + clip.Name, GsacHumanClip.Build(data, clip, humanoid, root.transform, joints));
             }
             context.SetMainObject(root);
         }

@@ -324,6 +324,17 @@ namespace Gsac
             Pose.Rotation[j + 3] = local.w;
         }
 
+        /// <summary>Brings a hand or foot to a place in the world, or as near as the limb is long.</summary>
+        public void Reach(GsacEnd end, Vector3 place)
+        {
+            Source = GsacSource.Script;
+            GsacLimb limb = GsacLimb.Find(Data, joints, end);
+            if (limb == null) throw Unknown("limb", end.ToString());
+            GsacSkeleton.Apply(target, model.Data, joints);
+            limb.Reach(place);
+            GsacSkeleton.Read(target, model.Data, joints);
+        }
+
         int JointIndex(string joint)
         {
             int j = Data.Joint(joint);

@@ -36,7 +36,11 @@ namespace Gsac
 
         public void Read(float[] weights)
         {
-            for (int e = 0; e < weights.Length; e++) weights[e] = this[e];
+            bool there = body != null;
+            for (int e = 0; e < weights.Length; e++)
+            {
+                weights[e] = there && shapes[e] >= 0 ? body.GetBlendShapeWeight(shapes[e]) / Whole : 0;
+            }
         }
 
         public void Clear()

@@ -26,6 +26,7 @@ public static class Drive
             case "saved": Saved(args[1]); break;
             case "body": Body(args[1], args[2], args[3]); break;
             case "clips": Clips(args[1], args[2]); break;
+            case "reach": Reach(args[1]); break;
             default: return 2;
         }
         return 0;
@@ -341,6 +342,75 @@ public static class Drive
         Player.Call(avatar, "OnDisable");
         bool freed = mesh == null;
         Say("on again " + freed + " " + (avatar.Body.sharedMesh != null), avatar.Weights[Array.IndexOf(avatar.Data.Expressions, "jawOpen")]);
+    }
+
+    /// <summary>Hands and feet brought to places by script, by objects over an Animator and by the scene view's handles.</summary>
+    static void Reach(string file)
+    {
+        GsacAvatar avatar = Imported(file);
+        avatar.transform.SetPositionAndRotation(new Vector3(3, 0.5f, -2), Quaternion.Euler(0, 70, 0));
+        var random = new System.Random(5);
+        Func<float> one = () => (float)random.NextDouble() * 2 - 1;
+        foreach (GsacEnd end in GsacLimb.Ends)
+        {
+            GsacLimb limb = GsacLimb.Find(avatar.Data, avatar.Joints, end);
+            float length = Vector3.Distance(limb.Upper.position, limb.Middle.position) + Vector3.Distance(limb.Middle.position, limb.Tip.position);
+            double off = 0, stretched = 0, shrunk = 0;
+            for (int i = 0; i < 200; i++)
+            {
+                var to = new Vector3(one(), one(), one());
+                float share = 0.25f + 0.7f * (float)random.NextDouble();
+                Vector3 place = limb.Upper.position + to * (share * length / to.magnitude);
+                avatar.Reach(end, place);
+                off = Math.Max(off, Vector3.Distance(limb.Tip.position, place));
+                avatar.Reach(end, limb.Upper.position + to * (3 * length / to.magnitude));
+                stretched = Math.Max(stretched, length - Vector3.Distance(limb.Upper.position, limb.Tip.position));
+                shrunk = Math.Max(shrunk, Math.Abs(Vector3.Distance(limb.Upper.position, limb.Middle.position)
+                                                   + Vector3.Distance(limb.Middle.position, limb.Tip.position) - length));
+            }
+            avatar.TPose();
+            avatar.Reach(end, limb.Upper.position); // no direction at all
+            bool finite = !float.IsNaN(limb.Tip.position.x);
+            // from straight: elbows go back, knees ahead
+            avatar.TPose();
+            avatar.SkipFade();
+            avatar.Refresh(0);
+            Vector3 straight = limb.Middle.position;
+            avatar.Reach(end, limb.Upper.position + (limb.Tip.position - limb.Upper.position) * 0.8f);
+            Vector3 bent = limb.Middle.position - straight;
+            Vector3 ahead = avatar.transform.localRotation * Vector3.forward;
+            avatar.TPose();
+            Say(end.ToString() + " " + finite, off, stretched / length, shrunk, Vector3.Dot(bent, ahead) > 0.05f ? 1 : Vector3.Dot(bent, ahead) < -0.05f ? -1 : 0);
+        }
+        // over an Animator that holds the shoulder and elbow
+        avatar.Source = GsacSource.Animator;
+        var mecanim = avatar.gameObject.AddComponent<Mecanim>();
+        mecanim.Joints.Add(Joint(avatar, "left_shoulder"));
+        mecanim.Joints.Add(Joint(avatar, "left_elbow"));
+        var reach = avatar.gameObject.AddComponent<GsacReach>();
+        var goal = new GameObject("goal").transform;
+        Transform wrist = Joint(avatar, "left_wrist");
+        reach.SetGoal(GsacEnd.LeftHand, goal);
+        Action frame = Player.Frame(new[] { avatar.gameObject });
+        goal.SetPositionAndRotation(Joint(avatar, "left_shoulder").position + new Vector3(0.1f, -0.2f, 0.15f), Quaternion.Euler(0, 30, 0));
+        reach.Turn = true;
+        for (int i = 0; i < 10; i++) frame();
+        Quaternion q = wrist.rotation, g = goal.rotation;
+        Say("goal", Vector3.Distance(wrist.position, goal.position), Math.Abs(q.x * g.x + q.y * g.y + q.z * g.z + q.w * g.w));
+        reach.SetGoal(GsacEnd.LeftHand, null);
+        frame();
+        Say("free", Degrees(Joint(avatar, "left_elbow")));
+        // a handle dragged in edit mode, and undone
+        avatar.SkipFade();
+        Player.SetPlaying(false);
+        var inspector = new GsacAvatarEditor { target = avatar };
+        Vector3 before = wrist.position, to2 = before + new Vector3(0, -0.05f, 0);
+        Player.Drags[1] = to2;
+        Player.HandlesSeen = 0;
+        inspector.OnSceneGUI();
+        double dragged = Vector3.Distance(wrist.position, to2);
+        UnityEditor.Undo.PerformUndo();
+        Say("handles", Player.HandlesSeen, dragged, Vector3.Distance(wrist.position, before));
     }
 
     static float[] Flat(Vector3[] rows)

@@ -34,6 +34,7 @@ namespace UnityEngine
             return Mathf.Sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
         }
         public float magnitude { get { return Distance(this, zero); } }
+        public static float Dot(Vector3 lhs, Vector3 rhs) { return lhs.x * rhs.x + lhs.y * rhs.y + lhs.z * rhs.z; }
     }
 
     public struct Vector4
@@ -81,6 +82,28 @@ namespace UnityEngine
             double half = degrees * Math.PI / 360;
             float s = (float)Math.Sin(half);
             return new Quaternion(x * s, y * s, z * s, (float)Math.Cos(half));
+        }
+
+        // for the stub of Transform: at length 1, as Unity keeps them
+        internal Quaternion Whole()
+        {
+            float n = 1 / Mathf.Sqrt(x * x + y * y + z * z + w * w);
+            return new Quaternion(x * n, y * n, z * n, w * n);
+        }
+
+        public static Quaternion FromToRotation(Vector3 fromDirection, Vector3 toDirection)
+        {
+            Vector3 a = fromDirection, b = toDirection;
+            double x = (double)a.y * b.z - (double)a.z * b.y, y = (double)a.z * b.x - (double)a.x * b.z, z = (double)a.x * b.y - (double)a.y * b.x;
+            double w = Vector3.Dot(a, b) + (double)a.magnitude * b.magnitude, n = Math.Sqrt(x * x + y * y + z * z + w * w);
+            if (n < 1e-12) return identity;
+            return new Quaternion((float)(x / n), (float)(y / n), (float)(z / n), (float)(w / n));
+        }
+
+        public static Quaternion Slerp(Quaternion a, Quaternion b, float t)
+        {
+            if (t != 1) throw new NotImplementedException();
+            return b;
         }
 
         public static Quaternion operator *(Quaternion a, Quaternion b)

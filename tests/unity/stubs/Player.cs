@@ -16,6 +16,8 @@ namespace UnityEngine
         public static string Typed;
         public static int UpdatesAsked;
         public static int FilesRead;
+        public static int HandlesSeen;
+        public static readonly Dictionary<int, Vector3> Drags = new Dictionary<int, Vector3>();
         public static int Heads; // for the made-up human poses: their turns come with either sign
 
         /// <summary>The objects that an inspector shows at once; null: its own target.</summary>

@@ -118,7 +118,7 @@ namespace UnityEngine
         public Quaternion rotation
         {
             get { return parent == null ? turn : parent.rotation * turn; }
-            set { turn = parent == null ? value : Quaternion.Inverse(parent.rotation) * value; }
+            set { turn = (parent == null ? value : Quaternion.Inverse(parent.rotation) * value).Whole(); }
         }
         public Vector3 forward
         {

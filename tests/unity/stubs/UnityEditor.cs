@@ -42,12 +42,25 @@ namespace UnityEditor
             EditorGUI.Changed |= moved != value;
             return moved;
         }
+        public static bool Toggle(string label, bool value, params GUILayoutOption[] options) { return value; }
         public static void HelpBox(string message, MessageType type) { Player.Labels.Add(type + ": " + message); }
         public static string DelayedTextField(string label, string text, params GUILayoutOption[] options)
         {
             if (Player.Typed == null) return text;
             EditorGUI.Changed |= Player.Typed != text;
             return Player.Typed;
+        }
+    }
+
+    public static class Handles
+    {
+        public static Vector3 PositionHandle(Vector3 position, Quaternion rotation)
+        {
+            Vector3 to;
+            Player.HandlesSeen++;
+            if (!Player.Drags.TryGetValue(Player.HandlesSeen, out to)) return position;
+            EditorGUI.Changed = true;
+            return to;
         }
     }
 
