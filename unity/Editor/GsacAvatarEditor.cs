@@ -64,7 +64,8 @@ namespace Gsac
             {
                 var names = new List<string> { First };
                 names.AddRange(avatar.Data.Clips.Keys);
-                int at = EditorGUILayout.Popup("Clip", string.IsNullOrEmpty(avatar.Clip) ? 0 : names.IndexOf(avatar.Clip), names.ToArray());
+                int at = string.IsNullOrEmpty(avatar.Clip) ? 0 : names.IndexOf(avatar.Clip);
+                at = EditorGUILayout.Popup("Clip", at, names.ToArray());
                 chosen = at > 0 ? names[at] : "";
             }
             else chosen = EditorGUILayout.DelayedTextField("Clip", avatar.Clip);
@@ -142,7 +143,7 @@ namespace Gsac
             if (names.Length == 0) return;
             if (avatar.Body == null)
             {
-                EditorGUILayout.HelpBox("The child `Body` is missing: its blend shapes are the expressions. Take it back from the prefab.",
+                EditorGUILayout.HelpBox("The child `Body` is missing, whose blend shapes are the expressions: take it back from the prefab",
                                         MessageType.Error);
                 return;
             }

@@ -1,3 +1,4 @@
+using System;
 using UnityEditor;
 using UnityEngine;
 
@@ -58,15 +59,9 @@ namespace Gsac
         /// <summary>A muscle's name as clips spell it: fingers with their hand and points, the others as they are called.</summary>
         static string Property(string muscle)
         {
-            foreach (string finger in Fingers)
-            {
-                foreach (string side in new[] { "Left", "Right" })
-                {
-                    string start = side + " " + finger + " ";
-                    if (muscle.StartsWith(start, System.StringComparison.Ordinal)) return side + "Hand." + finger + "." + muscle.Substring(start.Length);
-                }
-            }
-            return muscle;
+            string[] words = muscle.Split(new[] { ' ' }, 3);
+            bool finger = words.Length == 3 && Array.IndexOf(Fingers, words[1]) >= 0;
+            return finger ? words[0] + "Hand." + words[1] + "." + words[2] : muscle;
         }
 
         /// <summary>Straight from key to key.</summary>
@@ -75,7 +70,8 @@ namespace Gsac
             var keys = new Keyframe[values.Length];
             for (int k = 0; k < keys.Length; k++)
             {
-                float before = k > 0 ? (values[k] - values[k - 1]) * fps : 0, after = k + 1 < keys.Length ? (values[k + 1] - values[k]) * fps : 0;
+                float before = k > 0 ? (values[k] - values[k - 1]) * fps : 0;
+                float after = k + 1 < keys.Length ? (values[k + 1] - values[k]) * fps : 0;
                 keys[k] = new Keyframe(k / fps, values[k], before, after);
             }
             return new AnimationCurve(keys);

@@ -47,7 +47,9 @@ namespace Gsac
             context.AddObjectToAsset("humanoid", humanoid);
             foreach (GsacClip clip in data.Clips.Values)
             {
-                if (human) context.AddObjectToAsset("clip " + clip.Name, GsacHumanClip.Build(data, clip, humanoid, root.transform, joints));
+                if (!human) break;
+                AnimationClip made = GsacHumanClip.Build(data, clip, humanoid, root.transform, joints);
+                context.AddObjectToAsset("clip " + clip.Name, made);
             }
             context.SetMainObject(root);
         }

@@ -12,7 +12,7 @@ namespace Gsac
         RightFoot,
     }
 
-    /// <summary>An arm or a leg that reaches for a place: shoulder and elbow, or hip and knee, turn, and no further than they must.</summary>
+    /// <summary>An arm or a leg that reaches for a place: shoulder and elbow, or hip and knee, turn no further than they must.</summary>
     public sealed class GsacLimb
     {
         const float Longest = 0.9995f; // of the limb's length: quite straight it could bend to any side
@@ -41,24 +41,29 @@ namespace Gsac
         /// <summary>Null where the skeleton lacks a joint of it.</summary>
         public static GsacLimb Find(GsacData data, Transform[] joints, GsacEnd end)
         {
-            int upper = data.Joint(Names[(int)end, 0]), middle = data.Joint(Names[(int)end, 1]), tip = data.Joint(Names[(int)end, 2]);
+            int i = (int)end, upper = data.Joint(Names[i, 0]), middle = data.Joint(Names[i, 1]), tip = data.Joint(Names[i, 2]);
             return upper < 0 || middle < 0 || tip < 0 ? null : new GsacLimb(end, joints[upper], joints[middle], joints[tip]);
         }
 
-        /// <summary>Brings the wrist or ankle to a place in the world, or as near as the limb is long. It bends to the side to which it is bent.</summary>
+        /// <summary>
+        /// Brings the wrist or ankle to a place in the world, or as near as the limb is long. It bends to the side to which it is bent.
+        /// </summary>
         public void Reach(Vector3 place)
         {
             Vector3 a = Upper.position, b = Middle.position, c = Tip.position;
             float above = Vector3.Distance(a, b), below = Vector3.Distance(b, c), length = above + below;
             Vector3 way = place - a, was = Unit(c - a, b - a);
-            float far = Mathf.Clamp(way.magnitude, Math.Max(Nearest * length, Math.Abs(above - below) / Longest), Longest * length);
+            float least = Math.Max(Nearest * length, Math.Abs(above - below) / Longest);
+            float far = Mathf.Clamp(way.magnitude, least, Longest * length);
             Vector3 ahead = Unit(way, was);
             Vector3 side = Across(b - a, was) + Across(Upper.rotation * bend, was) * (Hint * length);
-            side = Unit(Across(Quaternion.FromToRotation(was, ahead) * side, ahead), Across(Upper.rotation * new Vector3(0, 1, 0), ahead));
+            side = Across(Quaternion.FromToRotation(was, ahead) * side, ahead);
+            side = Unit(side, Across(Upper.rotation * new Vector3(0, 1, 0), ahead));
             float along = (above * above + far * far - below * below) / (2 * far);
             Vector3 middle = a + ahead * along + side * Mathf.Sqrt(Math.Max(0, above * above - along * along));
             Upper.rotation = Quaternion.FromToRotation(b - a, middle - a) * Upper.rotation;
-            Middle.rotation = Quaternion.FromToRotation(Tip.position - Middle.position, a + ahead * far - Middle.position) * Middle.rotation;
+            b = Middle.position;
+            Middle.rotation = Quaternion.FromToRotation(Tip.position - b, a + ahead * far - b) * Middle.rotation;
         }
 
         /// <summary>The part of a vector that stands on a direction of length 1.</summary>

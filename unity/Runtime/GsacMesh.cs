@@ -5,8 +5,8 @@ using UnityEngine.Rendering;
 namespace Gsac
 {
     /// <summary>
-    /// The body under the gaussians as a skinned Unity mesh with the expressions as blend shapes: their weights move the gaussians too.
-    /// For shadows, colliders and own tools.
+    /// The body under the gaussians as a skinned Unity mesh: for shadows, colliders and own tools. Its blend shapes are the expressions:
+    /// their weights move the gaussians too.
     /// </summary>
     public static class GsacMesh
     {

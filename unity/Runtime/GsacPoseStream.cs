@@ -21,7 +21,8 @@ namespace Gsac
 
         [SerializeField] int port = 9000;
         [SerializeField, Tooltip("Listen to other machines too.")] bool anyAddress = false;
-        [SerializeField, Tooltip("What the stream moves; the rest is left to the Animator, the clip or the script.")] GsacParts parts = GsacParts.All;
+        [SerializeField, Tooltip("What the stream moves; the rest is left to the Animator, the clip or the script.")]
+        GsacParts parts = GsacParts.All;
         [SerializeField, Tooltip("s: time constant of the smoothing; 0 for none.")] float smoothing = 0.06f;
 
         readonly object padlock = new object();
@@ -150,7 +151,10 @@ namespace Gsac
                 if (!ReferenceEquals(data, avatar.Data)) Prepare();
                 float stay = GsacPose.Stay(Time.deltaTime, smoothing);
                 bool body = (parts & GsacParts.Body) != 0, face = (parts & GsacParts.Face) != 0;
-                for (int j = 0; j < joints.Length; j++) Turn(joints[j], j, stay, incoming.HasJoint[j] && (parts & partOf[j]) != 0);
+                for (int j = 0; j < joints.Length; j++)
+                {
+                    Turn(joints[j], j, stay, incoming.HasJoint[j] && (parts & partOf[j]) != 0);
+                }
                 Shift(joints[0], stay, incoming.HasTransl && body);
                 for (int e = 0; e < weights.Count; e++) Weigh(weights, e, stay, incoming.HasWeight[e] && face);
             }

@@ -2,7 +2,7 @@ using UnityEngine;
 
 namespace Gsac
 {
-    /// <summary>Hands and feet go where these objects are, over whatever else moves the person: trackers, handles, things to hold.</summary>
+    /// <summary>Hands and feet go where objects are, over whatever else moves the person: trackers, handles, things to hold.</summary>
     [AddComponentMenu("Gsac/Gsac Reach")]
     [DefaultExecutionOrder(9600)] // after the avatar and its stream, before it is drawn
     [RequireComponent(typeof(GsacAvatar))]
@@ -13,7 +13,8 @@ namespace Gsac
         [SerializeField] Transform leftFoot = null;
         [SerializeField] Transform rightFoot = null;
         [SerializeField, Tooltip("0..1: how far they go.")] float weight = 1;
-        [SerializeField, Tooltip("Wrists and ankles turn as the objects do: without rotation they stand as in the T-pose.")] bool turn = false;
+        [SerializeField, Tooltip("Wrists and ankles turn as the objects do: without rotation they stand as in the T-pose.")]
+        bool turn = false;
 
         readonly GsacLimb[] limbs = new GsacLimb[GsacLimb.Ends.Length];
         readonly Transform[] goals = new Transform[GsacLimb.Ends.Length];

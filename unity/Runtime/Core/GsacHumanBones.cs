@@ -60,7 +60,8 @@ namespace Gsac
                 }
                 foreach (string phalanx in Phalanges)
                 {
-                    if (human[j] != null && human[j].EndsWith(" " + phalanx, System.StringComparison.Ordinal)) parts[j] = GsacParts.Hands;
+                    bool finger = human[j] != null && human[j].EndsWith(" " + phalanx, System.StringComparison.Ordinal);
+                    if (finger) parts[j] = GsacParts.Hands;
                 }
             }
             return parts;
