@@ -194,6 +194,7 @@ def test_hands_and_feet_reach_places_and_bend_as_people_do(play, files):
         assert off < 1e-3 and stretched < 1e-3 and shrunk < 1e-4 and bent == side, end
     np.testing.assert_allclose(got["goal"], [0, 1], atol=1e-3)
     assert got["free"] == pytest.approx(60, abs=.01), "the Animator's again"
+    np.testing.assert_allclose(got["round"], [1, 0, 0], atol=2e-4, err_msg="a way round leaves no twist, and the arm is given back")
     np.testing.assert_allclose(got["handles"], [4, 0, 0], atol=1e-3)
 
 

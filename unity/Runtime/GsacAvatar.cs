@@ -119,7 +119,7 @@ namespace Gsac
         public string Clip
         {
             get { return clip; }
-            set { clip = value; }
+            set { clip = value ?? ""; }
         }
 
         /// <summary>Of clips of the file: 1 as they are, 0 stands, less than 0 plays backwards.</summary>
@@ -324,13 +324,13 @@ namespace Gsac
             Pose.Rotation[j + 3] = local.w;
         }
 
-        /// <summary>Brings a hand or foot to a place in the world, or as near as the limb is long.</summary>
+        /// <summary>Brings a hand or foot from the pose shown to a place in the world, or as near as the limb is long.</summary>
         public void Reach(GsacEnd end, Vector3 place)
         {
-            Source = GsacSource.Script;
             GsacLimb limb = GsacLimb.Find(Data, joints, end);
             if (limb == null) throw Unknown("limb", end.ToString());
-            GsacSkeleton.Apply(target, model.Data, joints);
+            if (source == GsacSource.Script) GsacSkeleton.Apply(target, model.Data, joints);
+            Source = GsacSource.Script;
             limb.Reach(place);
             GsacSkeleton.Read(target, model.Data, joints);
         }

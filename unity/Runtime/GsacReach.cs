@@ -16,7 +16,15 @@ namespace Gsac
         [SerializeField, Tooltip("Wrists and ankles turn as the objects do: without rotation they stand as in the T-pose.")]
         bool turn = false;
 
-        readonly GsacLimb[] limbs = new GsacLimb[GsacLimb.Ends.Length];
+        /// <summary>A limb, how it stood before it was moved, and how it was left.</summary>
+        struct Held
+        {
+            public GsacLimb Limb;
+            public bool Moved;
+            public Quaternion Upper, Middle, Tip, UpperLeft, MiddleLeft, TipLeft;
+        }
+
+        readonly Held[] limbs = new Held[GsacLimb.Ends.Length];
         readonly Transform[] goals = new Transform[GsacLimb.Ends.Length];
         GsacAvatar avatar;
         Transform[] joints;
@@ -47,7 +55,7 @@ namespace Gsac
         void Prepare()
         {
             joints = avatar.Joints;
-            for (int i = 0; i < limbs.Length; i++) limbs[i] = GsacLimb.Find(avatar.Data, joints, GsacLimb.Ends[i]);
+            for (int i = 0; i < limbs.Length; i++) limbs[i] = new Held { Limb = GsacLimb.Find(avatar.Data, joints, GsacLimb.Ends[i]) };
         }
 
         void LateUpdate()
@@ -61,12 +69,41 @@ namespace Gsac
             goals[(int)GsacEnd.RightFoot] = rightFoot;
             for (int i = 0; i < limbs.Length; i++)
             {
-                if (goals[i] == null || limbs[i] == null || weight <= 0) continue;
-                Transform tip = limbs[i].Tip;
-                Vector3 from = tip.position;
-                limbs[i].Reach(from + (goals[i].position - from) * weight);
-                if (turn) tip.rotation = Quaternion.Slerp(tip.rotation, goals[i].rotation, weight);
+                if (limbs[i].Limb == null) continue;
+                GiveBack(ref limbs[i]);
+                if (goals[i] != null && weight > 0) Reach(ref limbs[i], goals[i]);
             }
+        }
+
+        /// <summary>Where nothing else has moved a limb since, it stands again as before: or it would turn on from frame to frame.</summary>
+        static void GiveBack(ref Held held)
+        {
+            GsacLimb limb = held.Limb;
+            if (!held.Moved) return;
+            held.Moved = false;
+            if (Same(limb.Upper.localRotation, held.UpperLeft)) limb.Upper.localRotation = held.Upper;
+            if (Same(limb.Middle.localRotation, held.MiddleLeft)) limb.Middle.localRotation = held.Middle;
+            if (Same(limb.Tip.localRotation, held.TipLeft)) limb.Tip.localRotation = held.Tip;
+        }
+
+        void Reach(ref Held held, Transform goal)
+        {
+            GsacLimb limb = held.Limb;
+            held.Upper = limb.Upper.localRotation;
+            held.Middle = limb.Middle.localRotation;
+            held.Tip = limb.Tip.localRotation;
+            Vector3 from = limb.Tip.position;
+            limb.Reach(from + (goal.position - from) * weight);
+            if (turn) limb.Tip.rotation = Quaternion.Slerp(limb.Tip.rotation, goal.rotation, weight);
+            held.UpperLeft = limb.Upper.localRotation;
+            held.MiddleLeft = limb.Middle.localRotation;
+            held.TipLeft = limb.Tip.localRotation;
+            held.Moved = true;
+        }
+
+        static bool Same(Quaternion a, Quaternion b)
+        {
+            return a.x == b.x && a.y == b.y && a.z == b.z && a.w == b.w;
         }
     }
 }

@@ -400,11 +400,29 @@ public static class Drive
         reach.SetGoal(GsacEnd.LeftHand, null);
         frame();
         Say("free", Degrees(Joint(avatar, "left_elbow")));
+        // no Animator's clip, nothing else: the hand goes round and comes back
+        mecanim.Joints.Clear();
+        Transform shoulder = Joint(avatar, "left_shoulder");
+        shoulder.localRotation = Joint(avatar, "left_elbow").localRotation = Quaternion.identity;
+        reach.SetGoal(GsacEnd.LeftHand, goal);
+        reach.Turn = false;
+        var first = new Quaternion();
+        for (int i = 0; i <= 400; i++)
+        {
+            double angle = i * Math.PI / 100;
+            goal.SetPositionAndRotation(shoulder.position + new Vector3(0.25f * (float)Math.Cos(angle), 0.25f * (float)Math.Sin(angle), 0.2f), Quaternion.identity);
+            frame();
+            if (i == 0) first = shoulder.localRotation;
+        }
+        Quaternion last = shoulder.localRotation;
+        reach.SetGoal(GsacEnd.LeftHand, null);
+        frame();
+        Say("round", Math.Abs(first.x * last.x + first.y * last.y + first.z * last.z + first.w * last.w), Degrees(shoulder), Degrees(Joint(avatar, "left_elbow")));
         // a handle dragged in edit mode, and undone
         avatar.SkipFade();
         Player.SetPlaying(false);
         var inspector = new GsacAvatarEditor { target = avatar };
-        Vector3 before = wrist.position, to2 = before + new Vector3(0, -0.05f, 0);
+        Vector3 before = wrist.position, to2 = shoulder.position + (before - shoulder.position) * 0.8f;
         Player.Drags[1] = to2;
         Player.HandlesSeen = 0;
         inspector.OnSceneGUI();
