@@ -45,6 +45,11 @@ def test_a_stream_of_the_face_alone_leaves_body_and_animator_as_they_are(streame
     assert abs(got[5] - .5) < 1e-3
 
 
+def test_a_stream_begins_where_the_joint_stands(streamed):
+    apart = Rotation.from_rotvec([0, 0, np.pi / 3]).inv() * Rotation.from_rotvec([0, 1.5, 0])
+    assert 5 < streamed["began"] < .35 * np.degrees(apart.magnitude())
+
+
 @pytest.mark.parametrize("parts, moved, x", [("Hands", {2}, 0), ("Face", {3}, 0), ("Body", {1}, 1), ("All", {1, 2, 3}, 1),
                                              ("Face+Hands", {2, 3}, 1)])
 def test_a_stream_moves_the_chosen_parts_over_an_animator_and_gives_the_others_back(streamed, parts, moved, x):

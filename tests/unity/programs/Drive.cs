@@ -105,6 +105,15 @@ public static class Drive
             stream.Parts = parts;
             tell(parts.ToString().Replace(", ", "+"));
         }
+        stream.Parts = GsacParts.All;
+        Transform knee = Joint(avatar, "left_knee");
+        mecanim.Joints.Add(knee);
+        frame();
+        send("{\"joints\":{\"left_knee\":[0,-1.5,0]}}");
+        Quaternion stood = knee.localRotation;
+        frame();
+        Quaternion began = Quaternion.Inverse(stood) * knee.localRotation;
+        Say("began", 2 * Math.Acos(Math.Min(Math.Abs(began.w), 1)) * 180 / Math.PI);
         Player.Call(stream, "OnDisable");
     }
 
