@@ -155,6 +155,18 @@ def test_a_loaded_person_has_the_body_with_the_expressions_as_blend_shapes(play,
         np.testing.assert_allclose(got[f"shape.{name}"].reshape(-1, 3), moved * (-1, 1, 1), atol=1e-7)
 
 
+def test_the_body_has_the_face_of_the_gaussians_the_jaws_turn_too(play, mono, files, given, tmp_path):
+    play("body", files / "person.gsac", files / "person.txt", tmp_path / "body")
+    avatar, pose, _, weights = given("person")
+    moved = np.zeros_like(avatar.vertices)
+    for e, weight in enumerate(weights):
+        span = slice(avatar.expression_start[e], avatar.expression_start[e + 1])
+        np.add.at(moved, avatar.expression_vertex[span], weight * avatar.expression_delta[span])
+    got = mono.arrays(tmp_path / "body")["moved"].reshape(-1, 3) * (-1, 1, 1)
+    assert abs(got - moved).max() < 1e-5
+    assert abs(avatar.jaw_actions @ pose[22]).max() > .05, "the jaw adds something"
+
+
 def test_the_bodys_bounds_about_its_root_bone_hold_it_in_every_pose(play, mono, files, figure, tmp_path):
     play("body", files / "figure.gsac", files / "figure.txt", tmp_path / "body")
     centre, size = mono.arrays(tmp_path / "body")["bounds"].reshape(2, 3)

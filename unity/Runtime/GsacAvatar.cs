@@ -421,7 +421,9 @@ namespace Gsac
             shapes.Read(DrawnWeights);
             if (jaw < 0) return;
             Quaternion q = joints[jaw].localRotation;
-            GsacPose.AddJaw(model.Data, q.x, q.y, q.z, q.w, DrawnWeights);
+            GsacPose.ToAxisAngle(ref q.x, ref q.y, ref q.z, q.w);
+            GsacPose.AddJaw(model.Data, q.x, q.y, q.z, DrawnWeights);
+            shapes.ShowJaw(q.x, q.y, q.z);
         }
     }
 }

@@ -11,6 +11,10 @@ namespace Gsac
     public static class GsacMesh
     {
         const string Name = "Body";
+        const float Whole = 100;
+
+        /// <summary>Shapes by which the mesh follows the jaw's turn where it has no skin of its own: set by the avatar, a whole one is 1 rad.</summary>
+        public static readonly string[] JawShapes = { "turned jaw x", "turned jaw y", "turned jaw z" };
 
         public static Mesh Build(GsacData data)
         {
@@ -54,12 +58,30 @@ namespace Gsac
             for (int e = 0; e < data.Expressions.Length; e++)
             {
                 Array.Clear(moves, 0, moves.Length);
-                for (int m = data.ExpressionStart[e]; m < data.ExpressionStart[e + 1]; m++)
+                AddMoves(moves, data, e, 1);
+                mesh.AddBlendShapeFrame(data.Expressions[e], Whole, moves, null, null);
+            }
+            for (int axis = 0; axis < JawShapes.Length; axis++)
+            {
+                Array.Clear(moves, 0, moves.Length);
+                bool any = false;
+                for (int e = 0; e < data.Expressions.Length; e++)
                 {
-                    float[] d = data.ExpressionDelta;
-                    moves[data.ExpressionVertex[m]] += new Vector3(d[m * 3], d[m * 3 + 1], d[m * 3 + 2]);
+                    float weight = data.ExpressionJaw[e * 3 + axis];
+                    if (weight == 0) continue;
+                    AddMoves(moves, data, e, weight);
+                    any = true;
                 }
-                mesh.AddBlendShapeFrame(data.Expressions[e], 100, moves, null, null);
+                if (any) mesh.AddBlendShapeFrame(JawShapes[axis], Whole, moves, null, null);
+            }
+        }
+
+        static void AddMoves(Vector3[] moves, GsacData data, int expression, float weight)
+        {
+            float[] d = data.ExpressionDelta;
+            for (int m = data.ExpressionStart[expression]; m < data.ExpressionStart[expression + 1]; m++)
+            {
+                moves[data.ExpressionVertex[m]] += new Vector3(d[m * 3], d[m * 3 + 1], d[m * 3 + 2]) * weight;
             }
         }
 

@@ -13,16 +13,34 @@ namespace Gsac
 
         readonly SkinnedMeshRenderer body;
         readonly int[] shapes;
+        readonly int[] jaw = { -1, -1, -1 };
 
         /// <summary>body: null where there is none; then every weight is 0.</summary>
         public GsacShapes(SkinnedMeshRenderer body, string[] expressions)
         {
             this.body = body;
             shapes = new int[expressions.Length];
-            for (int e = 0; e < shapes.Length; e++)
-            {
-                shapes[e] = body == null || body.sharedMesh == null ? -1 : body.sharedMesh.GetBlendShapeIndex(expressions[e]);
-            }
+            for (int e = 0; e < shapes.Length; e++) shapes[e] = Index(expressions[e]);
+            for (int axis = 0; axis < jaw.Length; axis++) jaw[axis] = Index(GsacMesh.JawShapes[axis]);
+        }
+
+        int Index(string shape)
+        {
+            return body == null || body.sharedMesh == null ? -1 : body.sharedMesh.GetBlendShapeIndex(shape);
+        }
+
+        /// <summary>Has the mesh follow a turn of the jaw, axis-angle, as the gaussians do.</summary>
+        public void ShowJaw(float x, float y, float z)
+        {
+            if (body == null) return;
+            ShowJaw(jaw[0], x * Whole);
+            ShowJaw(jaw[1], y * Whole);
+            ShowJaw(jaw[2], z * Whole);
+        }
+
+        void ShowJaw(int shape, float weight)
+        {
+            if (shape >= 0 && body.GetBlendShapeWeight(shape) != weight) body.SetBlendShapeWeight(shape, weight);
         }
 
         public int Count { get { return shapes.Length; } }

@@ -330,12 +330,21 @@ public static class Drive
     /// <summary>The mesh under a loaded person: shapes, bones, bounds in a pose.</summary>
     static void Body(string file, string numbers, string path)
     {
-        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        GsacAvatar avatar = Play.Posed(file, Play.Numbers(numbers));
         SkinnedMeshRenderer body = avatar.Body;
         Mesh mesh = body.sharedMesh;
+        Player.Frame(new[] { avatar.gameObject })();
+        avatar.CollectWeights();
+        var moved = new Vector3[mesh.vertices.Length];
+        for (int i = 0; i < mesh.blendShapeCount; i++)
+        {
+            Vector3[] shape = Player.Shape(mesh, i);
+            for (int v = 0; v < moved.Length; v++) moved[v] += shape[v] * (body.GetBlendShapeWeight(i) / 100);
+        }
         using (var dump = new Dump(path))
         {
-            for (int i = 0; i < mesh.blendShapeCount; i++) dump.Put("shape." + avatar.Data.Expressions[i], Flat(Player.Shape(mesh, i)));
+            for (int i = 0; i < Math.Min(2, mesh.blendShapeCount); i++) dump.Put("shape." + avatar.Data.Expressions[i], Flat(Player.Shape(mesh, i)));
+            dump.Put("moved", Flat(moved));
             dump.Put("vertices", Flat(mesh.vertices));
             dump.Put("bounds", Flat(new[] { body.localBounds.center, body.localBounds.size }));
         }

@@ -37,7 +37,7 @@ public static class Play
         return 0;
     }
 
-    static float[] Numbers(string path)
+    public static float[] Numbers(string path)
     {
         string[] words = File.ReadAllText(path).Split(new[] { ' ', '\n' }, StringSplitOptions.RemoveEmptyEntries);
         return Array.ConvertAll(words, w => float.Parse(w, CultureInfo.InvariantCulture));
@@ -51,7 +51,7 @@ public static class Play
     }
 
     /// <summary>numbers: 165 of SMPL-X's pose, 3 of transl, the weights.</summary>
-    static GsacAvatar Posed(string file, float[] numbers)
+    public static GsacAvatar Posed(string file, float[] numbers)
     {
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
         avatar.SetSmplx(Part(numbers, 0, 3), Part(numbers, 3, 63), Part(numbers, 75, 45), Part(numbers, 120, 45), Part(numbers, 66, 3),

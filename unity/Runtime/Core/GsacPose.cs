@@ -174,19 +174,24 @@ namespace Gsac
             q[o + 3] = (float)Math.Cos(angle / 2);
         }
 
-        /// <summary>
-        /// Adds to expression weights what a rotation of the jaw stands for; jaw: x y z w, in the data's axes.
-        /// Bodies whose jaw has skin of its own have zeros there.
-        /// </summary>
-        public static void AddJaw(GsacData data, float x, float y, float z, float w, float[] weights)
+        /// <summary>rotation x y z w to axis-angle.</summary>
+        public static void ToAxisAngle(ref float x, ref float y, ref float z, float w)
         {
             double half = Math.Sqrt((double)x * x + (double)y * y + (double)z * z);
             double s = half > 1e-9 ? 2 * Math.Atan2(half, Math.Abs(w)) / half * (w < 0 ? -1 : 1) : 2;
-            for (int e = 0; e < weights.Length; e++)
-            {
-                float[] jaw = data.ExpressionJaw;
-                weights[e] += (float)(s * (jaw[e * 3] * x + jaw[e * 3 + 1] * y + jaw[e * 3 + 2] * z));
-            }
+            x = (float)(s * x);
+            y = (float)(s * y);
+            z = (float)(s * z);
+        }
+
+        /// <summary>
+        /// Adds to expression weights what a turn of the jaw stands for; x, y, z: axis-angle, in the data's axes.
+        /// Bodies whose jaw has skin of its own have zeros there.
+        /// </summary>
+        public static void AddJaw(GsacData data, float x, float y, float z, float[] weights)
+        {
+            float[] jaw = data.ExpressionJaw;
+            for (int e = 0; e < weights.Length; e++) weights[e] += jaw[e * 3] * x + jaw[e * 3 + 1] * y + jaw[e * 3 + 2] * z;
         }
     }
 }
