@@ -44,6 +44,7 @@ namespace Gsac
         GsacShapes shapes;
         int jaw;
         Animator animator;
+        Avatar built; // by this component, not a file's
         byte[] loose;
         GsacPose target;
         GsacPose shown;
@@ -158,6 +159,7 @@ namespace Gsac
             else if (joints != null) GsacSkeleton.Remove(transform, joints);
             Close();
             if (animator != null) animator.avatar = null;
+            FreeBuilt();
             target = null;
             loose = file;
             Take(next);
@@ -205,7 +207,7 @@ namespace Gsac
             }
             animator = GetComponent<Animator>();
             if (animator == null) animator = gameObject.AddComponent<Animator>();
-            if (animator.avatar == null) animator.avatar = GsacHumanoid.Build(data, name);
+            if (animator.avatar == null) animator.avatar = built = GsacHumanoid.Build(data, name);
             found = null;
         }
 
@@ -240,9 +242,20 @@ namespace Gsac
             fault = null;
         }
 
+        void FreeBuilt()
+        {
+            GsacCameras.Free(built);
+            built = null;
+        }
+
         void OnDisable()
         {
             Close();
+        }
+
+        void OnDestroy()
+        {
+            FreeBuilt();
         }
 
         /// <summary>"T" or "A", or another still pose of the file.</summary>

@@ -11,18 +11,33 @@ namespace UnityEngine
         public string name { get; set; }
         public HideFlags hideFlags { get; set; }
         internal bool Destroyed;
+        /// <summary>Materials and Avatars, which stay until somebody destroys them.</summary>
+        internal static readonly List<Object> Made = new List<Object>();
         public static void Destroy(Object o)
         {
-            var thing = o as GameObject;
-            if (thing != null) foreach (Transform child in thing.transform.Children) Destroy(child.gameObject);
-            if (thing != null) foreach (Component part in thing.Components) part.Destroyed = true;
-            o.Destroyed = true;
+            if (!Application.isPlaying) throw new InvalidOperationException("Destroy may not be called from edit mode");
+            End(o);
         }
         public static void DestroyImmediate(Object o)
         {
-            var thing = o as GameObject;
-            if (thing != null) thing.transform.SetParent(null, false);
-            Destroy(o);
+            var holder = o as GameObject;
+            if (holder != null) holder.transform.SetParent(null, false);
+            End(o);
+        }
+        static void End(Object o)
+        {
+            var holder = o as GameObject;
+            if (!ReferenceEquals(holder, null))
+            {
+                foreach (Component c in holder.Components)
+                {
+                    Player.Call(c, "OnDisable");
+                    Player.Call(c, "OnDestroy");
+                    c.Destroyed = true;
+                }
+                foreach (Transform child in holder.transform.Children) End(child.gameObject);
+            }
+            o.Destroyed = true;
         }
         public static bool operator ==(Object a, Object b)
         {
@@ -226,7 +241,9 @@ namespace UnityEngine
     {
         public static Avatar BuildHumanAvatar(GameObject go, HumanDescription humanDescription)
         {
-            return new Avatar { Description = humanDescription };
+            var made = new Avatar { Description = humanDescription };
+            Object.Made.Add(made);
+            return made;
         }
     }
 
@@ -242,6 +259,7 @@ namespace UnityEngine
 
     public static class Time
     {
+        public static int frameCount { get; internal set; }
         public static float deltaTime { get; internal set; } = 1 / 60f;
         public static float unscaledDeltaTime { get { return deltaTime; } }
     }
