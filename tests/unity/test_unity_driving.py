@@ -61,7 +61,7 @@ def test_a_stream_moves_the_chosen_parts_over_an_animator_and_gives_the_others_b
 
 
 def test_props_and_a_second_person_in_the_hand_take_no_joint_over(play, files):
-    assert play("props", files / "figure.gsac").split() == ["taken", "over", "0"]
+    assert play("props", files / "figure.gsac").splitlines() == ["taken over 0", "children 3 True"]
 
 
 def test_another_person_takes_the_place_of_one_and_the_users_things_stay(play, files, figure, tmp_path):

@@ -190,7 +190,7 @@ namespace Gsac
             GsacData data = model.Data;
             joints = GsacSkeleton.Joints(data, transform);
             jaw = data.Joint("jaw");
-            body = GsacMesh.Find(transform);
+            body = GsacMesh.Find(transform, joints);
             if (Application.isPlaying)
             {
                 if (body == null) body = GsacMesh.Attach(model.Body, model.Extent, transform, joints);

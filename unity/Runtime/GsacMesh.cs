@@ -85,11 +85,16 @@ namespace Gsac
             }
         }
 
-        /// <summary>The renderer of the body on a child of `root`; null where there is none.</summary>
-        public static SkinnedMeshRenderer Find(Transform root)
+        /// <summary>The renderer of the body on a child of `root`; null where there is none. What else is called so hangs on other bones.</summary>
+        public static SkinnedMeshRenderer Find(Transform root, Transform[] joints)
         {
-            Transform holder = GsacSkeleton.Child(root, Name);
-            return holder == null ? null : holder.GetComponent<SkinnedMeshRenderer>();
+            for (int i = 0; i < root.childCount; i++)
+            {
+                if (root.GetChild(i).name != Name) continue;
+                var body = root.GetChild(i).GetComponent<SkinnedMeshRenderer>();
+                if (body != null && (body.rootBone == null || body.rootBone == joints[0])) return body;
+            }
+            return null;
         }
 
         /// <summary>A renderer of the mesh on a child of `root`, switched off: give it a material and switch it on where it is wanted.</summary>

@@ -29,7 +29,7 @@ namespace Gsac
         }
 
         /// <summary>The first child of a name; null where there is none.</summary>
-        public static Transform Child(Transform parent, string name)
+        static Transform Child(Transform parent, string name)
         {
             for (int i = 0; i < parent.childCount; i++)
             {

@@ -129,6 +129,14 @@ public static class Drive
         int other = 0;
         for (int j = 0; j < before.Length; j++) other += ReferenceEquals(before[j], avatar.Joints[j]) ? 0 : 1;
         Console.WriteLine("taken over " + other);
+        // the user's own child by the name of ours
+        GsacAvatar loaded = new GameObject("person").AddComponent<GsacAvatar>();
+        new GameObject("Body").transform.SetParent(loaded.transform, false);
+        loaded.Use(File.ReadAllBytes(file));
+        Player.Call(loaded, "OnDisable");
+        bool sound = loaded.IsOpen && loaded.Body.sharedMesh != null;
+        loaded.Use(File.ReadAllBytes(file));
+        Console.WriteLine("children " + loaded.transform.childCount + " " + sound);
     }
 
     /// <summary>Another person in the place of one that carries the user's things; then a broken file, then other joints.</summary>

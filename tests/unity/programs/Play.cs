@@ -182,6 +182,9 @@ public static class Play
         Player.AddCamera("second eye").transform.SetPositionAndRotation(new Vector3(0, 1, 9), Quaternion.Euler(0, 180, 0));
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
+        var reach = avatar.gameObject.AddComponent<GsacReach>();
+        foreach (GsacEnd end in GsacLimb.Ends) reach.SetGoal(end, camera.transform);
+        reach.Turn = true;
         Action frame = Player.Frame(new[] { avatar.gameObject });
         var message = new GsacPoseMessage(avatar.Data);
         var heard = new GsacLivePose(avatar.Data);
