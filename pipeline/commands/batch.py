@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
+from gsac.pipeline.batch_entry import Status
 from gsac.pipeline.batch_plan import BatchPlanner, ClipPlan
-from gsac.pipeline.batch_record import FILE, BatchRecord, Status, read_request
+from gsac.pipeline.batch_record import FILE, BatchRecord, read_request
 from gsac.pipeline.batch_reporter import BatchReporter, open_batch_reporter
 from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.commands.options import (
