@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -112,6 +113,31 @@ def test_uploads_that_fail_are_said_once_and_can_be_pushed_later(server, machine
     assert inside(one, "cache", "push", one.out, "--json", **server.env).json["there"] == pushed.json["pushed"]
     pulled = inside(machine("two"), "cache", "pull", "--json", **server.env)
     assert sorted(pulled.json["pulled"]) == sorted(pushed.json["pushed"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("request_number", [1, 2, 4, 6, 9, 12, 16, 20])
+def test_sigkill_while_a_run_uploads_or_fetches_leaves_nothing_torn_here_nor_there(server, computed, machine, request_number):
+    for name in ("uploads", "fetches"):
+        toy, reached, ends = machine(name), threading.Event(), len(server.asked) + request_number
+
+        def hold(method, name, ends=ends, reached=reached):
+            if len(server.asked) + 1 >= ends:
+                reached.set()
+                server.stopping.wait(0.3)
+
+        server.trouble = hold
+        process = toy.start("run", toy.clip, "--out", toy.out, **server.env)
+        while not reached.wait(0.05) and process.poll() is None:
+            pass
+        process.kill()
+        process.communicate()
+        server.trouble = lambda method, name: None
+        server.objects = {name: there for name, there in server.objects.items() if "/leases/" not in name}  # they would expire
+        assert toy.run(**server.env).code == 0 and toy.result == computed[1]
+        assert toy.gsac("cache", "verify").code == 0
+    third = machine("third")
+    assert third.run(**server.env).code == 0 and third.result == computed[1]
 
 
 def test_two_machines_at_once_compute_each_stage_once_and_get_the_same(server, machine, everything):
