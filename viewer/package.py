@@ -1,5 +1,5 @@
-"""`python -m gsac.viewer.package FOLDER`: writes the npm package `gsac-avatar`, the element and the three.js object on which pages of
-others stand; viewer.html stands on the same modules."""
+"""`python -m gsac.viewer.package FOLDER`: writes the npm package `gsac-avatar`: an element for pages of others and an object for
+three.js, made of the modules of viewer.html."""
 
 from __future__ import annotations
 

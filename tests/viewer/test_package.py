@@ -22,11 +22,14 @@ HOST = """<!doctype html><html lang="en"><head><title>A page of others</title><l
 <script type="module" src="gsac-avatar.js"></script><script type="module">
 const it = document.querySelector("gsac-avatar");
 window.told = [];
-for (const event of ["load", "error", "note", "change", "pick", "end"]) it.addEventListener(event, (e) => told.push([event, e.detail]));
+for (const event of ["load", "error", "note", "change", "pick", "end"]) {
+  it.addEventListener(event, (e) => told.push([event, e.detail]));
+}
 window.it = it;
 window.gsac = it.viewer;
 </script></body></html>"""
-SCENE = """<!doctype html><html lang="en"><head><title>three</title><link rel="icon" href="data:,"><style>body { margin: 0; }</style>
+SCENE = """<!doctype html><html lang="en"><head><title>three</title>
+<link rel="icon" href="data:,"><style>body { margin: 0; }</style>
 <script type="importmap">{"imports": {"three": "./node_modules/three/build/three.module.js"}}</script></head><body>
 <script type="module">
 import * as THREE from "three";
@@ -93,8 +96,8 @@ def show(page, address):
 
 def key(page, name):
     for kind in ("keyDown", "keyUp"):
-        page.call("Input.dispatchKeyEvent", type=kind, key=name, code=name, windowsVirtualKeyCode={"Tab": 9, "ArrowRight": 39}.get(name, 0),
-                  text=name if len(name) == 1 else "")
+        page.call("Input.dispatchKeyEvent", type=kind, key=name, code=name, text=name if len(name) == 1 else "",
+                  windowsVirtualKeyCode={"Tab": 9, "ArrowRight": 39}.get(name, 0))
 
 
 def test_the_package_holds_every_module_that_it_imports_and_bears_the_programs_version():
@@ -131,8 +134,10 @@ def test_in_a_page_of_others_the_person_stands_whole_above_the_bar_and_axe_finds
     picture = page.picture().astype(int)[:height, :width]
     person = (np.abs(picture - (0x30, 0x40, 0x50)).max(-1) > 25)[: height - 50]
     rows, columns = np.flatnonzero(person.any(1)), np.flatnonzero(person.any(0))
-    assert np.ptp(rows) > 0.6 * height and rows.min() > 2 and rows.max() < height - 52 and 5 < columns.min() < columns.max() < width - 5
-    bar = page.run("(({top, left, right, bottom}) => [top, left, right, bottom])(it.shadowRoot.getElementById('bar').getBoundingClientRect())")
+    assert np.ptp(rows) > 0.6 * height and 2 < rows.min() < rows.max() < height - 52
+    assert 5 < columns.min() < columns.max() < width - 5
+    bar = page.run("(({top, left, right, bottom}) => [top, left, right, bottom])"
+                   "(it.shadowRoot.getElementById('bar').getBoundingClientRect())")
     assert bar[0] >= height - 54 and bar[1] >= 0 and bar[2] <= width and bar[3] <= height
     assert axe(page) == [] and page.errors == []
 
@@ -164,7 +169,8 @@ def test_methods_attributes_and_events_do_what_they_say(page, site):
     page.run("it.play('T'), it.express({ jawOpen: 0.5 }), it.turn({ head: [0, 20, 0] })")
     assert page.run("[gsac.playing, gsac.expression, gsac.turned]") == [{"pose": "T"}, {"jawOpen": 0.5}, {"head": [0, 20, 0]}]
     for wrong in ("it.play('dance')", "it.express({ jaw: 1 })", "it.turn({ head: [1] })", "it.look('tail')"):
-        assert "expected" in page.run(f"(() => {{ try {{ {wrong}; }} catch (e) {{ return e.message + ' expected ' + (e instanceof Error); }} }})()")
+        said = page.run(f"(() => {{ try {{ {wrong}; }} catch (error) {{ return error.message; }} }})()")
+        assert said and ("expected" in said or "this avatar has" in said)
     assert "pose=T" in page.run("it.view") and "expression=jawOpen:0.5" in page.run("it.view")
     page.run("it.setAttribute('pose', 'A'), it.removeAttribute('clip'), it.setAttribute('yaw', '40')")
     assert page.run("[gsac.playing, gsac.camera.yaw]") == [{"pose": "A"}, 40]
@@ -229,11 +235,9 @@ def test_threes_scene_shows_what_the_element_shows_and_what_is_nearer_hides_it(f
         page.run(f"show('{wall}')")
         seen[wall] = page.picture().astype(int)
     page.resize(800, 600)
-    import cv2; cv2.imwrite("/tmp/web21/three.png", np.concatenate([want, *seen.values()], 1)[..., ::-1])
     person = np.abs(want - (0xA0, 0xB0, 0xC0)).max(-1) > 30
     assert person.mean() > 0.03
-    error = ((seen["none"][person] - want[person]) ** 2).mean()
-    assert 10 * np.log10(255 ** 2 / error) > 45, "dB"
+    assert np.abs(seen["none"] - want).max() <= 2
     core = np.abs(seen["wall behind"] - (255, 0, 255)).max(-1) > 60
     assert (core & person).sum() > 0.8 * person.sum()
     assert np.abs(seen["wall before"][person] - (255, 0, 255)).max() <= 2

@@ -1,8 +1,8 @@
 // The avatar as an object of three.js: its gaussians in one draw among the other objects, hidden by what is nearer.
 
-import { AddEquation, BufferAttribute, BufferGeometry, CustomBlending, DataTexture, FloatType, GLSL3, Mesh, NearestFilter,
-  OneFactor, OneMinusSrcAlphaFactor, RawShaderMaterial, RedIntegerFormat, RGBAFormat, Sphere, UnsignedIntType, Vector2, Vector3,
-  Vector4 } from "three";
+import { AddEquation, BufferAttribute, BufferGeometry, CustomBlending, DataTexture, DoubleSide, FloatType, GLSL3, Mesh,
+  NearestFilter, OneFactor, OneMinusSrcAlphaFactor, RawShaderMaterial, RedIntegerFormat, RGBAFormat, Sphere, UnsignedIntType,
+  Vector2, Vector3, Vector4 } from "three";
 
 import { Binding } from "./binding.js";
 import { Levels } from "./levels.js";
@@ -32,10 +32,11 @@ export class GsacObject extends Mesh {
     geometry.boundingSphere = new Sphere(new Vector3(0, stature / 2, 0), stature);
     const uniforms = { gaussians: { value: null }, colours: { value: null }, order: { value: null },
       view: { value: [new Vector4(), new Vector4(), new Vector4()] }, size: { value: new Vector2() },
-      focal: { value: new Vector2() }, centre: { value: new Vector2() }, blend: { value: new Vector4(lowPass, alphaMax, alphaMin, Number(keepsEnergy)) },
-      depth: { value: new Vector2() } };
+      focal: { value: new Vector2() }, centre: { value: new Vector2() },
+      blend: { value: new Vector4(lowPass, alphaMax, alphaMin, Number(keepsEnergy)) }, depth: { value: new Vector2() } };
     super(geometry, new RawShaderMaterial({ uniforms, vertexShader: vertex, fragmentShader: fragment, glslVersion: GLSL3,
-      transparent: true, depthWrite: false, premultipliedAlpha: true, blending: CustomBlending, blendEquation: AddEquation,
+      transparent: true, side: DoubleSide, depthWrite: false, premultipliedAlpha: true, blending: CustomBlending,
+      blendEquation: AddEquation,
       blendSrc: OneFactor, blendDst: OneMinusSrcAlphaFactor }));
     this.avatar = avatar;
     this.ground = ground;
@@ -46,7 +47,8 @@ export class GsacObject extends Mesh {
     this.looks = levels.bindings.map((binding, n) => ({
       gaussians: texture(binding.data, Binding.PER_ROW * 3, binding.rows, RGBAFormat, FloatType, "RGBA32F"),
       colours: texture(fillColours(binding), Binding.PER_ROW, binding.rows, RGBAFormat, FloatType, "RGBA32F"),
-      order: texture(levels.sorts[n].order, DepthSort.PER_ROW, levels.sorts[n].rows, RedIntegerFormat, UnsignedIntType, "R32UI") }));
+      order: texture(levels.sorts[n].order, DepthSort.PER_ROW, levels.sorts[n].rows, RedIntegerFormat, UnsignedIntType, "R32UI"),
+    }));
     this.expression = {};
     this.turned = {};
     this.clock = 0;
@@ -106,7 +108,8 @@ export class GsacObject extends Mesh {
   // Sorts for the camera that three draws next.
   onBeforeRender(renderer, scene, camera) {
     const { uniforms, levels, skin, ground } = this;
-    const e = this.modelViewMatrix.multiplyMatrices(camera.matrixWorldInverse, this.matrixWorld).elements, p = camera.projectionMatrix.elements, view = new Float32Array(12);
+    const e = this.modelViewMatrix.multiplyMatrices(camera.matrixWorldInverse, this.matrixWorld).elements;
+    const p = camera.projectionMatrix.elements, view = new Float32Array(12);
     [1, -1, -1].forEach((sign, r) => {
       const [x, y, z, t] = [0, 4, 8, 12].map((c) => sign * e[c + r]);
       view.set([x, y, z, t - y * ground], r * 4);
