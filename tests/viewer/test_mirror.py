@@ -55,7 +55,8 @@ def ask(tmp_path, script):
 def test_left_and_right_of_the_face_are_swapped_and_only_the_avatars_actions_are_taken(tmp_path):
     got = ask(tmp_path, """console.log(JSON.stringify(mirrorFace([{ categoryName: "_neutral", score: 1 },
       { categoryName: "eyeBlinkLeft", score: 0.7 }, { categoryName: "jawOpen", score: 0.2 },
-      { categoryName: "mouthRight", score: 0.4 }, { categoryName: "tongueOut", score: 1 }], ["jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthLeft", "mouthRight"])));""")
+      { categoryName: "mouthRight", score: 0.4 }, { categoryName: "tongueOut", score: 1 }],
+      ["jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthLeft", "mouthRight"])));""")
     assert got == {"eyeBlinkRight": 0.7, "jawOpen": 0.2, "mouthLeft": 0.4}
 
 
