@@ -1,4 +1,4 @@
-"""gsac convert AVATAR FORMAT: the avatar as a file that export does not write: VRM, USDZ or SOG."""
+"""gsac convert AVATAR FORMAT: the avatar as a file that export does not write: VRM, USDZ, SOG or splats in glTF."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ FORMATS = {
     "vrm": "VRM 1.0, a humanoid with expressions for VTuber programs and social worlds",
     "usdz": "for Quick Look on iPhone, iPad and Mac, moving as the first clip does",
     "sog": "gaussians in one pose for PlayCanvas and SuperSplat",
+    "glb": "gaussians in one pose, alone, with KHR_gaussian_splatting",
 }
 """Suffix -> what it is for."""
 
@@ -29,7 +30,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("format", choices=FORMATS, metavar="FORMAT",
                          help="; ".join(f"{name}: {words}" for name, words in FORMATS.items()))
     command.add_argument("--pose", choices=get_args(Pose), default="a",
-                         help="pose of a .sog file: a (arms half down) or t (arms out); default: a")
+                         help="pose of the gaussians: a (arms half down) or t (arms out); default: a")
     command.add_argument("--out", type=Path, metavar="FILE", help="default: <avatar>.<FORMAT>, here")
     add_force(command)
     add_json(command)

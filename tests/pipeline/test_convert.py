@@ -27,7 +27,7 @@ def convert(capsys, *words):
     return code, said.out, said.err
 
 
-@pytest.mark.parametrize(("kind", "begins"), [("vrm", b"glTF"), ("usdz", b"PK"), ("sog", b"PK")])
+@pytest.mark.parametrize(("kind", "begins"), [("vrm", b"glTF"), ("usdz", b"PK"), ("sog", b"PK"), ("glb", b"glTF")])
 def test_an_avatar_becomes_a_file_of_each_format_named_after_its_run(run, tmp_path, monkeypatch, capsys, kind, begins):
     monkeypatch.chdir(tmp_path)
     code, out, _ = convert(capsys, run, kind, "--json")
