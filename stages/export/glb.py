@@ -2,9 +2,9 @@
 
 Mesh: as `gltf_body.py` has it.
 Gaussians: a POINTS primitive in T-pose with KHR_gaussian_splatting (its release candidate: linear scales, opacities after the
-sigmoid), each with the mesh face that it is bound to in `_GSAC_FACE`. No node shows this mesh, the last: PlayCanvas and Blender show
-all scenes of a file, and splats that stand still, for readers ignore a skin on them, would stand in the moving body. A program takes
-them by name, or from the file that has them alone.
+sigmoid), each with the mesh face that it is bound to in `_GSAC_FACE`. No node shows this mesh, the last: PlayCanvas and Blender
+show all scenes of a file, and splats, on which readers ignore a skin, would stand still in the moving body. A program takes them by
+name, or from the file that has them alone.
 """
 
 from __future__ import annotations
