@@ -70,11 +70,11 @@ def test_splat_transform_reads_back_the_gaussians_of_the_ply(splats, sog, node_p
     plyfile = pytest.importorskip("plyfile", reason="needs the package plyfile (pip install plyfile)")
     folder = node_package(SPLAT_TRANSFORM)
     (folder / "avatar.sog").write_bytes(sog)
-    done = subprocess.run(["node", "node_modules/.bin/splat-transform", "avatar.sog", "-w", "back.ply"], cwd=folder,
+    done = subprocess.run(["node", "node_modules/.bin/splat-transform", "avatar.sog", "-w", "sog.ply"], cwd=folder,
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     got, want = (plyfile.PlyData.read(io.BytesIO(raw))["vertex"].data
-                 for raw in ((folder / "back.ply").read_bytes(), ply_bytes(*splats)))
+                 for raw in ((folder / "sog.ply").read_bytes(), ply_bytes(*splats)))
 
     def columns(table, *names):
         return np.stack([table[name] for name in names], 1).astype(float)
