@@ -27,7 +27,7 @@ COMMANDS = {
     "data": "import a data set that you downloaded: frames, masks, cameras, poses and the published split",
     "view": "show an avatar in the browser",
     "render": "make a video of an avatar, moving or from all sides",
-    "convert": "write an avatar as VRM, USDZ or SOG",
+    "convert": "write an avatar as VRM, USDZ, SOG or splats in glTF",
     "report": "write report.html of a run's folder",
     "pack": "make one zip of an avatar with viewer, report and exports, which opens anywhere",
     "lineage": "where an artifact comes from: clip, parameters, code, model files, packages, device, time",
