@@ -58,8 +58,12 @@ SOURCES = (
     "Runtime/Resources/Gsac/Gsac.compute",
     "Runtime/Resources/Gsac/GsacCore.hlsl",
     "Runtime/Resources/Gsac/GsacDraw.hlsl",
+    "Runtime/Resources/Gsac/GsacOwn.hlsl",
+    "Runtime/Resources/Gsac/GsacOwn.shader",
     "Runtime/Resources/Gsac/GsacPass.hlsl",
     "Runtime/Resources/Gsac/GsacSplats.shader",
+    "Runtime/Resources/Gsac/GsacTrained.hlsl",
+    "Runtime/Resources/Gsac/GsacTrained.shader",
 )
 """Files of every package. Whole names, so that the cache sees these files."""
 

@@ -7,6 +7,10 @@
 #define GSAC_WIDE 1.3
 #define GSAC_DARKEST 0.25
 #define GSAC_BRIGHTEST 2.5
+// Display values of what lies behind for which an edge is exact where nobody knows what lies there, and for which its light is.
+#define GSAC_DARK_BEHIND 0.05
+#define GSAC_BRIGHT_BEHIND 0.85
+#define GSAC_USUAL_BEHIND 0.1
 
 // The frame of a face: orthonormal a, n, b, its centre, its size k (0 where it has no area).
 struct GsacFrame
@@ -164,6 +168,33 @@ float3 GsacLinear(float3 c)
     float3 high = pow(max((c + 0.055) / 1.055, 0), 2.4);
     return float3(c.x > 0.04045 ? high.x : c.x / 12.92, c.y > 0.04045 ? high.y : c.y / 12.92,
                   c.z > 0.04045 ? high.z : c.z / 12.92);
+}
+
+float3 GsacDisplay(float3 c)
+{
+    float3 high = 1.055 * pow(max(c, 0), 1 / 2.4) - 0.055;
+    return float3(c.x > 0.0031308 ? high.x : c.x * 12.92, c.y > 0.0031308 ? high.y : c.y * 12.92,
+                  c.z > 0.0031308 ? high.z : c.z * 12.92);
+}
+
+// A picture that was composited in display colours, made ready to be laid over linear ones: emitted light and alpha, premultiplied.
+// trained: display colour, premultiplied, and alpha; behind: linear light of what lies there, where that is known.
+// Of a person over any background the display colour is trained.rgb + (1 - a) background; in linear light that is no "over", so the
+// alpha is that of two backgrounds; the emitted light makes it exact for the background that is there.
+float4 GsacOver(float4 trained, float3 behind, bool known)
+{
+    float left = 1 - trained.a;
+    float3 low = GsacLinear(trained.rgb + left * GSAC_DARK_BEHIND);
+    float3 high = GsacLinear(trained.rgb + left * GSAC_BRIGHT_BEHIND);
+    float span = GsacLinear(GSAC_BRIGHT_BEHIND).x - GsacLinear(GSAC_DARK_BEHIND).x;
+    // green has most of what an eye sees
+    float through = (high.g - low.g) / span;
+    float3 there = max(known ? behind : GsacLinear(GSAC_USUAL_BEHIND), 1e-6);
+    float3 wanted = GsacLinear(trained.rgb + left * GsacDisplay(there));
+    // emitted light is never negative
+    float3 most = wanted / there;
+    through = min(through, min(most.r, min(most.g, most.b)));
+    return float4(max(wanted - through * there, 0), 1 - through);
 }
 
 #endif
