@@ -51,6 +51,7 @@ SOURCES = (
     "Runtime/GsacLoader.cs",
     "Runtime/GsacMesh.cs",
     "Runtime/GsacModel.cs",
+    "Runtime/GsacPicture.cs",
     "Runtime/GsacPoseStream.cs",
     "Runtime/GsacRenderer.cs",
     "Runtime/GsacSkeleton.cs",

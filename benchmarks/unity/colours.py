@@ -104,7 +104,7 @@ class Stage:
         P, screen = projection(camera), [self.size, self.size, 0, 0]
         return {"unity_MatrixV": view, "glstate_matrix_projection": P.T, "_ScreenParams": screen, "_ScaledScreenParams": screen,
                 "_ScreenSize": screen, "_WorldSpaceCameraPos": [0, 0, 0, 0], "GsacEyeView": view,
-                "GsacEyeProjection": projection(camera, flipped=True).T, "GsacEyeScreen": [self.size, self.size, 2, 0],
+                "GsacEyeProjection": projection(camera, flipped=True).T, "GsacEyeScreen": [self.size, self.size, 2, 1],
                 "GsacEyeRect": [-1, -1, 1, 1], "GsacEyeLens": [P[0, 0], P[1, 1], P[0, 2], P[1, 2]],
                 "GsacIndexBits": index_bits(len(g)), **draw_rule(g.low_pass, linear),
                 **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}

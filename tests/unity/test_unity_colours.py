@@ -1,4 +1,4 @@
-"""A project with linear colours shows the trained picture, which was composited in display colours; on a software GPU."""
+"""A project with linear colours shows the trained picture, which was composited in display colours: scripts, and a software GPU."""
 
 from pathlib import Path
 
@@ -57,3 +57,52 @@ def test_what_stands_before_the_person_hides_her_and_what_stands_behind_does_not
     assert abs(seen - BACKGROUND).max() > .2
     np.testing.assert_allclose(hidden, BACKGROUND, atol=1e-3)
     np.testing.assert_array_equal(shown, seen)
+
+
+@pytest.fixture(scope="module")
+def told(play, mono, files, tmp_path_factory):
+    """(situation -> splats drawn to a picture, quads drawn to the scene, pictures, linear colours; what the pictures are drawn with)."""
+    path = tmp_path_factory.mktemp("picture") / "asked"
+    lines = dict(line.split(": ") for line in play("picture", files / "figure.gsac", path).splitlines())
+    return {what: tuple(map(int, words.split())) for what, words in lines.items()}, mono.arrays(path)
+
+
+def test_a_picture_of_the_avatar_alone_is_drawn_for_a_camera_and_two_triangles_lay_it_over_the_scene(told, figure):
+    count = len(figure.gaussians)
+    for lens in ("wide", "flat", "again"):
+        assert told[0][lens] in [(n, 1, 2, 0) for n in (count, *map(len, figure.coarser))]
+    assert told[0]["part of a screen"][:2] == (told[0]["again"][0], 1) and told[0]["copy"] == (0,)
+
+
+def test_a_headset_and_who_wants_it_so_get_the_splats_themselves(told):
+    drawn = told[0]["again"][0]
+    assert told[0]["switched off"][:2] == told[0]["headset"][:2] == (0, drawn)
+    assert told[0]["switched off"][3] == 1
+
+
+def test_pictures_are_kept_while_the_person_comes_nearer_and_freed_with_the_renderer(told):
+    assert told[0]["new pictures in a walk of a metre"][0] < 8
+    assert told[0]["gone"][2] == 0 and told[0]["materials"] == (0,)
+
+
+@pytest.mark.parametrize("lens", ["wide", "tele", "flat"])
+def test_the_picture_holds_the_avatar_pixel_for_pixel_of_the_screen(told, lens):
+    asked = {name.removeprefix(f"{lens}."): array for name, array in told[1].items() if name.startswith(lens)}
+    P, view, crop = (asked[name].reshape(4, 4).astype(float) for name in ("lens", "GsacEyeView", "GsacEyeProjection"))
+    (left, low, right, top), (sx, sy, mx, my) = asked["GsacEyeRect"], asked["GsacEyeLens"]
+    eye = np.c_[told[1]["joints"].reshape(-1, 3), np.ones(55)] @ view.T
+    clip = eye @ P.T
+    place = clip[:, :2] / clip[:, 3:]
+    got = eye @ crop.T
+    wanted = (place - [left, low]) / [right - left, top - low] * 2 - 1
+    np.testing.assert_allclose(got[:, :2] / got[:, 3:], wanted * [1, -1], atol=2e-4)
+    inside = (abs(place) < 1).all(1)
+    assert inside.any() and (abs(wanted[inside]) < 1).all()
+    pixels = (np.array([left, low, right, top]) + 1) / 2 * [1920, 1080, 1920, 1080]
+    np.testing.assert_allclose(pixels, np.round(pixels), atol=1e-2)
+    np.testing.assert_allclose([pixels[2] - pixels[0], pixels[3] - pixels[1]], asked["size"], atol=1e-2)
+    # the shader's corner goes through the camera to where it is on the screen
+    away = asked["GsacEyeScreen"][2]
+    corner = np.array([(left + mx) / sx, (top + my) / sy, -1, 1]) * ([1, 1, away, 1] if lens == "flat" else [away, away, away, 1])
+    back = P @ corner
+    np.testing.assert_allclose(back[:2] / back[3], [left, top], atol=1e-5)

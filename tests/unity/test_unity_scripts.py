@@ -18,7 +18,8 @@ pytestmark = pytest.mark.slow
 MIRROR = np.diag([-1.0, 1, 1])
 ONCE = {
     "GsacAvatar.Open": "a file is read", "GsacAvatar.Unknown": "an error", "GsacRenderer.Prepare": "a model's first frame",
-    "GsacRenderer.Complain": "an error", "GsacCameras.get_Material": "the first draw", "GsacRenderer.NewView": "a camera's first frame", "GsacView.Resize": "another file", "GsacPoseStream.Prepare": "another file",
+    "GsacRenderer.Complain": "an error", "GsacCameras.Make": "the first draw", "GsacPicture.Resize": "an avatar that grows on the screen",
+    "GsacRenderer.NewView": "a camera's first frame", "GsacView.Resize": "another file", "GsacPoseStream.Prepare": "another file",
     "GsacBenchmark.Finish": "the end"}
 """What a frame may call and most frames do not: why."""
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}

@@ -12,7 +12,7 @@ namespace Gsac
     public static class GsacCameras
     {
         static readonly List<GsacRenderer> Renderers = new List<GsacRenderer>();
-        static Material material;
+        static Material material, own, trained;
 
         /// <summary>Whether a camera shows an object of its layers; null: all do. The editor's prefab stages and hidden objects are told by it.</summary>
         public static Func<Camera, GameObject, bool> Shows;
@@ -20,11 +20,29 @@ namespace Gsac
         /// <summary>The splats' material, shared by all avatars that have none of their own.</summary>
         public static Material Material
         {
-            get
-            {
-                if (material == null) material = new Material(Resources.Load<Shader>("Gsac/GsacSplats")) { hideFlags = HideFlags.HideAndDontSave };
-                return material;
-            }
+            get { return Made(ref material, "Gsac/GsacSplats"); }
+        }
+
+        /// <summary>What draws an avatar's own picture, and what lays it over the scene.</summary>
+        internal static Material OwnMaterial
+        {
+            get { return Made(ref own, "Gsac/GsacOwn"); }
+        }
+
+        internal static Material TrainedMaterial
+        {
+            get { return Made(ref trained, "Gsac/GsacTrained"); }
+        }
+
+        static Material Made(ref Material material, string shader)
+        {
+            if (material == null) Make(ref material, shader);
+            return material;
+        }
+
+        static void Make(ref Material material, string shader)
+        {
+            material = new Material(Resources.Load<Shader>(shader)) { hideFlags = HideFlags.HideAndDontSave };
         }
 
         internal static void Add(GsacRenderer renderer)
@@ -43,7 +61,9 @@ namespace Gsac
             Camera.onPreCull -= Draw;
             RenderPipelineManager.beginCameraRendering -= Draw;
             Free(material);
-            material = null;
+            Free(own);
+            Free(trained);
+            material = own = trained = null;
         }
 
         /// <summary>Destroys what was made at run time, or in the editor while nothing plays.</summary>

@@ -42,6 +42,9 @@ namespace Gsac
         [SerializeField, Tooltip("0..1: how far the avatar stands in the light of the room in which its clip was filmed; 0 is even light.")]
         float clipLight = 1;
 
+        [SerializeField, Tooltip("In projects with linear colours: draws the avatar's edges and layers as it was trained, by a picture of its own for each camera but a headset's.")]
+        bool trainedColours = true;
+
         readonly List<GsacView> views = new List<GsacView>();
         GsacAvatar avatar;
         GsacModel model;
@@ -74,6 +77,16 @@ namespace Gsac
         {
             get { return clipLight; }
             set { clipLight = value; }
+        }
+
+        /// <summary>
+        /// Whether a project with linear colours shows the trained picture, at the cost of a picture of the avatar's size for each camera.
+        /// Off, and in a headset, the splats are blended among the scene's linear colours: paler edges, nothing else to pay.
+        /// </summary>
+        public bool TrainedColours
+        {
+            get { return trainedColours; }
+            set { trainedColours = value; }
         }
 
         void OnEnable()
@@ -141,7 +154,7 @@ namespace Gsac
             GsacModel.Level level = model.Levels[n];
             if (level.Count == 0) return;
             Pose(level, n);
-            view.Draw(kernels, splats[n], level, n, model, transform, shape);
+            view.Draw(kernels, splats[n], level, n, model, transform, shape, trainedColours);
         }
 
         /// <summary>Takes the joints, weights and light of this frame; `shape` counts on where they differ from those before.</summary>

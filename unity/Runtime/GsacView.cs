@@ -33,6 +33,7 @@ namespace Gsac
         readonly Matrix4x4[] toEye = new Matrix4x4[2], lens = new Matrix4x4[2]; // of each eye: the avatar's space to the eye's, projection
         int eyes;
         float nearest; // m from an eye to a joint
+        readonly GsacPicture picture = new GsacPicture();
         GraphicsBuffer keys;
         bool found;
         Vector4 depthRow;
@@ -50,6 +51,7 @@ namespace Gsac
 
         public void Dispose()
         {
+            picture.Dispose();
             if (keys != null) keys.Dispose();
             keys = null;
             sortedShape = 0;
@@ -202,27 +204,35 @@ namespace Gsac
 
         /// <summary>
         /// Sorts for this camera, unless it stands and looks as before at the same, and asks Unity to draw. n: the level's number;
-        /// shape: of the splats, other than 0.
+        /// shape: of the splats, other than 0; trained: in linear colours by a picture of its own.
         /// </summary>
-        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, int n, GsacModel model, Transform root, int shape)
+        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, int n, GsacModel model, Transform root, int shape,
+                         bool trained)
         {
             if (keys == null || keys.count != model.KeyCount) Resize(model.KeyCount);
             if (!IsSorted(n, shape)) Sort(kernels, splats, level);
             Matrix4x4 m = root.localToWorldMatrix;
             for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], m.GetRow(r));
             bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
-            properties.SetVector(BlendId, new Vector4(model.Data.LowPass, model.Data.AlphaMax, model.Data.AlphaMin, linear ? 1 : 0));
+            bool own = linear && trained && eyes == 1 && GsacPicture.IsPossible;
+            properties.SetVector(BlendId, new Vector4(model.Data.LowPass, model.Data.AlphaMax, model.Data.AlphaMin, linear && !own ? 1 : 0));
             properties.SetInteger(KeepsEnergyId, model.Data.KeepsEnergy ? 1 : 0);
             properties.SetInteger(IndexBitsId, level.Sort.IndexBits);
             properties.SetBuffer(SplatsId, splats);
             properties.SetBuffer(ColoursId, level.Colours);
             properties.SetBuffer(KeysId, keys);
-            var draw = new RenderParams(GsacCameras.Material)
+            var draw = new RenderParams(own ? GsacCameras.TrainedMaterial : GsacCameras.Material)
             {
                 camera = Camera, worldBounds = bounds, matProps = properties, layer = root.gameObject.layer,
                 shadowCastingMode = ShadowCastingMode.Off, receiveShadows = false,
             };
-            Graphics.RenderPrimitivesIndexed(draw, MeshTopology.Triangles, model.Quads, level.Count * 6);
+            int indices = level.Count * 6;
+            if (own)
+            {
+                picture.Draw(Camera, bounds, properties, model.Quads, indices);
+                indices = 6; // the picture's two triangles
+            }
+            Graphics.RenderPrimitivesIndexed(draw, MeshTopology.Triangles, model.Quads, indices);
         }
 
         void Resize(int count)

@@ -44,7 +44,18 @@ namespace UnityEngine
 
     public struct Rect
     {
-        public Rect(float x, float y, float width, float height) { }
+        public float width { get; set; }
+        public float height { get; set; }
+        public Rect(float x, float y, float width, float height)
+        {
+            this.width = width;
+            this.height = height;
+        }
+    }
+
+    public struct Color
+    {
+        public static Color clear { get { return new Color(); } }
     }
 
     public struct Bounds

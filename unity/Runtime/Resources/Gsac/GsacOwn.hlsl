@@ -1,7 +1,7 @@
 // The avatar's own picture: the gaussians composited in display colours, as they were trained, and their mean depth, m.
 float4x4 GsacEyeView;       // world -> eye, -z ahead
-float4x4 GsacEyeProjection; // as the picture is drawn: y as the graphics API has it in textures
-float4 GsacEyeScreen;       // px of the picture; m from the eye at which it is laid over the scene, 0
+float4x4 GsacEyeProjection; // to the picture: y as the graphics API has it in textures
+float4 GsacEyeScreen;       // px of the picture; two numbers for GsacTrained.hlsl
 
 #include "GsacDraw.hlsl"
 

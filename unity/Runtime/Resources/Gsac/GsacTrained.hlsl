@@ -3,8 +3,8 @@
 
 #define GSAC_STAND_IN 8 // px: a texture that small is Unity's for one that is not there
 
-float4 GsacEyeScreen;       // px of the picture; m from the eye at which it is laid over the scene, 0
-float4 GsacEyeRect;         // clip x and y of the lower left and the upper right corner of where the avatar lies, y up
+float4 GsacEyeScreen;       // px of the picture; m from the eye at which it is laid over the scene, whether a copy of that may be used
+float4 GsacEyeRect;         // clip x and y of the picture's lower left and upper right corner, y up
 float4 GsacEyeLens;         // of the camera's own projection, y up: clip x and y of the eye's, what shifts them
 Texture2D<float4> GsacTrained;     // display colour, premultiplied; alpha
 Texture2D<float> GsacTrainedDepth; // mean depth, m, premultiplied
@@ -22,15 +22,16 @@ struct GsacLaidPixel
     float depth : SV_Depth;
 };
 
-// vertex: 4, of the rectangle in which the avatar lies.
+// vertex: 4, the picture's corners.
 GsacLaidVaryings GsacLaid(uint vertex, float4x4 projection)
 {
-    float2 corner = float2((vertex & 1) ? GsacEyeRect.z : GsacEyeRect.x, (vertex & 2) ? GsacEyeRect.w : GsacEyeRect.y);
+    float2 place = float2((vertex & 1) ? 1.0 : 0.0, (vertex & 2) ? 1.0 : 0.0);
+    float2 corner = lerp(GsacEyeRect.xy, GsacEyeRect.zw, place);
     float away = GsacEyeScreen.z;
     float2 side = (corner + GsacEyeLens.zw) / GsacEyeLens.xy;
     GsacLaidVaryings output;
     output.clip = mul(projection, float4(GsacLensOf(projection).flat ? side : side * away, -away, 1));
-    output.place = 0.5 * corner + 0.5;
+    output.place = place;
     return output;
 }
 
@@ -40,7 +41,7 @@ GsacLaidPixel GsacLay(GsacLaidVaryings input, float4x4 projection, float3 behind
     float4 trained = GsacTrained.Sample(GsacLinearClampSampler, input.place);
     clip(trained.a - GsacBlend.z);
     GsacLaidPixel pixel;
-    pixel.colour = GsacOver(trained, behind, size.x > GSAC_STAND_IN);
+    pixel.colour = GsacOver(trained, behind, size.x > GSAC_STAND_IN && GsacEyeScreen.w > 0.5);
     float depth = GsacTrainedDepth.Sample(GsacLinearClampSampler, input.place) / trained.a;
     float2 place = mul(projection, float4(0, 0, -depth, 1)).zw;
     pixel.depth = saturate(place.x / place.y);
