@@ -217,7 +217,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.unity.colours", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("avatars", nargs="+", type=Path, help=".gsac files")
-    parser.add_argument("--stand-ins", type=Path, required=True, help="folder of stand-ins for Unity's shader files: tests/unity/shims")
+    parser.add_argument("--stand-ins", type=Path, required=True,
+                        help="folder of stand-ins for Unity's shader files: tests/unity/shims")
     parser.add_argument("--size", type=int, default=512, help="px, height and width of a picture")
     parser.add_argument("--shots", type=int, default=4)
     parser.add_argument("--no-refit", action="store_true", help="leave out the slow way")

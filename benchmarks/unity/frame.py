@@ -41,7 +41,8 @@ def sort_steps(count: int) -> tuple[int, list[tuple[str, dict[str, int], int]]]:
 
 def draw_rule(low_pass: LowPass, linear: int = 0) -> Parameters:
     """The draw rule as the splats' shader takes it. linear: 1 where the project blends linear colours."""
-    return {"GsacBlend": [low_pass.px2, MAX_ALPHA, MIN_ALPHA, linear], "GsacKeepsEnergy": int(low_pass.keeps_energy)}
+    return {"GsacBlend": [low_pass.px2, MAX_ALPHA, MIN_ALPHA, linear], "GsacKeepsEnergy": int(low_pass.keeps_energy),
+            "GsacTint": [1, 1, 1, 1], "GsacFog": 0}
 
 
 def index_bits(count: int) -> int:

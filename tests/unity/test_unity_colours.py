@@ -61,7 +61,7 @@ def test_what_stands_before_the_person_hides_her_and_what_stands_behind_does_not
 
 @pytest.fixture(scope="module")
 def told(play, mono, files, tmp_path_factory):
-    """(situation -> splats drawn to a picture, quads drawn to the scene, pictures, linear colours; what the pictures are drawn with)."""
+    """(situation -> splats drawn to a picture, quads to the scene, pictures, linear colours; what the pictures are drawn with)."""
     path = tmp_path_factory.mktemp("picture") / "asked"
     lines = dict(line.split(": ") for line in play("picture", files / "figure.gsac", path).splitlines())
     return {what: tuple(map(int, words.split())) for what, words in lines.items()}, mono.arrays(path)
@@ -106,3 +106,15 @@ def test_the_picture_holds_the_avatar_pixel_for_pixel_of_the_screen(told, lens):
     corner = np.array([(left + mx) / sx, (top + my) / sy, -1, 1]) * ([1, 1, away, 1] if lens == "flat" else [away, away, away, 1])
     back = P @ corner
     np.testing.assert_allclose(back[:2] / back[3], [left, top], atol=1e-5)
+
+
+def test_a_tinted_and_a_fading_person_look_as_without_a_picture_of_their_own(stage, shot, monkeypatch):
+    usual = stage.parameters
+    monkeypatch.setattr(stage, "parameters", lambda *of: usual(*of) | {"GsacTint": [.3, 1, .6, .5]})
+    stage.draw_own(shot)
+    got, want = stage.lay(shot, BACKGROUND, known=False), stage.draw_direct(shot, BACKGROUND)
+    monkeypatch.undo()
+    stage.draw_own(shot)
+    shown = abs(got - BACKGROUND).max(2) > .02
+    assert .4 < shown.sum() / (abs(stage.lay(shot, BACKGROUND, known=False) - BACKGROUND).max(2) > .02).sum() < .6
+    assert colours.decibels(got, want, shown) > 28

@@ -1,5 +1,8 @@
 """When the Unity package draws an avatar, for which cameras, and that nothing is done on the GPU for what nobody sees."""
 
+import re
+
+import numpy as np
 import pytest
 
 pytestmark = pytest.mark.slow
@@ -12,8 +15,8 @@ def told(play, files):
     return {what: tuple(map(int, said.split())) if said[0].isdigit() else said for what, said in lines.items()}
 
 
-@pytest.mark.parametrize("where", ["out of view 265", "out of view 95", "out of view 0", "above", "beyond the far plane", "layer culled",
-                                   "headset looks away"])
+@pytest.mark.parametrize("where", ["out of view 265", "out of view 95", "out of view 0", "above", "beyond the far plane",
+                                   "layer culled", "headset looks away"])
 def test_a_person_out_of_view_costs_no_dispatch_and_no_draw(told, where):
     assert told[where] == (0, 0)
 
@@ -59,3 +62,23 @@ def test_a_lens_that_brings_the_person_near_brings_the_fine_gaussians(play, file
     lines = [line.split(": ") for line in play("zoom", files / "figure.gsac").splitlines()]
     drawn = [(who, counts.index(int(n))) for who, n in lines]
     assert drawn == [("far", level) for level in (2, 0, 1, 0, 2)] + [("far", 2), ("near", 0)]
+
+
+def test_tint_share_fog_and_material_are_set_on_the_component(play, files):
+    """The tint as the project's linear colour space has it; a person who has faded away costs nothing."""
+    *lines, faded = play("finish", files / "figure.gsac").splitlines()
+    names, numbers = zip(*(line.split(" ", 1) for line in lines), strict=True)
+    assert names == ("package",) * 5 + ("own", "package")
+    half = ((.5 + .055) / 1.055) ** 2.4
+    np.testing.assert_allclose([list(map(float, n.split())) for n in numbers], [
+        [1, 1, 1, 1, 1], [half, 1, 0, 1, 1], [half, 1, 0, .25, 1], [half, 1, 0, 1, 1], *[[half, 1, 0, 1, 0]] * 3], atol=1e-6)
+    assert faded == "faded: 0 0"
+
+
+def test_stencil_depth_test_and_queue_are_the_materials(hlsl):
+    """In every pipeline's pass; the queue is any material's own."""
+    text = (hlsl.CORE / "GsacSplats.shader").read_text()
+    declared = re.findall(r"^ +(?:\[Enum.*?\] )?(_\w+) \(", text, re.MULTILINE)
+    for part in text.split("SubShader\n")[1:]:
+        assert sorted(re.findall(r"\[(_\w+)\]", part.split("HLSLPROGRAM")[0])) == sorted(declared)
+        assert '"Queue" = "Transparent"' in part

@@ -42,6 +42,18 @@ namespace Gsac
         [SerializeField, Tooltip("0..1: how far the avatar stands in the light of the room in which its clip was filmed; 0 is even light.")]
         float clipLight = 1;
 
+        [SerializeField, Tooltip("A material with the shader Gsac/Splats, for a render queue, stencil or depth test of its own; the package's where this is empty.")]
+        Material material;
+
+        [SerializeField, Tooltip("Multiplies the colours.")]
+        Color tint = Color.white;
+
+        [SerializeField, Tooltip("0..1: how much of the person is there; less fades her by pixels.")]
+        float opacity = 1;
+
+        [SerializeField, Tooltip("Whether the scene's fog lies over the person; not in HDRP.")]
+        bool fog = true;
+
         [SerializeField, Tooltip("In projects with linear colours: draws the avatar's edges and layers as it was trained, by a picture of its own for each camera but a headset's.")]
         bool trainedColours = true;
 
@@ -79,9 +91,37 @@ namespace Gsac
             set { clipLight = value; }
         }
 
+        /// <summary>A material with the shader Gsac/Splats, for a render queue, stencil or depth test of its own; null: the package's.</summary>
+        public Material Material
+        {
+            get { return material; }
+            set { material = value; }
+        }
+
+        /// <summary>Multiplies the colours; its alpha counts for nothing.</summary>
+        public Color Tint
+        {
+            get { return tint; }
+            set { tint = value; }
+        }
+
+        /// <summary>0..1: how much of the person is there. Less fades her by pixels; at 0 she costs nothing.</summary>
+        public float Opacity
+        {
+            get { return opacity; }
+            set { opacity = value; }
+        }
+
+        /// <summary>Whether the scene's fog lies over the person; not in HDRP, whose fog knows no such things.</summary>
+        public bool Fog
+        {
+            get { return fog; }
+            set { fog = value; }
+        }
+
         /// <summary>
         /// Whether a project with linear colours shows the trained picture, at the cost of a picture of the avatar's size for each camera.
-        /// Off, and in a headset, the splats are blended among the scene's linear colours: paler edges, nothing else to pay.
+        /// Off, in a headset and with a material of its own the splats are blended among the scene's linear colours: paler edges, no more to pay.
         /// </summary>
         public bool TrainedColours
         {
@@ -133,28 +173,35 @@ namespace Gsac
             gathered = false;
         }
 
-        /// <summary>Draws the avatar where this camera sees it; called just before the camera culls.</summary>
-        internal void Draw(Camera camera)
+        /// <summary>What this camera sees of the avatar, null where that is nothing; called just before the camera culls.</summary>
+        internal GsacView See(Camera camera)
         {
             if (avatar == null) avatar = GetComponent<GsacAvatar>();
-            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null) return;
+            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null || opacity <= 0) return null;
             try
             {
-                if (!Ready()) return;
+                if (!Ready()) return null;
             }
             catch (GsacException e)
             {
                 Complain(e.Message);
-                return;
+                return null;
             }
             Gather();
             GsacView view = View(camera);
-            if (!view.Look(transform, boneRows, model)) return;
-            int n = view.Level(model, finestWithin);
-            GsacModel.Level level = model.Levels[n];
-            if (level.Count == 0) return;
-            Pose(level, n);
-            view.Draw(kernels, splats[n], level, n, model, transform, shape, trainedColours);
+            if (!view.Look(transform, boneRows, model)) return null;
+            view.Choose(finestWithin, Finish());
+            return view.Level.Count > 0 ? view : null;
+        }
+
+        GsacFinish Finish()
+        {
+            Color shown = QualitySettings.activeColorSpace == ColorSpace.Linear ? tint.linear : tint;
+            return new GsacFinish
+            {
+                Material = material != null ? material : GsacCameras.Material, Tint = new Vector4(shown.r, shown.g, shown.b, Mathf.Clamp(opacity, 0, 1)),
+                Trained = trainedColours && material == null, Fog = fog, Layer = gameObject.layer,
+            };
         }
 
         /// <summary>Takes the joints, weights and light of this frame; `shape` counts on where they differ from those before.</summary>
@@ -243,12 +290,15 @@ namespace Gsac
             Debug.LogError(name + ": the avatar cannot be drawn: " + what, this);
         }
 
-        /// <summary>Skins and binds what is not yet of this shape.</summary>
-        void Pose(GsacModel.Level level, int n)
+        /// <summary>Skins and binds what is not yet of this moment's shape, for the level that the view has chosen.</summary>
+        internal void Pose(GsacView view)
         {
+            int n = view.LevelNumber;
             if (skinned != shape) Skin();
-            if (bound[n] != shape) Bind(level, splats[n]);
+            if (bound[n] != shape) Bind(view.Level, splats[n]);
             skinned = bound[n] = shape;
+            view.Shape = shape;
+            view.Splats = splats[n];
         }
 
         void Skin()
@@ -321,7 +371,7 @@ namespace Gsac
 
         GsacView NewView(Camera camera)
         {
-            var view = new GsacView(camera);
+            var view = new GsacView(camera, this);
             views.Add(view);
             return view;
         }

@@ -136,6 +136,33 @@ public static class Drawing
         frame();
     }
 
+    /// <summary>What the draw is told: material, tint and share, fog; a line for each change on the component.</summary>
+    public static void Finish(string file)
+    {
+        var renderer = Person(file).GetComponent<GsacRenderer>();
+        Camera camera = Player.AddCamera("eye");
+        Turn(camera, 180);
+        var own = new Material(null) { name = "own" };
+        Player.OnDraw = (asked, indices, count) =>
+        {
+            Vector4 tint = Player.Value(asked.matProps, Shader.PropertyToID("GsacTint"));
+            Console.WriteLine(string.Format(System.Globalization.CultureInfo.InvariantCulture, "{0} {1} {2} {3} {4} {5}", asked.material.name ?? "package",
+                tint.x, tint.y, tint.z, tint.w, Player.Value(asked.matProps, Shader.PropertyToID("GsacFog")).x));
+        };
+        foreach (Action change in new Action[]
+        {
+            () => { }, () => renderer.Tint = new Color(0.5f, 1, 0, 0.1f), () => renderer.Opacity = 0.25f, () => renderer.Opacity = 7,
+            () => renderer.Fog = false, () => renderer.Material = own, () => renderer.Material = null,
+        })
+        {
+            change();
+            camera.Render();
+        }
+        renderer.Opacity = 0;
+        Turn(camera, 181);
+        Tell("faded", camera.Render);
+    }
+
     /// <summary>Materials and Avatars that live, with two people, one, none; in play and in edit mode.</summary>
     public static void Freed(string file)
     {

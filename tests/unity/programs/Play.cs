@@ -35,13 +35,16 @@ public static class Play
             case "cameras": Drawing.Cameras(args[1]); break;
             case "zoom": Drawing.Zoom(args[1]); break;
             case "picture": DrawOwn.Picture(args[1], args[2]); break;
+            case "finish": Drawing.Finish(args[1]); break;
+            case "crowd": Crowd.Print(args); break;
+            case "crowds": Crowd.Count(args[1]); break;
             case "freed": Drawing.Freed(args[1]); break;
             default: return 2;
         }
         return 0;
     }
 
-    static float[] Numbers(string path)
+    public static float[] Numbers(string path)
     {
         string[] words = File.ReadAllText(path).Split(new[] { ' ', '\n' }, StringSplitOptions.RemoveEmptyEntries);
         return Array.ConvertAll(words, w => float.Parse(w, CultureInfo.InvariantCulture));
@@ -55,7 +58,7 @@ public static class Play
     }
 
     /// <summary>numbers: 165 of SMPL-X's pose, 3 of transl, the weights.</summary>
-    static GsacAvatar Posed(string file, float[] numbers)
+    public static GsacAvatar Posed(string file, float[] numbers)
     {
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
         avatar.SetSmplx(Part(numbers, 0, 3), Part(numbers, 3, 63), Part(numbers, 75, 45), Part(numbers, 120, 45), Part(numbers, 66, 3),
@@ -503,6 +506,7 @@ public static class Play
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
         var both = new[] { GsacLoader.Load(bytes, "one").gameObject, GsacLoader.Load(bytes, "two").gameObject };
+        both[1].transform.SetPositionAndRotation(new Vector3(0, 0, -5), Quaternion.identity); // not among each other
         Player.Frame(both)();
         int two = Player.BuffersAlive;
         Console.WriteLine("draws " + draws);

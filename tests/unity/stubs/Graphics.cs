@@ -100,10 +100,10 @@ namespace UnityEngine
 
     public sealed class ComputeShader : Object
     {
-        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct" };
+        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct", "Join" };
         // by property, and by property and kernel
-        internal readonly Vector4[] Values = new Vector4[64];
-        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 64];
+        internal readonly Vector4[] Values = new Vector4[96];
+        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 96];
         public int FindKernel(string name)
         {
             int kernel = Array.IndexOf(Kernels, name);
@@ -118,10 +118,10 @@ namespace UnityEngine
 
     public sealed class MaterialPropertyBlock
     {
-        internal readonly Vector4[] Values = new Vector4[64];
-        internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[64];
-        internal readonly Matrix4x4[] Matrices = new Matrix4x4[64];
-        internal readonly Texture[] Textures = new Texture[64];
+        internal readonly Vector4[] Values = new Vector4[96];
+        internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[96];
+        internal readonly Matrix4x4[] Matrices = new Matrix4x4[96];
+        internal readonly Texture[] Textures = new Texture[96];
         public void SetVector(int nameID, Vector4 value) { Values[nameID] = value; }
         public void SetMatrix(int nameID, Matrix4x4 value) { Matrices[nameID] = value; }
         public void SetTexture(int nameID, Texture value) { Textures[nameID] = value; }

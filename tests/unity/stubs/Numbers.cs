@@ -40,6 +40,18 @@ namespace UnityEngine
     {
         public float x, y, z, w;
         public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+        public static Vector4 operator -(Vector4 a, Vector4 b) { return new Vector4(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w); }
+        public static Vector4 operator *(Vector4 a, float s) { return new Vector4(a.x * s, a.y * s, a.z * s, a.w * s); }
+    }
+
+    public struct Color
+    {
+        public float r, g, b, a;
+        public Color(float r, float g, float b, float a) { this.r = r; this.g = g; this.b = b; this.a = a; }
+        public static Color clear { get { return new Color(); } }
+        public static Color white { get { return new Color(1, 1, 1, 1); } }
+        public Color linear { get { return new Color(Linear(r), Linear(g), Linear(b), a); } }
+        static float Linear(float x) { return x <= 0.04045f ? x / 12.92f : (float)Math.Pow((x + 0.055) / 1.055, 2.4); }
     }
 
     public struct Rect
@@ -53,15 +65,16 @@ namespace UnityEngine
         }
     }
 
-    public struct Color
-    {
-        public static Color clear { get { return new Color(); } }
-    }
-
     public struct Bounds
     {
         public Vector3 center, size;
         public Bounds(Vector3 center, Vector3 size) { this.center = center; this.size = size; }
+        public void Encapsulate(Bounds bounds)
+        {
+            Vector3 least = Vector3.Min(center - size * 0.5f, bounds.center - bounds.size * 0.5f);
+            Vector3 most = Vector3.Max(center + size * 0.5f, bounds.center + bounds.size * 0.5f);
+            this = new Bounds((least + most) * 0.5f, most - least);
+        }
     }
 
     public struct Quaternion
@@ -113,6 +126,13 @@ namespace UnityEngine
                 m03 = t.x, m13 = t.y, m23 = t.z, m33 = 1,
             };
         }
+
+        public bool Equals(Matrix4x4 m)
+        {
+            return Same(GetRow(0), m.GetRow(0)) && Same(GetRow(1), m.GetRow(1)) && Same(GetRow(2), m.GetRow(2)) && Same(GetRow(3), m.GetRow(3));
+        }
+
+        static bool Same(Vector4 a, Vector4 b) { return a.x == b.x && a.y == b.y && a.z == b.z && a.w == b.w; }
 
         public Vector4 GetRow(int r)
         {

@@ -4,6 +4,7 @@ float4x4 GsacEyeProjection; // to the picture: y as the graphics API has it in t
 float4 GsacEyeScreen;       // px of the picture; two numbers for GsacTrained.hlsl
 
 #include "GsacDraw.hlsl"
+#include "GsacFinish.hlsl"
 
 struct GsacOwnVaryings
 {
@@ -26,6 +27,8 @@ GsacOwnVaryings OwnVertex(uint vertex : SV_VertexID)
     output.clip = corner.clip;
     output.sigmas = corner.sigmas;
     output.colour = corner.colour;
+    // the tint is one of linear colours
+    if (any(GsacTint.rgb != 1)) output.colour.rgb = GsacDisplay(GsacLinear(output.colour.rgb) * GsacTint.rgb);
     bool flat = GsacLensOf(GsacEyeProjection).flat;
     output.depth = flat ? (GsacEyeProjection[2][3] - corner.clip.z) / GsacEyeProjection[2][2] : corner.clip.w;
     return output;

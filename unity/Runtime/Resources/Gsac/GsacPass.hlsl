@@ -1,6 +1,8 @@
 // Vertex and Fragment of every pipeline's pass. The pass has included its pipeline's file, which brings UNITY_MATRIX_V,
-// UNITY_MATRIX_P and the stereo macros, and says GSAC_SCREEN (px) and GSAC_ORIGIN (place of the pipeline's origin).
+// UNITY_MATRIX_P and the stereo macros, and says GSAC_SCREEN (px), GSAC_ORIGIN (place of the pipeline's origin) and, where the
+// pipeline has fog by distance, GSAC_FOGGED (a colour at a clip-space z).
 #include "GsacDraw.hlsl"
+#include "GsacFinish.hlsl"
 
 struct GsacInput
 {
@@ -24,12 +26,13 @@ GsacVaryings Vertex(GsacInput input)
     GsacCorner corner = GsacSplatCorner(input.vertex, UNITY_MATRIX_V, UNITY_MATRIX_P, GSAC_SCREEN, GSAC_ORIGIN);
     output.clip = corner.clip;
     output.sigmas = corner.sigmas;
-    output.colour = corner.colour;
+    output.colour = float4(GsacThroughFog(corner.colour.rgb * GsacTint.rgb, corner.clip.z), corner.colour.a);
     return output;
 }
 
 float4 Fragment(GsacVaryings input) : SV_Target
 {
     UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input);
+    GsacFade(input.clip.xy);
     return GsacPixel(input.sigmas, input.colour);
 }

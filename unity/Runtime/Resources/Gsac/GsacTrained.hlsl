@@ -1,5 +1,6 @@
 // Lays the avatar's own picture over the scene, for a wrapper that brings the pipeline's projection and what lies behind.
 #include "GsacDraw.hlsl"
+#include "GsacFinish.hlsl"
 
 #define GSAC_STAND_IN 8 // px: a texture that small is Unity's for one that is not there
 
@@ -38,6 +39,7 @@ GsacLaidVaryings GsacLaid(uint vertex, float4x4 projection)
 // behind: linear light of what lies there; size: px of the picture that it is from, a few where there is none.
 GsacLaidPixel GsacLay(GsacLaidVaryings input, float4x4 projection, float3 behind, float2 size)
 {
+    GsacFade(input.clip.xy);
     float4 trained = GsacTrained.Sample(GsacLinearClampSampler, input.place);
     clip(trained.a - GsacBlend.z);
     GsacLaidPixel pixel;
@@ -45,5 +47,7 @@ GsacLaidPixel GsacLay(GsacLaidVaryings input, float4x4 projection, float3 behind
     float depth = GsacTrainedDepth.Sample(GsacLinearClampSampler, input.place) / trained.a;
     float2 place = mul(projection, float4(0, 0, -depth, 1)).zw;
     pixel.depth = saturate(place.x / place.y);
+    float alpha = max(pixel.colour.a, 1e-6);
+    pixel.colour.rgb = alpha * GsacThroughFog(pixel.colour.rgb / alpha, place.x);
     return pixel;
 }

@@ -53,7 +53,9 @@ Shader "Gsac/Trained"
             #pragma target 4.5
             #pragma vertex Vertex
             #pragma fragment Fragment
+            #pragma multi_compile_fog
             #include "Packages/com.unity.render-pipelines.universal/ShaderLibrary/Core.hlsl"
+            #define GSAC_FOGGED(colour, z) MixFog(colour, ComputeFogFactor(z))
             #include "GsacTrained.hlsl"
 
             GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
@@ -90,7 +92,9 @@ Shader "Gsac/Trained"
             #pragma target 4.5
             #pragma vertex Vertex
             #pragma fragment Fragment
+            #pragma multi_compile_fog
             #include "UnityCG.cginc"
+            #include "GsacFogBuiltIn.hlsl"
             #include "GsacTrained.hlsl"
 
             GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
