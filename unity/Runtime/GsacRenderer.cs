@@ -34,6 +34,9 @@ namespace Gsac
         static readonly int[] LightIds =
         {
             Shader.PropertyToID("GsacLightRed"), Shader.PropertyToID("GsacLightGreen"), Shader.PropertyToID("GsacLightBlue"),
+            Shader.PropertyToID("GsacSceneRed"), Shader.PropertyToID("GsacSceneGreen"), Shader.PropertyToID("GsacSceneBlue"),
+            Shader.PropertyToID("GsacSceneRed2"), Shader.PropertyToID("GsacSceneGreen2"), Shader.PropertyToID("GsacSceneBlue2"),
+            Shader.PropertyToID("GsacSceneLast"),
         };
 
         [SerializeField, Tooltip("m: where coarser levels of detail begin for a lens of 60 degrees, if the file does not say at which height; each doubling takes the next.")]
@@ -54,6 +57,9 @@ namespace Gsac
         [SerializeField, Tooltip("Whether the scene's fog lies over the person; not in HDRP.")]
         bool fog = true;
 
+        [SerializeField, Tooltip("The scene's light, instead of the clip's.")]
+        GsacSceneLight sceneLight = new GsacSceneLight();
+
         [SerializeField, Tooltip("In projects with linear colours: draws the avatar's edges and layers as it was trained, by a picture of its own for each camera but a headset's.")]
         bool trainedColours = true;
 
@@ -67,10 +73,10 @@ namespace Gsac
         GraphicsBuffer turns, bent; // null where the body has no pose correctives
         float[] turnRows;
         Vector4[] boneRows;
-        readonly Vector4[] light = new Vector4[3];
+        readonly Vector4[] light = new Vector4[10]; // of each of LightIds
         Vector4[] shownBones; // what `shape` stands for
         float[] shownWeights;
-        readonly Vector4[] shownLight = new Vector4[3];
+        readonly Vector4[] shownLight = new Vector4[10];
         int shape; // counts the poses, weights and lights that were drawn
         int skinned;
         int[] bound; // the shape that each level was bound to
@@ -117,6 +123,12 @@ namespace Gsac
         {
             get { return fog; }
             set { fog = value; }
+        }
+
+        /// <summary>How far the avatar stands in the scene's light, and which that is.</summary>
+        public GsacSceneLight SceneLight
+        {
+            get { return sceneLight; }
         }
 
         /// <summary>
@@ -214,6 +226,7 @@ namespace Gsac
             avatar.CollectWeights();
             float lit = model.Data.Light == null ? 0 : Mathf.Clamp(clipLight, 0, 1);
             for (int c = 0; c < 3; c++) light[c] = Light(c, lit);
+            sceneLight.Fill(transform, avatar.Joints[0].position, light, 3);
             bool same = Keep(boneRows, shownBones) & Keep(avatar.DrawnWeights, shownWeights) & Keep(light, shownLight);
             if (!same) shape++;
         }
@@ -319,7 +332,7 @@ namespace Gsac
         void Bind(GsacModel.Level level, GraphicsBuffer splats)
         {
             kernels.SetInt(SplatCountId, level.Count);
-            for (int c = 0; c < 3; c++) kernels.SetVector(LightIds[c], light[c]);
+            for (int i = 0; i < LightIds.Length; i++) kernels.SetVector(LightIds[i], light[i]);
             kernels.SetBuffer(bindKernel, CornersId, level.Corners);
             kernels.SetBuffer(bindKernel, LocalId, level.Local);
             kernels.SetBuffer(bindKernel, PosedId, posed);

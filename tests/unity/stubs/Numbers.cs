@@ -140,6 +140,12 @@ namespace UnityEngine
                 : r == 2 ? new Vector4(m20, m21, m22, m23) : new Vector4(m30, m31, m32, m33);
         }
 
+        public Vector4 GetColumn(int c)
+        {
+            return c == 0 ? new Vector4(m00, m10, m20, m30) : c == 1 ? new Vector4(m01, m11, m21, m31)
+                : c == 2 ? new Vector4(m02, m12, m22, m32) : new Vector4(m03, m13, m23, m33);
+        }
+
         public Vector3 MultiplyPoint3x4(Vector3 p)
         {
             return new Vector3(m00 * p.x + m01 * p.y + m02 * p.z + m03, m10 * p.x + m11 * p.y + m12 * p.z + m13,

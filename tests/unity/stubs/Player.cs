@@ -15,6 +15,10 @@ namespace UnityEngine
         public static Action<MaterialPropertyBlock, int> OnOwnDraw;
         public static bool HasHalfTargets;
 
+        /// <summary>The light around, and whether something stands between the person and the sun.</summary>
+        public static Rendering.SphericalHarmonicsL2 Probe;
+        public static bool IsShaded;
+
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;
         public static int UpdatesAsked;

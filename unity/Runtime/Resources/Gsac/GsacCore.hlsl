@@ -7,6 +7,7 @@
 #define GSAC_WIDE 1.3
 #define GSAC_DARKEST 0.25
 #define GSAC_BRIGHTEST 2.5
+#define GSAC_GAMMA 2.2 // a factor of linear light is this root of it in display colours
 // Display values of what lies behind for which an edge is exact where nobody knows what lies there, and for which its light is.
 #define GSAC_DARK_BEHIND 0.05
 #define GSAC_BRIGHT_BEHIND 0.85
@@ -82,6 +83,30 @@ float3 GsacLightOn(GsacFrame f, float4 red, float4 green, float4 blue)
 {
     float4 n = float4(f.k > 0 ? float3(f.n.xy, abs(f.n.z)) : float3(0, 0, 0), 1);
     return clamp(float3(dot(red, n), dot(green, n), dot(blue, n)), GSAC_DARKEST, GSAC_BRIGHTEST);
+}
+
+// Light that a scene throws on a surface, of its normal: linear, as a factor of the surface's colour, in the second order that a
+// diffuse surface needs (Ramamoorthi and Hanrahan 2001). red, green, blue: of x, y, z and 1.
+struct GsacSceneLight
+{
+    float4 red;
+    float4 green;
+    float4 blue;
+    float4 red2; // of xy, yz, zz, zx
+    float4 green2;
+    float4 blue2;
+    float4 last; // of xx - yy; how far it stands in for the clip's light, 0..1
+};
+
+// What the scene's light multiplies display colours with.
+float3 GsacSceneOn(GsacFrame f, GsacSceneLight s)
+{
+    float3 n = f.k > 0 ? f.n : float3(0, 0, 0);
+    float4 one = float4(n, 1);
+    float4 two = n.xyzz * n.yzzx;
+    float3 light = float3(dot(s.red, one), dot(s.green, one), dot(s.blue, one))
+        + float3(dot(s.red2, two), dot(s.green2, two), dot(s.blue2, two)) + s.last.rgb * (n.x * n.x - n.y * n.y);
+    return min(pow(max(light, 1e-6), 1 / GSAC_GAMMA), GSAC_BRIGHTEST);
 }
 
 // Covariance: diagonal xx yy zz, rest xy xz yz.
