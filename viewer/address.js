@@ -29,6 +29,8 @@ export function readAddress(words) {
     turned: readTurns(given.get("joints") ?? ""),
     // light=off: even light instead of the clip's. Default: the clip's.
     lit: given.get("light") !== "off",
+    // lamp=AROUND,ABOVE: a lamp in place of the clip's light, degrees from the person's front to her left and above. Default: none.
+    lamp: readLamp(given.get("lamp")),
     // turntable, or turntable=off: whether the avatar turns. Default: where nothing else is picked, and until something is.
     turntable: given.has("turntable") ? given.get("turntable") !== "off" : null,
     picked: PICKED.some((name) => given.has(name)),
@@ -37,6 +39,12 @@ export function readAddress(words) {
     // draw=webgpu|webgl|software, only when the page opens: the renderer. Default: what suits the device.
     draw: given.get("draw"),
   };
+}
+
+/** @returns {number[] | null} two angles; null where there are not two numbers */
+function readLamp(words) {
+  const angles = (words ?? "").split(",").map(Number);
+  return words && angles.length === 2 && angles.every(Number.isFinite) ? angles : null;
 }
 
 /** @returns {Object<string, number>} weights by name */

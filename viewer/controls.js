@@ -1,6 +1,7 @@
 // The page's buttons, sliders and dropped files: they change the viewer and show its state.
 
 import { listenForKeys } from "./keys.js";
+import { addLightDial } from "./light_dial.js";
 import { pickJoint } from "./limb.js";
 import { MotionError } from "./motion.js";
 import { addMotions, listenForDrops } from "./motion_files.js";
@@ -33,6 +34,7 @@ export class Controls {
     this.onClick("turntable", () => { viewer.turntable = !viewer.turntable; });
     this.onClick("light", () => { viewer.levels.lit = !viewer.levels.lit; });
     find("light").hidden = viewer.avatar.light === null;
+    this.showLamp = addLightDial(viewer.levels.scene, find("lamp"), find("lamp-share"), () => this.show());
     this.onClick("pause", () => this.pause());
     this.onClick("reset", () => this.reset());
     this.onClick("fullscreen", () => this.fullscreen());
@@ -180,6 +182,7 @@ export class Controls {
     }
     find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
     find("light").setAttribute("aria-pressed", String(viewer.levels.lit));
+    this.showLamp();
     find("timeline").hidden = find("pause").disabled = find("time").disabled = !viewer.length;
     if (!viewer.length) find("clock").textContent = "";
     find("fullscreen").setAttribute("aria-pressed", String(document.fullscreenElement !== null));

@@ -176,7 +176,7 @@ export class Viewer {
     const panel = document.getElementById("panel").offsetTop;
     const view = Array.from(camera.view, (x) => x.toFixed(5));
     return [pose.quats, pose.transl, view, camera.fov, stage.clientWidth, stage.clientHeight, window.devicePixelRatio, panel,
-      levels.lit, renderer?.kind, background, JSON.stringify(expression)].join(" ");
+      levels.lit, levels.scene.rows, renderer?.kind, background, JSON.stringify(expression)].join(" ");
   }
 
   // Sets a pose to what plays at a place in the clip, s.
@@ -287,6 +287,8 @@ export class Viewer {
     this.opening = options.turntable === null && !options.picked && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.turntable = options.turntable ?? this.opening;
     this.levels.lit = options.lit;
+    if (options.lamp) this.levels.scene.place(...options.lamp);
+    else this.levels.scene.turnOff();
     this.levels.drawn = 0;
     this.expression = options.expression;
     this.turned = Object.fromEntries(Object.entries(options.turned).filter(([joint]) => avatar.names.includes(joint)));
