@@ -107,6 +107,7 @@ def test_a_lamp_stands_in_for_the_clips_light_as_far_as_its_slider_says_and_with
     browser.open(f"{address}?lamp{draw}#draw={draw}")
     if draw == "webgpu" and not browser.has_webgpu():
         pytest.skip("this chromium has no WebGPU")
+    assert browser.run("gsac.renderer.kind") == draw
     view = f"pose=A&yaw=20&pitch={PITCH}&dist={DISTANCE}&fov={FOV}&target=0,0,0&bg=3a6080&still"
 
     def picture(words, share=None):
