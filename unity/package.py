@@ -68,6 +68,7 @@ SOURCES = (
     "Runtime/Resources/Gsac/GsacFinish.hlsl",
     "Runtime/Resources/Gsac/GsacFogBuiltIn.hlsl",
     "Runtime/Resources/Gsac/GsacJoin.compute",
+    "Runtime/Resources/Gsac/GsacLatest.hlsl",
     "Runtime/Resources/Gsac/GsacOwn.hlsl",
     "Runtime/Resources/Gsac/GsacOwn.shader",
     "Runtime/Resources/Gsac/GsacPass.hlsl",

@@ -8,13 +8,14 @@ const BACK = ["Delete", "Backspace", "Escape"];
 
 /**
  * Makes an element the dial, and the range beside it the slider from the clip's light to the lamp's. Returns what makes both show the light.
- * @param {import("./scene_light.js").SceneLight} light
+ * @param {() => import("./scene_light.js").SceneLight} lightNow of the avatar that is there
  * @param {HTMLElement} dial
  * @param {HTMLInputElement} slider
  * @param {() => void} onChange
  */
-export function addLightDial(light, dial, slider, onChange) {
+export function addLightDial(lightNow, dial, slider, onChange) {
   const put = (share) => {
+    const light = lightNow();
     light.share = share;
     light.update();
     onChange();
@@ -25,7 +26,7 @@ export function addLightDial(light, dial, slider, onChange) {
     // beyond the rim, to its double, the lamp goes round to the back
     const z = from <= 1 ? Math.sqrt(1 - from * from) : -Math.sqrt(Math.max(0, 1 - (2 - Math.min(from, 2)) ** 2));
     const side = Math.sqrt(1 - z * z) / (from || 1);
-    light.place(Math.atan2(x * side, z) * 180 / Math.PI, Math.asin(Math.min(1, Math.max(-1, y * side))) * 180 / Math.PI);
+    lightNow().place(Math.atan2(x * side, z) * 180 / Math.PI, Math.asin(Math.min(1, Math.max(-1, y * side))) * 180 / Math.PI);
     onChange();
   };
   dial.addEventListener("pointerdown", (event) => {
@@ -37,7 +38,7 @@ export function addLightDial(light, dial, slider, onChange) {
   dial.addEventListener("keydown", (event) => {
     if (BACK.includes(event.key)) put(0);
     else if (event.key in KEYS) {
-      const [around, above] = KEYS[event.key];
+      const [around, above] = KEYS[event.key], light = lightNow();
       light.place(light.around + (light.share ? around : 0), light.above + (light.share ? above : 0));
       onChange();
     } else return;
@@ -46,7 +47,7 @@ export function addLightDial(light, dial, slider, onChange) {
   });
   slider.addEventListener("input", () => put(Number(slider.value)));
   return () => {
-    const [x, y, z] = light.direction, on = light.share > 0;
+    const light = lightNow(), [x, y, z] = light.direction, on = light.share > 0;
     dial.style.setProperty("--x", String(x));
     dial.style.setProperty("--y", String(-y));
     dial.classList.toggle("lit", on);

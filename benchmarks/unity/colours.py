@@ -86,6 +86,7 @@ class Stage:
         self.direct = Painting(gpu, *programs.direct, size, size, count)
         self.own = Painting(gpu, *programs.own, size, size, count, ("rgba16float", "r16float"))
         self.laid = Painting(gpu, *programs.laid, size, size, 1, depth=True)
+        gpu.put("GsacLatest", np.zeros(1, np.uint32))
         gpu.textures |= {"GsacTrained": self.own.targets[0], "GsacTrainedDepth": self.own.targets[1]}
 
     def put(self, shot: Shot, g: Gaussians) -> None:

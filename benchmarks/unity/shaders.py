@@ -16,6 +16,8 @@ STEREO = Path(__file__).parent / "stereo"
 """Folder with a stand-in for Unity's own shader file, as in a headset."""
 KERNELS = ("Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct")
 EYES = ("Vertex", "Fragment")
+TEXTURES = ("--shift-texture-binding", "20", "--shift-sampler-binding", "30")
+"""Options of glslangValidator: a fragment program's textures keep clear of its vertex program's buffers."""
 
 
 def missing_packages() -> list[str]:
@@ -28,7 +30,7 @@ def compile_hlsl(source: Path, entry: str, stage: str, folder: Path, include: Se
 
     Raises ShaderError or AssertionError with the tools' words.
     """
-    out = compile_spirv(Path(source), entry, stage, Path(folder) / f"{entry}.spv", *(f"-I{i}" for i in include))
+    out = compile_spirv(Path(source), entry, stage, Path(folder) / f"{entry}.spv", *TEXTURES, *(f"-I{i}" for i in include))
     done = subprocess.run(["spirv-val", "--target-env", "vulkan1.0", str(out)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return Program(out.read_bytes())

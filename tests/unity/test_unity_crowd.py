@@ -24,7 +24,7 @@ INTS = ("GsacVertexCount", "GsacSplatCount", "GsacIndexBits", "GsacSortStage", "
 VECTORS = ("GsacDepthRange", "GsacDepthRow", *EVEN, "GsacJoinModel0", "GsacJoinModel1", "GsacJoinModel2")
 BUFFERS = ("GsacRest", "GsacSkin", "GsacMoves", "GsacWeights", "GsacBones", "GsacPosed", "GsacCorners", "GsacLocal", "GsacSplats",
            "GsacKeys", "GsacColours", "GsacJoined", "GsacJoinedColours")
-DRAWN = ("GsacModel0", "GsacModel1", "GsacModel2", "GsacBlend", "GsacTint", "GsacIndexBits", "GsacKeepsEnergy")
+DRAWN = ("GsacModel0", "GsacModel1", "GsacModel2", "GsacBlend", "GsacTint", "GsacIndexBits", "GsacKeepsEnergy", "GsacNumber")
 
 
 @pytest.fixture
@@ -56,12 +56,12 @@ def painted(gpu, kernels, passes):
         given = {"GsacFog": 0, "unity_MatrixV": view_of(places[-1]).T, "glstate_matrix_projection": projection(CAMERA).T,
                  "_ScreenParams": [256, 256, 0, 0]}
         pictures = []
-        for row in asked["draws"].reshape(-1, 4 * len(DRAWN) + 4):
+        for row in asked["draws"].reshape(-1, 4 * len(DRAWN) + 5):
             parameters = given | dict(zip(DRAWN, row[:4 * len(DRAWN)].reshape(-1, 4), strict=True))
-            parameters |= {name: int(parameters[name][0]) for name in ("GsacIndexBits", "GsacKeepsEnergy")}
+            parameters |= {name: int(parameters[name][0]) for name in DRAWN[5:]}
             parameters["GsacBlend"] = [*parameters["GsacBlend"][:3], 0]
-            names = "GsacSplats", "GsacColours", "GsacKeys"
-            gpu.buffers |= {name: made[int(n)] for name, n in zip(names, row[-4:-1], strict=True)}
+            names = "GsacSplats", "GsacColours", "GsacKeys", "GsacLatest"
+            gpu.buffers |= {name: made[int(n)] for name, n in zip(names, row[-5:-1], strict=True)}
             pictures.append(Painting(gpu, *passes[""], 256, 256, int(row[-1]) // 6).draw(parameters))
         return pictures, places
     return paint

@@ -41,6 +41,11 @@ def test_a_camera_that_is_rendered_by_hand_sees_the_person(told):
     assert told["by hand, posed after the frame's joints were taken"] == (0, 1) and told["by hand, refreshed"] == told["first"]
 
 
+def test_of_a_camera_that_is_rendered_again_within_a_frame_only_the_last_draw_counts(play, files):
+    """Unity keeps the others until the frame ends: a cube's sides, a photograph by the main camera."""
+    assert play("repeated", files / "figure.gsac").splitlines() == ["0 counts 0", "0 1 counts 1", "0 1 2 counts 2"]
+
+
 def test_each_camera_keeps_its_own_order(told):
     assert told["second camera"][0] > 0 and told["first camera after it"] == (0, 1)
 

@@ -67,6 +67,7 @@ def picture(gpu, passes, scene, pipeline, matrix=None, linear=0, low_pass=PIXEL,
     gpu.put("GsacSplats", splats)
     gpu.put("GsacColours", pack_avatar(scene["avatar"])["GsacColours"])
     gpu.put("GsacKeys", order | np.uint32(5 << 13))
+    gpu.put("GsacLatest", np.zeros(1, np.uint32))
     view = np.vstack([scene["view"], [0, 0, 0, 1]])
     eye = -scene["view"][:, :3].T @ scene["view"][:, 3]
     if pipeline == "HDRenderPipeline":
@@ -128,6 +129,10 @@ def test_a_projection_with_y_down_gives_the_same_picture_upside_down(gpu, passes
 def test_a_tint_multiplies_every_colour(gpu, passes, scene, pipeline):
     tint = np.array([.5, 1, .25, 1])
     assert psnr(picture(gpu, passes, scene, pipeline, GsacTint=tint), scene["truth"] * tint) > 55
+
+
+def test_a_draw_that_a_later_one_replaced_shows_nothing(gpu, passes, scene):
+    assert not picture(gpu, passes, scene, "", GsacNumber=1).any()
 
 
 @pytest.mark.parametrize("share", [0, .25, .5, .9])

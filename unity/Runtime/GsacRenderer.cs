@@ -262,7 +262,7 @@ namespace Gsac
 
         bool Prepare()
         {
-            if (!SystemInfo.supportsComputeShaders || SystemInfo.maxComputeBufferInputsVertex < 3)
+            if (!SystemInfo.supportsComputeShaders || SystemInfo.maxComputeBufferInputsVertex < 4)
             {
                 Complain("this graphics API (" + SystemInfo.graphicsDeviceType + ") has no compute shaders or no buffers in vertex shaders;"
                          + " use Direct3D 11 or 12, Vulkan or Metal");

@@ -20,6 +20,8 @@ namespace Gsac
         static readonly int BlendId = Shader.PropertyToID("GsacBlend");
         static readonly int TintId = Shader.PropertyToID("GsacTint");
         static readonly int FogId = Shader.PropertyToID("GsacFog");
+        static readonly int NumberId = Shader.PropertyToID("GsacNumber");
+        static readonly int LatestId = Shader.PropertyToID("GsacLatest");
         static readonly int KeepsEnergyId = Shader.PropertyToID("GsacKeepsEnergy");
         static readonly int[] ModelIds =
         {
@@ -31,14 +33,18 @@ namespace Gsac
         readonly int[] sortKernels = new int[3];
         readonly GsacPicture picture = new GsacPicture();
         bool found;
-        GraphicsBuffer keys;
+        readonly int[] number = new int[1]; // of the frame's draws
+        int frame = -1;
+        GraphicsBuffer keys, latest;
         int sortedShape, sortedPart;
         GsacDepths sorted;
 
         public void Dispose()
         {
             picture.Dispose();
-            if (keys != null) keys.Dispose();
+            if (keys == null) return;
+            keys.Dispose();
+            latest.Dispose();
             keys = null;
             sortedShape = 0;
         }
@@ -60,6 +66,8 @@ namespace Gsac
         {
             Dispose();
             keys = GsacModel.Empty(most, 1);
+            latest = GsacModel.Empty(1, 1);
+            latest.SetData(number);
         }
 
         void Dispatch(ComputeShader kernels, GraphicsBuffer splats, int count, GsacSort sort)
@@ -86,10 +94,26 @@ namespace Gsac
             }
         }
 
+        /// <summary>
+        /// Makes the next draw the only one that counts: Unity keeps a draw until the frame ends, also where its camera is rendered
+        /// once more before, as for the sides of a cube.
+        /// </summary>
+        void Count()
+        {
+            int now = frame == Time.frameCount ? number[0] + 1 : 0;
+            frame = Time.frameCount;
+            if (now == number[0]) return;
+            number[0] = now;
+            latest.SetData(number);
+        }
+
         /// <summary>Asks Unity for the draw. space: of the splats to the world; rule: whose blending; indices: two triangles a splat.</summary>
         public void Draw(Camera camera, GsacFinish finish, GsacData rule, Matrix4x4 space, GraphicsBuffer splats, GraphicsBuffer colours,
                          GraphicsBuffer indices, int count, GsacSort sort, Bounds bounds)
         {
+            Count();
+            properties.SetInteger(NumberId, number[0]);
+            properties.SetBuffer(LatestId, latest);
             for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], space.GetRow(r));
             bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
             bool own = linear && finish.Trained && !camera.stereoEnabled && GsacPicture.IsPossible;

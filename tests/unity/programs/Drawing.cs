@@ -136,6 +136,29 @@ public static class Drawing
         frame();
     }
 
+    /// <summary>A line for each of three frames, the camera rendered one, two, three times: the draws' numbers, and the one that counts.</summary>
+    public static void Repeated(string file)
+    {
+        GameObject person = Person(file).gameObject;
+        Camera camera = Player.AddCamera("eye");
+        Turn(camera, 180);
+        string line = "";
+        uint[] latest = null;
+        Player.OnDraw = (asked, indices, count) =>
+        {
+            line += Player.Value(asked.matProps, Shader.PropertyToID("GsacNumber")).x + " ";
+            latest = Player.Words(Player.Buffer(asked.matProps, Shader.PropertyToID("GsacLatest")));
+        };
+        Action frame = Player.Frame(new[] { person });
+        for (int more = 0; more < 3; more++)
+        {
+            line = "";
+            frame();
+            for (int n = 0; n < more; n++) camera.Render();
+            Console.WriteLine(line + "counts " + latest[0]);
+        }
+    }
+
     /// <summary>What the draw is told: material, tint and share, fog; a line for each change on the component.</summary>
     public static void Finish(string file)
     {

@@ -39,6 +39,7 @@ public static class Play
             case "finish": Drawing.Finish(args[1]); break;
             case "crowd": Crowd.Print(args); break;
             case "crowds": Crowd.Count(args[1]); break;
+            case "repeated": Drawing.Repeated(args[1]); break;
             case "freed": Drawing.Freed(args[1]); break;
             default: return 2;
         }

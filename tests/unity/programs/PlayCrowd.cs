@@ -22,7 +22,7 @@ public static class Crowd
         "GsacRest", "GsacSkin", "GsacMoves", "GsacWeights", "GsacBones", "GsacPosed", "GsacCorners", "GsacLocal", "GsacSplats", "GsacKeys",
         "GsacColours", "GsacJoined", "GsacJoinedColours",
     };
-    static readonly string[] Drawn = { "GsacModel0", "GsacModel1", "GsacModel2", "GsacBlend", "GsacTint", "GsacIndexBits", "GsacKeepsEnergy" };
+    static readonly string[] Drawn = { "GsacModel0", "GsacModel1", "GsacModel2", "GsacBlend", "GsacTint", "GsacIndexBits", "GsacKeepsEnergy", "GsacNumber" };
 
     static void Put(List<float> row, Vector4 v)
     {
@@ -69,7 +69,7 @@ public static class Crowd
             Player.OnDraw = (asked, indices, count) =>
             {
                 foreach (string name in Drawn) Put(draws, Player.Value(asked.matProps, Shader.PropertyToID(name)));
-                foreach (string name in new[] { "GsacSplats", "GsacColours", "GsacKeys" }) draws.Add(number(Player.Buffer(asked.matProps, Shader.PropertyToID(name))));
+                foreach (string name in new[] { "GsacSplats", "GsacColours", "GsacKeys", "GsacLatest" }) draws.Add(number(Player.Buffer(asked.matProps, Shader.PropertyToID(name))));
                 draws.Add(count);
             };
             Player.Frame(people.ToArray())();

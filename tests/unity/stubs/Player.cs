@@ -47,7 +47,7 @@ namespace UnityEngine
         /// <summary>A frame of these components as one call, in their execution order, and then of all cameras.</summary>
         public static Action Frame(GameObject[] objects)
         {
-            Action all = () => { };
+            Action all = () => Time.frameCount++;
             foreach (string message in new[] { "Update", "LateUpdate" })
             {
                 var ordered = new List<KeyValuePair<int, Action>>();

@@ -236,6 +236,7 @@ namespace UnityEngine
 
     public static class Time
     {
+        public static int frameCount { get; internal set; }
         public static float deltaTime { get; internal set; } = 1 / 60f;
         public static float unscaledDeltaTime { get { return deltaTime; } }
     }

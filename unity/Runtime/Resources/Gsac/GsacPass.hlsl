@@ -3,6 +3,7 @@
 // pipeline has fog by distance, GSAC_FOGGED (a colour at a clip-space z).
 #include "GsacDraw.hlsl"
 #include "GsacFinish.hlsl"
+#include "GsacLatest.hlsl"
 
 struct GsacInput
 {
@@ -24,7 +25,7 @@ GsacVaryings Vertex(GsacInput input)
     UNITY_SETUP_INSTANCE_ID(input);
     UNITY_INITIALIZE_VERTEX_OUTPUT_STEREO(output);
     GsacCorner corner = GsacSplatCorner(input.vertex, UNITY_MATRIX_V, UNITY_MATRIX_P, GSAC_SCREEN, GSAC_ORIGIN);
-    output.clip = corner.clip;
+    output.clip = GsacIfLatest(corner.clip);
     output.sigmas = corner.sigmas;
     output.colour = float4(GsacThroughFog(corner.colour.rgb * GsacTint.rgb, corner.clip.z), corner.colour.a);
     return output;

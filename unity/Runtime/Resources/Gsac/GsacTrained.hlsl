@@ -1,6 +1,7 @@
 // Lays the avatar's own picture over the scene, for a wrapper that brings the pipeline's projection and what lies behind.
 #include "GsacDraw.hlsl"
 #include "GsacFinish.hlsl"
+#include "GsacLatest.hlsl"
 
 #define GSAC_STAND_IN 8 // px: a texture that small is Unity's for one that is not there
 
@@ -31,7 +32,8 @@ GsacLaidVaryings GsacLaid(uint vertex, float4x4 projection)
     float away = GsacEyeScreen.z;
     float2 side = (corner + GsacEyeLens.zw) / GsacEyeLens.xy;
     GsacLaidVaryings output;
-    output.clip = mul(projection, float4(GsacLensOf(projection).flat ? side : side * away, -away, 1));
+    float3 eye = float3(GsacLensOf(projection).flat ? side : side * away, -away);
+    output.clip = GsacIfLatest(mul(projection, float4(eye, 1)));
     output.place = place;
     return output;
 }
