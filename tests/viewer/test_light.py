@@ -129,7 +129,8 @@ def test_a_lamp_stands_in_for_the_clips_light_as_far_as_its_slider_says_and_with
 
 def test_the_dial_puts_the_lamp_where_it_is_dragged_and_keys_turn_it(browser, address):
     browser.open(f"{address}?dial#pose=A")
-    dial, lamp = "document.getElementById('lamp')", "(() => { const l = gsac.levels.scene; return [l.share, l.around, l.above]; })()"
+    dial = "document.getElementById('lamp')"
+    lamp = "(() => { const l = gsac.levels.scene; return [l.share, l.around, l.above]; })()"
     assert browser.run(lamp)[0] == 0 and browser.run("document.getElementById('lamp-share').offsetParent === null")
     drag = """(({left, top, width, height}, right, up) => %s.dispatchEvent(new PointerEvent('pointerdown', {pointerId: 1,
         clientX: left + width / 2 * (1 + right), clientY: top + height / 2 * (1 - up)})))(%s.getBoundingClientRect(), %s, %s)"""
