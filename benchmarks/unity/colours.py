@@ -83,7 +83,7 @@ class Stage:
     def __init__(self, gpu: Gpu, programs: Programs, avatar: RiggedAvatar, size: int) -> None:
         self.gpu, self.programs, self.avatar, self.size = gpu, programs, avatar, size
         count = len(avatar.gaussians)
-        self.direct = Painting(gpu, *programs.direct, size, size, count)
+        self.direct = Painting(gpu, *programs.direct, size, size, count, depth=True)
         self.own = Painting(gpu, *programs.own, size, size, count, ("rgba16float", "r16float"))
         self.laid = Painting(gpu, *programs.laid, size, size, 1, depth=True)
         gpu.put("GsacLatest", np.zeros(1, np.uint32))

@@ -132,6 +132,7 @@ class Painting:
             primitive={"topology": "triangle-list"}, depth_stencil=test if depth else None)
         self.targets = [gpu.texture(width, height, form) for form in forms]
         self.depth = gpu.texture(width, height, "depth32float") if depth else None
+        self.kept = None
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(count, dtype=np.uint32)[:, None]
         self.index = gpu.device.create_buffer_with_data(data=np.ascontiguousarray(corners), usage=wgpu.BufferUsage.INDEX)
 
@@ -144,14 +145,18 @@ class Painting:
         """Encodes a draw on cleared targets. instance: 0 for the left eye, 1 for the right; behind, far: colour and depth there."""
         attachments = [{"view": target.create_view(), "clear_value": behind, "load_op": "clear", "store_op": "store"}
                        for target in self.targets]
-        depth = self.depth and {"view": self.depth.create_view(), "depth_clear_value": far, "depth_load_op": "clear",
-                                "depth_store_op": "store"}
+        depth = self.depth and {"view": (self.kept or self.depth).create_view(), "depth_clear_value": far,
+                                "depth_load_op": "load" if self.kept else "clear", "depth_store_op": "store"}
         work = encoder.begin_render_pass(color_attachments=attachments, depth_stencil_attachment=depth, timestamp_writes=timestamps)
         work.set_pipeline(self.pipeline)
         work.set_bind_group(0, group)
         work.set_index_buffer(self.index, "uint32")
         work.draw_indexed(self.count * 6, 1, 0, 0, instance)
         work.end()
+
+    def keep_depth(self, depth: GPUTexture | None) -> None:
+        """From here on draws against a depth that lies there; None: against the same far one everywhere."""
+        self.kept = depth
 
     def read(self) -> np.ndarray:
         """The first target's picture (H, W, 4) float32, premultiplied RGBA."""

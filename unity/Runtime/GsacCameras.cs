@@ -16,6 +16,7 @@ namespace Gsac
         static readonly List<GsacCrowd> Crowds = new List<GsacCrowd>();
         static int[] group = new int[16], counts = new int[16]; // of each of Seen: the first whom it is drawn with; gaussians of a group
         static Material material, own, trained;
+        static readonly Material[] body = new Material[2];
 
         /// <summary>
         /// Gaussians that a headset's camera draws at most, of all people together; 0: as many as there are. The farthest person gets
@@ -41,6 +42,17 @@ namespace Gsac
         internal static Material TrainedMaterial
         {
             get { return Made(ref trained, "Gsac/GsacTrained"); }
+        }
+
+        /// <summary>What the body's mesh wears: shadow, depth texture and motion; depth.</summary>
+        internal static Material[] BodyMaterials
+        {
+            get
+            {
+                Made(ref body[0], "Gsac/GsacBody");
+                Made(ref body[1], "Gsac/GsacBodyDepth");
+                return body;
+            }
         }
 
         static Material Made(ref Material material, string shader)
@@ -75,7 +87,9 @@ namespace Gsac
             Free(material);
             Free(own);
             Free(trained);
-            material = own = trained = null;
+            Free(body[0]);
+            Free(body[1]);
+            material = own = trained = body[0] = body[1] = null;
         }
 
         /// <summary>Destroys what was made at run time, or in the editor while nothing plays.</summary>

@@ -57,6 +57,9 @@ namespace Gsac
         [SerializeField, Tooltip("Whether the scene's fog lies over the person; not in HDRP.")]
         bool fog = true;
 
+        [SerializeField, Tooltip("Whether the person casts shadows and writes depth and motion, by the mesh under the gaussians.")]
+        bool bodyPass = true;
+
         [SerializeField, Tooltip("The scene's light, instead of the clip's.")]
         GsacSceneLight sceneLight = new GsacSceneLight();
 
@@ -125,6 +128,16 @@ namespace Gsac
             set { fog = value; }
         }
 
+        /// <summary>
+        /// Whether the person casts shadows and writes depth and motion, by the mesh under the gaussians. A material that the child
+        /// `Body` has of its own stays.
+        /// </summary>
+        public bool BodyPass
+        {
+            get { return bodyPass; }
+            set { bodyPass = value; }
+        }
+
         /// <summary>How far the avatar stands in the scene's light, and which that is.</summary>
         public GsacSceneLight SceneLight
         {
@@ -149,6 +162,7 @@ namespace Gsac
 
         void OnDisable()
         {
+            Dress(false);
             GsacCameras.Remove(this);
             Drop();
         }
@@ -174,6 +188,13 @@ namespace Gsac
         void LateUpdate()
         {
             Refresh();
+            Dress(bodyPass && opacity > 0);
+        }
+
+        void Dress(bool on)
+        {
+            if (avatar == null) avatar = GetComponent<GsacAvatar>();
+            if (avatar != null && avatar.IsOpen && avatar.Body != null) GsacMesh.Dress(avatar.Body, on);
         }
 
         /// <summary>

@@ -87,6 +87,39 @@ public static class DrawOwn
         Console.WriteLine("materials: " + Player.Alive<Material>());
     }
 
+    /// <summary>What the body's mesh wears, situation by situation.</summary>
+    public static void Body(string file)
+    {
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        GsacAvatar other = GsacLoader.Load(File.ReadAllBytes(file), "other");
+        var renderer = avatar.GetComponent<GsacRenderer>();
+        SkinnedMeshRenderer body = avatar.Body;
+        Action frame = Player.Frame(new[] { avatar.gameObject, other.gameObject });
+        Action<string> tell = what =>
+        {
+            frame();
+            Material[] worn = body.sharedMaterials;
+            Console.WriteLine(what + ": " + (worn.Length > 0 && worn[0] != null ? worn.Length : 0) + " " + (body.sharedMaterial == other.Body.sharedMaterial)
+                              + " " + body.shadowCastingMode + " " + body.enabled + " " + Player.Alive<Material>());
+        };
+        tell("loaded");
+        renderer.BodyPass = false;
+        tell("switched off");
+        renderer.BodyPass = true;
+        renderer.Opacity = 0;
+        tell("faded away");
+        renderer.Opacity = 0.5f;
+        tell("half there");
+        Player.Call(renderer, "OnDisable");
+        Console.WriteLine("renderer off: " + (body.sharedMaterial == null));
+        Player.Call(renderer, "OnEnable");
+        var own = new Material(Resources.Load<Shader>("mine"));
+        body.sharedMaterial = own;
+        tell("own material");
+        renderer.BodyPass = false;
+        tell("own material, switched off");
+    }
+
     static float[] Rows(Matrix4x4 m)
     {
         var rows = new List<float>();

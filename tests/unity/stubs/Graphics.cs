@@ -226,8 +226,11 @@ namespace UnityEngine
 
     public class Renderer : Component
     {
-        public bool enabled { get; set; }
+        public bool enabled { get; set; } = true;
         public ShadowCastingMode shadowCastingMode { get; set; }
+        Material[] materials = { null };
+        public Material sharedMaterial { get { return materials.Length == 0 ? null : materials[0]; } set { materials = new[] { value }; } }
+        public Material[] sharedMaterials { get { return (Material[])materials.Clone(); } set { materials = (Material[])value.Clone(); } }
     }
 
     public sealed class SkinnedMeshRenderer : Renderer
@@ -314,5 +317,5 @@ namespace UnityEngine.Rendering
 
     public enum GraphicsDeviceType { Vulkan }
     public enum IndexFormat { UInt16, UInt32 }
-    public enum ShadowCastingMode { Off, ShadowsOnly = 3 }
+    public enum ShadowCastingMode { Off, On }
 }

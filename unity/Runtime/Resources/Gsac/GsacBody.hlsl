@@ -2,8 +2,11 @@
 #ifndef GSAC_BODY_INCLUDED
 #define GSAC_BODY_INCLUDED
 
-// m behind the body's surface at which its depth lies: gaussians lie on both sides of the surface, and none may be cut off.
-#define GSAC_BEHIND 0.1
+// m behind the body's surface at which its depth lies, where the gaussians are tested against it afterwards. They lie on both sides of
+// the surface, clothes and an arm before the trunk far from it: 0.1 m costs 32 to 44 dB of the picture, 0.4 m 63 and more.
+#ifndef GSAC_BEHIND
+#define GSAC_BEHIND 0.4
+#endif
 
 struct GsacBodyVertex
 {

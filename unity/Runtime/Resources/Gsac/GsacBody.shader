@@ -137,6 +137,8 @@ Shader "Gsac/Body"
             #pragma fragment GsacNothing
             #pragma multi_compile_instancing
             #include "Packages/com.unity.render-pipelines.universal/ShaderLibrary/Core.hlsl"
+            // a depth texture: only with depth priming are gaussians tested against it
+            #define GSAC_BEHIND 0.1
             #include "GsacBody.hlsl"
 
             GsacBodyVaryings Vertex(GsacBodyVertex input)

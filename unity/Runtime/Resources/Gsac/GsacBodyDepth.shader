@@ -1,4 +1,4 @@
-// The body's depth, a little behind its surface, after the sky and before all transparent things: for depth of field and fog, and so
+// The body's depth, behind its surface, after the sky and before all transparent things: for depth of field and fog, and so
 // that transparent things behind the person are hidden by her.
 Shader "Gsac/Body Depth"
 {
@@ -22,6 +22,8 @@ Shader "Gsac/Body Depth"
             #pragma multi_compile_instancing
             #include "Packages/com.unity.render-pipelines.core/ShaderLibrary/Common.hlsl"
             #include "Packages/com.unity.render-pipelines.high-definition/Runtime/ShaderLibrary/ShaderVariables.hlsl"
+            // nothing is tested against it but effects on the whole picture
+            #define GSAC_BEHIND 0
             #include "GsacBody.hlsl"
 
             GsacBodyVaryings Vertex(GsacBodyVertex input)
