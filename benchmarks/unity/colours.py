@@ -112,7 +112,7 @@ class Stage:
 
     def draw_direct(self, shot: Shot, background: float) -> np.ndarray:
         """Display values (size, size, 3) of the splats as one draw over a background."""
-        grey = float(to_linear(np.float64(background)))
+        grey = float(to_linear(np.asarray(background)))
         return to_display(self.direct.draw(self.parameters(shot, 1), behind=(grey, grey, grey, 1))[..., :3])
 
     def draw_own(self, shot: Shot) -> None:
@@ -121,7 +121,7 @@ class Stage:
 
     def lay(self, shot: Shot, background: float, known: bool, far: float = 1) -> np.ndarray:
         """Display values (size, size, 3) of the own picture laid over a background. far: depth of what stands in the scene."""
-        grey = float(to_linear(np.float64(background)))
+        grey = float(to_linear(np.asarray(background)))
         if self.programs.behind:
             side = self.size if known else 4
             copy = self.gpu.texture(side, side, "rgba16float")
@@ -191,17 +191,18 @@ def refit(avatar: RiggedAvatar, size: int = 320, steps: int = 200, rate: float =
 
 
 def decibels(got: np.ndarray, want: np.ndarray, where: np.ndarray) -> float:
-    """PSNR of display values (H, W, 3) in the pixels of a mask (H, W)."""
+    """PSNR in the pixels of `where`. got, want: (H, W, 3) display values; where: (H, W) bool."""
     return float(-10 * np.log10(((np.clip(got, 0, 1) - np.clip(want, 0, 1))[where] ** 2).mean() + 1e-12))
 
 
 def measure(stage: Stage, shots: list[Shot], fitted: Gaussians | None) -> dict[str, np.ndarray]:
     """Way -> (shots, backgrounds, 2) dB: of the whole picture and of the person's pixels alone."""
     avatar, rows = stage.avatar, {way: [] for way in WAYS if fitted is not None or way != "refitted"}
+    shown = {"refitted": fitted}
     for shot in shots:
         rgb, alpha = trained_picture(shot, avatar.faces, avatar.gaussians)
         for way, row in rows.items():
-            stage.put(shot, fitted if way == "refitted" else avatar.gaussians)
+            stage.put(shot, shown.get(way) or avatar.gaussians)
             if way in ("own", "behind"):
                 stage.draw_own(shot)
             found = []

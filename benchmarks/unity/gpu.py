@@ -79,7 +79,7 @@ class Gpu:
         for number, (kind, name) in {n: b for program in programs for n, b in program.bindings.items()}.items():
             if kind in ("texture", "sampler"):
                 entries.append({"binding": number,
-                                "resource": self.textures[name].create_view() if kind == "texture" else self.sampler})
+                                "resource": self.textures[str(name)].create_view() if kind == "texture" else self.sampler})
                 continue
             buffer = self.buffers[name] if kind != "uniform" else self.device.create_buffer_with_data(
                 data=uniform, usage=usage.UNIFORM)

@@ -56,9 +56,10 @@ def parameters(shot):
     view, P = np.diag([1.0, -1, -1, 1]), projection(shot.camera)
     moved = np.eye(4)
     moved[0, 3] = -.1
-    return {"unity_MatrixV": view, "glstate_matrix_projection": P.T, "unity_ObjectToWorld": np.eye(4), "_WorldSpaceCameraPos": [0, 0, 0, 0],
-            "_ScreenParams": [SIZE, SIZE, 0, 0], "_ScaledScreenParams": [SIZE, SIZE, 0, 0], "_ScreenSize": [SIZE, SIZE, 0, 0],
-            "_LightDirection": [0, 0, 0], "_LightPosition": [0, 0, 0], "_HasLastPositionData": 0, "unity_MotionVectorsParams": [0, 0, 0, 0],
+    return {"unity_MatrixV": view, "glstate_matrix_projection": P.T, "unity_ObjectToWorld": np.eye(4), "_HasLastPositionData": 0,
+            **dict.fromkeys(("_LightDirection", "_LightPosition"), [0, 0, 0]),
+            **dict.fromkeys(("_ScreenParams", "_ScaledScreenParams", "_ScreenSize"), [SIZE, SIZE, 0, 0]),
+            **dict.fromkeys(("_WorldSpaceCameraPos", "unity_MotionVectorsParams"), [0, 0, 0, 0]),
             **dict.fromkeys(("_NonJitteredVP", "_NonJitteredViewProjMatrix", "_PreviousVP", "_PrevViewProjMatrix"), (P @ view).T),
             **dict.fromkeys(("_PreviousM", "unity_MatrixPreviousM"), moved.T)}
 
@@ -84,10 +85,11 @@ def painted(gpu, shot, avatar, parameters):
             depth_stencil={"format": "depth32float", "depth_write_enabled": True, "depth_compare": "less-equal"})
         target, depth = gpu.texture(SIZE, SIZE, "rgba16float"), gpu.texture(SIZE, SIZE, "depth32float")
         index = device.create_buffer_with_data(data=avatar.faces.astype(np.uint32), usage=wgpu.BufferUsage.INDEX)
-        encoder = device.create_command_encoder()
+        encoder, clear = device.create_command_encoder(), {"load_op": "clear", "store_op": "store"}
         work = encoder.begin_render_pass(
-            color_attachments=[{"view": target.create_view(), "clear_value": (0, 0, 0, 0), "load_op": "clear", "store_op": "store"}],
-            depth_stencil_attachment={"view": depth.create_view(), "depth_clear_value": 1, "depth_load_op": "clear", "depth_store_op": "store"})
+            color_attachments=[{"view": target.create_view(), "clear_value": (0, 0, 0, 0), **clear}],
+            depth_stencil_attachment={"view": depth.create_view(), "depth_clear_value": 1,
+                                      **{f"depth_{what}": how for what, how in clear.items()}})
         work.set_pipeline(pipeline)
         work.set_bind_group(0, gpu.group(layout, [vertex, fragment], vertex.uniform(parameters)))
         for i, buffer in enumerate(buffers):
@@ -138,7 +140,7 @@ def test_the_motion_is_the_way_on_the_screen_since_the_frame_before(compiled, pa
 
 
 def test_a_person_wears_the_passes_by_default_and_what_others_gave_her_stays(play, files):
-    lines = dict(line.split(": ") for line in play("body", files / "figure.gsac").splitlines())
+    lines = dict(line.split(": ") for line in play("dressed", files / "figure.gsac").splitlines())
     assert lines["loaded"].split()[:4] == ["2", "True", "On", "True"]
     assert lines["switched off"].split()[0] == lines["faded away"].split()[0] == "0"
     assert lines["half there"].split()[:2] == ["2", "True"] and lines["renderer off"] == "True"

@@ -83,12 +83,11 @@ public static class DrawOwn
         tell("headset");
         Player.SetEyes(camera, null);
         Player.Call(renderer, "OnDisable");
-        tell("gone");
-        Console.WriteLine("materials: " + Player.Alive<Material>());
+        Console.WriteLine("gone: " + Player.Alive<RenderTexture>() + " " + Player.Alive<Material>());
     }
 
     /// <summary>What the body's mesh wears, situation by situation.</summary>
-    public static void Body(string file)
+    public static void Dressed(string file)
     {
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
         GsacAvatar other = GsacLoader.Load(File.ReadAllBytes(file), "other");

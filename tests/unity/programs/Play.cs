@@ -35,7 +35,7 @@ public static class Play
             case "cameras": Drawing.Cameras(args[1]); break;
             case "zoom": Drawing.Zoom(args[1]); break;
             case "scene": PlayLight.Scene(args[1], args[2]); break;
-            case "body": DrawOwn.Body(args[1]); break;
+            case "dressed": DrawOwn.Dressed(args[1]); break;
             case "picture": DrawOwn.Picture(args[1], args[2]); break;
             case "finish": Drawing.Finish(args[1]); break;
             case "crowd": Crowd.Print(args); break;
