@@ -155,6 +155,10 @@ def test_a_loaded_person_has_the_body_with_the_expressions_as_blend_shapes(play,
         np.testing.assert_allclose(got[f"shape.{name}"].reshape(-1, 3), moved * (-1, 1, 1), atol=1e-7)
 
 
+def test_a_blend_shape_that_moves_in_edit_mode_has_the_person_drawn_anew_and_one_at_rest_has_not(play, files):
+    assert play("face", files / "figure.gsac").splitlines() == ["drawn 0", "still 0", "drawn 0.6", "still 0.6"]
+
+
 def test_the_body_has_the_face_of_the_gaussians_the_jaws_turn_too(play, mono, files, given, tmp_path):
     play("body", files / "person.gsac", files / "person.txt", tmp_path / "body")
     avatar, pose, _, weights = given("person")

@@ -27,6 +27,7 @@ public static class Drive
             case "body": Body(args[1], args[2], args[3]); break;
             case "clips": Clips(args[1], args[2]); break;
             case "reach": Reach(args[1]); break;
+            case "face": Face(args[1]); break;
             default: return 2;
         }
         return 0;
@@ -368,6 +369,24 @@ public static class Drive
         Player.Call(avatar, "OnDisable");
         bool freed = mesh == null;
         Say("on again " + freed + " " + (avatar.Body.sharedMesh != null), avatar.Weights[Array.IndexOf(avatar.Data.Expressions, "jawOpen")]);
+    }
+
+    /// <summary>Dispatches of frames in edit mode: the first, one in which nothing moves, one in which a blend shape does.</summary>
+    static void Face(string file)
+    {
+        GsacAvatar avatar = Imported(file);
+        Player.SetPlaying(false);
+        Player.AddCamera("eye").transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
+        int asked = 0;
+        Player.OnDispatch = (shader, kernel, groups) => asked++;
+        Action frame = Player.Frame(new[] { avatar.gameObject });
+        foreach (float weight in new[] { 0f, 0, 60, 60 })
+        {
+            asked = 0;
+            avatar.Body.SetBlendShapeWeight(avatar.Body.sharedMesh.GetBlendShapeIndex("jawOpen"), weight);
+            frame();
+            Say(asked > 0 ? "drawn" : "still", avatar.DrawnWeights[Array.IndexOf(avatar.Data.Expressions, "jawOpen")]);
+        }
     }
 
     /// <summary>Hands and feet brought to places by script, by objects over an Animator and by the scene view's handles.</summary>
