@@ -19,7 +19,8 @@ MIRROR = np.diag([-1.0, 1, 1])
 ONCE = {
     "GsacAvatar.Open": "a file is read", "GsacAvatar.Unknown": "an error", "GsacAvatar.Complain": "an error",
     "GsacRenderer.Prepare": "a model's first frame",
-    "GsacRenderer.Complain": "an error", "GsacCameras.get_Material": "the first draw",
+    "GsacRenderer.Complain": "an error", "GsacCameras.Make": "the first draw",
+    "GsacPicture.Resize": "an avatar that grows on the screen",
     "GsacRenderer.NewView": "a camera's first frame", "GsacSorted.Resize": "another file",
     "GsacCameras.Grow": "more people than ever", "GsacCameras.NewCrowd": "people meet", "GsacCrowd.Reserve": "more of them",
     "GsacCrowd.Plan": "others of them", "GsacPoseStream.Prepare": "another file", "GsacReach.Prepare": "another file",

@@ -34,6 +34,9 @@ public static class Play
             case "life": Life(args[1]); break;
             case "cameras": Drawing.Cameras(args[1]); break;
             case "zoom": Drawing.Zoom(args[1]); break;
+            case "scene": PlayLight.Scene(args[1], args[2]); break;
+            case "dressed": DrawOwn.Dressed(args[1]); break;
+            case "picture": DrawOwn.Picture(args[1], args[2]); break;
             case "finish": Drawing.Finish(args[1]); break;
             case "crowd": Crowd.Print(args); break;
             case "crowds": Crowd.Count(args[1]); break;
