@@ -34,11 +34,11 @@ def run(program, *args, heap="256m", collector=""):
 
 def compile_package(package, out):
     """The package over the stubs of Unity, Runtime without the editor's, as Unity does. Returns the tests' program."""
-    stubs, editor = sorted((HERE / "stubs").glob("*.cs")), HERE / "stubs" / "UnityEditor.cs"
-    compile_csharp([s for s in stubs if s != editor], out / "UnityEngine.dll")
+    stubs, editor = (set((HERE / "stubs").glob(f"{kind}*.cs")) for kind in ("", "UnityEditor"))
+    compile_csharp(sorted(stubs - editor), out / "UnityEngine.dll")
     options = [f"-r:{out / 'UnityEngine.dll'}"]
     compile_csharp(sorted((package / "Runtime").rglob("*.cs")), out / "Gsac.dll", *options)
-    compile_csharp([editor], out / "UnityEditor.dll", *options)
+    compile_csharp(sorted(editor), out / "UnityEditor.dll", *options)
     options += [f"-r:{out / 'UnityEditor.dll'}", f"-r:{out / 'Gsac.dll'}"]
     compile_csharp(sorted((package / "Editor").rglob("*.cs")), out / "Gsac.Editor.dll", *options)
     options.append(f"-r:{out / 'Gsac.Editor.dll'}")

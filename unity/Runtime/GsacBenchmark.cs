@@ -16,6 +16,7 @@ namespace Gsac
         const int MostSeconds = 24 * 3600;
 
         [SerializeField] GsacAvatar avatar = null;
+        [SerializeField, Tooltip("Where no avatar is named: the first of these.")] GsacCast cast = null;
         [SerializeField, Tooltip("s")] float duration = 600;
         [SerializeField, Tooltip("s between two poses")] float every = 0.5f;
         [SerializeField, Tooltip("s before counting begins")] float warmUp = 3;
@@ -38,6 +39,11 @@ namespace Gsac
             Application.runInBackground = true;
             perSecond = new int[Math.Min(MostSeconds, (int)duration + 2)];
             secondEnds = warmUp + 1;
+        }
+
+        void Start()
+        {
+            if (avatar == null && cast != null) avatar = cast.First;
         }
 
         void Update()

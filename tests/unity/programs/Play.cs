@@ -32,6 +32,7 @@ public static class Play
             case "inspector": Inspector(args[1]); break;
             case "demo": Demo(args[1]); break;
             case "life": Life(args[1]); break;
+            case "cast": Adopt.Cast(args[1]); break;
             default: return 2;
         }
         return 0;

@@ -4,7 +4,7 @@ using System.Collections.Generic;
 
 namespace UnityEngine
 {
-    [Flags] public enum HideFlags { HideAndDontSave = 61 }
+    [Flags] public enum HideFlags { DontSave = 52, HideAndDontSave = 61 }
 
     public class Object
     {
@@ -12,6 +12,8 @@ namespace UnityEngine
         public HideFlags hideFlags { get; set; }
         internal bool Destroyed;
         public static void Destroy(Object o) { o.Destroyed = true; }
+        public static void DestroyImmediate(Object o) { o.Destroyed = true; }
+        public static T Instantiate<T>(T original) where T : Component { return Cloner.Clone(original); }
         public static bool operator ==(Object a, Object b)
         {
             bool noA = ReferenceEquals(a, null) || a.Destroyed, noB = ReferenceEquals(b, null) || b.Destroyed;
@@ -82,6 +84,7 @@ namespace UnityEngine
             foreach (Component c in Components) if (c is T) return (T)(object)c;
             return default(T);
         }
+        public T[] GetComponentsInChildren<T>(bool includeInactive) { return transform.GetComponentsInChildren<T>(includeInactive); }
     }
 
     public sealed class Transform : Component
@@ -225,6 +228,7 @@ namespace UnityEngine
     {
         internal static readonly List<string> Errors = new List<string>();
         public static void Log(object message) { }
+        public static void LogWarning(object message, Object context) { Errors.Add(message.ToString()); }
         public static void LogError(object message, Object context) { Errors.Add(message.ToString()); }
     }
 
