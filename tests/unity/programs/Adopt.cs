@@ -1,7 +1,10 @@
 using System;
+using System.Collections.Concurrent;
 using System.Collections.Generic;
 using System.Globalization;
 using System.IO;
+using System.Threading;
+using System.Threading.Tasks;
 using Gsac;
 using UnityEditor;
 using UnityEditor.AssetImporters;
@@ -49,5 +52,79 @@ public static class Adopt
         Console.WriteLine("named " + cast.People.Length);
         new GsacCastFiller().OnProcessScene(scene, new BuildReport());
         Console.WriteLine("named " + cast.People.Length);
+    }
+
+    /// <summary>Plays Unity's main thread: what is awaited goes on in the next frame.</summary>
+    sealed class Frames : SynchronizationContext
+    {
+        readonly BlockingCollection<Action> waiting = new BlockingCollection<Action>();
+        public int Count;
+
+        public override void Post(SendOrPostCallback d, object state) { waiting.Add(() => d(state)); }
+
+        public void RunUntil(Task task)
+        {
+            while (!task.IsCompleted)
+            {
+                Action next;
+                if (!waiting.TryTake(out next, 20)) continue;
+                Count++;
+                next();
+            }
+        }
+    }
+
+    /// <summary>A file loaded without a halt: where it was parsed, how many frames it took, what is left where it was stopped or bad.</summary>
+    public static void LoadAsync(string file, string broken)
+    {
+        var frames = new Frames();
+        SynchronizationContext.SetSynchronizationContext(frames);
+        int main = Thread.CurrentThread.ManagedThreadId;
+        var uploads = new HashSet<int>();
+        Player.OnUpload = () =>
+        {
+            uploads.Add(Thread.CurrentThread.ManagedThreadId);
+            Thread.Sleep(3);
+        };
+        Task<GsacAvatar> task = GsacLoader.LoadAsync(file);
+        Console.WriteLine("at once " + task.IsCompleted);
+        frames.RunUntil(task);
+        GsacAvatar avatar = task.Result;
+        Console.WriteLine(avatar.name + " frames " + (frames.Count > 6) + " uploads " + (uploads.Count == 1 && uploads.Contains(main)));
+        Player.OnUpload = null;
+        int alive = Player.BuffersAlive;
+        Player.AddCamera("eye").transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
+        int draws = 0;
+        Player.OnDraw = (asked, indices, count) => draws++;
+        Player.Frame(new[] { avatar.gameObject })();
+        Console.WriteLine("draws " + draws + " before " + (alive > 0));
+        Player.Call(avatar.GetComponent<GsacRenderer>(), "OnDisable");
+        Player.Call(avatar, "OnDisable");
+        Console.WriteLine("buffers " + Player.BuffersAlive);
+        var stop = new CancellationTokenSource();
+        Player.OnUpload = () =>
+        {
+            Thread.Sleep(3);
+            stop.Cancel();
+        };
+        task = GsacLoader.LoadAsync(file, stop.Token);
+        frames.RunUntil(task);
+        Console.WriteLine("stopped " + task.IsCanceled + " buffers " + Player.BuffersAlive);
+        Player.OnUpload = () =>
+        {
+            Thread.Sleep(3);
+            Player.SetPlaying(false);
+        };
+        task = GsacLoader.LoadAsync(File.ReadAllBytes(file), "Ada");
+        frames.RunUntil(task);
+        Console.WriteLine("play mode ended " + task.IsCanceled + " buffers " + Player.BuffersAlive);
+        Player.SetPlaying(true);
+        foreach (string path in new[] { broken, broken + ".none" })
+        {
+            task = GsacLoader.LoadAsync(path);
+            frames.RunUntil(task);
+            Exception e = task.Exception.InnerException;
+            Console.WriteLine(e.GetType().Name + " " + e.Message);
+        }
     }
 }

@@ -33,6 +33,7 @@ public static class Play
             case "demo": Demo(args[1]); break;
             case "life": Life(args[1]); break;
             case "cast": Adopt.Cast(args[1]); break;
+            case "load": Adopt.LoadAsync(args[1], args[2]); break;
             default: return 2;
         }
         return 0;

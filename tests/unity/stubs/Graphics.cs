@@ -41,6 +41,7 @@ namespace UnityEngine
         }
         public void SetData(Array data)
         {
+            if (Player.OnUpload != null) Player.OnUpload();
             if (data is Vector4[])
             {
                 var rows = (Vector4[])data;

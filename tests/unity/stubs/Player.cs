@@ -10,6 +10,7 @@ namespace UnityEngine
         /// <summary>What is called at each dispatch (shader, kernel, groups) and draw (parameters, indices, how many).</summary>
         public static Action<ComputeShader, int, int> OnDispatch;
         public static Action<RenderParams, GraphicsBuffer, int> OnDraw;
+        public static Action OnUpload;
 
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;
