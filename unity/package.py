@@ -24,7 +24,9 @@ SOURCES = (
     "Editor/GsacCastFiller.cs",
     "Editor/GsacImporter.cs",
     "Editor/GsacPoseStreamEditor.cs",
+    "Editor/GsacSceneBounds.cs",
     "Editor/GsacSceneViews.cs",
+    "Editor/GsacThumbnail.cs",
     "LICENSE.md",
     "README.md",
     "Runtime/Core/GsacContainer.cs",
@@ -65,6 +67,8 @@ SOURCES = (
     "Runtime/Resources/Gsac/GsacSplats.shader",
     "Samples~/Demo/Benchmark.unity",
     "Samples~/Demo/Demo.unity",
+    "SelfCheck/Gsac.SelfCheck.asmdef",
+    "SelfCheck/GsacPainter.cs",
     "package.json",
 )
 """Files of the package. Whole names, so that the cache sees these files."""

@@ -10,6 +10,9 @@ import numpy as np
 HERE = Path(__file__).parents[1] / "unity"
 PROGRAMS = {"mcs": "mono-mcs", "mono": "mono-runtime"}
 
+ASSEMBLIES = {"Runtime": "Gsac.dll", "SelfCheck": "Gsac.SelfCheck.dll", "Editor": "Gsac.Editor.dll"}
+"""Folder of the package -> what it is compiled to; each may use those before it."""
+
 
 def missing_packages():
     return sorted(package for program, package in PROGRAMS.items() if not shutil.which(program))
@@ -37,11 +40,12 @@ def compile_package(package, out):
     stubs, editor = (set((HERE / "stubs").glob(f"{kind}*.cs")) for kind in ("", "UnityEditor"))
     compile_csharp(sorted(stubs - editor), out / "UnityEngine.dll")
     options = [f"-r:{out / 'UnityEngine.dll'}"]
-    compile_csharp(sorted((package / "Runtime").rglob("*.cs")), out / "Gsac.dll", *options)
-    compile_csharp(sorted(editor), out / "UnityEditor.dll", *options)
-    options += [f"-r:{out / 'UnityEditor.dll'}", f"-r:{out / 'Gsac.dll'}"]
-    compile_csharp(sorted((package / "Editor").rglob("*.cs")), out / "Gsac.Editor.dll", *options)
-    options.append(f"-r:{out / 'Gsac.Editor.dll'}")
+    for folder, library in ASSEMBLIES.items():
+        if folder == "Editor":
+            compile_csharp(sorted(editor), out / "UnityEditor.dll", *options)
+            options.append(f"-r:{out / 'UnityEditor.dll'}")
+        compile_csharp(sorted((package / folder).rglob("*.cs")), out / library, *options)
+        options.append(f"-r:{out / library}")
     return compile_csharp(sorted((HERE / "programs").glob("[ADP]*.cs")), out / "Play.exe", *options)
 
 

@@ -162,10 +162,18 @@ def test_the_manifest_is_a_package_with_its_sample(upm):
     assert all(any(path.startswith(sample["path"] + "/") for path in upm) for sample in manifest["samples"])
 
 
-def test_assemblies_are_named_apart_and_the_editor_is_kept_out_of_players(upm):
-    runtime, editor = (json.loads(upm[path]) for path in ("Runtime/Gsac.asmdef", "Editor/Gsac.Editor.asmdef"))
-    assert runtime["name"] == "Gsac" and editor["references"] == ["Gsac"] and editor["includePlatforms"] == ["Editor"]
-    assert all(b"UnityEditor" not in content for path, content in upm.items() if path.startswith("Runtime/"))
+def test_assemblies_are_named_apart_know_each_other_and_the_editor_is_kept_out_of_players(upm):
+    assemblies = {Path(path).parent: json.loads(content) for path, content in upm.items() if path.endswith(".asmdef")}
+    names = [assembly["name"] for assembly in assemblies.values()]
+    assert len(set(names)) == len(names)
+    for assembly in assemblies.values():
+        foreign = set(assembly["references"]) - set(names)
+        assert not foreign or assembly["defineConstraints"], f"{assembly['name']} needs {foreign}, which not every project has"
+    for path, content in upm.items():
+        if path.endswith(".cs"):
+            own = next(assemblies[folder] for folder in Path(path).parents if folder in assemblies)
+            assert ("Editor" in Path(path).parts) == (own["includePlatforms"] == ["Editor"]), path
+            assert own["includePlatforms"] == ["Editor"] or b"UnityEditor" not in content, path
 
 
 def test_scripts_ask_for_resources_and_kernels_that_are_there(upm):

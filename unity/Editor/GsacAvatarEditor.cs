@@ -11,6 +11,17 @@ namespace Gsac
         int expression;
         Vector3 degrees;
 
+        /// <summary>Unity asks by name whether the key F knows what to frame, and what.</summary>
+        public bool HasFrameBounds()
+        {
+            return ((GsacAvatar)target).CanOpen;
+        }
+
+        public Bounds OnGetFrameBounds()
+        {
+            return GsacSceneBounds.Of((GsacAvatar)target);
+        }
+
         public override void OnInspectorGUI()
         {
             DrawDefaultInspector();

@@ -3,6 +3,7 @@ using System.Collections.Concurrent;
 using System.Collections.Generic;
 using System.Globalization;
 using System.IO;
+using System.Reflection;
 using System.Threading;
 using System.Threading.Tasks;
 using Gsac;
@@ -126,5 +127,55 @@ public static class Adopt
             Exception e = task.Exception.InnerException;
             Console.WriteLine(e.GetType().Name + " " + e.Message);
         }
+    }
+
+    /// <summary>The plain picture of a posed person for a camera, with perspective and without.</summary>
+    public static void Paint(string file, string numbers, string path)
+    {
+        GsacAvatar avatar = Play.Posed(file, Play.Numbers(numbers));
+        avatar.transform.localPosition = new Vector3(0.4f, 0.1f, -0.7f);
+        avatar.transform.localRotation = Quaternion.Euler(5, 40, -3);
+        avatar.transform.localScale = new Vector3(1.2f, 1.2f, 1.2f);
+        Camera camera = Player.AddCamera("eye");
+        camera.transform.SetPositionAndRotation(new Vector3(1.5f, 1.6f, 2.5f), Quaternion.Euler(12, 215, 2));
+        Player.Frame(new[] { avatar.gameObject })();
+        avatar.CollectWeights();
+        var bones = new Vector4[avatar.Data.JointCount * 3];
+        GsacSkeleton.Bones(avatar.Data, avatar.transform, avatar.Joints, bones);
+        Matrix4x4 toEye = camera.worldToCameraMatrix * avatar.transform.localToWorldMatrix;
+        var lens = new Matrix4x4 { m00 = 460 / 256f, m11 = 460 / 256f, m02 = 0.1f, m12 = -0.05f, m22 = -1, m32 = -1 };
+        var flat = new Matrix4x4 { m00 = 0.9f, m11 = 0.9f, m03 = 0.1f, m13 = -0.05f, m22 = -1, m33 = 1 };
+        using (var dump = new Dump(path))
+        {
+            dump.Put("perspective", GsacPainter.Paint(avatar.Data, bones, avatar.DrawnWeights, toEye, lens, 256, 256));
+            dump.Put("flat", GsacPainter.Paint(avatar.Data, bones, avatar.DrawnWeights, toEye, flat, 256, 256));
+            dump.Put("toEye", new[] { toEye.m00, toEye.m01, toEye.m02, toEye.m03, toEye.m10, toEye.m11, toEye.m12, toEye.m13, toEye.m20, toEye.m21, toEye.m22, toEye.m23 });
+        }
+    }
+
+    /// <summary>A prefab's thumbnail as numbers, then what a click meets and F frames of a person who was put somewhere.</summary>
+    public static void Look(string file, string path)
+    {
+        var context = new AssetImportContext { assetPath = file };
+        new GsacImporter().OnImportAsset(context);
+        var pixels = new List<float>();
+        foreach (Color32 c in context.Thumbnail.GetPixels32()) pixels.AddRange(new float[] { c.r, c.g, c.b, c.a });
+        var person = ((GameObject)context.mainObject).GetComponent<GsacAvatar>();
+        Player.SetPlaying(false);
+        person.transform.localPosition = new Vector3(3, 0, 1);
+        var inspector = new GsacAvatarEditor { target = person };
+        Bounds framed = inspector.OnGetFrameBounds();
+        typeof(GsacSceneBounds).GetMethod("Draw", BindingFlags.NonPublic | BindingFlags.Static).Invoke(null, new object[] { person, GizmoType.Pickable });
+        var balls = new List<float>();
+        foreach (KeyValuePair<Vector3, float> ball in Gizmos.Balls) balls.AddRange(new[] { ball.Key.x, ball.Key.y, ball.Key.z, ball.Value });
+        using (var dump = new Dump(path))
+        {
+            dump.Put("thumbnail", pixels.ToArray());
+            dump.Put("framed", new[] { framed.center.x, framed.center.y, framed.center.z, framed.size.x, framed.size.y, framed.size.z });
+            dump.Put("balls", balls.ToArray());
+        }
+        Console.WriteLine("frames " + inspector.HasFrameBounds());
+        var empty = new GameObject("empty").AddComponent<GsacAvatar>();
+        Console.WriteLine("empty frames " + new GsacAvatarEditor { target = empty }.HasFrameBounds());
     }
 }

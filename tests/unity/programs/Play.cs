@@ -34,12 +34,14 @@ public static class Play
             case "life": Life(args[1]); break;
             case "cast": Adopt.Cast(args[1]); break;
             case "load": Adopt.LoadAsync(args[1], args[2]); break;
+            case "paint": Adopt.Paint(args[1], args[2], args[3]); break;
+            case "look": Adopt.Look(args[1], args[2]); break;
             default: return 2;
         }
         return 0;
     }
 
-    static float[] Numbers(string path)
+    public static float[] Numbers(string path)
     {
         string[] words = File.ReadAllText(path).Split(new[] { ' ', '\n' }, StringSplitOptions.RemoveEmptyEntries);
         return Array.ConvertAll(words, w => float.Parse(w, CultureInfo.InvariantCulture));
@@ -53,7 +55,7 @@ public static class Play
     }
 
     /// <summary>numbers: 165 of SMPL-X's pose, 3 of transl, the weights.</summary>
-    static GsacAvatar Posed(string file, float[] numbers)
+    public static GsacAvatar Posed(string file, float[] numbers)
     {
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
         avatar.SetSmplx(Part(numbers, 0, 3), Part(numbers, 3, 63), Part(numbers, 75, 45), Part(numbers, 120, 45), Part(numbers, 66, 3),

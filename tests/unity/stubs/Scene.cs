@@ -96,6 +96,8 @@ namespace UnityEngine
         public int childCount { get { return Children.Count; } }
         public Vector3 localPosition { get { return place; } set { place = value; } }
         public Quaternion localRotation { get { return turn; } set { turn = value; } }
+        public Vector3 lossyScale { get { return parent == null ? scale : Times(parent.lossyScale, scale); } }
+        static Vector3 Times(Vector3 a, Vector3 b) { return new Vector3(a.x * b.x, a.y * b.y, a.z * b.z); }
         public Vector3 localScale { get { return scale; } set { scale = value; } }
         public Vector3 position
         {

@@ -96,6 +96,12 @@ namespace UnityEditor.AssetImporters
         public string assetPath { get; set; }
         public UnityEngine.Object mainObject { get; private set; }
         public void AddObjectToAsset(string identifier, UnityEngine.Object obj) { Added.Add(identifier, obj); }
+        public void AddObjectToAsset(string identifier, UnityEngine.Object obj, Texture2D thumbnail)
+        {
+            Thumbnail = thumbnail;
+            Added.Add(identifier, obj);
+        }
+        public Texture2D Thumbnail;
         public void SetMainObject(UnityEngine.Object obj) { mainObject = obj; }
         public void LogImportError(string msg) { Words.Add("error: " + msg); }
         public void LogImportWarning(string msg) { Words.Add("warning: " + msg); }

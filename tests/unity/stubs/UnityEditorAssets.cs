@@ -6,6 +6,10 @@ namespace UnityEditor
 {
     using UnityEngine;
 
+    [Flags] public enum GizmoType { Pickable = 1, NonSelected = 32, Selected = 4 }
+
+    [AttributeUsage(AttributeTargets.Method)] public sealed class DrawGizmo : Attribute { public DrawGizmo(GizmoType gizmo) { } }
+
     public static class AssetDatabase
     {
         /// <summary>Not Unity's: path -> main object, as the project has them.</summary>
