@@ -26,6 +26,7 @@ SOURCES = (
     "Editor/GsacPoseStreamEditor.cs",
     "Editor/GsacSceneBounds.cs",
     "Editor/GsacSceneViews.cs",
+    "Editor/GsacSelfCheckMenu.cs",
     "Editor/GsacThumbnail.cs",
     "LICENSE.md",
     "README.md",
@@ -58,6 +59,7 @@ SOURCES = (
     "Runtime/GsacModel.cs",
     "Runtime/GsacPoseStream.cs",
     "Runtime/GsacRenderer.cs",
+    "Runtime/GsacReport.cs",
     "Runtime/GsacSkeleton.cs",
     "Runtime/GsacView.cs",
     "Runtime/Resources/Gsac/Gsac.compute",
@@ -69,6 +71,7 @@ SOURCES = (
     "Samples~/Demo/Demo.unity",
     "SelfCheck/Gsac.SelfCheck.asmdef",
     "SelfCheck/GsacPainter.cs",
+    "SelfCheck/GsacSelfCheck.cs",
     "package.json",
 )
 """Files of the package. Whole names, so that the cache sees these files."""

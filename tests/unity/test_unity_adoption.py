@@ -1,5 +1,7 @@
 """What a studio does with the package: its scenes show the people of the project."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -88,3 +90,23 @@ def test_a_prefab_has_a_thumbnail_of_head_and_shoulders_and_can_be_clicked_and_f
     nearest = (np.linalg.norm(vertices[:, None] - balls[:, :3], axis=2) - balls[:, 3]).min(1)
     assert nearest.max() < .06, "a click on the surface meets a ball"
     assert said == ["frames True", "empty frames False"]
+
+
+def test_the_self_check_draws_in_each_pipeline_says_where_nobody_is_seen_and_puts_the_project_back(play, files, tmp_path):
+    said, *paths, restored = play("self-check", files / "figure.gsac", tmp_path).splitlines()
+    assert "avatar.gsac" in said and restored == "restored True"
+    good, bad = (json.loads((tmp_path / path).read_text()) for path in paths)
+    assert (good["pipeline"], bad["pipeline"]) == ("built-in", "URP")
+    assert good["report"] == "gsac-self-check" and good["humanoid"] is True and good["joints"] == 55 and good["gpu"] == 'stub "GPU"'
+    assert [view["view"] for view in good["views"]] == ["front", "turned", "orthographic"]
+    for there, missing in zip(good["views"], bad["views"], strict=True):
+        assert there["mode"] == "mono" and there["decibels"] > 45 and there["person_share"] > .02
+        assert there["drawn_share"] > there["person_share"] * .9
+        assert missing["drawn_share"] == 0 and missing["decibels"] < 20
+
+
+def test_in_a_headset_the_self_check_compares_both_eyes(play, files, tmp_path):
+    report = json.loads((tmp_path / play("eye-check", files / "figure.gsac", tmp_path).strip()).read_text())
+    eyes = report["views"][3:]
+    assert [(eye["view"], eye["mode"]) for eye in eyes] == [(f"{side} eye", "SinglePassInstanced") for side in ("left", "right")]
+    assert all(eye["decibels"] > 45 and eye["person_share"] > .01 for eye in report["views"])

@@ -1,4 +1,5 @@
 using System;
+using System.Collections;
 using System.Collections.Concurrent;
 using System.Collections.Generic;
 using System.Globalization;
@@ -177,5 +178,89 @@ public static class Adopt
         Console.WriteLine("frames " + inspector.HasFrameBounds());
         var empty = new GameObject("empty").AddComponent<GsacAvatar>();
         Console.WriteLine("empty frames " + new GsacAvatarEditor { target = empty }.HasFrameBounds());
+    }
+
+    /// <summary>A camera's picture as Unity would give it: the plain one before the camera's colour, lowest row first; or nobody.</summary>
+    static Color32[] Pictured(GsacAvatar avatar, Color behind, Matrix4x4 view, Matrix4x4 projection, int width, int height, bool there)
+    {
+        var bones = new Vector4[avatar.Data.JointCount * 3];
+        GsacSkeleton.Bones(avatar.Data, avatar.transform, avatar.Joints, bones);
+        avatar.CollectWeights();
+        float[] plain = GsacPainter.Paint(avatar.Data, bones, avatar.DrawnWeights, view * avatar.transform.localToWorldMatrix, projection, width, height);
+        var pixels = new Color32[width * height];
+        for (int i = 0; i < pixels.Length; i++)
+        {
+            int at = there ? ((height - 1 - i / width) * width + i % width) * 4 : 0;
+            float through = 1 - plain[at + 3];
+            Func<float, float, byte> mix = (over, under) => (byte)(255 * (over + through * under) + 0.5f);
+            pixels[i] = new Color32(mix(plain[at], behind.r), mix(plain[at + 1], behind.g), mix(plain[at + 2], behind.b), 255);
+        }
+        return pixels;
+    }
+
+    class UniversalPipeline : UnityEngine.Rendering.RenderPipelineAsset
+    {
+    }
+
+    /// <summary>The menu in a project with two pipelines of which one draws nobody; the files it wrote.</summary>
+    public static void SelfCheck(string file, string folder)
+    {
+        Player.SetDataPath(folder);
+        Player.SetPlaying(false);
+        GsacSelfCheckMenu.Begin();
+        Console.WriteLine(Player.Labels[0]);
+        Imported(file);
+        var urp = new UniversalPipeline();
+        AssetDatabase.Project["Settings/URP.asset"] = urp;
+        var usual = new UniversalPipeline();
+        QualitySettings.renderPipeline = usual;
+        Player.OnRender = camera =>
+        {
+            camera.projectionMatrix = camera.orthographic ? new Matrix4x4 { m00 = 0.9f, m11 = 0.9f, m22 = -1, m33 = 1 }
+                                                          : new Matrix4x4 { m00 = 2.7f, m11 = 2.7f, m22 = -1, m32 = -1 };
+            var person = (GsacAvatar)typeof(GsacSelfCheckMenu).GetField("person", BindingFlags.NonPublic | BindingFlags.Static).GetValue(null);
+            bool there = UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline != urp;
+            camera.targetTexture.Pixels = Pictured(person, camera.backgroundColor, camera.worldToCameraMatrix, camera.projectionMatrix, 256, 256, there);
+        };
+        GsacSelfCheckMenu.Begin();
+        for (int i = 0; i < 200 && EditorApplication.update != null; i++) EditorApplication.update();
+        foreach (string path in GsacSelfCheckMenu.Written) Console.WriteLine(path);
+        Console.WriteLine("restored " + ReferenceEquals(QualitySettings.renderPipeline, usual));
+    }
+
+    /// <summary>The scene in a player with a headset.</summary>
+    public static void EyeCheck(string file, string folder)
+    {
+        Player.SetDataPath(folder);
+        GsacAvatar prefab = Imported(file);
+        var cast = new GameObject("People").AddComponent<GsacCast>();
+        Player.Call(cast, "OnDisable");
+        cast.People = new[] { prefab };
+        Player.Call(cast, "OnEnable");
+        Camera eye = Player.AddCamera("eye");
+        eye.transform.SetPositionAndRotation(new Vector3(0, 1, 3), Quaternion.Euler(0, 180, 0));
+        eye.backgroundColor = new Color(0.2f, 0.3f, 0.4f, 1);
+        Player.SetEyes(eye, new[] { 1.5f, 1.6f });
+        Player.OnRender = camera => camera.targetTexture.Pixels = Pictured(cast.First, camera.backgroundColor, camera.worldToCameraMatrix, camera.projectionMatrix, 256, 256, true);
+        Player.OnCapture = () =>
+        {
+            var both = new Texture2D(200, 120);
+            var pixels = new Color32[200 * 120];
+            foreach (Camera.StereoscopicEye side in new[] { Camera.StereoscopicEye.Left, Camera.StereoscopicEye.Right })
+            {
+                Color32[] one = Pictured(cast.First, eye.backgroundColor, eye.GetStereoViewMatrix(side), eye.GetStereoProjectionMatrix(side), 100, 120, true);
+                for (int i = 0; i < one.Length; i++) pixels[i / 100 * 200 + (int)side * 100 + i % 100] = one[i];
+            }
+            both.SetPixels32(pixels);
+            return both;
+        };
+        var check = new GameObject("check").AddComponent<GsacSelfCheck>();
+        Player.SetField(check, "cast", cast);
+        Player.SetField(check, "eye", eye);
+        var steps = (IEnumerator)typeof(GsacSelfCheck).GetMethod("Start", BindingFlags.NonPublic | BindingFlags.Instance).Invoke(check, null);
+        while (steps.MoveNext())
+        {
+        }
+        Console.WriteLine(check.ResultFile);
     }
 }

@@ -115,7 +115,7 @@ namespace UnityEngine
         }
     }
 
-    public sealed class Camera : Behaviour
+    public sealed partial class Camera : Behaviour
     {
         internal static readonly List<Camera> All = new List<Camera>();
         public enum StereoscopicEye { Left, Right }
@@ -182,7 +182,7 @@ namespace UnityEngine
         public Transform rootBone { get; set; }
     }
 
-    public static class QualitySettings
+    public static partial class QualitySettings
     {
         public static int vSyncCount { get; set; }
         public static ColorSpace activeColorSpace { get { return ColorSpace.Linear; } }

@@ -11,6 +11,8 @@ namespace UnityEngine
         public static Action<ComputeShader, int, int> OnDispatch;
         public static Action<RenderParams, GraphicsBuffer, int> OnDraw;
         public static Action OnUpload;
+        public static Action<Camera> OnRender;
+        public static Func<Texture2D> OnCapture;
 
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;

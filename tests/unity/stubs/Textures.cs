@@ -27,6 +27,7 @@ namespace UnityEngine
         public void SetPixels32(Color32[] colors) { pixels = (Color32[])colors.Clone(); }
         public Color32[] GetPixels32() { return (Color32[])pixels.Clone(); }
         public void Apply() { }
+        public void ReadPixels(Rect source, int destX, int destY) { pixels = (Color32[])RenderTexture.active.Pixels.Clone(); }
     }
 
     public static class Gizmos

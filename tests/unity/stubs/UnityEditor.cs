@@ -52,10 +52,18 @@ namespace UnityEditor
     public static class EditorUtility
     {
         public static bool IsPersistent(UnityEngine.Object target) { return false; }
+        public static bool DisplayDialog(string title, string message, string ok)
+        {
+            Player.Labels.Add(message);
+            return true;
+        }
+        public static void RevealInFinder(string path) { }
     }
 
     public static class EditorApplication
     {
+        public delegate void CallbackFunction();
+        public static CallbackFunction update;
         public static void QueuePlayerLoopUpdate() { Player.UpdatesAsked++; }
     }
 

@@ -10,6 +10,8 @@ namespace UnityEditor
 
     [AttributeUsage(AttributeTargets.Method)] public sealed class DrawGizmo : Attribute { public DrawGizmo(GizmoType gizmo) { } }
 
+    [AttributeUsage(AttributeTargets.Method)] public sealed class MenuItem : Attribute { public MenuItem(string itemName) { } }
+
     public static class AssetDatabase
     {
         /// <summary>Not Unity's: path -> main object, as the project has them.</summary>
