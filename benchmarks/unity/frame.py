@@ -41,7 +41,8 @@ def sort_steps(count: int) -> tuple[int, list[tuple[str, dict[str, int], int]]]:
 
 def draw_rule(low_pass: LowPass, linear: int = 0) -> Parameters:
     """The draw rule as the splats' shader takes it. linear: 1 where the project blends linear colours."""
-    return {"GsacBlend": [low_pass.px2, MAX_ALPHA, MIN_ALPHA, linear], "GsacKeepsEnergy": int(low_pass.keeps_energy)}
+    return {"GsacBlend": [low_pass.px2, MAX_ALPHA, MIN_ALPHA, linear], "GsacKeepsEnergy": int(low_pass.keeps_energy),
+            "GsacTint": [1, 1, 1, 1], "GsacFog": 0, "GsacNumber": 0}
 
 
 def index_bits(count: int) -> int:
@@ -75,6 +76,7 @@ class Frame:
         gpu.put("GsacPosed", np.full((V, 4), np.nan, np.float32))
         gpu.put("GsacSplats", np.full((N, 12), np.nan, np.float32))
         gpu.put("GsacKeys", np.zeros(keys, np.uint32))
+        gpu.put("GsacLatest", np.zeros(1, np.uint32))
         low, high = -1.5, 1.5
         base = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacIndexBits": index_bits(N), "GsacSortStage": 0,
                        "GsacSortShift": 0, "GsacSortStrides": 0, "GsacDepthRange": np.array([low, 1 / (high - low)]),

@@ -27,6 +27,7 @@ COMMANDS = {
     "data": "import a data set that you downloaded: frames, masks, cameras, poses and the published split",
     "view": "show an avatar in the browser",
     "render": "make a video of an avatar, moving or from all sides",
+    "convert": "write an avatar as VRM, USDZ or SOG",
     "report": "write report.html of a run's folder",
     "pack": "make one zip of an avatar with viewer, report and exports, which opens anywhere",
     "compare": "write a page that shows two runs side by side",

@@ -8,13 +8,13 @@ from gsac.pipeline.executors.executor import Executor, Hear
 from gsac.stages.contract import BadInput, did_you_mean
 
 
-def _local(workers: int, hear: Hear) -> Executor:
+def _local(workers: int, hear: Hear, memory_mb: float) -> Executor:
     from gsac.pipeline.executors.local import LocalExecutor
 
-    return LocalExecutor(workers, hear)
+    return LocalExecutor(workers, hear, memory_mb)
 
 
-EXECUTORS: dict[str, Callable[[int, Hear], Executor]] = {"local": _local}
+EXECUTORS: dict[str, Callable[[int, Hear, float], Executor]] = {"local": _local}
 
 
 def check_executor(name: str) -> None:

@@ -18,6 +18,8 @@ class ClipJob:
     clip: Path
     out: Path
     arguments: tuple[str, ...] = ()
+    peak_mb: float = field(default=0.0, compare=False)
+    """Memory that it is reckoned to need."""
 
     @property
     def name(self) -> str:
@@ -36,6 +38,15 @@ class ClipResult:
     error: str = ""
     summary: dict[str, Any] = field(default_factory=dict)
     """The object of its --json."""
+    unchanged: bool = False
+    """Whether all its results were in the cache, so that it needed no process."""
+    killed: int = 0
+    """How often a signal ended its run or a stage of it; after a second time it is not tried again."""
+
+    @property
+    def was_killed(self) -> bool:
+        """Whether a signal ended its run or a stage of it, as where memory runs out."""
+        return self.code < 0 or any(row.get("killed") for row in self.summary.get("stages", []))
 
 
 Hear = Callable[[ClipJob, str], None]

@@ -1,4 +1,7 @@
-"""A pool of processes on this machine, one a clip: a clip that kills its process harms no other clip."""
+"""A pool of processes on this machine, one a clip: a clip that kills its process harms no other clip.
+
+A clip whose process is killed, as by a machine that ran out of memory, is tried once more, alone; then it is set aside.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Hear
+from gsac.pipeline.executors.memory import Memory
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.tether import tethered
 
@@ -21,10 +25,12 @@ THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 class LocalExecutor:
-    """Runs `gsac run` for each clip. workers: how many clips at once; hear: gets what their runs say."""
+    """Runs `gsac run` for each clip. workers: how many clips at once; hear: gets what their runs say; memory_mb: what they may
+    take together."""
 
-    def __init__(self, workers: int, hear: Hear):
-        self._hear = hear
+    def __init__(self, workers: int, hear: Hear, memory_mb: float):
+        self._hear, self._memory = hear, Memory(memory_mb)
+        self._leaving = False
         self._pool = ThreadPoolExecutor(workers)  # the threads only wait for their process
         self._futures: list[Future[ClipResult]] = []
         self._running: set[subprocess.Popen] = set()
@@ -35,6 +41,8 @@ class LocalExecutor:
         return self
 
     def __exit__(self, *exc) -> None:
+        self._leaving = True
+        self._memory.end()
         self._pool.shutdown(wait=False, cancel_futures=True)
         for process in list(self._running):
             with contextlib.suppress(ProcessLookupError):
@@ -49,6 +57,19 @@ class LocalExecutor:
             yield future.result()
 
     def _run(self, job: ClipJob) -> ClipResult:
+        result, killed, wanted = None, 0, job.peak_mb
+        while result is None or (killed == 1 and result.was_killed and not self._leaving):
+            with self._memory.take(wanted) as may_start:
+                if not may_start:
+                    return result or ClipResult(job, ExitCode.INTERRUPTED, 0.0, "the batch ended before its turn")
+                result = self._try(job)
+            killed, wanted = killed + result.was_killed, self._memory.limit_mb
+        result.killed = killed
+        if killed > 1:
+            result.error += " (twice, the second time with no other clip beside it: it is not tried again)"
+        return result
+
+    def _try(self, job: ClipJob) -> ClipResult:
         began = time.monotonic()
         with tempfile.TemporaryFile() as out:
             said = []

@@ -121,8 +121,10 @@ def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, fra
     screen = np.array([SIZE, SIZE, 0, 0])
     parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": projection(camera).T, "_ScreenParams": screen,
                   "GsacBlend": [*asked["draw"][12:15], 0], "GsacKeepsEnergy": int(asked["keeps_energy"][0]),
+                  "GsacTint": [1, 1, 1, 1], "GsacFog": 0, "GsacNumber": 0,
                   "GsacIndexBits": int(asked["draw"][16]),
                   **{f"GsacModel{r}": model[r] for r in range(3)}}
+    gpu.put("GsacLatest", np.zeros(1, np.uint32))
     got = Painting(gpu, *passes[""], SIZE, SIZE, len(bound.means)).draw(parameters)
 
     size = np.linalg.norm(model[:, 0])

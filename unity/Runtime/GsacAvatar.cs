@@ -36,6 +36,7 @@ namespace Gsac
         Transform[] joints;
         int jaw;
         Animator animator;
+        Avatar built; // by this component, not a file's
         byte[] loose;
         GsacPose target;
         GsacPose shown;
@@ -101,6 +102,7 @@ namespace Gsac
                 Destroy(child.gameObject);
             }
             if (animator != null) animator.avatar = null;
+            FreeBuilt();
             target = null;
             loose = file;
             Open();
@@ -125,7 +127,7 @@ namespace Gsac
             }
             animator = GetComponent<Animator>();
             if (animator == null) animator = gameObject.AddComponent<Animator>();
-            if (animator.avatar == null) animator.avatar = GsacHumanoid.Build(data, gameObject, joints);
+            if (animator.avatar == null) animator.avatar = built = GsacHumanoid.Build(data, gameObject, joints);
             FindClip();
         }
 
@@ -144,9 +146,20 @@ namespace Gsac
             model = null;
         }
 
+        void FreeBuilt()
+        {
+            GsacCameras.Free(built);
+            built = null;
+        }
+
         void OnDisable()
         {
             Close();
+        }
+
+        void OnDestroy()
+        {
+            FreeBuilt();
         }
 
         /// <summary>"T" or "A", or another still pose of the file.</summary>

@@ -120,10 +120,16 @@ namespace Gsac
                 KeyCount = Math.Max(KeyCount, levels[i].Sort.KeyCount);
             }
             Levels = levels;
-            uint[] quads = GsacPacking.Quads(Math.Max(most, 1));
-            Quads = new GraphicsBuffer(GraphicsBuffer.Target.Index, quads.Length, 4);
-            Quads.SetData(quads);
-            yield return Quads;
+            yield return Quads = Indices(Math.Max(most, 1));
+        }
+
+        /// <summary>Two triangles a splat, for `count` of them.</summary>
+        public static GraphicsBuffer Indices(int count)
+        {
+            uint[] quads = GsacPacking.Quads(count);
+            var indices = new GraphicsBuffer(GraphicsBuffer.Target.Index, quads.Length, 4);
+            indices.SetData(quads);
+            return indices;
         }
 
         /// <summary>width: numbers of four bytes an element. Unity knows no empty buffer.</summary>

@@ -120,6 +120,7 @@ namespace Gsac
             avatar.ClearExpressions();
             if (Array.IndexOf(avatar.Data.Expressions, "jawOpen") >= 0) avatar.SetExpression("jawOpen", 0.5f);
             avatar.Refresh(0);
+            avatar.GetComponent<GsacRenderer>().Refresh();
         }
 
         /// <summary>pixels: lowest row first; the view begins at column `left` of rows of `stride`.</summary>

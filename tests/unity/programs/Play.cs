@@ -38,6 +38,13 @@ public static class Play
             case "look": Adopt.Look(args[1], args[2]); break;
             case "self-check": Adopt.SelfCheck(args[1], args[2]); break;
             case "eye-check": Adopt.EyeCheck(args[1], args[2]); break;
+            case "cameras": Drawing.Cameras(args[1]); break;
+            case "zoom": Drawing.Zoom(args[1]); break;
+            case "finish": Drawing.Finish(args[1]); break;
+            case "crowd": Crowd.Print(args); break;
+            case "crowds": Crowd.Count(args[1]); break;
+            case "repeated": Drawing.Repeated(args[1]); break;
+            case "freed": Drawing.Freed(args[1]); break;
             default: return 2;
         }
         return 0;
@@ -226,24 +233,15 @@ public static class Play
         var empty = new GameObject("empty").AddComponent<GsacAvatar>();
         new GsacAvatarEditor { target = empty }.OnInspectorGUI();
 
-        System.Runtime.CompilerServices.RuntimeHelpers.RunClassConstructor(typeof(GsacImporter).Assembly.GetType("Gsac.GsacSceneViews").TypeHandle);
         var eye = new GameObject("scene view").AddComponent<Camera>();
         eye.transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
-        var view = new UnityEditor.SceneView { camera = eye };
-        int asked0 = Player.UpdatesAsked;
-        view.Draw();
-        view.Draw();
-        int still = Player.UpdatesAsked - asked0;
-        eye.transform.SetPositionAndRotation(new Vector3(0, 1, 5), Quaternion.Euler(0, 180, 0));
-        view.Draw();
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
-        Action frame = Player.Frame(new[] { avatar.gameObject });
-        frame();
+        eye.Render();
         avatar.enabled = false;
         Player.Call(avatar, "OnDisable");
-        frame();
-        Console.WriteLine("draws " + draws + " updates " + still + " " + (Player.UpdatesAsked - asked0));
+        eye.Render();
+        Console.WriteLine("draws " + draws);
     }
 
     /// <summary>The demo scene as its file describes it, opened and played; the user presses buttons, drags and turns the wheel.</summary>
@@ -316,8 +314,8 @@ public static class Play
             float focal = float.Parse(args[i + 1], CultureInfo.InvariantCulture);
             string how = args[i + 3];
             camera.transform.SetPositionAndRotation(new Vector3(0, 1, float.Parse(args[i], CultureInfo.InvariantCulture)), Quaternion.Euler(0, 180, 0));
-            camera.projectionMatrix = new Matrix4x4 { m00 = focal, m11 = focal };
-            camera.orthographic = how == "flat";
+            camera.projectionMatrix = how == "flat" ? new Matrix4x4 { m00 = focal, m11 = focal, m22 = -1e-4f, m33 = 1 }
+                : new Matrix4x4 { m00 = focal, m11 = focal, m22 = -1, m23 = -0.02f, m32 = -1 };
             Player.SetPixelHeight(camera, int.Parse(args[i + 2]));
             Player.SetEyes(camera, how == "left" ? new[] { focal, focal / 2 } : how == "right" ? new[] { focal / 2, focal } : null);
             camera.cullingMask = how == "hidden" ? 0 : -1;
@@ -514,6 +512,7 @@ public static class Play
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
         var both = new[] { GsacLoader.Load(bytes, "one").gameObject, GsacLoader.Load(bytes, "two").gameObject };
+        both[1].transform.SetPositionAndRotation(new Vector3(0, 0, -5), Quaternion.identity); // not among each other
         Player.Frame(both)();
         int two = Player.BuffersAlive;
         Console.WriteLine("draws " + draws);

@@ -16,9 +16,9 @@ namespace UnityEngine
         public float nearClipPlane { get; set; }
         public float farClipPlane { get; set; }
         public float fieldOfView { get; set; }
+        public bool orthographic { get; set; }
         public float orthographicSize { get; set; }
         public RenderTexture targetTexture { get; set; }
-        public void Render() { Player.OnRender(this); }
     }
 
     public sealed class RenderTexture : Texture

@@ -36,10 +36,13 @@ namespace UnityEngine
             return on.GetType().GetMethod(message, BindingFlags.Instance | BindingFlags.NonPublic | BindingFlags.Public, null, Type.EmptyTypes, null);
         }
 
-        /// <summary>A frame of these components as one call, in their execution order.</summary>
+        /// <summary>Whether cameras are rendered by a scriptable pipeline.</summary>
+        public static bool HasPipeline;
+
+        /// <summary>A frame of these components as one call, in their execution order, and then of all cameras.</summary>
         public static Action Frame(GameObject[] objects)
         {
-            Action all = () => { };
+            Action all = () => Time.frameCount++;
             foreach (string message in new[] { "Update", "LateUpdate" })
             {
                 var ordered = new List<KeyValuePair<int, Action>>();
@@ -56,7 +59,12 @@ namespace UnityEngine
                 ordered.Sort((a, b) => a.Key.CompareTo(b.Key));
                 foreach (KeyValuePair<int, Action> pair in ordered) all += pair.Value;
             }
-            return all;
+            return all + RenderCameras;
+        }
+
+        static void RenderCameras()
+        {
+            for (int i = 0; i < Camera.All.Count; i++) if (Camera.All[i].enabled) Camera.All[i].Render();
         }
 
         public static string PropertyName(int id) { return Shader.NameOf(id); }
@@ -67,6 +75,7 @@ namespace UnityEngine
         public static Vector4 Value(MaterialPropertyBlock block, int id) { return block.Values[id]; }
         public static GraphicsBuffer Buffer(MaterialPropertyBlock block, int id) { return block.Buffers[id]; }
         public static int BuffersAlive { get { return GraphicsBuffer.Alive; } }
+        public static int Alive<T>() { return UnityEngine.Object.Made.FindAll(o => o is T && o != null).Count; }
         public static List<string> Errors { get { return Debug.Errors; } }
         public static HumanDescription Description(Avatar avatar) { return avatar.Description; }
         public static void SetDeltaTime(float seconds) { Time.deltaTime = seconds; }

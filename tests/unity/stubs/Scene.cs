@@ -11,8 +11,24 @@ namespace UnityEngine
         public string name { get; set; }
         public HideFlags hideFlags { get; set; }
         internal bool Destroyed;
-        public static void Destroy(Object o) { o.Destroyed = true; }
-        public static void DestroyImmediate(Object o) { o.Destroyed = true; }
+        /// <summary>Materials and Avatars, which stay until somebody destroys them.</summary>
+        internal static readonly List<Object> Made = new List<Object>();
+        public static void Destroy(Object o)
+        {
+            if (!Application.isPlaying) throw new InvalidOperationException("Destroy may not be called from edit mode");
+            DestroyImmediate(o);
+        }
+        public static void DestroyImmediate(Object o)
+        {
+            o.Destroyed = true;
+            var holder = o as GameObject;
+            if (ReferenceEquals(holder, null)) return;
+            foreach (Component c in holder.Components)
+            {
+                Player.Call(c, "OnDisable");
+                Player.Call(c, "OnDestroy");
+            }
+        }
         public static T Instantiate<T>(T original) where T : Component { return Cloner.Clone(original); }
         public static bool operator ==(Object a, Object b)
         {
@@ -206,7 +222,9 @@ namespace UnityEngine
     {
         public static Avatar BuildHumanAvatar(GameObject go, HumanDescription humanDescription)
         {
-            return new Avatar { Description = humanDescription };
+            var made = new Avatar { Description = humanDescription };
+            Object.Made.Add(made);
+            return made;
         }
     }
 
@@ -222,6 +240,7 @@ namespace UnityEngine
 
     public static class Time
     {
+        public static int frameCount { get; internal set; }
         public static float deltaTime { get; internal set; } = 1 / 60f;
         public static float unscaledDeltaTime { get { return deltaTime; } }
     }

@@ -73,15 +73,31 @@ namespace UnityEditor
         public static void RecordObjects(UnityEngine.Object[] objectsToUndo, string name) { }
     }
 
-    public class SceneView : ScriptableObject
+    public class SceneVisibilityManager : ScriptableObject
     {
-        public static event Action<SceneView> duringSceneGui;
-        public Camera camera { get; set; }
-        public void Draw() { duringSceneGui(this); }
+        public static SceneVisibilityManager instance { get; } = new SceneVisibilityManager();
+        public readonly HashSet<GameObject> Hidden = new HashSet<GameObject>();
+        public bool IsHidden(GameObject gameObject, bool includeDescendants = false) { return Hidden.Contains(gameObject); }
     }
 
     [AttributeUsage(AttributeTargets.Class)] public sealed class CustomEditor : Attribute { public CustomEditor(Type inspectedType) { } }
     [AttributeUsage(AttributeTargets.Class)] public sealed class InitializeOnLoadAttribute : Attribute { }
+}
+
+namespace UnityEditor.SceneManagement
+{
+    using UnityEngine;
+
+    public static class StageUtility
+    {
+        /// <summary>The test's: what a camera shows that has a stage of its own.</summary>
+        public static readonly Dictionary<Camera, GameObject> Staged = new Dictionary<Camera, GameObject>();
+        public static bool IsGameObjectRenderedByCamera(GameObject gameObject, Camera camera)
+        {
+            GameObject only;
+            return !Staged.TryGetValue(camera, out only) || ReferenceEquals(only, gameObject);
+        }
+    }
 }
 
 namespace UnityEditor.AssetImporters
