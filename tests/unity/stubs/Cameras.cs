@@ -5,7 +5,7 @@ namespace UnityEngine
 {
     using UnityEngine.Rendering;
 
-    public enum CameraClearFlags { SolidColor = 2 }
+    public enum CameraClearFlags { Skybox = 1, SolidColor = 2 }
 
     public sealed partial class Camera
     {

@@ -8,7 +8,7 @@ namespace UnityEngine
     public enum MeshTopology { Triangles }
     public enum ColorSpace { Gamma, Linear }
 
-    public sealed class Shader : Object
+    public sealed partial class Shader : Object
     {
         static readonly List<string> Names = new List<string>();
         public static int PropertyToID(string name)
@@ -21,7 +21,7 @@ namespace UnityEngine
         internal static string NameOf(int id) { return Names[id]; }
     }
 
-    public sealed class Material : Object
+    public sealed partial class Material : Object
     {
         public Material(Shader shader) { Made.Add(this); }
     }
@@ -107,7 +107,7 @@ namespace UnityEngine
         public bool receiveShadows { get; set; }
     }
 
-    public static class Graphics
+    public static partial class Graphics
     {
         public static void RenderPrimitivesIndexed(in RenderParams rparams, MeshTopology topology, GraphicsBuffer indexBuffer, int indexCount,
                                                    int startIndex = 0, int instanceCount = 1)
@@ -164,7 +164,7 @@ namespace UnityEngine
         public float weight3 { get; set; }
     }
 
-    public sealed class Mesh : Object
+    public sealed partial class Mesh : Object
     {
         public IndexFormat indexFormat { get; set; }
         public Vector3[] vertices { get; set; }
@@ -181,7 +181,7 @@ namespace UnityEngine
         public ShadowCastingMode shadowCastingMode { get; set; }
     }
 
-    public sealed class SkinnedMeshRenderer : Renderer
+    public sealed partial class SkinnedMeshRenderer : Renderer
     {
         public Mesh sharedMesh { get; set; }
         public Transform[] bones { get; set; }

@@ -232,6 +232,8 @@ namespace UnityEngine
     {
         public static bool isPlaying { get; internal set; } = true;
         public static bool isEditor { get { return false; } }
+        public static event Action onBeforeRender;
+        internal static void BeforeRender() { if (onBeforeRender != null) onBeforeRender(); }
         public static bool runInBackground { get; set; }
         public static int targetFrameRate { get; set; }
         public static string unityVersion { get { return "stub"; } }
