@@ -34,7 +34,7 @@ def run(program, *args, heap="256m", collector=""):
 
 
 def compile_package(package, out):
-    """The package with its samples over the stubs of Unity, an assembly each, players' without the editor's. Returns the tests' program."""
+    """The package with its samples over the stubs of Unity; players' assemblies without the editor's. The tests' program."""
     stubs, editor = (set((HERE / "stubs").glob(f"{kind}*.cs")) for kind in ("", "UnityEditor"))
     compile_csharp(sorted(stubs - editor), out / "UnityEngine.dll")
     options = [f"-r:{out / 'UnityEngine.dll'}"]

@@ -133,21 +133,25 @@ def test_the_unitypackage_holds_the_code_the_demo_and_the_person(upm, unitypacka
     assert installed == {path.removeprefix("Samples~/"): content for path, content in wanted.items() if not path.endswith(".meta")}
 
 
-@pytest.mark.parametrize("scene", ["Demo", "Benchmark"])
+SCENES = [path for path in unity_package.SOURCES if path.endswith(".unity")]
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda path: Path(path).stem)
 def test_a_scenes_references_resolve_inside_the_package(upm, scene):
-    text = upm[f"Samples~/Demo/{scene}.unity"].decode()
+    text = upm[scene].decode()
     known = {guid_of(meta): path for path, meta in metas(upm).items()}
     documents = {int(n): body for n, body in re.findall(r"^--- !u!\d+ &(\d+)\n(.*?)(?=^--- |\Z)", text, re.MULTILINE | re.DOTALL)}
+    assert len(documents) == text.count("--- !u!"), "no number is given twice"
     used = set()
-    for file_id, guid in re.findall(r"\{fileID: (-?\d+)(?:, guid: ([^,}]+), type: 3)?\}", text):
-        if guid:
-            used.add((int(file_id), known[guid]))
+    for file_id, own in re.findall(r"\{fileID: (-?\d+)(?:, guid: ([^,}]+), type: 3)?\}", text):
+        if own:
+            used.add((int(file_id), known[own]))
         else:
             assert int(file_id) == 0 or int(file_id) in documents
-    script = {"Demo": "GsacDemo", "Benchmark": "GsacBenchmark"}[scene]
-    scripts = {(11500000, f"Runtime/{name}.cs") for name in ("GsacCast", script)}
-    assert used == scripts
-    for path in (path for _, path in scripts):
+    assert {(number, Path(path).suffix) for number, path in used} <= {(11500000, ".cs"), (4800000, ".shader")}
+    assert (11500000, "Runtime/GsacCast.cs") in used, "people of the project, none of its own"
+    assert not any(folder not in scene and path.startswith("Samples~/") for _, path in used for folder in [str(Path(path).parent)])
+    for path in (path for _, path in used if path.endswith(".cs")):
         source = upm[path].decode()
         body = next(b for b in documents.values() if guid_of(metas(upm)[path]) in b)
         fields = body.split("m_EditorClassIdentifier: \n")[1]

@@ -36,6 +36,7 @@ public static class Play
             case "load": Adopt.LoadAsync(args[1], args[2]); break;
             case "paint": Adopt.Paint(args[1], args[2], args[3]); break;
             case "look": Adopt.Look(args[1], args[2]); break;
+            case "samples": AdoptSamples.Run(args[1], args[2]); break;
             case "self-check": Adopt.SelfCheck(args[1], args[2]); break;
             case "eye-check": Adopt.EyeCheck(args[1], args[2]); break;
             case "cameras": Drawing.Cameras(args[1]); break;

@@ -94,6 +94,7 @@ namespace UnityEngine
         {
             on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);
         }
+        public static void BeforeRender() { Application.BeforeRender(); }
         public static TextAsset Text(byte[] bytes) { return new TextAsset { bytes = bytes }; }
     }
 }

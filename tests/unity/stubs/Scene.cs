@@ -156,8 +156,9 @@ namespace UnityEngine
         }
         public void SetPositionAndRotation(Vector3 position, Quaternion rotation)
         {
-            if (parent != null) throw new NotImplementedException();
-            place = position;
+            Matrix4x4 above = parent == null ? Matrix4x4.identity : parent.localToWorldMatrix;
+            if (above.m00 != 1 || above.m11 != 1 || above.m22 != 1) throw new NotImplementedException();
+            place = position - new Vector3(above.m03, above.m13, above.m23);
             turn = rotation;
         }
     }
