@@ -110,8 +110,14 @@ SOURCES = (
     "Samples~/Timeline/GsacFaceTrack.cs",
     "Samples~/VR/VR.unity",
     "SelfCheck/Gsac.SelfCheck.asmdef",
+    "SelfCheck/GsacCheckedView.cs",
     "SelfCheck/GsacPainter.cs",
     "SelfCheck/GsacSelfCheck.cs",
+    "Tests/Editor/Gsac.Editor.Tests.asmdef",
+    "Tests/Editor/GsacImportTests.cs",
+    "Tests/Runtime/Gsac.Tests.asmdef",
+    "Tests/Runtime/GsacPictureTests.cs",
+    "Tests/Runtime/GsacReadingTests.cs",
     "package.json",
 )
 """Files of the package. Whole names, so that the cache sees these files."""

@@ -55,3 +55,9 @@ def test_the_shader_of_the_rooms_depth_compiles_for_one_eye_and_for_two(hlsl, pa
     text = hlsl.shader_passes(package / "Samples~" / "MixedReality" / "GsacRoomDepth.shader")[""]
     for stand_in in (Path(__file__).parent / "shims", hlsl.STEREO):
         assert all(hlsl.compile_pass(text, tmp_path, stand_in))
+
+
+def test_the_packages_own_tests_pass_and_ask_for_a_person_where_there_is_none(sample):
+    lines = sample("OwnTests")
+    assert len(lines) == 10 and len({line.split()[0] for line in lines}) == 5
+    assert [line.split(" ", 1)[1] for line in lines] == ["passed", "passed", "ignored", "ignored", "ignored"] + ["passed"] * 5, lines

@@ -30,7 +30,7 @@ namespace Gsac
             GsacAvatar avatar = cast == null ? null : cast.First;
             if (avatar == null) yield break; // the cast has said it
             for (int i = 0; i < Settling; i++) yield return null;
-            List<GsacReport> views = Look(avatar);
+            List<GsacCheckedView> views = Look(avatar);
             if (eye != null && eye.stereoEnabled)
             {
                 Pose(avatar);
@@ -49,7 +49,7 @@ namespace Gsac
         }
 
         /// <summary>Renders the person by hand, with perspective, from the side, and without perspective.</summary>
-        public static List<GsacReport> Look(GsacAvatar avatar)
+        public static List<GsacCheckedView> Look(GsacAvatar avatar)
         {
             int layer = avatar.gameObject.layer;
             avatar.gameObject.layer = Layer;
@@ -68,7 +68,7 @@ namespace Gsac
                 camera.fieldOfView = 40;
                 camera.orthographicSize = 1.1f;
                 camera.targetTexture = target;
-                var views = new List<GsacReport>();
+                var views = new List<GsacCheckedView>();
                 views.Add(View("front", avatar, camera, target, 0));
                 views.Add(View("turned", avatar, camera, target, 70));
                 camera.orthographic = true;
@@ -84,7 +84,7 @@ namespace Gsac
             }
         }
 
-        static GsacReport View(string name, GsacAvatar avatar, Camera camera, RenderTexture target, float yaw)
+        static GsacCheckedView View(string name, GsacAvatar avatar, Camera camera, RenderTexture target, float yaw)
         {
             Quaternion turn = Quaternion.Euler(5, yaw + 180, 0);
             camera.transform.SetPositionAndRotation(avatar.transform.position + new Vector3(0, 0.9f, 0) - turn * Vector3.forward * 3.2f, turn);
@@ -100,7 +100,7 @@ namespace Gsac
         }
 
         /// <summary>What each eye of the headset was shown in the frame that has ended.</summary>
-        void LookByEyes(GsacAvatar avatar, List<GsacReport> views)
+        void LookByEyes(GsacAvatar avatar, List<GsacCheckedView> views)
         {
             Texture2D both = ScreenCapture.CaptureScreenshotAsTexture(ScreenCapture.StereoScreenCaptureMode.BothEyes);
             Color32[] pixels = both.GetPixels32();
@@ -124,7 +124,7 @@ namespace Gsac
         }
 
         /// <summary>pixels: lowest row first; the view begins at column `left` of rows of `stride`.</summary>
-        static GsacReport Row(string name, string mode, GsacAvatar avatar, Color32[] pixels, int stride, int left, int width, int height,
+        static GsacCheckedView Row(string name, string mode, GsacAvatar avatar, Color32[] pixels, int stride, int left, int width, int height,
                               Matrix4x4 view, Matrix4x4 projection, Color behind)
         {
             var bones = new Vector4[avatar.Data.JointCount * 3];
@@ -149,18 +149,15 @@ namespace Gsac
                     counted += 3;
                 }
             }
-            var row = new GsacReport();
-            row.Add("view", name);
-            row.Add("mode", mode);
-            // of the pixels where the person is or should be
-            row.Add("decibels", Math.Round(Math.Min(99, -10 * Math.Log10(squares / Math.Max(counted, 1))), 2));
-            row.Add("person_share", Math.Round(there / (width * height), 4));
-            row.Add("drawn_share", Math.Round(seen / (width * height), 4));
-            return row;
+            return new GsacCheckedView
+            {
+                Name = name, Mode = mode, Decibels = Math.Min(99, -10 * Math.Log10(squares / Math.Max(counted, 1))),
+                PersonShare = there / (width * height), DrawnShare = seen / (width * height),
+            };
         }
 
         /// <summary>The path of the file.</summary>
-        public static string Write(GsacAvatar avatar, string pipeline, List<GsacReport> views)
+        public static string Write(GsacAvatar avatar, string pipeline, List<GsacCheckedView> views)
         {
             GsacReport report = GsacReport.OfDevice("self-check");
             report.Add("pipeline", pipeline);
@@ -170,7 +167,7 @@ namespace Gsac
             report.Add("joints", avatar.Joints.Length);
             report.Add("expressions", avatar.Data.Expressions.Length);
             report.Add("gaussians", avatar.Data.Levels[0].Count);
-            report.Add("views", views);
+            report.Add("views", views.ConvertAll(view => view.Report()));
             return report.Write("gsac-self-check-" + pipeline);
         }
 

@@ -17,7 +17,7 @@ using UnityEngine.SceneManagement;
 /// <summary>What a studio does with the package's people: files of the project, scenes, loading.</summary>
 public static class Adopt
 {
-    static GsacAvatar Imported(string file)
+    public static GsacAvatar Imported(string file)
     {
         var context = new AssetImportContext { assetPath = file };
         new GsacImporter().OnImportAsset(context);
@@ -181,7 +181,7 @@ public static class Adopt
     }
 
     /// <summary>A camera's picture as Unity would give it: the plain one before the camera's colour, lowest row first; or nobody.</summary>
-    static Color32[] Pictured(GsacAvatar avatar, Color behind, Matrix4x4 view, Matrix4x4 projection, int width, int height, bool there)
+    public static Color32[] Pictured(GsacAvatar avatar, Color behind, Matrix4x4 view, Matrix4x4 projection, int width, int height, bool there)
     {
         var bones = new Vector4[avatar.Data.JointCount * 3];
         GsacSkeleton.Bones(avatar.Data, avatar.transform, avatar.Joints, bones);

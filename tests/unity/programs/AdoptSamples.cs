@@ -17,9 +17,11 @@ using UnityEngine.XR.Hands;
 public static class AdoptSamples
 {
     static byte[] file;
+    static string path;
 
-    public static void Run(string sample, string path)
+    public static void Run(string sample, string given)
     {
+        path = given;
         file = File.ReadAllBytes(path);
         typeof(AdoptSamples).GetMethod(sample, BindingFlags.Static | BindingFlags.NonPublic).Invoke(null, null);
     }
@@ -272,5 +274,42 @@ public static class AdoptSamples
         none = controllers.TryTip(true, out tip);
         InputDevices.Places[XRNode.RightHand] = new Vector3(0, 1, 0);
         Say($"{none} {controllers.TryTip(false, out tip)} {tip.z}");
+    }
+
+    /// <summary>The package's own tests, each with its outcome; of the first person where there is one.</summary>
+    static void OwnTests()
+    {
+        foreach (bool there in new[] { false, true })
+        {
+            GsacCast.FindPeople = () => there ? new[] { Adopt.Imported(path) } : new GsacAvatar[0];
+            UnityEditor.AssetDatabase.Project.Clear();
+            if (there) Adopt.Imported(path);
+            Player.OnRender = camera =>
+            {
+                var seen = UnityEngine.Player.Last<GsacCast>().First;
+                camera.targetTexture.Pixels = Adopt.Pictured(seen, camera.backgroundColor, camera.worldToCameraMatrix, camera.projectionMatrix, 256, 256, true);
+            };
+            foreach (Type type in new[] { typeof(Gsac.Tests.GsacReadingTests), typeof(Gsac.Tests.GsacPictureTests), typeof(Gsac.Tests.GsacImportTests) })
+            {
+                foreach (MethodInfo test in type.GetMethods(BindingFlags.Public | BindingFlags.Instance | BindingFlags.DeclaredOnly)) Console.WriteLine(test.Name + " " + Outcome(type, test));
+            }
+        }
+    }
+
+    static string Outcome(Type type, MethodInfo test)
+    {
+        try
+        {
+            var steps = test.Invoke(Activator.CreateInstance(type), null) as System.Collections.IEnumerator;
+            while (steps != null && steps.MoveNext())
+            {
+            }
+            return "passed";
+        }
+        catch (Exception e)
+        {
+            Exception inner = e is TargetInvocationException ? e.InnerException : e;
+            return inner is NUnit.Framework.IgnoreException ? "ignored" : inner.ToString();
+        }
     }
 }

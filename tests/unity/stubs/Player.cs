@@ -94,6 +94,10 @@ namespace UnityEngine
         {
             on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);
         }
+        public static T Last<T>() where T : Component
+        {
+            return (T)GameObject.Made.FindLast(c => c is T);
+        }
         public static void BeforeRender() { Application.BeforeRender(); }
         public static TextAsset Text(byte[] bytes) { return new TextAsset { bytes = bytes }; }
     }

@@ -70,6 +70,7 @@ namespace UnityEngine
 
     public sealed class GameObject : Object
     {
+        internal static new readonly List<Component> Made = new List<Component>();
         internal readonly List<Component> Components = new List<Component>();
         public Transform transform { get; private set; }
         public int layer { get; set; }
@@ -92,6 +93,7 @@ namespace UnityEngine
             made.gameObject = this;
             made.name = name;
             Components.Add(made);
+            if (made is MonoBehaviour) Made.Add(made);
             Player.Call(made, "OnEnable");
             return made;
         }
