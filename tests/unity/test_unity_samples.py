@@ -60,4 +60,4 @@ def test_the_shader_of_the_rooms_depth_compiles_for_one_eye_and_for_two(hlsl, pa
 def test_the_packages_own_tests_pass_and_ask_for_a_person_where_there_is_none(sample):
     lines = sample("OwnTests")
     assert len(lines) == 10 and len({line.split()[0] for line in lines}) == 5
-    assert [line.split(" ", 1)[1] for line in lines] == ["passed", "passed", "ignored", "ignored", "ignored"] + ["passed"] * 5, lines
+    assert [line.split(" ", 1)[1] for line in lines] == ["passed"] * 2 + ["ignored"] * 3 + ["passed"] * 5, lines
