@@ -34,10 +34,21 @@ namespace Gsac
         /// <summary>Keys to sort at the finest level.</summary>
         public int KeyCount { get; private set; }
 
+        /// <summary>The body's mesh, for avatars that no importer gave one.</summary>
+        public Mesh Body
+        {
+            get
+            {
+                if (body == null) body = GsacMesh.Build(Data);
+                return body;
+            }
+        }
+
         readonly object source;
         readonly List<GraphicsBuffer> buffers = new List<GraphicsBuffer>();
         IEnumerator<GraphicsBuffer> parts;
         bool uploaded;
+        Mesh body;
         int users;
 
         GsacModel(object source, byte[] bytes)
@@ -73,6 +84,7 @@ namespace Gsac
         {
             if (--users > 0) return;
             Shared.Remove(source);
+            GsacCameras.Free(body);
             foreach (GraphicsBuffer buffer in buffers) buffer.Dispose();
             buffers.Clear();
         }

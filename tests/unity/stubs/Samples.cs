@@ -50,18 +50,8 @@ namespace UnityEngine
         public void SetFloat(int nameID, float value) { Set[Shader.NameOf(nameID)] = value; }
     }
 
-    public sealed partial class SkinnedMeshRenderer
-    {
-        public readonly Dictionary<int, float> Shown = new Dictionary<int, float>();
-        public float GetBlendShapeWeight(int index) { return Shown[index]; }
-        public void SetBlendShapeWeight(int index, float value) { Shown[index] = value; }
-    }
-
     public sealed partial class Mesh
     {
-        public readonly List<string> ShapeNames = new List<string>();
-        public void AddBlendShapeFrame(string shapeName, float frameWeight, Vector3[] deltaVertices, Vector3[] deltaNormals, Vector3[] deltaTangents) { ShapeNames.Add(shapeName); }
-        public int GetBlendShapeIndex(string blendShapeName) { return ShapeNames.IndexOf(blendShapeName); }
         public Bounds bounds { get; set; }
     }
 
@@ -88,11 +78,6 @@ namespace UnityEngine
         public static readonly List<object> Running = new List<object>();
         public static void GetSubsystems<T>(List<T> subsystems) { foreach (object one in Running) if (one is T) subsystems.Add((T)one); }
     }
-}
-
-namespace UnityEngine
-{
-    public sealed class AnimationClip : Object { }
 }
 
 namespace UnityEngine.Playables
