@@ -8,7 +8,7 @@ namespace UnityEngine
     public enum MeshTopology { Triangles }
     public enum ColorSpace { Gamma, Linear }
 
-    public sealed class Shader : Object
+    public sealed partial class Shader : Object
     {
         static readonly List<string> Names = new List<string>();
         public static int PropertyToID(string name)
@@ -21,7 +21,7 @@ namespace UnityEngine
         internal static string NameOf(int id) { return Names[id]; }
     }
 
-    public sealed class Material : Object
+    public sealed partial class Material : Object
     {
         public Material(Shader shader) { Made.Add(this); }
     }
@@ -41,6 +41,7 @@ namespace UnityEngine
         }
         public void SetData(Array data)
         {
+            if (Player.OnUpload != null) Player.OnUpload();
             if (data is Vector4[])
             {
                 var rows = (Vector4[])data;
@@ -141,7 +142,7 @@ namespace UnityEngine
         public bool receiveShadows { get; set; }
     }
 
-    public static class Graphics
+    public static partial class Graphics
     {
         public static void RenderPrimitivesIndexed(in RenderParams rparams, MeshTopology topology, GraphicsBuffer indexBuffer, int indexCount,
                                                    int startIndex = 0, int instanceCount = 1)
@@ -156,7 +157,7 @@ namespace UnityEngine
 
     public enum CameraType { Game = 1, SceneView = 2, Preview = 4, VR = 8, Reflection = 16 }
 
-    public sealed class Camera : Behaviour
+    public sealed partial class Camera : Behaviour
     {
         internal static readonly List<Camera> All = new List<Camera>();
         public delegate void CameraCallback(Camera cam);
@@ -180,6 +181,7 @@ namespace UnityEngine
         {
             if (Player.HasPipeline) Rendering.RenderPipelineManager.Begin(this);
             else if (onPreCull != null) onPreCull(this);
+            if (Player.OnRender != null) Player.OnRender(this);
         }
         Matrix4x4 ViewAt(float side)
         {
@@ -205,7 +207,7 @@ namespace UnityEngine
         public float weight3 { get; set; }
     }
 
-    public sealed class Mesh : Object
+    public sealed partial class Mesh : Object
     {
         public IndexFormat indexFormat { get; set; }
         public Vector3[] vertices { get; set; }
@@ -257,7 +259,7 @@ namespace UnityEngine
         }
     }
 
-    public static class QualitySettings
+    public static partial class QualitySettings
     {
         public static int vSyncCount { get; set; }
         public static ColorSpace activeColorSpace { get { return ColorSpace.Linear; } }

@@ -6,6 +6,8 @@ namespace UnityEngine
     public static class Mathf
     {
         public static float Sqrt(float x) { return (float)Math.Sqrt(x); }
+        public const float Rad2Deg = (float)(180 / Math.PI);
+        public static float Atan2(float y, float x) { return (float)Math.Atan2(y, x); }
         public static float Exp(float x) { return (float)Math.Exp(x); }
         public static float Clamp(float x, float low, float high) { return Math.Min(Math.Max(x, low), high); }
         public static float DeltaAngle(float from, float to) { return (float)(to - from - 360 * Math.Floor((to - from + 180) / 360)); }

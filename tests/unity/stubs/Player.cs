@@ -10,6 +10,9 @@ namespace UnityEngine
         /// <summary>What is called at each dispatch (shader, kernel, groups) and draw (parameters, indices, how many).</summary>
         public static Action<ComputeShader, int, int> OnDispatch;
         public static Action<RenderParams, GraphicsBuffer, int> OnDraw;
+        public static Action OnUpload;
+        public static Action<Camera> OnRender;
+        public static Func<Texture2D> OnCapture;
 
         /// <summary>What is called where splats are drawn into an avatar's own picture (properties, indices); whether a device can.</summary>
         public static Action<MaterialPropertyBlock, int> OnOwnDraw;
@@ -146,6 +149,11 @@ namespace UnityEngine
         {
             on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);
         }
+        public static T Last<T>() where T : Component
+        {
+            return (T)GameObject.Made.FindLast(c => c is T);
+        }
+        public static void BeforeRender() { Application.BeforeRender(); }
         public static object Field(Component of, string field)
         {
             return of.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).GetValue(of);
