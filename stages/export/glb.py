@@ -1,18 +1,20 @@
 """`avatar.glb`: a skinned, textured, animated mesh for any glTF tool, and the gaussians.
 
 Mesh: as `gltf_body.py` has it.
-Gaussians: in a scene of their own, so that what shows the file shows one person: a POINTS primitive in T-pose with
-KHR_gaussian_splatting (its release candidate: linear scales, opacities after the sigmoid). They have no skin, which readers of
-splats ignore; `_GSAC_FACE` holds the mesh face that each is bound to.
+Gaussians: a POINTS primitive in T-pose with KHR_gaussian_splatting (its release candidate: linear scales, opacities after the
+sigmoid), each with the mesh face that it is bound to in `_GSAC_FACE`. No node shows this mesh, the last: PlayCanvas and Blender
+show all scenes of a file, and splats, on which readers ignore a skin, would stand still in the moving body. A program takes them by
+name, or from the file that has them alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.rotation import to_xyzw
-from gsac.stages.export.gltf_body import body_document
+from gsac.stages.export.gltf_body import body_document, head_of
 from gsac.stages.export.gltf_file import ARRAY_BUFFER, GltfFile
 from gsac.stages.export.ply import SH0
 from gsac.stages.export.texture import Surface
@@ -23,10 +25,24 @@ SPLATS = "KHR_gaussian_splatting"
 
 def glb_bytes(avatar: RiggedAvatar, surface: Surface, means: np.ndarray, quats: np.ndarray, scales: np.ndarray) -> bytes:
     """The file's bytes. means: (N, 3) m, quats: (N, 4) wxyz, scales: (N, 3) m, of the gaussians in T-pose, feet at y = 0."""
-    file, g = GltfFile(), avatar.gaussians
+    file = GltfFile()
     document = body_document(file, avatar, surface)
+    document["meshes"].append(_points(file, avatar.gaussians, means, quats, scales))
+    return file.glb(document | {"extensionsUsed": [SPLATS]})
+
+
+def splats_glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, scales: np.ndarray) -> bytes:
+    """The bytes of a file that shows the gaussians alone. means: (N, 3) m, quats: (N, 4) wxyz, scales: (N, 3) m, feet at y = 0."""
+    file = GltfFile()
+    points = _points(file, avatar.gaussians, means, quats, scales)
+    return file.glb({"asset": head_of(avatar), "extensionsUsed": [SPLATS], "scene": 0, "scenes": [{"name": "avatar", "nodes": [0]}],
+                     "nodes": [{"name": "gaussians", "mesh": 0}], "meshes": [points]})
+
+
+def _points(file: GltfFile, g: Gaussians, means: np.ndarray, quats: np.ndarray, scales: np.ndarray) -> dict:
+    """The mesh of the gaussians, whose arrays go into the file."""
     rgb = np.clip(g.rgb, 0, 1)
-    points = {"primitives": [{
+    return {"primitives": [{
         "mode": POINTS, "attributes": {
             "POSITION": file.add(means.astype("<f4"), ARRAY_BUFFER, bounds=True),
             "COLOR_0": file.add(np.column_stack([_linear(rgb), g.opacity]).astype("<f4"), ARRAY_BUFFER),
@@ -38,11 +54,6 @@ def glb_bytes(avatar: RiggedAvatar, surface: Surface, means: np.ndarray, quats: 
         }, "extensions": {SPLATS: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display",
                                    "projection": "perspective", "sortingMethod": "cameraDistance"}}}],
         "name": "gaussians"}
-    document["extensionsUsed"] = [SPLATS]
-    document["scenes"].append({"name": "gaussians", "nodes": [len(document["nodes"])]})
-    document["nodes"].append({"name": "gaussians", "mesh": len(document["meshes"])})
-    document["meshes"].append(points)
-    return file.glb(document)
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ def body_document(file: GltfFile, avatar: RiggedAvatar, surface: Surface) -> dic
         nodes.append(node | ({"children": children} if children else {}))
     root = int(np.flatnonzero(avatar.parents < 0)[0])
     document = {
-        "asset": {"version": "2.0", "generator": "gsac", "copyright": "; ".join(avatar.licence.values())},
+        "asset": head_of(avatar),
         "scene": 0, "scenes": [{"name": "avatar", "nodes": [root, J]}],
         "nodes": [*nodes, {"name": "body", "mesh": 0, "skin": 0}], "meshes": [_mesh(file, avatar, surface)],
         "skins": [{"joints": list(range(J)), "skeleton": root, "inverseBindMatrices": file.add(inverse.reshape(J, 16))}],
@@ -43,6 +43,11 @@ def body_document(file: GltfFile, avatar: RiggedAvatar, surface: Surface) -> dic
         document["animations"] = [_animation(file, name, clip, avatar, nodes[root]["translation"], root)
                                   for name, clip in avatar.clips.items()]
     return document
+
+
+def head_of(avatar: RiggedAvatar) -> dict[str, str]:
+    """What a glTF file says of itself."""
+    return {"version": "2.0", "generator": "gsac", "copyright": "; ".join(avatar.licence.values())}
 
 
 def _mesh(file: GltfFile, avatar: RiggedAvatar, surface: Surface) -> dict:

@@ -9,6 +9,7 @@ import numpy as np
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.stages.export.config import Pose
+from gsac.stages.export.glb import splats_glb_bytes
 from gsac.stages.export.sog import sog_bytes
 from gsac.stages.export.stage import pose_gaussians
 from gsac.stages.export.texture import Surface, paint_surface
@@ -31,7 +32,12 @@ def sog(avatar: RiggedAvatar, pose: Pose) -> bytes:
     return sog_bytes(*pose_gaussians(avatar, _find_pose(avatar, pose)), avatar.gaussians.rgb, avatar.gaussians.opacity)
 
 
-WRITERS: dict[str, Callable[[RiggedAvatar, Pose], bytes]] = {"vrm": vrm, "usdz": usdz, "sog": sog}
+def glb(avatar: RiggedAvatar, pose: Pose) -> bytes:
+    """The gaussians in the pose."""
+    return splats_glb_bytes(avatar, *pose_gaussians(avatar, _find_pose(avatar, pose)))
+
+
+WRITERS: dict[str, Callable[[RiggedAvatar, Pose], bytes]] = {"vrm": vrm, "usdz": usdz, "sog": sog, "glb": glb}
 """Format, which is the file's suffix -> its bytes."""
 
 

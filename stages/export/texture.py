@@ -9,7 +9,7 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.camera import Camera
@@ -85,7 +85,7 @@ def vertex_colours(vertices: np.ndarray, means: np.ndarray, rgb: np.ndarray,
     Returns the nearest gaussians (V, K) of each vertex, and (V, 3) float32 sRGB: their mean, weighted by opacity and nearness. The
     binding does not serve: training moves gaussians away from the face that carries them.
     """
-    distance, near = cKDTree(means).query(vertices, k=min(NEAREST, len(means)))
+    distance, near = KDTree(means).query(vertices, k=min(NEAREST, len(means)))
     distance, near = distance.reshape(len(vertices), -1), near.reshape(len(vertices), -1)
     weight = (opacity[near] + 1e-6) / (distance ** 2 + BLUR_M ** 2)
     return near, np.einsum("vk,vkc->vc", weight / weight.sum(1, keepdims=True), np.clip(rgb, 0, 1)[near]).astype(np.float32)

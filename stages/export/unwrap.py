@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from gsac.avatar.artifacts import ArtifactError
 
-AXES = np.float64([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
+AXES = np.array([(1.0, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
 FLAT = np.array([(2, 1), (2, 1), (0, 2), (0, 2), (0, 1), (0, 1)])
 """The coordinates that remain when a chart is flattened along each of `AXES`."""
 ROUNDS, COMPANY = 6, 0.3

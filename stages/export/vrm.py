@@ -1,14 +1,12 @@
 """`avatar.vrm`, VRM 1.0: the mesh of avatar.glb as a humanoid whose bones and expressions VRM's programs know by name.
 
-The 52 actions are custom expressions by their ARKit names, which face trackers look for; VRM's own moods, vowels, blinks and glances
-are made of them. Its terms of use are the strictest that VRM has, unless a person writes others: a likeness is nobody else's.
+The 52 actions are custom expressions by their ARKit names, which face trackers look for; VRM's own moods, vowels, blinks and
+glances are made of them. The terms of use are the strictest that VRM has; what was agreed with the person stands beside them.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-
-import numpy as np
 
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
@@ -22,7 +20,8 @@ LIMBS = {"collar": "Shoulder", "shoulder": "UpperArm", "elbow": "LowerArm", "wri
          "ankle": "Foot", "foot": "Toes", "eye_smplhf": "Eye"}
 FINGERS = {"index": "Index", "middle": "Middle", "ring": "Ring", "pinky": "Little"}
 PHALANGES, THUMB = ("Proximal", "Intermediate", "Distal"), ("Metacarpal", "Proximal", "Distal")
-BONES = {"pelvis": "hips", "spine1": "spine", "spine2": "chest", "spine3": "upperChest", "neck": "neck", "head": "head", "jaw": "jaw"}
+BONES = {"pelvis": "hips", "spine1": "spine", "spine2": "chest", "spine3": "upperChest", "neck": "neck", "head": "head",
+         "jaw": "jaw"}
 for _side in ("left", "right"):
     BONES |= {f"{_side}_{joint}": _side + bone for joint, bone in LIMBS.items()}
     BONES |= {f"{_side}_{finger}{k + 1}": f"{_side}{bone}{part}" for finger, bone in FINGERS.items()
@@ -61,7 +60,7 @@ def vrm_bytes(avatar: RiggedAvatar, surface: Surface) -> bytes:
     file = GltfFile()
     document = body_document(file, replace(avatar, clips={}), surface)
     mesh, joint = len(avatar.joints), avatar.joint_names.index
-    eyes = np.mean([avatar.joints[joint(f"{side}_eye_smplhf")] for side in ("left", "right")], axis=0) - avatar.joints[joint("head")]
+    left, right, head = (avatar.joints[joint(name)] for name in ("left_eye_smplhf", "right_eye_smplhf", "head"))
     range_map = {"inputMaxValue": GLANCE_DEGREES, "outputScale": 1.0}
     document["extensionsUsed"] = [VRM]
     document["extensions"] = {VRM: {
@@ -69,7 +68,7 @@ def vrm_bytes(avatar: RiggedAvatar, surface: Surface) -> bytes:
         "humanoid": {"humanBones": {bone: {"node": joint(name)} for name, bone in BONES.items()}},
         "expressions": name_expressions(avatar.expression_names, mesh),
         "firstPerson": {"meshAnnotations": [{"node": mesh, "type": "auto"}]},
-        "lookAt": {"type": "expression", "offsetFromHeadBone": eyes.tolist()} | {
+        "lookAt": {"type": "expression", "offsetFromHeadBone": ((left + right) / 2 - head).tolist()} | {
             f"rangeMap{way}": range_map for way in ("HorizontalInner", "HorizontalOuter", "VerticalDown", "VerticalUp")},
     }}
     return file.glb(document)
@@ -82,7 +81,8 @@ def state_terms(licence: dict[str, str]) -> dict:
         "copyrightInformation": licence.get("avatar", ""), "thirdPartyLicenses": licence.get("body", ""),
         "avatarPermission": "onlySeparatelyLicensedPerson", "allowExcessivelyViolentUsage": False,
         "allowExcessivelySexualUsage": False, "commercialUsage": "personalNonProfit", "allowPoliticalOrReligiousUsage": False,
-        "allowAntisocialOrHateUsage": False, "creditNotation": "required", "allowRedistribution": False, "modification": "prohibited",
+        "allowAntisocialOrHateUsage": False, "creditNotation": "required", "allowRedistribution": False,
+        "modification": "prohibited",
     }
 
 

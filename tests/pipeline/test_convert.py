@@ -27,7 +27,7 @@ def convert(capsys, *words):
     return code, said.out, said.err
 
 
-@pytest.mark.parametrize(("kind", "begins"), [("vrm", b"glTF"), ("usdz", b"PK"), ("sog", b"PK")])
+@pytest.mark.parametrize(("kind", "begins"), [("vrm", b"glTF"), ("usdz", b"PK"), ("sog", b"PK"), ("glb", b"glTF")])
 def test_an_avatar_becomes_a_file_of_each_format_named_after_its_run(run, tmp_path, monkeypatch, capsys, kind, begins):
     monkeypatch.chdir(tmp_path)
     code, out, _ = convert(capsys, run, kind, "--json")
@@ -58,6 +58,9 @@ def test_nothing_is_written_over_and_a_wrong_name_or_file_is_said(run, tmp_path,
     assert convert(capsys, run, "vrm", "--out", there, "--force")[0] == 0 and there.read_bytes()[:4] == b"glTF"
     code, _, said = convert(capsys, run, "usdz", "--out", tmp_path / "a.glb")
     assert code == 2 and "expected a file .usdz" in said
+    for words, named in ((["vmr"], "unknown format vmr"), (["sog", "--pose", "x"], "--pose x: expected a or t")):
+        code, _, said = convert(capsys, run, *words)
+        assert code == 2 and named in said
     broken = tmp_path / "broken.gsac"
     broken.write_bytes((run / "export" / "avatar.gsac").read_bytes()[:900])
     code, _, said = convert(capsys, broken, "vrm", "--out", tmp_path / "b.vrm")

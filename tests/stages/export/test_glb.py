@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.stages.export.glb import glb_bytes
+from gsac.stages.export.glb import glb_bytes, splats_glb_bytes
 from gsac.stages.export.stage import pose_gaussians
 from gsac.stages.export.texture import paint_surface
 
@@ -146,22 +146,21 @@ def test_points_keep_the_rules_of_the_extensions_release_candidate(figure, gltf)
     np.testing.assert_allclose(np.linalg.norm(a["ROTATION"], axis=1), 1, atol=1e-5)
     assert a["SCALE"].min() >= 0 and a["OPACITY"].min() >= 0 and a["OPACITY"].max() <= 1
     np.testing.assert_allclose(a["SH_DEGREE_0_COEF_0"] * .2820947917738781 + .5, figure.gaussians.rgb, atol=1e-6)
-    node = gltf.doc["nodes"][gltf.node["gaussians"]]
-    assert not {"scale", "matrix", "rotation"} & node.keys()
 
 
-def test_what_is_shown_unasked_is_one_person_and_the_gaussians_have_a_scene_of_their_own(gltf):
-    shown, apart = gltf.doc["scenes"]
-    assert gltf.doc["scene"] == 0 and (shown["name"], apart["name"]) == ("avatar", "gaussians")
-    assert apart["nodes"] == [gltf.node["gaussians"]]
+def test_what_is_shown_is_one_person_and_the_gaussians_are_a_mesh_that_no_node_shows(gltf):
+    assert len(gltf.doc["scenes"]) == 1, "PlayCanvas shows all scenes"
+    assert [n["name"] for n in gltf.doc["nodes"] if "mesh" in n] == ["body"], "Blender shows nodes that are in no scene"
+    assert [mesh["name"] for mesh in gltf.doc["meshes"]] == ["body", "gaussians"]
 
-    def meshes(i):
-        node = gltf.doc["nodes"][i]
-        return [node["mesh"]] if "mesh" in node else [m for child in node.get("children", []) for m in meshes(child)]
 
-    assert [m for node in shown["nodes"] for m in meshes(node)] == [0]
-    assert not set(shown["nodes"]) & set(apart["nodes"]), "three moves a node that two scenes share into the last"
-    assert "skin" not in gltf.doc["nodes"][gltf.node["gaussians"]], "three and Babylon ignore a skin on points"
+def test_a_file_of_the_gaussians_alone_holds_the_same_and_shows_them(figure, rest, gltf):
+    alone = Gltf(splats_glb_bytes(figure, *rest))
+    assert alone.doc["nodes"] == [{"name": "gaussians", "mesh": 0}] and alone.doc["scenes"][0]["nodes"] == [0]
+    assert alone.doc["meshes"][0]["primitives"][0]["extensions"] == gltf.doc["meshes"][1]["primitives"][0]["extensions"]
+    assert alone.doc["extensionsUsed"] == ["KHR_gaussian_splatting"]
+    for name, values in gltf.attributes(1).items():
+        np.testing.assert_array_equal(alone.attributes(0)[name], values)
 
 
 def test_left_hand_is_on_the_left_and_red_in_mesh_and_points(gltf):

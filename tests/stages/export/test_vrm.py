@@ -142,7 +142,8 @@ def test_three_vrm_poses_its_humanoid_and_plays_its_expressions(avatar, vrm, nod
     assert seen["version"] == "1" and seen["meta"]["copyrightInformation"] == avatar.licence["avatar"]
     assert set(seen["bones"]) == set(BONES.values())
     assert set(seen["expressions"]) == OWN | set(avatar.expression_names)
-    place = {name: avatar.joints[avatar.joint_names.index(f"left_{name}")] - (0, avatar.ground, 0) for name in ("shoulder", "wrist")}
+    place = {name: avatar.joints[avatar.joint_names.index(f"left_{name}")] - (0, avatar.ground, 0)
+             for name in ("shoulder", "wrist")}
     np.testing.assert_allclose(seen["rest"], place["wrist"], atol=1e-5)
     x, y, z = place["wrist"] - place["shoulder"]
     np.testing.assert_allclose(seen["hanging"], place["shoulder"] + (y, -x, z), atol=1e-4)
