@@ -19,6 +19,7 @@ from gsac.avatar.joints import INDEX
 from gsac.avatar.yaw import yaw
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.smplx.jacobians import Chain
+from gsac.stages.smplx.lm.arm_paths import ArmPaths
 from gsac.stages.smplx.lm.hidden_arms import (
     ARM_JOINTS,
     BEHIND_SPREAD,
@@ -136,48 +137,45 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     """The state with doubtful arms in poses that explain points and mask clearly better, where there are any; and (T, 2) bool, the
     doubtful arms that no stay has.
 
-    missing: (T, 2) bool, hands that were not detected; None: all were. An arm that is doubtful or without a hand for
-    much of the clip is left: nothing tells which of its frames are right.
+    missing: (T, 2) bool, hands that were not detected; None: all were.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     wrong = find_contradicted(arms, problem, state, missing)
     doubtful = wrong | find_untold(arms, problem, state, missing)
-    if problem.seen.seconds is None:
+    seconds = problem.seen.seconds
+    if seconds is None or not problem.seen.outlines:
         return state, doubtful
     settled = replace(state, local=state.local.copy())
-    trusted = 1 - np.maximum(doubtful.mean(0), missing.mean(0)) > TRUSTED
-    for side in np.flatnonzero(doubtful.any(0) & trusted).tolist():
+    for side in np.flatnonzero(doubtful.any(0)).tolist():
+        around = np.zeros(len(doubtful), bool)
         for first, last in bridge(doubtful[:, side]):
-            stay = Stay(side, first, last, *find_around(problem.seen.seconds, first, last))
-            shown, contradicted = ~missing[stay.around, side], wrong[first:last, side].sum() >= DOUBTS
-            settled.local[stay.around] = search(arms, problem, settled, stay, shown, contradicted)
+            around[slice(*find_around(seconds, first, last))] = True
+        for start, stop in bridge(around, 0):
+            doubted = start + np.flatnonzero(doubtful[start:stop, side])
+            stay = Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop)
+            settled.local[stay.around] = search(arms, problem, settled, stay, ~missing[stay.around, side])
     return settled, doubtful
 
 
-def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, contradicted: bool) -> np.ndarray:
+def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray) -> np.ndarray:
     """Joint rotations (F, J, 3, 3) of the stay's frames: as they are unless others are clearly better.
 
-    shown: (F,) bool, of the hand; contradicted: whether the pictures contradict what is there for some frames. Else others must be
-    better than what it comes to when it may move as freely.
+    shown: (F,) bool, of the hand.
     """
-    def fit(trials: list[State], steps: int) -> list[tuple[float, State]]:
-        found = []
-        for trial in trials:
-            alone = isolate_arm(problem, stay)
-            hold(arms.cut(stay), alone, trial, stay.side, shown)
-            bent = bend_arm(alone, trial, steps)
-            alone.seen.depth = problem.seen.depth[stay.around].copy()
-            hold(arms.cut(stay), alone, bent, stay.side, shown)
-            found.append((alone.cost(bent), bent))
-        return found
+    alone, asis = isolate_arm(problem, stay), isolate_state(state, stay, state.local[stay.around])
+    hold(arms.cut(stay), alone, asis, stay.side, shown)
+    freed = bend_arm(alone, asis, STEPS)
+    paths = ArmPaths(alone, asis, stay.side, shown, arms.height)
+    path = paths.find([asis.local, freed.local])
+    paths.anchor(path)
+    bent = bend_arm(alone, isolate_state(state, stay, path), STEPS)
+    if DEBUG: print(stay, "asis", round(paths.cost(asis.local)), "freed", round(paths.cost(freed.local)), "path", round(paths.cost(path)), "bent", round(paths.cost(bent.local)))
+    if os.environ.get("NOLM") or paths.cost(path) < paths.cost(bent.local): bent.local[:] = path
+    return bent.local if paths.cost(bent.local) < paths.cost(asis.local) - CLEARLY else asis.local
 
-    asis, *others = [isolate_state(state, stay, start) for start in list_starts(state, stay)]
-    likely = sorted(fit(others, FIRST_STEPS), key=lambda entry: entry[0])[:LEFT]
-    freed, *found = fit([asis, *(trial for _, trial in likely)], FIRST_STEPS + MORE_STEPS)
-    (before, _), found = (*fit([asis], 0), [freed, *found]) if contradicted else (freed, found)
-    lowest, best = min(found, key=lambda entry: entry[0])
-    return best.local if lowest < before - CLEARLY else asis.local
-
+import os
+DEBUG = os.environ.get("DBG")
+STEPS = 18
 
 def hold(arms: HiddenArms, alone: Problem, state: State, side: int, shown: np.ndarray) -> None:
     """Tells the arm's problem that it lies inside the mask, and its hand before the trunk where it is seen, and not inside it.
@@ -195,17 +193,3 @@ def hold(arms: HiddenArms, alone: Problem, state: State, side: int, shown: np.nd
     sunk = shown & ~hidden & np.isfinite(near)
     seen.depth[sunk, wrist], spread[sunk, wrist] = (near - SKIN - hips)[sunk], BEHIND_SPREAD
     seen.depth_spread = spread
-
-
-def list_starts(state: State, stay: Stay) -> list[np.ndarray]:
-    """Joint rotations (F, J, 3, 3) to search from: as they are, as just before and after the stay, and in each of `POSES`."""
-    asis, joints = state.local[stay.around], ARM_JOINTS[stay.side, 1:3]
-    frame = np.arange(stay.start, stay.stop)
-    held = np.flatnonzero((frame >= stay.first - 1) & (frame <= stay.last))
-    ends = [state.local[t, joints] for t in (max(stay.first - 2, 0), min(stay.last + 1, len(state.local) - 1))]
-    out = [asis]
-    for goal in [*ends, *(rotation.exp(hiding_pose(stay.side, pose)) for pose in POSES)]:
-        start = asis.copy()
-        start[np.ix_(held, joints)] = goal
-        out.append(start)
-    return out

@@ -23,7 +23,7 @@ from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.doubtful_arms import settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
-from gsac.stages.smplx.lm.hidden_arms import HiddenArms, describe_arms, widen_arm
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, describe_arms, widen_arm
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
@@ -55,6 +55,13 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     detector = Detector.load(sightings.detector, body)
     sightings, problem, state, steps, said = fit_either_side(body, sightings, outlines, detector, config)
     hidden = HiddenArms.of(body, sightings.person_height)
+    state, early = settle_doubtful(hidden, problem, state, sightings.missing)
+    import os
+    if os.environ.get("DBG"): print("early", early.sum(0), [np.flatnonzero(e).tolist() for e in early.T])
+    for side in (0, 1):
+        moves = np.ix_(early[:, side], np.isin(problem.active, ARM_JOINTS[side]))
+        problem.loose[moves] = QUICK
+        problem.spread[moves] *= FREE
     hidden.find(problem, state, sightings.missing)
     state = hidden.search(problem, state)
     iou = np.full(len(sightings.xy), np.nan)
