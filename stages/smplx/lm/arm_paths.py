@@ -22,41 +22,41 @@ from gsac.avatar.mesh import vertex_normals
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.smplx import prior
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, HAND, HANDS, SIDES, WRIST
-from gsac.stages.smplx.lm.problem import INSIDE_ROBUST, INSIDE_SIGHTINGS, Problem
+from gsac.stages.smplx.lm.problem import INSIDE_SIGHTINGS, Problem
 from gsac.stages.smplx.lm.solver import robust
 from gsac.stages.smplx.state import State, to_params
 
 DIRECTIONS, TWISTS, BENDS = 200, np.radians(np.arange(0, 360, 36)), np.radians((5, 35, 65, 95, 120, 140))
 """Of the poses: directions of the upper arm, its turns about itself, bends of the elbow."""
-MOVES, STEPS = 100, np.radians((16, 10, 6, 4))
-MOVE = np.array([(0.7, 1, 1), (0.7, 1, 0.05), (0.2, 0.5, 0.5)])
 LIKELY = 20.0
 """Squared distance, in spreads, of a pose from the mean one, at most."""
+MOVES, FINER = 100, np.radians((16, 10, 6, 4))
+"""Small moves that a path tries in each frame, and their sizes, one after the other."""
+MOVE = np.array([(0.7, 1, 1), (0.7, 1, 0.05), (0.2, 0.5, 0.5)])
+"""Shares of those about the axes of shoulder, elbow and wrist: an elbow is a hinge, a forearm turns about itself."""
 WEIGHED, KEPT = 1200, 120
 """Poses of a frame, the best by points and mask, that are weighed against the body; and of these that paths go through."""
-BESIDE = 3.0
 ASTRAY = 6.0
 """Robust limit of points, in spreads: the detector takes the other arm, or cloth, for a hidden one."""
+BESIDE, SLACK, SPREAD = 3.0, 0.008, 0.01
+"""Of middle lines outside the mask, and of the mask outside a limb: robust limit, in spreads, and what is free and the spread,
+as shares of the person's height."""
 LEFT, LEFT_SHARE, SAMPLES = 0.02, 0.008, 60
 """Of the mask's parts that the body leaves: distance from it, and the area of a whole arm, as shares of the person's height and its
 square; places at most."""
 RADIUS = (0.048, 0.04, 0.05)
 """m, of upper arm, forearm and hand."""
 OFF, SINKS, SUNK = 0.02, 0.02, 60.0
-"""m off the surface at which middle lines of forearm and hand lie when they touch it; spread, and the most that a pose inside the body
-costs."""
+"""m off the surface at which middle lines of forearm and hand lie when they touch it; spread, and the most that a pose inside
+the body costs."""
 TOUCHES, APART = 0.06, 2.0
 """Spread, m, and robust limit, in spreads, of a hand that is not seen from the body: most likely it touches it."""
 BEHIND = 0.03
 """m behind the body's surface from which on a hand is hidden."""
 BLIND, MISSED = 12.0, 4.0
 """Cost of a hand that is seen where the body hides it, and of one in plain view that is not seen."""
-RESTS = 4.0
-"""Robust limit of an arm's speed, in spreads."""
-BELIEVED, HELD = 4.0, 0.015
-"""Spreads from a path up to which a point is its arm's; then the spread of the path's own point, as a share of the person's height."""
-ANCHORED = 0.05
-"""m, spread of the depths that a path gives to elbow and wrist."""
+STILL, RESTS = 0.4, 4.0
+"""Factor on the spread of an arm's speed, and its robust limit, in spreads: who turns shows a resting arm from all sides."""
 
 
 @dataclass
@@ -107,10 +107,10 @@ class ArmPaths:
             own = np.concatenate([own[best], np.stack([local[t, ARM_JOINTS[self.side, 1:]] for local in known])])
             poses.append(own[np.argsort(self.weigh(t, own), kind="stable")[:KEPT]])
         path = self.walk(poses)
-        for step in STEPS:
-            moves = list_moves(self.side)
-            moves = rotation.exp(step * moves)
-            path = self.walk([np.concatenate([path[max(t - 1, 0):t + 2], path[t] @ moves]) for t in range(len(path))])
+        moves = np.random.default_rng(0).normal(size=(MOVES, 3, 3)) * MOVE
+        for size in FINER:
+            turns = rotation.exp(size * moves)
+            path = self.walk([np.concatenate([path[max(t - 1, 0):t + 2], path[t] @ turns]) for t in range(len(path))])
         out = self.state.local.copy()
         out[:, ARM_JOINTS[self.side, 1:]] = path
         return out
@@ -138,7 +138,7 @@ class ArmPaths:
         trace = np.einsum("...ab,...ab->...", before[..., :2, :, :], after[..., :2, :, :])
         angle = np.arccos(np.clip((trace - 1) / 2, -1, 1))
         gap = self.alone.seen.seconds[t] - self.alone.seen.seconds[t - 1]
-        return robust(angle / gap / self.alone.speed_spread[1:3], RESTS)[0].sum(-1)
+        return robust(angle / gap / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1)
 
     def place(self, t: int, poses: np.ndarray) -> np.ndarray:
         """(K, 4, 3) m, shoulder, elbow, wrist and middle knuckle. poses: (K, 3, 3, 3) rotations of shoulder, elbow and wrist."""
@@ -162,9 +162,9 @@ class ArmPaths:
         if seen.outlines and seen.outlines[t].area > 0:
             lower = x[:, 1:3]
             at = [seen.outlines[t].at(alone.project(self.state, one))
-                  for one in (*lower.swapaxes(0, 1), lower.mean(1), x[:, 3], 2 * x[:, 3] - x[:, 2])]
-            outside = np.stack([np.where(inside & (distance > 0), distance, 0) for distance, _, inside in at], 1)
-            out += INSIDE_SIGHTINGS * robust(outside / seen.outline_spread, BESIDE)[0].mean(1)
+                  for one in (*lower.swapaxes(0, 1), lower.mean(1), x[:, 3])]
+            outside = np.stack([np.where(inside, distance, 0) for distance, _, inside in at], 1) / self.height
+            out += INSIDE_SIGHTINGS * robust(np.maximum(outside - SLACK, 0) / SPREAD, BESIDE)[0].mean(1)
         return out
 
     def weigh(self, t: int, poses: np.ndarray) -> np.ndarray:
@@ -175,33 +175,13 @@ class ArmPaths:
         if len(around.left):
             size = np.exp(self.state.log_focal) / x[0, 0, 2] * np.array(RADIUS)
             off = np.min([measure_gap(xy[:, k], xy[:, k + 1], around.left) - size[k] for k in range(3)], axis=0)
-            out += around.weight * robust(np.maximum(off, 0) / self.alone.seen.outline_spread, BESIDE)[0].mean(1)
+            out += around.weight * robust(np.maximum(off / self.height - SLACK, 0) / SPREAD, BESIDE)[0].mean(1)
         clear = around.measure_clearance(np.stack([x[:, 1:3].mean(1), x[:, 2], x[:, 3]], 1))
         out += np.minimum((np.minimum((clear - OFF) / SINKS, 0) ** 2).sum(1), SUNK)
         hidden = around.hides(xy[:, 3], x[:, 3, 2])
         if self.shown[t]:
             return out + BLIND * hidden
         return out + MISSED * ~hidden + robust(np.maximum(clear[:, 2] - 2 * OFF, 0) / TOUCHES, APART)[0]
-
-    def anchor(self, local: np.ndarray) -> None:
-        """Gives the arm's problem the depths of a path's elbow and wrist, which its points hardly tell, and the path's own points
-        where it lies far from those seen. local: (F, J, 3, 3) joint rotations.
-        """
-        seen, rows = self.alone.seen, [ELBOW[self.side], WRIST[self.side]]
-        spread = np.broadcast_to(seen.depth_spread, seen.depth.shape).copy()
-        seen.xy, seen.spread = seen.xy.copy(), seen.spread.copy()
-        for t, pose in enumerate(local[:, ARM_JOINTS[self.side, 1:]]):
-            x = self.place(t, pose[None])[0, 1:3]
-            xy = self.alone.project(self.state, x)
-            off = np.linalg.norm(np.nan_to_num(seen.xy[t, rows]) - xy, axis=1) / seen.spread[t, rows]
-            astray = ~((off < BELIEVED) & np.isfinite(seen.spread[t, rows]))
-            for row, own, place, wrong in zip(rows, x, xy, astray, strict=True):
-                seen.depth[t, row], spread[t, row] = own[2] - self.hips[t], ANCHORED
-                if wrong:
-                    seen.xy[t, row], seen.spread[t, row] = place, HELD * self.height
-            if astray[1]:
-                seen.spread[t, HAND[self.side]] = np.inf
-        seen.depth_spread = spread
 
 
 @cache
@@ -221,13 +201,6 @@ def list_poses(side: int) -> np.ndarray:
     out = np.stack([shoulder[direction, twist], elbow[bend], np.tile(np.eye(3), (len(bend), 1, 1))], 1)
     flip = np.diag([-1.0, 1, 1])
     return out if side == 0 else flip @ out @ flip
-
-
-@cache
-def list_moves(side: int) -> np.ndarray:
-    """(K, 3, 3) rotation vectors of small moves of shoulder, elbow and wrist, in steps."""
-    out = np.random.default_rng(0).normal(size=(MOVES, 3, 3)) * MOVE
-    return out
 
 
 def measure_gap(start: np.ndarray, end: np.ndarray, places: np.ndarray) -> np.ndarray:

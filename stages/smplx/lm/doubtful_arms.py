@@ -14,7 +14,6 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from gsac.avatar import rotation
 from gsac.avatar.joints import INDEX
 from gsac.avatar.yaw import yaw
 from gsac.avatar.zbuffer import silhouette
@@ -24,17 +23,14 @@ from gsac.stages.smplx.lm.hidden_arms import (
     ARM_JOINTS,
     BEHIND_SPREAD,
     ELBOW,
-    HIDES,
     ROUGH_DEPTH,
     SKIN,
     TRUSTED,
     WRIST,
     HiddenArms,
     Stay,
-    bend_arm,
     bridge,
     find_around,
-    hiding_pose,
     isolate_arm,
     isolate_state,
 )
@@ -55,10 +51,6 @@ MOVED, LOST = 0.11, 0.03
 that nothing tells. Hanging arms move by 83 mm in turns of 20 frames, hands that went to the hips or the back by 138 on."""
 DEEP = 0.03
 """m inside the trunk from which on a hand would not be seen."""
-POSES = (*HIDES, ((20, 30, -40), (0, -95, 0)), ((0, -40, 40), (0, -125, 0)), ((0, -55, -62), (0, -100, 0)))
-"""Rotation vectors, degrees, of the left shoulder and elbow: hidden, on the hip, at the hair, before the chest."""
-FIRST_STEPS, MORE_STEPS, LEFT = 6, 18, 2
-"""Steps of each search, and more of those that are best by then."""
 CLEARLY = 20.0
 """By how much the cost must fall: by 73 on where a hand is seen on the back and fitted inside the trunk or before the belly, by 6
 at most where nothing tells where a hand is."""
@@ -164,18 +156,10 @@ def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: 
     """
     alone, asis = isolate_arm(problem, stay), isolate_state(state, stay, state.local[stay.around])
     hold(arms.cut(stay), alone, asis, stay.side, shown)
-    freed = bend_arm(alone, asis, STEPS)
     paths = ArmPaths(alone, asis, stay.side, shown, arms.height)
-    path = paths.find([asis.local, freed.local])
-    paths.anchor(path)
-    bent = bend_arm(alone, isolate_state(state, stay, path), STEPS)
-    if DEBUG: print(stay, "asis", round(paths.cost(asis.local)), "freed", round(paths.cost(freed.local)), "path", round(paths.cost(path)), "bent", round(paths.cost(bent.local)))
-    if os.environ.get("NOLM") or paths.cost(path) < paths.cost(bent.local): bent.local[:] = path
-    return bent.local if paths.cost(bent.local) < paths.cost(asis.local) - CLEARLY else asis.local
+    path = paths.find([asis.local])
+    return path if paths.cost(path) < paths.cost(asis.local) - CLEARLY else asis.local
 
-import os
-DEBUG = os.environ.get("DBG")
-STEPS = 18
 
 def hold(arms: HiddenArms, alone: Problem, state: State, side: int, shown: np.ndarray) -> None:
     """Tells the arm's problem that it lies inside the mask, and its hand before the trunk where it is seen, and not inside it.

@@ -56,8 +56,6 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     sightings, problem, state, steps, said = fit_either_side(body, sightings, outlines, detector, config)
     hidden = HiddenArms.of(body, sightings.person_height)
     state, early = settle_doubtful(hidden, problem, state, sightings.missing)
-    import os
-    if os.environ.get("DBG"): print("early", early.sum(0), [np.flatnonzero(e).tolist() for e in early.T])
     for side in (0, 1):
         moves = np.ix_(early[:, side], np.isin(problem.active, ARM_JOINTS[side]))
         problem.loose[moves] = QUICK
