@@ -128,7 +128,7 @@ class ArmPaths:
         return np.stack([own[k] for own, k in zip(poses, reversed(picked), strict=True)])
 
     def cost(self, local: np.ndarray) -> float:
-        """Of one path, (F, J, 3, 3) joint rotations."""
+        """Of the path of local, (F, J, 3, 3) joint rotations."""
         poses = local[:, ARM_JOINTS[self.side, 1:]]
         motion = sum(float(self.measure_motion(t, poses[t - 1], poses[t])) for t in range(1, len(poses)))
         return motion + sum(float(self.weigh(t, pose[None])[0]) for t, pose in enumerate(poses))
