@@ -55,11 +55,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     detector = Detector.load(sightings.detector, body)
     sightings, problem, state, steps, said = fit_either_side(body, sightings, outlines, detector, config)
     hidden = HiddenArms.of(body, sightings.person_height)
-    state, early = settle_doubtful(hidden, problem, state, sightings.missing)
-    for side in (0, 1):
-        moves = np.ix_(early[:, side], np.isin(problem.active, ARM_JOINTS[side]))
-        problem.loose[moves] = QUICK
-        problem.spread[moves] *= FREE
+    state, moved = move_doubtful(hidden, problem, state, sightings.missing)
     hidden.find(problem, state, sightings.missing)
     state = hidden.search(problem, state)
     iou = np.full(len(sightings.xy), np.nan)
@@ -77,6 +73,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         steps += more
     cost = problem.cost(state)
     state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing)
+    doubtful |= moved & ~hidden.mark(len(moved))
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     sigma = estimate_joint_sigma(problem, state)
@@ -139,6 +136,20 @@ def fit_points(problem: Problem, state: State, sightings: Sightings, detector: D
     subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
     state, more = problem.minimise(state, iterations)
     return state, first + more
+
+
+def move_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None) -> tuple[State, np.ndarray]:
+    """The state with doubtful arms where they clearly are, before they drag the trunk along; and (T, 2) bool, those that moved.
+
+    They move as quickly as a gesture from then on. missing: (T, 2) bool, hands that were not detected; None: all were.
+    """
+    settled, moved = settle_doubtful(arms, problem, state, missing)
+    moved &= (settled.local != state.local)[:, ARM_JOINTS].any((2, 3, 4))
+    for side in (0, 1):
+        arm = np.ix_(moved[:, side], np.isin(problem.active, ARM_JOINTS[side]))
+        problem.loose[arm] = QUICK
+        problem.spread[arm] *= FREE
+    return settled, moved
 
 
 def stand_on_ground(problem: Problem, state: State, sightings: Sightings, weight: float) -> None:
