@@ -55,8 +55,9 @@ BEHIND = 0.03
 """m behind the body's surface from which on a hand is hidden."""
 BLIND, MISSED = 12.0, 4.0
 """Cost of a hand that is seen where the body hides it, and of one in plain view that is not seen."""
-STILL, RESTS = 0.4, 4.0
-"""Factor on the spread of an arm's speed, and its robust limit, in spreads: who turns shows a resting arm from all sides."""
+STILL, RESTS, LASTS = 0.4, 4.0, 0.3
+"""Factor on the spread of an arm's speed, its robust limit, in spreads, and the time, s, for which that costs
+once: who turns shows a resting arm from all sides."""
 
 
 @dataclass
@@ -138,7 +139,7 @@ class ArmPaths:
         trace = np.einsum("...ab,...ab->...", before[..., :2, :, :], after[..., :2, :, :])
         angle = np.arccos(np.clip((trace - 1) / 2, -1, 1))
         gap = self.alone.seen.seconds[t] - self.alone.seen.seconds[t - 1]
-        return robust(angle / gap / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1)
+        return gap / LASTS * robust(angle / gap / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1)
 
     def place(self, t: int, poses: np.ndarray) -> np.ndarray:
         """(K, 4, 3) m, shoulder, elbow, wrist and middle knuckle. poses: (K, 3, 3, 3) rotations of shoulder, elbow and wrist."""

@@ -134,9 +134,17 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     wrong = find_contradicted(arms, problem, state, missing)
     doubtful = wrong | find_untold(arms, problem, state, missing)
+    return move(arms, problem, state, doubtful, missing), doubtful
+
+
+def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray, missing: np.ndarray) -> State:
+    """The state with arms in poses that explain points and mask clearly better, where there are any.
+
+    doubtful: (T, 2) bool, those arms; missing: (T, 2) bool, hands that were not detected.
+    """
     seconds = problem.seen.seconds
     if seconds is None or not problem.seen.outlines:
-        return state, doubtful
+        return state
     settled = replace(state, local=state.local.copy())
     for side in np.flatnonzero(doubtful.any(0)).tolist():
         around = np.zeros(len(doubtful), bool)
@@ -146,7 +154,7 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
             doubted = start + np.flatnonzero(doubtful[start:stop, side])
             stay = Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop)
             settled.local[stay.around] = search(arms, problem, settled, stay, ~missing[stay.around, side])
-    return settled, doubtful
+    return settled
 
 
 def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray) -> np.ndarray:
