@@ -30,7 +30,7 @@ DIRECTIONS, TWISTS, BENDS = 200, np.radians(np.arange(0, 360, 36)), np.radians((
 """Of the poses: directions of the upper arm, its turns about itself, bends of the elbow."""
 LIKELY = 20.0
 """Squared distance, in spreads, of a pose from the mean one, at most."""
-MOVES, FINER = 100, np.radians((16, 10, 6, 4))
+MOVES, FINER = 100, np.radians((16, 10, 6, 4, 2))
 """Small moves that a path tries in each frame, and their sizes, one after the other."""
 MOVE = np.array([(0.7, 1, 1), (0.7, 1, 0.05), (0.2, 0.5, 0.5)])
 """Shares of those about the axes of shoulder, elbow and wrist: an elbow is a hinge, a forearm turns about itself."""
@@ -55,9 +55,11 @@ BEHIND = 0.03
 """m behind the body's surface from which on a hand is hidden."""
 BLIND, MISSED = 12.0, 4.0
 """Cost of a hand that is seen where the body hides it, and of one in plain view that is not seen."""
-STILL, RESTS, LASTS = 0.4, 4.0, 0.3
-"""Factor on the spread of an arm's speed, its robust limit, in spreads, and the time, s, for which that costs
-once: who turns shows a resting arm from all sides."""
+STILL, RESTS = 0.4, 4.0
+"""Factor on the spread of an arm's speed, its robust limit, in spreads: who turns shows a resting arm from all sides."""
+
+SURE = 0.15
+"""rad, spread of shoulder and elbow about where they are in a frame in which they are no doubt."""
 
 
 @dataclass
@@ -90,9 +92,10 @@ class Around:
 class ArmPaths:
     """Paths of one arm through the frames of its own problem; all else keeps still."""
 
-    def __init__(self, alone: Problem, state: State, side: int, shown: np.ndarray, height: float):
-        """alone: the arm's problem; shown: (F,) bool, of the hand; height: px, of the person."""
-        self.alone, self.state, self.side, self.shown, self.height = alone, state, side, shown, height
+    def __init__(self, alone: Problem, state: State, side: int, shown: np.ndarray, sure: np.ndarray, height: float):
+        """alone: the arm's problem; shown: (F,) bool, of the hand; sure: (F,) bool, frames in which the arm is not doubtful;
+        height: px, of the person."""
+        self.alone, self.state, self.side, self.shown, self.sure, self.height = alone, state, side, shown, sure, height
         self.chain = alone.skeleton.pose(state.local, state.shape)
         self.hips = alone.locate_points(self.chain, state)[:, list(alone.hips), 2].mean(1)
         self.around = look_around(alone, state, side, height)
@@ -108,9 +111,9 @@ class ArmPaths:
             own = np.concatenate([own[best], np.stack([local[t, ARM_JOINTS[self.side, 1:]] for local in known])])
             poses.append(own[np.argsort(self.weigh(t, own), kind="stable")[:KEPT]])
         path = self.walk(poses)
-        moves = np.random.default_rng(0).normal(size=(MOVES, 3, 3)) * MOVE
-        for size in FINER:
-            turns = rotation.exp(size * moves)
+        moves = np.random.default_rng(0).normal(size=(len(FINER), MOVES, 3, 3)) * MOVE
+        for size, own in zip(FINER, moves, strict=True):
+            turns = rotation.exp(size * own)
             path = self.walk([np.concatenate([path[max(t - 1, 0):t + 2], path[t] @ turns]) for t in range(len(path))])
         out = self.state.local.copy()
         out[:, ARM_JOINTS[self.side, 1:]] = path
@@ -136,10 +139,9 @@ class ArmPaths:
 
     def measure_motion(self, t: int, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Cost (...) of the motion from frame t - 1 to t. before, after: (..., 3, 3, 3) rotations."""
-        trace = np.einsum("...ab,...ab->...", before[..., :2, :, :], after[..., :2, :, :])
-        angle = np.arccos(np.clip((trace - 1) / 2, -1, 1))
+        angle = measure_turns(before[..., :2, :, :], after[..., :2, :, :])
         gap = self.alone.seen.seconds[t] - self.alone.seen.seconds[t - 1]
-        return gap / LASTS * robust(angle / gap / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1)
+        return robust(angle / gap / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1)
 
     def place(self, t: int, poses: np.ndarray) -> np.ndarray:
         """(K, 4, 3) m, shoulder, elbow, wrist and middle knuckle. poses: (K, 3, 3, 3) rotations of shoulder, elbow and wrist."""
@@ -160,6 +162,9 @@ class ArmPaths:
         depths = np.nan_to_num((x[:, 1:, 2] - self.hips[t] - seen.depth[t, rows]) / spread)
         bends = (rotation.log(poses) - alone.mean[1:]) / alone.spread[t, 1:]
         out = robust(points, ASTRAY)[0].sum((1, 2)) + robust(depths, ASTRAY)[0].sum(1) + (bends**2).sum((1, 2))
+        if self.sure[t]:
+            turns = measure_turns(poses[:, :2], self.state.local[t, ARM_JOINTS[self.side, 1:3]])
+            out += robust(turns / SURE, RESTS)[0].sum(1)
         if seen.outlines and seen.outlines[t].area > 0:
             lower = x[:, 1:3]
             at = [seen.outlines[t].at(alone.project(self.state, one))
@@ -202,6 +207,11 @@ def list_poses(side: int) -> np.ndarray:
     out = np.stack([shoulder[direction, twist], elbow[bend], np.tile(np.eye(3), (len(bend), 1, 1))], 1)
     flip = np.diag([-1.0, 1, 1])
     return out if side == 0 else flip @ out @ flip
+
+
+def measure_turns(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Angles (...) rad between rotations (..., 3, 3)."""
+    return np.arccos(np.clip((np.einsum("...ab,...ab->...", before, after) - 1) / 2, -1, 1))
 
 
 def measure_gap(start: np.ndarray, end: np.ndarray, places: np.ndarray) -> np.ndarray:

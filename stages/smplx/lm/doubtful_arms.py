@@ -29,6 +29,7 @@ from gsac.stages.smplx.lm.hidden_arms import (
     WRIST,
     HiddenArms,
     Stay,
+    bend_arm,
     bridge,
     find_around,
     isolate_arm,
@@ -51,6 +52,8 @@ MOVED, LOST = 0.11, 0.03
 that nothing tells. Hanging arms move by 83 mm in turns of 20 frames, hands that went to the hips or the back by 138 on."""
 DEEP = 0.03
 """m inside the trunk from which on a hand would not be seen."""
+STEPS = 8
+"""Steps from the cheapest path on."""
 CLEARLY = 20.0
 """By how much the cost must fall: by 73 on where a hand is seen on the back and fitted inside the trunk or before the belly, by 6
 at most where nothing tells where a hand is."""
@@ -153,20 +156,23 @@ def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray,
         for start, stop in bridge(around, 0):
             doubted = start + np.flatnonzero(doubtful[start:stop, side])
             stay = Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop)
-            settled.local[stay.around] = search(arms, problem, settled, stay, ~missing[stay.around, side])
+            shown = ~missing[stay.around, side]
+            settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, side])
     return settled
 
 
-def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray) -> np.ndarray:
+def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, sure: np.ndarray) -> np.ndarray:
     """Joint rotations (F, J, 3, 3) of the stay's frames: as they are unless others are clearly better.
 
-    shown: (F,) bool, of the hand.
+    shown: (F,) bool, of the hand; sure: (F,) bool, frames in which the arm is not doubtful.
     """
     alone, asis = isolate_arm(problem, stay), isolate_state(state, stay, state.local[stay.around])
     hold(arms.cut(stay), alone, asis, stay.side, shown)
-    paths = ArmPaths(alone, asis, stay.side, shown, arms.height)
-    path = paths.find([asis.local])
-    return path if paths.cost(path) < paths.cost(asis.local) - CLEARLY else asis.local
+    paths = ArmPaths(alone, asis, stay.side, shown, sure, arms.height)
+    path = isolate_state(state, stay, paths.find([asis.local]))
+    bent = bend_arm(alone, path, STEPS)
+    best = bent if paths.cost(bent.local) < paths.cost(path.local) + CLEARLY else path
+    return best.local if paths.cost(best.local) < paths.cost(asis.local) - CLEARLY else asis.local
 
 
 def hold(arms: HiddenArms, alone: Problem, state: State, side: int, shown: np.ndarray) -> None:

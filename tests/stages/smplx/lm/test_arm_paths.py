@@ -43,7 +43,7 @@ def person_with(body, folder, pose, turn):
 
 def paths_of(arms, problem, state, shown):
     stay = Stay(0, BENT[0], BENT[-1] + 1, 0, FRAMES)
-    return ArmPaths(isolate_arm(problem, stay), state, 0, shown, arms.height)
+    return ArmPaths(isolate_arm(problem, stay), state, 0, shown, ~ALL, arms.height)
 
 
 def hang(state):
