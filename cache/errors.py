@@ -23,6 +23,10 @@ class CacheFolderError(CacheError):
     """What was named as the store's folder is none."""
 
 
+class CacheSetupError(CacheError):
+    """The place that several stores share cannot be used as it is named or set up."""
+
+
 class CacheReadOnlyError(CacheError):
     """The store's folder may be read but not written."""
 

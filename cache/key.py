@@ -21,7 +21,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -91,12 +91,30 @@ class KeyParts:
     def key(self) -> str:
         """The action digest. CacheError names a parameter that JSON cannot hold."""
         try:
-            return typed_digest(f"action {KEY_VERSION}", canonical(asdict(self)))
+            named = (f'"{name}":'.encode() + self._text(name) for name in sorted(one.name for one in fields(self)))
+            return typed_digest(f"action {KEY_VERSION}", b"{" + b",".join(named) + b"}")
         except (TypeError, ValueError):
             for name, value in self.params.items():
                 if not _plain(value):
                     raise CacheError(f"parameter {self.stage}.{name} = {value!r} is not a plain finite value") from None
             raise
+
+    def _text(self, name: str) -> bytes:
+        texts = self._texts
+        if name not in texts:
+            texts[name] = canonical(getattr(self, name))
+        return texts[name]
+
+    @cached_property
+    def _texts(self) -> dict[str, bytes]:
+        """Part -> its canonical JSON, as far as written out."""
+        return {}
+
+    def with_inputs(self, inputs: dict[str, str]) -> KeyParts:
+        """The same of other inputs (port -> tree digest); what the two share is written out once."""
+        other = replace(self, inputs=inputs)
+        other._texts.update((name, self._text(name)) for name in (one.name for one in fields(self)) if name != "inputs")
+        return other
 
     def diff(self, other: KeyParts) -> list[Change]:
         """What changes from self (before) to other (after), in the order of the key's parts."""

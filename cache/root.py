@@ -1,4 +1,4 @@
-"""The folder of the store."""
+"""The folder of the store, and the place that it shares with others."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gsac.cache.errors import CacheFolderError
 
+REMOTE = "GSAC_REMOTE"
 NOT_FOR_ALL = 0o775
 """Mode of a new store, less the umask: who may write to a store can put results into it."""
 
@@ -19,6 +20,11 @@ def default_root() -> Path:
     except RuntimeError as error:
         asked = f"GSAC_CACHE={named}" if named else "the cache belongs into the home folder"
         raise CacheFolderError(f"{asked}: there is no such home folder; set GSAC_CACHE to the full path of a folder") from error
+
+
+def named_remote() -> str | None:
+    """$GSAC_REMOTE, the place of the results that several machines share; None where nothing is shared."""
+    return os.environ.get(REMOTE) or None
 
 
 def make_root(root: Path) -> None:

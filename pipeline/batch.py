@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Executor
@@ -55,13 +56,14 @@ def make_jobs(clips: list[Path], out: Path, arguments: tuple[str, ...]) -> list[
     return jobs
 
 
-def run_batch(jobs: list[ClipJob], executor: Executor, on_result: Callable[[ClipResult], None]) -> list[ClipResult]:
-    """Runs every job, also after one that fails; results in the order of the jobs."""
-    results = {}
+def run_batch(jobs: list[ClipJob], executor: Executor, on_result: Callable[[ClipResult], None],
+              others: Iterable[ClipResult] = ()) -> list[ClipResult]:
+    """Runs every job, also after one that fails; results as they came. others: results that are made here meanwhile."""
+    results: list[ClipResult] = []
     with executor:
         for job in jobs:
             executor.submit(job)
-        for result in executor.collect():
-            results[result.job] = result
+        for result in itertools.chain(others, executor.collect()):
+            results.append(result)
             on_result(result)
-    return [results[job] for job in jobs]
+    return results

@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
+from gsac.pipeline.pace import duration
 from gsac.pipeline.reporter import PLAIN_GAP_S, PlainReporter, TerminalReporter
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 
+WORTH_S = 5.0
+"""s before which a batch has no rate worth telling."""
+
+
 class BatchReporter(AbstractContextManager):
     """Passes on what the clips' runs say, some lines of each; called from several threads."""
 
-    def __init__(self, reporter: PlainReporter, clips: int):
-        self._reporter, self._clips = reporter, clips
+    def __init__(self, reporter: PlainReporter, clips: Mapping[str, float]):
+        """clips: name -> seconds that it may take, of those that are to be run."""
+        self._reporter, self._clips = reporter, dict(clips)
+        self._whole, self._began = sum(clips.values()), time.monotonic()
         self._lock = threading.Lock()
         self._last: dict[str, float] = {}
-        self._done = 0
+        self._done, self._whole_done = 0, 0.0
 
     def __exit__(self, *exc) -> None:
         pass
@@ -37,13 +45,23 @@ class BatchReporter(AbstractContextManager):
         """The end of a clip's run, in words."""
         with self._lock:
             self._done += 1
-            self._reporter.note(f"{words} ({self._done} of {self._clips} clips)")
+            self._whole_done += self._clips.get(clip, 0.0)
+            self._reporter.note(f"{words} ({self.course()})")
+
+    def course(self) -> str:
+        """`3 of 12 clips, 1.5 a minute, about 6 min left`"""
+        words, passed = [f"{self._done} of {len(self._clips)} clips"], time.monotonic() - self._began
+        share = self._whole_done / self._whole if self._whole else self._done / max(1, len(self._clips))
+        if self._done and passed >= WORTH_S:
+            words.append(f"{60 * self._done / passed:.2g} a minute")
+            words += [f"about {duration(passed * (1 - share) / share)} left"] if 0 < share < 1 else []
+        return ", ".join(words)
 
 
 class BatchTable(BatchReporter):
     """The last line of each clip at work, under the lines of those that have ended."""
 
-    def __init__(self, reporter: TerminalReporter, clips: int):
+    def __init__(self, reporter: TerminalReporter, clips: Mapping[str, float]):
         from rich.live import Live
 
         super().__init__(reporter, clips)
@@ -73,9 +91,10 @@ class BatchTable(BatchReporter):
         table.add_column(no_wrap=True, overflow="ellipsis")
         for clip, line in list(self._rows.items()):
             table.add_row(Text(clip), Text(line))
+        table.add_row(Text("batch", style="bold"), Text(self.course()))
         return table
 
 
-def open_batch_reporter(reporter: PlainReporter, clips: int) -> BatchReporter:
-    """Of the kind that fits the command's own reporter."""
+def open_batch_reporter(reporter: PlainReporter, clips: Mapping[str, float]) -> BatchReporter:
+    """Of the kind that fits the command's own reporter. clips: name -> seconds that it may take."""
     return BatchTable(reporter, clips) if isinstance(reporter, TerminalReporter) else BatchReporter(reporter, clips)

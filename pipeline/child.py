@@ -31,7 +31,11 @@ the kernel again for every image costs a tenth of the time of smplx and train.""
 
 
 class StageBugError(StageError):
-    """A stage raised something it should not have; the log has the traceback."""
+    """A stage raised something it should not have; the log has the traceback. killed: name of the signal that ended it."""
+
+    def __init__(self, message: str, killed: str = ""):
+        super().__init__(message)
+        self.killed = killed
 
 
 class NoRoomError(StageError):
@@ -121,9 +125,10 @@ class Child:
 
 def _judge(end: dict | None, code: int, log: Path) -> dict[str, Any]:
     if end is None:
-        why = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        killed = signal.Signals(-code).name if code < 0 else ""
+        why = f"killed by {killed}" if killed else f"exit code {code}"
         hint = " (out of memory?)" if code == -signal.SIGKILL else ""
-        raise StageBugError(f"its process ended without a word: {why}{hint}\n{tail(log)}".rstrip())
+        raise StageBugError(f"its process ended without a word: {why}{hint}\n{tail(log)}".rstrip(), killed)
     if end["event"] == "failed" and end["kind"] == "no room":
         raise NoRoomError(end["message"], end["errno"])
     if end["event"] == "failed":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -112,26 +113,33 @@ class Forecast:
                                  "cpu_ratio": _share(real.cpu_seconds, told.cpu_seconds)}
 
 
-def foretell(plans: Iterable[StagePlan], keys: Keys, store: Store, clip: Path) -> Forecast:
-    """Forecast of the stages that are not up to date, as the plans say."""
-    plans = list(plans)
-    due = [plan.stage for plan in plans if plan.cached is None]
-    footage = _footage_of(next((plan.cached for plan in plans if plan.stage == SPLIT and plan.cached is not None), None), store)
-    footage = footage or expect_footage(clip, keys.configs.get(SPLIT))
-    cores = count_cores()
-    models = {name: _model_time(name, keys.configs[name], footage, keys.device_of(name), cores) for name in due}
-    pace = {name: _pace(name, keys, store, cores) for name in due}
-    overall = sum(pace.values(), Pace())
-    stages, unknown, known_here = {}, [], bool(overall.modelled)
-    for name in due:
-        if (expected := models[name]) is not None:
-            stages[name] = (pace[name] if pace[name].modelled else overall).scale(expected)
-        elif (usual := _last_time(name, store)) is not None:
-            stages[name], known_here = usual, True
-        else:
-            unknown.append(name)
-    return Forecast(stages, tuple(unknown), cores, known_here, footage.read or not any(models.values()),
-                    os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0)
+class Forecaster:
+    """Forecasts clips with the same keys; what earlier runs took is looked up once."""
+
+    def __init__(self, keys: Keys, store: Store):
+        self._keys, self._store, self._cores = keys, store, count_cores()
+        self._pace = functools.cache(lambda name: _pace(name, keys, store, self._cores))
+        self._last_time = functools.cache(lambda name: _last_time(name, store))
+
+    def foretell(self, plans: Iterable[StagePlan], clip: Path) -> Forecast:
+        """Forecast of the stages that are not up to date, as the plans say."""
+        plans, keys = list(plans), self._keys
+        due = [plan.stage for plan in plans if plan.cached is None]
+        split = next((plan.cached for plan in plans if plan.stage == SPLIT and plan.cached is not None), None)
+        footage = _footage_of(split, self._store) or expect_footage(clip, keys.configs.get(SPLIT))
+        models = {name: _model_time(name, keys.configs[name], footage, keys.device_of(name), self._cores) for name in due}
+        pace = {name: self._pace(name) for name in due}
+        overall = sum(pace.values(), Pace())
+        stages, unknown, known_here = {}, [], bool(overall.modelled)
+        for name in due:
+            if (expected := models[name]) is not None:
+                stages[name] = (pace[name] if pace[name].modelled else overall).scale(expected)
+            elif (usual := self._last_time(name)) is not None:
+                stages[name], known_here = usual, True
+            else:
+                unknown.append(name)
+        return Forecast(stages, tuple(unknown), self._cores, known_here, footage.read or not any(models.values()),
+                        os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0)
 
 
 def count_cores() -> int:

@@ -8,7 +8,7 @@ import sysconfig
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.errors import CacheError, CacheFolderError, CacheReadOnlyError, IntegrityError
+from gsac.cache.errors import CacheError, CacheFolderError, CacheReadOnlyError, CacheSetupError, IntegrityError
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput, StageError
 
@@ -51,7 +51,7 @@ def exit_code(error: BaseException) -> ExitCode | None:
         return exit_code(error.cause) or ExitCode.FAILED
     if isinstance(error, NotUpToDateError):
         return ExitCode.STALE
-    if isinstance(error, (BadInput, CacheFolderError, CacheReadOnlyError)):
+    if isinstance(error, (BadInput, CacheFolderError, CacheReadOnlyError, CacheSetupError)):
         return ExitCode.USAGE
     if isinstance(error, IntegrityError):
         return ExitCode.INTEGRITY

@@ -115,6 +115,10 @@ class Keys:
 
     def parts(self, name: str, inputs: dict[str, str]) -> KeyParts:
         """The key's parts of a stage. inputs: port -> tree digest."""
+        return self.shared_parts(name).with_inputs(dict(inputs))
+
+    def shared_parts(self, name: str) -> KeyParts:
+        """The key's parts of a stage but its inputs: those that all clips share."""
         stage = self.project.stage(name)
         config, device = self.configs[name], self.device_of(name)
         params = config_values(config)
@@ -122,13 +126,25 @@ class Keys:
             params.pop("device", None)  # the device that was chosen counts, not how
         return KeyParts(
             stage=name,
-            inputs=dict(inputs),
             params=params,
             code=self.code(name),
             models={model: self.models.sha256(model) for model in self._models(stage, config)},
             packages=self._versions(stage, device),
             device=device,
         )
+
+
+class KeysOfOneMoment(Keys):
+    """The same for many clips that are judged together: what their keys share is looked at once."""
+
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store):
+        super().__init__(project, configs, store)
+        self._shared: dict[str, KeyParts] = {}
+
+    def shared_parts(self, name: str) -> KeyParts:
+        if name not in self._shared:
+            self._shared[name] = super().shared_parts(name)
+        return self._shared[name]
 
 
 def _asked_by(stage: Stage, config: Any, names: Callable[[Any], tuple[str, ...]], model: str) -> str:

@@ -73,6 +73,8 @@ class StageResult:
     outputs: dict[str, str] = field(default_factory=dict)
     """Port -> tree digest."""
     error: str | None = None
+    killed: str = ""
+    """Name of the signal that ended the stage's process."""
 
     @classmethod
     def of(cls, plan: StagePlan, outcome: Outcome, record: Record, config: Any) -> StageResult:
@@ -91,7 +93,7 @@ class StageResult:
             "params": self.params, "timings": self.timings,
             "inputs": self.inputs, "outputs": self.outputs,
         }
-        return row | ({"error": self.error} if self.error else {})
+        return row | ({"error": self.error} if self.error else {}) | ({"killed": self.killed} if self.killed else {})
 
 
 @dataclass
@@ -113,13 +115,14 @@ class Options:
 class ClipRun:
     """The stages of one clip, their results shown in one folder and kept in one store."""
 
-    def __init__(self, project: Project, configs: dict[str, Any], store: Store, folder: RunFolder, reporter: PlainReporter):
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, folder: RunFolder, reporter: PlainReporter,
+                 keys: Keys | None = None):
         self.graph = project.graph
         self.configs = configs
         self.store = store
         self.folder = folder
         self.reporter = reporter
-        self.keys = Keys(project, configs, store)
+        self.keys = keys or Keys(project, configs, store)
         self.results: list[StageResult] = []
         self.metrics: dict[str, Any] = {}
         self.forecast: Forecast | None = None
@@ -192,7 +195,11 @@ class ClipRun:
                 inputs = self.graph.step(name).deps
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
                 lease.add(parts.key)
-                plan = plans[name] = self._plan(parts, options)
+                plan = self._plan(parts, options)
+                with self._recording_failure(plan, parts.key, runner):
+                    if plan.cached is None and name not in options.force and runner.fetch(parts):
+                        plan = self._plan(parts, options)
+                plans[name] = plan
                 outcome, record = Outcome.CACHED, plan.cached
                 if record is None:
                     if name in required:
@@ -226,9 +233,9 @@ class ClipRun:
 
     def foretell(self, clip: Path, plans: list[StagePlan], options: Options) -> Forecast:
         """How long the stages that are not up to date will take; says it, too."""
-        from gsac.pipeline.cost_forecast import foretell  # a run with nothing to do needs none
+        from gsac.pipeline.cost_forecast import Forecaster  # a run with nothing to do needs none
 
-        self.forecast = foretell(plans, self.keys, self.store, clip)
+        self.forecast = Forecaster(self.keys, self.store).foretell(plans, clip)
         if self.forecast.worth_saying:
             self.reporter.note(self.forecast.sentence(describe_quality(quality_entry(options.quality, self.configs))))
         return self.forecast
@@ -283,7 +290,8 @@ class ClipRun:
         except (StageError, CacheError) as error:
             self.reporter.ends(plan.stage, Outcome.FAILED, 0.0)
             self.results.append(StageResult(plan.stage, Outcome.FAILED, plan.sentence, key,
-                                            params=config_values(self.configs[plan.stage]), error=str(error)))
+                                            params=config_values(self.configs[plan.stage]), error=str(error),
+                                            killed=getattr(error, "killed", "")))
             raise StageFailedError(plan.stage, error, runner.logs / f"{plan.stage}.log") from error
 
     @contextlib.contextmanager

@@ -26,6 +26,7 @@ from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.sharing import Sharing, sharing
 from gsac.pipeline.sources import Source
 from gsac.stages.contract import BadInput, StageError
 
@@ -62,17 +63,20 @@ class StageRunner:
     leaving: list[Child] = field(default_factory=list)
     """Processes that may not have ended yet, which takes a while where they held much memory."""
     _kept: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
+    _shares: Sharing | None = None
+    """What other machines get and give; None where nothing is shared."""
     _waiting_room: Path | None = None
     """Folder for the logs of prepared processes."""
 
     def __enter__(self) -> StageRunner:
+        self._shares = self._kept.enter_context(sharing(self.store, self.reporter))
         return self
 
     def __exit__(self, *exc) -> None:
         self._drop()
         while self.leaving:
             self.leaving.pop().close()
-        self._kept.close()
+        self._kept.__exit__(*exc)
 
     def prepare(self, *names: str) -> None:
         """Starts a process a stage, which loads the stage's code while its inputs are made; ends the prepared ones of others."""
@@ -113,6 +117,10 @@ class StageRunner:
         self._drop(keep=tuple(self.prepared.keys() - {name}))
         return self._child(name, log)
 
+    def fetch(self, parts: KeyParts) -> bool:
+        """Whether another machine's result of the key, which is not here, has been put into the store."""
+        return self._shares is not None and self._shares.fetch(parts, self.keys.project.outputs(parts.stage)) is not None
+
     def run(self, parts: KeyParts, reason: Reason, inputs: dict[str, Path], forced: bool = False,
             sources: Iterable[Source] = ()) -> tuple[Outcome, Record]:
         """The stage's result: from the cache if it is there by now, else computed.
@@ -125,22 +133,35 @@ class StageRunner:
         with single_flight(self.store, parts.key, lambda: self._waiting(name), outputs) as there:
             if there is not None and not forced:
                 return Outcome.CACHED, there
-            models = self.keys.models.need(parts.models, self.reporter.note)
-            watched = [*sources, *(Source(path, self.store) for path in models.values())]
-            self.reporter.starts(name, reason.value)
-            scratch = self.store.partial(parts.key)
-            if forced:
-                objects.remove(scratch)
-            for _ in range(READINGS):
-                record = self._attempt(parts, inputs, models, watched, scratch, forced)
-                if record is not None:
-                    break
-            else:
-                raise BadInput(f"what stage {name} reads was written or replaced each of {READINGS} times that it was read "
-                               f"({', '.join(str(source.path) for source in watched)}); run again when it is left alone")
-            objects.remove(scratch)
+            shares = self._shares if not forced else None
+            with shares.claimed(parts, outputs) if shares is not None else contextlib.nullcontext() as shared:
+                if shared is not None:
+                    return Outcome.CACHED, shared
+                record = self._compute_whole(parts, reason, inputs, forced, sources)
+                if self._shares is not None:
+                    self._shares.upload(record)
         self.reporter.ends(name, Outcome.RAN, record.info.seconds)
         return Outcome.RAN, record
+
+    def _compute_whole(self, parts: KeyParts, reason: Reason, inputs: dict[str, Path], forced: bool,
+                       sources: Iterable[Source]) -> Record:
+        """Computes and publishes, of sources that stayed as they were."""
+        name = parts.stage
+        models = self.keys.models.need(parts.models, self.reporter.note)
+        watched = [*sources, *(Source(path, self.store) for path in models.values())]
+        self.reporter.starts(name, reason.value)
+        scratch = self.store.partial(parts.key)
+        if forced:
+            objects.remove(scratch)
+        for _ in range(READINGS):
+            record = self._attempt(parts, inputs, models, watched, scratch, forced)
+            if record is not None:
+                break
+        else:
+            raise BadInput(f"what stage {name} reads was written or replaced each of {READINGS} times that it was read "
+                           f"({', '.join(str(source.path) for source in watched)}); run again when it is left alone")
+        objects.remove(scratch)
+        return record
 
     def _attempt(self, parts: KeyParts, inputs: dict[str, Path], models: dict[str, Path], watched: list[Source], scratch: Path,
                  forced: bool) -> Record | None:

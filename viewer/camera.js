@@ -10,6 +10,9 @@ const MARGIN_WIDE = 0.58;
 
 // A press that moves less than this is a click, px.
 const STILL = 5;
+// The second of two clicks comes within this, ms, and lies nearer to the first than this, px.
+const TWICE_MS = 300;
+const TWICE_PX = 30;
 
 /**
  * What a renderer draws from. view: 3x4, row by row, world to camera; focal: px; centre: px from the middle of the box to the
@@ -24,6 +27,10 @@ export class OrbitCamera {
     this.fov = 30;
     // Share of the picture's height that the controls cover at the bottom; the figure stands above them.
     this.covered = 0;
+    // Share of its width that they cover at the right.
+    this.beside = 0;
+    // Share of what is free above them that is kept free over the head.
+    this.above = 0;
     // How far the figure has walked from where it was framed, m; the camera follows.
     this.walked = [0, 0, 0];
     this.view = new Float32Array(12);
@@ -44,7 +51,8 @@ export class OrbitCamera {
     this.moved = false;
     this.behind = [0, 0, 0, 0, 0, 0];
     this.target = low.map((l, i) => (l + high[i]) / 2);
-    const tall = (high[1] - low[1]) * MARGIN_TALL / (1 - this.covered), wide = (high[0] - low[0]) * MARGIN_WIDE / aspect;
+    const tall = (high[1] - low[1]) * Math.max(MARGIN_TALL, 0.5 / (1 - 2 * this.above)) / (1 - this.covered);
+    const wide = (high[0] - low[0]) * MARGIN_WIDE / aspect / (1 - this.beside);
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
   }
 
@@ -86,7 +94,9 @@ export class OrbitCamera {
   eye(width, height) {
     this.update();
     const focal = this.focal(height);
-    return { view: this.view, focal: [focal, focal], centre: [0, -this.covered * height / 2], box: [0, 0, width, height] };
+    /** @type {[number, number]} */
+    const centre = [-this.beside * width / 2, -this.covered * height / 2];
+    return { view: this.view, focal: [focal, focal], centre, box: [0, 0, width, height] };
   }
 
   // Fills this.view.
@@ -122,11 +132,20 @@ export class OrbitCamera {
   /**
    * @param {HTMLElement} element
    * @param {() => void} onMove called with each gesture
-   * @param {(x: number, y: number) => void} onClick called with the place of a click or tap that moved nothing, px of the page
+   * @param {(x: number, y: number) => void} onClick called with the place of a single click or tap, px of the element
+   * @param {(x: number, y: number) => void} onTwice called with the place of the second of two clicks or taps
    */
-  listen(element, onMove, onClick) {
+  listen(element, onMove, onClick, onTwice) {
     const fingers = new Map();
-    let pressed = null;
+    let pressed = null, last = null, once = 0;
+    const click = (e) => {
+      const { left, top } = element.getBoundingClientRect(), [x, y] = [e.clientX - left, e.clientY - top];
+      const twice = last && e.timeStamp - last[2] < TWICE_MS && Math.hypot(x - last[0], y - last[1]) < TWICE_PX;
+      last = twice ? null : [x, y, e.timeStamp];
+      clearTimeout(once);
+      if (twice) onTwice(x, y);
+      else once = window.setTimeout(() => onClick(x, y), TWICE_MS);
+    };
     element.addEventListener("contextmenu", (e) => e.preventDefault());
     element.addEventListener("pointerdown", (e) => {
       element.setPointerCapture(e.pointerId);
@@ -136,7 +155,7 @@ export class OrbitCamera {
     const lift = (e) => fingers.delete(e.pointerId);
     element.addEventListener("pointerup", (e) => {
       lift(e);
-      if (pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < STILL) onClick(e.clientX, e.clientY);
+      if (pressed && Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) < STILL) click(e);
       pressed = null;
     });
     element.addEventListener("pointercancel", lift);

@@ -1,4 +1,4 @@
-// The page's keys.
+// The keys that move the avatar and its camera.
 
 // Degrees and factor of one press.
 const TURN = 10;
@@ -6,11 +6,11 @@ const NEARER = 0.9;
 
 /**
  * Key -> what it does; the letters in either case.
- * @param {import("./controls.js").Controls} controls
+ * @param {import("./element.js").GsacAvatar} person
  * @returns {Object<string, () => void>}
  */
-function keyActions(controls) {
-  const { viewer } = controls, { camera } = viewer;
+export function keyActions(person) {
+  const { viewer } = person, { camera } = viewer;
   const turn = (yaw, pitch) => () => {
     viewer.turntable = false;
     camera.turn(-yaw / 0.35, pitch / 0.3);
@@ -21,12 +21,11 @@ function keyActions(controls) {
     camera.moved = true;
   };
   return {
-    " ": () => { controls.pause(); },
-    f: () => controls.fullscreen(),
-    r: () => controls.reset(),
+    " ": () => person.toggle(),
+    f: () => person.fullscreen(),
+    r: () => person.reset(),
     t: () => { viewer.turntable = !viewer.turntable; },
-    "?": () => controls.help(),
-    Escape: () => controls.openDrawer(null),
+    z: () => viewer.look(viewer.near ? null : "face"),
     ArrowLeft: turn(-TURN, 0),
     ArrowRight: turn(TURN, 0),
     ArrowUp: turn(0, TURN),
@@ -37,15 +36,21 @@ function keyActions(controls) {
   };
 }
 
-// Listens on the page; a slider, a list or a button that has the focus keeps the keys that it uses itself.
-export function listenForKeys(controls) {
-  const actions = keyActions(controls);
-  document.addEventListener("keydown", (event) => {
-    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key, at = /** @type {HTMLElement} */ (event.target);
-    if (event.ctrlKey || event.metaKey || event.altKey || !Object.hasOwn(actions, key) || at.closest("dialog")) return;
-    if (at.matches("input, select") && key !== "Escape" || at.matches("button") && key === " ") return;
+/**
+ * Listens for keys; a slider, a list or a button that has the focus keeps the keys that it uses itself.
+ * @param {EventTarget} place
+ * @param {Object<string, () => void>} actions
+ * @param {() => void} onAction called after each
+ */
+export function listenForKeys(place, actions, onAction) {
+  place.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const at = /** @type {HTMLElement} */ (event.composedPath()[0]);
+    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || !Object.hasOwn(actions, key)) return;
+    if (at.closest?.("dialog")) return;
+    if (at.matches?.("input, select") && key !== "Escape" || at.matches?.("button") && key === " ") return;
     event.preventDefault();
     actions[key]();
-    controls.show();
+    onAction();
   });
 }

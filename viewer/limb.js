@@ -2,15 +2,15 @@
 
 import { transformPoint } from "./projection.js";
 
-// A click further than this from every joint means none, px of the page.
+// A click further than this from every joint means none, px.
 const REACH = 48;
 // Joints that a click on the body seldom means: fingers, eyes and jaw lie too close together.
 const SMALL = /index|middle|pinky|ring|thumb|eye|jaw/;
 
 /**
  * @param {import("./viewer.js").Viewer} viewer
- * @param {number} x px of the page
- * @param {number} y px of the page
+ * @param {number} x px of the stage
+ * @param {number} y px of the stage
  * @returns {string | null} name of the nearest joint on the screen
  */
 export function pickJoint(viewer, x, y) {

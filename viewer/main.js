@@ -1,35 +1,37 @@
-// Runs the page: unpacks the avatar inside it, shows it, and follows the address.
+// Runs the page: unpacks the avatar inside it, shows it in the element <gsac-avatar>, and follows the address.
 
 import { readAddress } from "./address.js";
 import { decodeBase64 } from "./base64.js";
 import { Controls } from "./controls.js";
+import { GsacAvatar } from "./element.js";
 import { readName } from "./name.js";
-import { readAvatar } from "./reader.js";
-import { Viewer } from "./viewer.js";
+import { unpackPlanes } from "./planes.js";
 import { offerHeadset } from "./xr.js";
 
-// The bytes of avatar.gsac, which page.html holds compressed and in base64.
+// The bytes of avatar.gsac, which page.html holds in planes, compressed and in base64.
 async function unpackAvatar() {
-  if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old: it cannot unpack the avatar");
-  const packed = decodeBase64(document.getElementById("avatar").textContent.trim());
-  return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
+  const { textContent, dataset } = document.getElementById("avatar");
+  const packed = new Blob([decodeBase64(textContent.trim())]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return unpackPlanes(new Uint8Array(await new Response(packed).arrayBuffer()), JSON.parse(dataset.planes));
 }
 
 async function main() {
   const options = () => readAddress(location.hash.slice(1));
-  const file = await unpackAvatar(), viewer = await Viewer.open(readAvatar(file), options().draw);
+  customElements.define("gsac-avatar", GsacAvatar);
+  const person = /** @type {GsacAvatar} */ (document.getElementById("person"));
+  person.screen = document.documentElement;
   // For the browser's console, tests and benchmarks.
-  Object.assign(window, { gsac: viewer });
-  const controls = new Controls(viewer, readName(location.pathname), file);
-  const follow = () => {
-    viewer.follow(options());
-    controls.show();
-  };
-  follow();
-  window.addEventListener("hashchange", follow);
-  await offerHeadset(viewer, document.getElementById("tools"), (text) => controls.note(text));
+  Object.assign(window, { gsac: person.viewer });
+  const controls = new Controls(person, readName(location.pathname)), first = options();
+  controls.follow(first);
+  await person.open((await unpackAvatar()).buffer, first);
+  window.addEventListener("hashchange", () => {
+    const next = options();
+    controls.follow(next);
+    person.follow(next);
+  });
+  await offerHeadset(person.viewer, document.getElementById("tools"), (text) => controls.note(text));
   document.getElementById("message").hidden = true;
-  viewer.run();
   document.documentElement.dataset.ready = "yes";
 }
 

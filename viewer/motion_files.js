@@ -1,4 +1,4 @@
-// Motion files that the user drops on the page or chooses: their motions become clips of the avatar.
+// Files that the user drops on the page or chooses: an avatar, or motions, which become clips of the avatar.
 
 import { readBvh } from "./bvh.js";
 import { readFbx } from "./fbx.js";
@@ -9,6 +9,34 @@ import { retarget } from "./retarget.js";
 // Of all files that are dropped together.
 const MOST_BYTES = 128 * 2 ** 20;
 const READERS = { bvh: readBvhMotions, fbx: readFbx, glb: readGltf, gltf: readGltf, vrma: readGltf };
+
+// Files of gaussians that stand still.
+const SPLATS = ["ply", "spz", "sog", "splat"];
+
+// The end of a file's name.
+function kindOf(file) {
+  return file.name.split(".").at(-1).toLowerCase();
+}
+
+/**
+ * @param {File[]} files
+ * @returns {File | undefined} the one that is an avatar
+ */
+export function findAvatar(files) {
+  return files.find((file) => kindOf(file) === "gsac");
+}
+
+/**
+ * Throws MotionError.
+ * @param {File} file
+ * @returns {Promise<ArrayBuffer>}
+ */
+export function readFile(file) {
+  if (file.size > MOST_BYTES) throw new MotionError(`${file.name}: it has ${file.size} bytes; at most ${MOST_BYTES} are read`);
+  return file.arrayBuffer().catch((error) => {
+    throw new MotionError(`${file.name}: the browser could not read it (${error.name})`);
+  });
+}
 
 function readBvhMotions(bytes, where) {
   return [{ name: where.replace(/\.[^.]*$/, ""), source: readBvh(new TextDecoder().decode(bytes), where) }];
@@ -21,26 +49,24 @@ function readBvhMotions(bytes, where) {
  * @returns {Promise<string[]>} the clips' names
  */
 export async function addMotions(avatar, files) {
-  const kind = (file) => file.name.split(".").at(-1).toLowerCase();
-  const motions = files.filter((file) => Object.hasOwn(READERS, kind(file)));
+  const motions = files.filter((file) => Object.hasOwn(READERS, kindOf(file)));
   if (!motions.length) {
     const names = files.map((file) => file.name).join(", ") || "nothing";
-    throw new MotionError(`${names}: a motion is read from .bvh, .fbx, .glb, .gltf and .vrma`);
+    if (files.some((file) => SPLATS.includes(kindOf(file)))) {
+      throw new MotionError(`${names}: gaussians without a body, which a splat viewer shows; drop the avatar itself, its .gsac`);
+    }
+    throw new MotionError(`${names}: a motion is read from .bvh, .fbx, .glb, .gltf and .vrma, an avatar from .gsac`);
   }
   const size = files.reduce((sum, file) => sum + file.size, 0);
   if (size > MOST_BYTES) throw new MotionError(`${files[0].name}: it has ${size} bytes; at most ${MOST_BYTES} are read`);
   /** @type {Object<string, Uint8Array>} */
   const bytes = {};
-  for (const file of files) {
-    bytes[file.name] = new Uint8Array(await file.arrayBuffer().catch((error) => {
-      throw new MotionError(`${file.name}: the browser could not read it (${error.name})`);
-    }));
-  }
+  for (const file of files) bytes[file.name] = new Uint8Array(await readFile(file));
   const found = [];
   let frames = 0;
   for (const file of motions) {
     try {
-      for (const { name, source } of await READERS[kind(file)](bytes[file.name], file.name, bytes)) {
+      for (const { name, source } of await READERS[kindOf(file)](bytes[file.name], file.name, bytes)) {
         frames += source.frames;
         const refused = MotionSource.refuse(frames, avatar.names.length);
         if (refused) throw new MotionError(`${file.name}: ${refused}`);

@@ -1,5 +1,5 @@
 // Written by `python -m gsac.viewer.wgsl` from the HLSL of the Unity package and page.hlsl. Do not edit.
-// glslang 11, naga-wasm@30.1.0, HLSL 993557f1535cd45614e23ca54c8f0dce4b6dbfaae3e09e0e046c121aa74b6c95
+// glslang 11, naga-wasm@30.1.0, HLSL 7dc0adbd2d58788897b835d4684ed784f0ffc673616fd89e7535a325041cabba
 
 export const SHADERS = {
   Skin: { bindings: {"parameters": 0, "GsacSkin": 2, "GsacRest": 1, "GsacMoves": 3, "GsacWeights": 4, "GsacBones": 5, "GsacPosed": 6}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
@@ -1286,121 +1286,132 @@ var<private> entryPointOutput_u002e_sigmas: vec2<f32>;
 var<private> entryPointOutput_u002e_colour: vec4<f32>;
 
 fn SplatVertex_1() {
-var phi_1745_: vec2<f32>;
-var phi_1747_: vec4<f32>;
-var phi_1748_: vec4<f32>;
-var phi_1753_: vec4<f32>;
-var phi_1752_: vec2<f32>;
-var phi_1751_: vec4<f32>;
+var phi_2051_: vec2<f32>;
+var phi_2053_: vec4<f32>;
+var phi_2056_: vec4<f32>;
+var phi_2061_: vec4<f32>;
+var phi_2060_: vec2<f32>;
+var phi_2059_: vec4<f32>;
 
-let _e51 = vertex_1;
-let _e53 = unnamed.PageView0_;
-let _e55 = unnamed.PageView1_;
-let _e57 = unnamed.PageView2_;
-let _e58 = mat4x4<f32>(_e53, _e55, _e57, vec4<f32>(0f, 0f, 0f, 1f));
-let _e61 = unnamed.PageLens[0u];
-let _e64 = unnamed.PageLens[2u];
-let _e67 = unnamed.PageLens[1u];
-let _e68 = -(_e67);
-let _e71 = unnamed.PageLens[3u];
-let _e72 = -(_e71);
-let _e77 = unnamed.PageInk;
-let _e78 = _e77.xy;
+let _e54 = vertex_1;
+let _e56 = unnamed.PageView0_;
+let _e58 = unnamed.PageView1_;
+let _e60 = unnamed.PageView2_;
+let _e61 = mat4x4<f32>(_e56, _e58, _e60, vec4<f32>(0f, 0f, 0f, 1f));
+let _e64 = unnamed.PageLens[0u];
+let _e67 = unnamed.PageLens[2u];
+let _e70 = unnamed.PageLens[1u];
+let _e71 = -(_e70);
+let _e74 = unnamed.PageLens[3u];
+let _e75 = -(_e74);
+let _e80 = unnamed.PageInk;
+let _e81 = _e80.xy;
 switch bitcast<i32>(0u) {
 default: {
-let _e84 = GsacKeys_1.data[(_e51 >> bitcast<u32>(2i))];
-let _e86 = unnamed.GsacIndexBits;
-let _e90 = (_e84 & ((1u << bitcast<u32>(_e86)) - 1u));
-let _e93 = GsacColours_1.data[_e90];
-let _e97 = GsacSplats.data[(_e90 * 3u)];
-let _e102 = GsacSplats.data[((_e90 * 3u) + 1u)];
-let _e107 = GsacSplats.data[((_e90 * 3u) + 2u)];
-let _e110 = (_e93.xyz * _e107.yzw);
-let _e116 = vec4<f32>(_e110.x, _e93.y, _e93.z, _e93.w);
-let _e122 = vec4<f32>(_e116.x, _e110.y, _e116.z, _e116.w);
-let _e128 = vec4<f32>(_e122.x, _e122.y, _e110.z, _e122.w);
-let _e131 = unnamed.GsacModel0_[0u];
-let _e134 = unnamed.GsacModel1_[0u];
-let _e137 = unnamed.GsacModel2_[0u];
-let _e141 = unnamed.GsacModel0_[1u];
-let _e144 = unnamed.GsacModel1_[1u];
-let _e147 = unnamed.GsacModel2_[1u];
-let _e151 = unnamed.GsacModel0_[2u];
-let _e154 = unnamed.GsacModel1_[2u];
-let _e157 = unnamed.GsacModel2_[2u];
-let _e169 = unnamed.GsacModel0_[3u];
-let _e172 = unnamed.GsacModel1_[3u];
-let _e175 = unnamed.GsacModel2_[3u];
-let _e177 = ((((vec3<f32>(_e131, _e134, _e137) * _e97.x) + (vec3<f32>(_e141, _e144, _e147) * _e97.y)) + (vec3<f32>(_e151, _e154, _e157) * _e97.z)) + vec3<f32>(_e169, _e172, _e175));
-let _e182 = (vec4<f32>(_e177.x, _e177.y, _e177.z, 1f) * _e58);
-let _e184 = -(_e182.z);
-let _e190 = unnamed.GsacBlend[2u];
-if (!((_e184 > 0.01f)) || (_e93.w < _e190)) {
-phi_1753_ = vec4<f32>(2f, 2f, 2f, 1f);
-phi_1752_ = vec2<f32>(0f, 0f);
-phi_1751_ = _e128;
+let _e87 = GsacKeys_1.data[(_e54 >> bitcast<u32>(2i))];
+let _e89 = unnamed.GsacIndexBits;
+let _e93 = (_e87 & ((1u << bitcast<u32>(_e89)) - 1u));
+let _e96 = GsacColours_1.data[_e93];
+let _e100 = GsacSplats.data[(_e93 * 3u)];
+let _e105 = GsacSplats.data[((_e93 * 3u) + 1u)];
+let _e110 = GsacSplats.data[((_e93 * 3u) + 2u)];
+let _e113 = (_e96.xyz * _e110.yzw);
+let _e119 = vec4<f32>(_e113.x, _e96.y, _e96.z, _e96.w);
+let _e125 = vec4<f32>(_e119.x, _e113.y, _e119.z, _e119.w);
+let _e131 = vec4<f32>(_e125.x, _e125.y, _e113.z, _e125.w);
+let _e134 = unnamed.GsacModel0_[0u];
+let _e137 = unnamed.GsacModel1_[0u];
+let _e140 = unnamed.GsacModel2_[0u];
+let _e144 = unnamed.GsacModel0_[1u];
+let _e147 = unnamed.GsacModel1_[1u];
+let _e150 = unnamed.GsacModel2_[1u];
+let _e154 = unnamed.GsacModel0_[2u];
+let _e157 = unnamed.GsacModel1_[2u];
+let _e160 = unnamed.GsacModel2_[2u];
+let _e172 = unnamed.GsacModel0_[3u];
+let _e175 = unnamed.GsacModel1_[3u];
+let _e178 = unnamed.GsacModel2_[3u];
+let _e180 = ((((vec3<f32>(_e134, _e137, _e140) * _e100.x) + (vec3<f32>(_e144, _e147, _e150) * _e100.y)) + (vec3<f32>(_e154, _e157, _e160) * _e100.z)) + vec3<f32>(_e172, _e175, _e178));
+let _e185 = (vec4<f32>(_e180.x, _e180.y, _e180.z, 1f) * _e61);
+let _e187 = -(_e185.z);
+let _e188 = vec2<f32>(_e64, 0f);
+let _e189 = vec2<f32>(0f, _e71);
+let _e190 = vec2<f32>(_e67, _e75);
+let _e191 = length(_e188);
+let _e192 = length(_e189);
+let _e193 = vec2<f32>(_e191, _e192);
+let _e195 = (_e188 / vec2(_e191));
+let _e197 = (_e189 / vec2(_e192));
+let _e201 = (vec2<f32>(dot(_e195, _e190), dot(_e197, _e190)) / _e193);
+let _e208 = unnamed.GsacBlend[2u];
+if (!((false || (_e187 > 0.01f))) || (_e96.w < _e208)) {
+phi_2061_ = vec4<f32>(2f, 2f, 2f, 1f);
+phi_2060_ = vec2<f32>(0f, 0f);
+phi_2059_ = _e131;
 break;
 }
-let _e194 = (vec4<f32>(_e131, _e134, _e137, 0f) * _e58);
-let _e196 = (vec4<f32>(_e141, _e144, _e147, 0f) * _e58);
-let _e198 = (vec4<f32>(_e151, _e154, _e157, 0f) * _e58);
-let _e199 = vec2<f32>(_e61, _e68);
-let _e202 = (vec2<f32>(1f, 1f) / abs(_e199));
-let _e215 = -(vec3<f32>(_e194.z, _e196.z, _e198.z));
-let _e227 = ((_e78 * 0.5f) * abs(_e199));
-let _e228 = (vec2<f32>(_e64, _e72) / _e199);
-let _e231 = unnamed.GsacBlend[0u];
-let _e239 = clamp((vec3<f32>(_e182.x, _e182.y, _e184).xy / vec2(_e184)), (_e228 - (_e202 * 1.3f)), (_e228 + (_e202 * 1.3f)));
-let _e245 = ((vec3<f32>(_e194.x, _e196.x, _e198.x) - (_e215 * _e239.x)) * (_e227.x / _e184));
-let _e251 = ((vec3<f32>(_e194.y, _e196.y, _e198.y) - (_e215 * _e239.y)) * (_e227.y / _e184));
-let _e270 = vec3<f32>(fma(_e102.w, _e245.z, fma(_e97.w, _e245.x, (_e102.z * _e245.y))), fma(_e107.x, _e245.z, fma(_e102.z, _e245.x, (_e102.x * _e245.y))), fma(_e102.y, _e245.z, fma(_e102.w, _e245.x, (_e107.x * _e245.y))));
-let _e290 = dot(_e245, _e270);
-let _e291 = dot(_e251, _e270);
-let _e292 = dot(_e251, vec3<f32>(fma(_e102.w, _e251.z, fma(_e97.w, _e251.x, (_e102.z * _e251.y))), fma(_e107.x, _e251.z, fma(_e102.z, _e251.x, (_e102.x * _e251.y))), fma(_e102.y, _e251.z, fma(_e102.w, _e251.x, (_e107.x * _e251.y)))));
-let _e296 = max(fma(_e290, _e292, -((_e291 * _e291))), 0f);
-let _e299 = fma(_e231, ((_e290 + _e292) + _e231), _e296);
-let _e300 = (_e290 + _e231);
-let _e301 = (_e292 + _e231);
-let _e302 = (_e300 + _e301);
-let _e306 = length(vec2<f32>((0.5f * (_e300 - _e301)), _e291));
-let _e307 = fma(0.5f, _e302, _e306);
-phi_1745_ = vec2<f32>(1f, 0f);
-if (_e306 > (_e302 * 0.0000005f)) {
-phi_1745_ = normalize(select(vec2<f32>(_e291, (_e307 - _e300)), vec2<f32>((_e307 - _e301), _e291), vec2((_e300 > _e301))));
+let _e212 = (vec4<f32>(_e134, _e137, _e140, 0f) * _e61);
+let _e214 = (vec4<f32>(_e144, _e147, _e150, 0f) * _e61);
+let _e216 = (vec4<f32>(_e154, _e157, _e160, 0f) * _e61);
+let _e217 = (_e81 * _e193);
+let _e219 = (_e80.yx * _e193);
+let _e237 = select(_e81, _e80.yx, vec2(((abs(_e195.x) < abs(_e195.y)) && (abs((_e219.x - _e219.y)) < abs((_e217.x - _e217.y))))));
+let _e253 = -(vec3<f32>(_e212.z, _e214.z, _e216.z));
+let _e261 = ((_e237 * 0.5f) * _e193);
+let _e262 = (vec2<f32>(1f, 1f) / _e193);
+let _e265 = unnamed.GsacBlend[0u];
+let _e273 = clamp((vec3<f32>(_e185.x, _e185.y, _e187).xy / vec2(_e187)), (_e201 - (_e262 * 1.3f)), (_e201 + (_e262 * 1.3f)));
+let _e279 = ((vec3<f32>(_e212.x, _e214.x, _e216.x) - (_e253 * _e273.x)) * (_e261.x / _e187));
+let _e285 = ((vec3<f32>(_e212.y, _e214.y, _e216.y) - (_e253 * _e273.y)) * (_e261.y / _e187));
+let _e304 = vec3<f32>(fma(_e105.w, _e279.z, fma(_e100.w, _e279.x, (_e105.z * _e279.y))), fma(_e110.x, _e279.z, fma(_e105.z, _e279.x, (_e105.x * _e279.y))), fma(_e105.y, _e279.z, fma(_e105.w, _e279.x, (_e110.x * _e279.y))));
+let _e324 = dot(_e279, _e304);
+let _e325 = dot(_e285, _e304);
+let _e326 = dot(_e285, vec3<f32>(fma(_e105.w, _e285.z, fma(_e100.w, _e285.x, (_e105.z * _e285.y))), fma(_e110.x, _e285.z, fma(_e105.z, _e285.x, (_e105.x * _e285.y))), fma(_e105.y, _e285.z, fma(_e105.w, _e285.x, (_e110.x * _e285.y)))));
+let _e330 = max(fma(_e324, _e326, -((_e325 * _e325))), 0f);
+let _e333 = fma(_e265, ((_e324 + _e326) + _e265), _e330);
+let _e334 = (_e324 + _e265);
+let _e335 = (_e326 + _e265);
+let _e336 = (_e334 + _e335);
+let _e340 = length(vec2<f32>((0.5f * (_e334 - _e335)), _e325));
+let _e341 = fma(0.5f, _e336, _e340);
+phi_2051_ = vec2<f32>(1f, 0f);
+if (_e340 > (_e336 * 0.0000005f)) {
+phi_2051_ = normalize(select(vec2<f32>(_e325, (_e341 - _e334)), vec2<f32>((_e341 - _e335), _e325), vec2((_e334 > _e335))));
 }
-let _e321 = phi_1745_;
-let _e334 = unnamed.GsacKeepsEnergy;
-phi_1747_ = _e128;
-if (_e334 != 0u) {
-phi_1747_ = vec4<f32>(_e110.x, _e110.y, _e110.z, (_e93.w * sqrt((_e296 / max(_e299, 0.000000000001f)))));
+let _e355 = phi_2051_;
+let _e368 = unnamed.GsacKeepsEnergy;
+phi_2053_ = _e131;
+if (_e368 != 0u) {
+phi_2053_ = vec4<f32>(_e113.x, _e113.y, _e113.z, (_e96.w * sqrt((_e330 / max(_e333, 0.000000000001f)))));
 }
-let _e340 = phi_1747_;
-let _e344 = unnamed.GsacBlend[2u];
-let _e358 = (vec2<f32>(select(-1f, 1f, ((_e51 & 1u) != 0u)), select(-1f, 1f, ((_e51 & 2u) != 0u))) * (sqrt((2f * log(max((_e340.w / _e344), 1f)))) + 0.001f));
-let _e368 = (vec4<f32>(_e182.x, _e182.y, _e182.z, 1f) * mat4x4<f32>(vec4<f32>(_e61, 0f, _e64, 0f), vec4<f32>(0f, _e68, _e72, 0f), vec4<f32>(0f, 0f, -1f, -0.02f), vec4<f32>(0f, 0f, -1f, 0f)));
-let _e376 = (_e368.xy + (((((((_e321 * sqrt(_e307)) * _e358.x) + ((vec2<f32>(-(_e321.y), _e321.x) * sqrt(max((_e299 / _e307), 0.000001f))) * _e358.y)) * 2f) / _e78) * sign(_e199)) * _e368.w));
-let _e382 = vec4<f32>(_e376.x, _e368.y, _e368.z, _e368.w);
-let _e391 = unnamed.GsacBlend[3u];
-phi_1748_ = _e340;
-if (_e391 > 0.5f) {
-let _e397 = pow(max(((_e340.xyz + vec3<f32>(0.055f, 0.055f, 0.055f)) * vec3<f32>(0.94786733f, 0.94786733f, 0.94786733f)), vec3<f32>(0f, 0f, 0f)), vec3<f32>(2.4f, 2.4f, 2.4f));
-let _e420 = vec4<f32>(select((_e340.x * 0.07739938f), _e397.x, (_e340.x > 0.04045f)), _e340.y, _e340.z, _e340.w);
-let _e425 = vec4<f32>(_e420.x, select((_e340.y * 0.07739938f), _e397.y, (_e340.y > 0.04045f)), _e420.z, _e420.w);
-phi_1748_ = vec4<f32>(_e425.x, _e425.y, select((_e340.z * 0.07739938f), _e397.z, (_e340.z > 0.04045f)), _e425.w);
+let _e374 = phi_2053_;
+let _e378 = unnamed.GsacBlend[2u];
+let _e392 = (vec2<f32>(select(-1f, 1f, ((_e54 & 1u) != 0u)), select(-1f, 1f, ((_e54 & 2u) != 0u))) * (sqrt((2f * log(max((_e374.w / _e378), 1f)))) + 0.001f));
+let _e399 = (((((_e355 * sqrt(_e341)) * _e392.x) + ((vec2<f32>(-(_e355.y), _e355.x) * sqrt(max((_e333 / _e341), 0.000001f))) * _e392.y)) * 2f) / _e237);
+let _e404 = (vec4<f32>(_e185.x, _e185.y, _e185.z, 1f) * mat4x4<f32>(vec4<f32>(_e64, 0f, _e67, 0f), vec4<f32>(0f, _e71, _e75, 0f), vec4<f32>(0f, 0f, -1f, -0.02f), vec4<f32>(0f, 0f, -1f, 0f)));
+let _e413 = (_e404.xy + (((_e195 * _e399.x) + (_e197 * _e399.y)) * _e404.w));
+let _e419 = vec4<f32>(_e413.x, _e404.y, _e404.z, _e404.w);
+let _e428 = unnamed.GsacBlend[3u];
+phi_2056_ = _e374;
+if (_e428 > 0.5f) {
+let _e434 = pow(max(((_e374.xyz + vec3<f32>(0.055f, 0.055f, 0.055f)) * vec3<f32>(0.94786733f, 0.94786733f, 0.94786733f)), vec3<f32>(0f, 0f, 0f)), vec3<f32>(2.4f, 2.4f, 2.4f));
+let _e457 = vec4<f32>(select((_e374.x * 0.07739938f), _e434.x, (_e374.x > 0.04045f)), _e374.y, _e374.z, _e374.w);
+let _e462 = vec4<f32>(_e457.x, select((_e374.y * 0.07739938f), _e434.y, (_e374.y > 0.04045f)), _e457.z, _e457.w);
+phi_2056_ = vec4<f32>(_e462.x, _e462.y, select((_e374.z * 0.07739938f), _e434.z, (_e374.z > 0.04045f)), _e462.w);
 }
-let _e432 = phi_1748_;
-phi_1753_ = vec4<f32>(_e382.x, _e376.y, _e382.z, _e382.w);
-phi_1752_ = _e358;
-phi_1751_ = _e432;
+let _e469 = phi_2056_;
+phi_2061_ = vec4<f32>(_e419.x, _e413.y, _e419.z, _e419.w);
+phi_2060_ = _e392;
+phi_2059_ = _e469;
 break;
 }
 }
-let _e434 = phi_1753_;
-let _e436 = phi_1752_;
-let _e438 = phi_1751_;
-entryPointOutput_u002e_clip = _e434;
-entryPointOutput_u002e_sigmas = _e436;
-entryPointOutput_u002e_colour = _e438;
+let _e471 = phi_2061_;
+let _e473 = phi_2060_;
+let _e475 = phi_2059_;
+entryPointOutput_u002e_clip = _e471;
+entryPointOutput_u002e_sigmas = _e473;
+entryPointOutput_u002e_colour = _e475;
 return;
 }
 

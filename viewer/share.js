@@ -1,16 +1,16 @@
 // What leaves the page: a link to this view, and the avatar's own file.
 
 /**
- * The page's address with all that is seen now, as address.js reads it.
+ * All that is seen now, as the words after # that address.js reads.
  * @param {import("./viewer.js").Viewer} viewer
  */
 export function describeView(viewer) {
-  const { camera, playing, levels } = viewer, words = [], round = (x) => String(Math.round(x * 1000) / 1000);
+  const { camera, playing, levels, near } = viewer, words = [], round = (x) => String(Math.round(x * 1000) / 1000);
   words.push(playing.clip ? `clip=${encodeURIComponent(playing.clip)}` : `pose=${encodeURIComponent(playing.pose)}`);
   if (playing.clip && viewer.paused) words.push(`t=${round(viewer.clock)}`);
   if (viewer.turntable) words.push("turntable");
   words.push(`yaw=${round(camera.yaw % 360)}`);
-  if (camera.moved) {
+  if (camera.moved || near) {
     words.push(`pitch=${round(camera.pitch)}`, `dist=${round(camera.distance)}`, `target=${camera.target.map(round).join(",")}`);
   }
   words.push(`bg=${viewer.background.slice(1)}`);
@@ -19,7 +19,7 @@ export function describeView(viewer) {
   if (face.length) words.push(`expression=${face.join(",")}`);
   if (turned.length) words.push(`joints=${turned.join(";")}`);
   if (!levels.lit) words.push("light=off");
-  return `${location.href.split("#")[0]}#${words.join("&")}`;
+  return words.join("&");
 }
 
 /**

@@ -22,6 +22,14 @@ const RECOVER_MS = 1000;
 // Of the shadow: its radius as a share of the figure's height, and how dark its middle is, 0..1.
 const SHADOW_RADIUS = 0.3;
 const SHADOW_STRENGTH = 0.4;
+// Share of the picture, at most, that the figure makes room for at the bottom and the right, and at the top of the rest.
+const MOST_COVERED = 0.5;
+const MOST_ABOVE = 0.2;
+// Joints whose vertices are the face; and of what is looked at: the box that is framed, as a multiple of its own.
+const FACE = /^(head|jaw|left_eye|right_eye)/;
+const NEAR_MARGIN = 1.25;
+// Of a limb that is looked at: half of its box, at least, m.
+const LEAST_NEAR = 0.12;
 
 /**
  * A round shadow on the floor: middle and radius, m; strength in its middle, 0..1.
@@ -33,36 +41,26 @@ const SHADOW_STRENGTH = 0.4;
  * @typedef {{clip?: string, pose?: string}} Playing
  */
 
+/**
+ * What lies over the picture: px from its bottom, from its right and from its top.
+ * @typedef {{bottom: number, right: number, top: number}} Cover
+ */
+
 export class Viewer {
   /**
-   * @param {import("./reader.js").Avatar} avatar
-   * @param {string | null} asked the renderer, as for makeRenderer
+   * Shows nothing until `show`.
+   * @param {HTMLElement} stage holds the canvas, and nothing before it
    */
-  static async open(avatar, asked) {
-    const viewer = new Viewer(avatar);
-    await viewer.drawBy(asked);
-    return viewer;
-  }
-
-  // Use `open`.
-  constructor(avatar) {
-    /** @type {import("./reader.js").Avatar} */
-    this.avatar = avatar;
-    this.pose = new Pose(avatar);
-    // The pose that the present one fades in from; fade: 0..1.
-    this.before = new Pose(avatar);
+  constructor(stage) {
+    this.stage = stage;
+    // How far the pose that plays has come in, 0..1.
     this.fade = 1;
-    this.skin = new Skin(avatar);
-    this.stage = document.getElementById("stage");
     /** @type {import("./renderer.js").Renderer | null} */
     this.renderer = null;
     this.camera = new OrbitCamera();
-    const [low, high] = bounds(avatar.vertices);
-    // Box around the figure at rest, m.
-    this.low = low;
-    this.high = high;
-    this.levels = new Levels(avatar, high[1] - low[1]);
     this.rate = new FrameRate();
+    /** @type {() => Cover} told by whoever lays something over the picture */
+    this.cover = () => ({ bottom: 0, right: 0, top: 0 });
     /** @type {Object<string, number>} weights by name */
     this.expression = {};
     /** @type {Object<string, number[]>} joint -> axis-angle, degrees, on top of what plays */
@@ -75,8 +73,15 @@ export class Viewer {
     this.turntable = false;
     // Whether it turns because nobody has picked anything yet.
     this.opening = false;
-    // Whether the page is one frame without controls and floor.
+    // Whether the picture is one frame without a floor.
     this.still = false;
+    // What is looked at, "face" or a joint; null: the whole figure.
+    /** @type {string | null} */
+    this.near = null;
+    // Whether it draws by and by; hidden: whether it is out of sight; filmed: whether each frame is drawn for a film.
+    this.running = false;
+    this.hidden = false;
+    this.filmed = false;
     this.background = BACKGROUND;
     /** @type {XRSession | null} the headset's */
     this.session = null;
@@ -86,28 +91,61 @@ export class Viewer {
     this.onRate = () => {};
     /** @type {(text: string) => void} called when the renderer had to change */
     this.onChange = () => {};
+    /** @type {() => void} called when a clip that does not loop is over */
+    this.onEnd = () => {};
+  }
+
+  /**
+   * Shows an avatar, in place of another one if there is one.
+   * @param {import("./reader.js").Avatar} avatar
+   * @param {string | null} asked the renderer, as for makeRenderer
+   */
+  async show(avatar, asked) {
+    this.session?.end();
+    const [low, high] = bounds(avatar.vertices), pose = new Pose(avatar), skin = new Skin(avatar);
+    const levels = new Levels(avatar, high[1] - low[1]);
+    const canvas = this.avatar ? replaceCanvas(this.canvas) : this.canvas;
+    this.dispose();
+    const renderer = await makeRenderer(asked, canvas, { avatar, skin, levels });
+    this.avatar = avatar;
+    this.pose = pose;
+    // The pose that the present one fades in from.
+    this.before = new Pose(avatar);
+    this.skin = skin;
+    // Box around the figure at rest, m.
+    this.low = low;
+    this.high = high;
+    this.levels = levels;
+    this.headset = null;
+    this.take(renderer);
   }
 
   get canvas() {
     return /** @type {HTMLCanvasElement} */ (this.stage.firstElementChild);
   }
 
-  // Makes the renderer; one that is lost later is followed by the next simpler one. asked: as for makeRenderer.
-  async drawBy(asked) {
-    const renderer = await makeRenderer(asked, this.canvas, this);
+  // Draws by this renderer; one that is lost later is followed by the next simpler one.
+  take(renderer) {
     renderer.onLost = async (why) => {
       if (this.renderer !== renderer) return;
-      this.renderer = null;
-      if ("device" in renderer) renderer.device.destroy();
+      this.dispose();
       replaceCanvas(this.canvas);
       await new Promise((done) => setTimeout(done, RECOVER_MS));
-      await this.drawBy(renderer.kind === "webgpu" ? "webgl" : "software");
+      this.take(await makeRenderer(renderer.kind === "webgpu" ? "webgl" : "software", this.canvas, this));
       this.move();
       this.draw();
       const way = this.renderer.kind === "webgl" ? "by WebGL" : "without the graphics card";
       this.onChange(`${why || "The graphics driver stopped"}: now drawn ${way}.`);
     };
     this.renderer = renderer;
+  }
+
+  // Gives the graphics card back what it holds; nothing is drawn until there is another renderer.
+  dispose() {
+    const { renderer } = this;
+    this.renderer = null;
+    if (renderer && "device" in renderer) renderer.device.destroy();
+    if (renderer && "gl" in renderer) renderer.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 
   /** @param {Playing} what fades in, from its beginning */
@@ -126,13 +164,23 @@ export class Viewer {
       this.opening = this.turntable = false;
       this.camera.glideTo(0);
     }
-    if (!this.camera.moved) this.frame("glide");
+    if (!this.camera.moved) this.reframe("glide");
   }
 
   // Of the clip that plays, s; 0 for a pose.
   get length() {
-    const clip = this.avatar.clips[this.playing.clip];
+    const clip = this.avatar?.clips[this.playing.clip];
     return clip ? (clip.loop ? clip.keys : clip.keys - 1) / clip.fps : 0;
+  }
+
+  // What a film of it takes, s: once through the motion, or once around the figure.
+  get round() {
+    return this.length || 360 / TURNTABLE_DEGREES_PER_S;
+  }
+
+  // Whether the user asked the system for less motion.
+  get calm() {
+    return matchMedia("(prefers-reduced-motion: reduce)").matches;
   }
 
   // Goes to a place in the clip, s.
@@ -157,6 +205,7 @@ export class Viewer {
         if (!this.avatar.clips[this.playing.clip].loop) {
           this.before.copy(this.pose);
           this.fade = 0;
+          this.onEnd();
         }
         this.clock %= length;
       }
@@ -172,11 +221,11 @@ export class Viewer {
   // Everything the picture depends on, as text: equal texts need no new picture.
   get state() {
     this.camera.update();
-    const { pose, camera, stage, levels, renderer, background, expression } = this;
-    const panel = document.getElementById("panel").offsetTop;
+    const { pose, camera, stage, levels, renderer, background, expression } = this, { bottom, right } = this.cover();
     const view = Array.from(camera.view, (x) => x.toFixed(5));
-    return [pose.quats, pose.transl, view, camera.fov, stage.clientWidth, stage.clientHeight, window.devicePixelRatio, panel,
-      levels.lit, renderer?.kind, background, JSON.stringify(expression)].join(" ");
+    const place = [stage.clientWidth, stage.clientHeight, window.devicePixelRatio, bottom, right];
+    const look = [levels.lit, renderer?.kind, background, JSON.stringify(expression)];
+    return [pose.quats, pose.transl, view, camera.fov, place, look].join(" ");
   }
 
   // Sets a pose to what plays at a place in the clip, s.
@@ -224,7 +273,7 @@ export class Viewer {
 
   draw() {
     if (!this.renderer) return;
-    if (this.resize() && !this.camera.moved) this.frame();
+    if (this.resize() && !this.camera.moved) this.reframe("frame");
     const eye = this.camera.eye(this.canvas.width, this.canvas.height);
     this.chooseLevel([eye]);
     this.renderer.prepare(eye.view);
@@ -232,26 +281,31 @@ export class Viewer {
     this.renderer.paint(eye, this.still || this.camera.pitch <= 0 ? null : this.shadow);
   }
 
-  // Fits the canvas and the camera to the page and its panel of controls. Returns whether the figure has other room than before.
+  // Fits the canvas and the camera to the stage and what covers it. Returns whether the figure has other room than before.
   resize() {
     const ratio = Math.min(window.devicePixelRatio || 1, this.renderer?.kind === "software" ? 1 : MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
-    const { offsetHeight, offsetTop } = document.getElementById("panel");
-    const panel = offsetHeight ? window.innerHeight - offsetTop : 0, covered = Math.min(0.5, panel / window.innerHeight);
-    document.documentElement.style.setProperty("--panel", `${panel}px`);
-    const same = this.canvas.width === width && this.canvas.height === height;
-    const other = !same || Math.abs(covered - this.camera.covered) > 0.01;
-    if (!same) Object.assign(this.canvas, { width, height });
-    this.camera.covered = covered;
+    const { bottom, right, top } = this.cover(), { camera, canvas, stage } = this;
+    const covered = Math.min(MOST_COVERED, bottom / (stage.clientHeight || 1));
+    const beside = Math.min(MOST_COVERED, right / (stage.clientWidth || 1));
+    const same = canvas.width === width && canvas.height === height;
+    const other = !same || Math.abs(covered - camera.covered) > 0.01 || Math.abs(beside - camera.beside) > 0.01;
+    if (!same) Object.assign(canvas, { width, height });
+    camera.covered = covered;
+    camera.beside = beside;
+    camera.above = Math.min(MOST_ABOVE, top / (stage.clientHeight * (1 - covered) || 1));
     return other;
   }
 
   // Draws from now on whenever something changes; a headset's session draws by itself (xr.js).
   run() {
+    if (this.running) return;
+    this.running = true;
     let last = null, shown = null;
     const frame = (now) => {
-      if (this.still || this.session) {
+      if (!this.running) return;
+      if (this.still || this.session || this.hidden) {
         last = shown = null;
         this.rate.reset();
       } else {
@@ -259,7 +313,7 @@ export class Viewer {
         if (this.turntable) this.camera.yaw += seconds * TURNTABLE_DEGREES_PER_S;
         this.advance(seconds);
         const { state } = this;
-        if (state !== shown) {
+        if (state !== shown || this.filmed) {
           this.move();
           this.draw();
         }
@@ -272,6 +326,10 @@ export class Viewer {
     requestAnimationFrame(frame);
   }
 
+  stop() {
+    this.running = false;
+  }
+
   // Counts a frame; now: ms.
   tick(now) {
     const rate = this.rate.frame(now);
@@ -282,10 +340,9 @@ export class Viewer {
   follow(options) {
     const { avatar, camera } = this, { clip, pose, pitch, distance, target } = options;
     this.still = options.still;
-    document.body.classList.toggle("bare", this.still);
     this.background = options.background ?? this.background;
-    this.opening = options.turntable === null && !options.picked && !matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.turntable = options.turntable ?? this.opening;
+    this.opening = options.turntable === null && !options.picked && !this.calm;
+    this.turntable = !this.calm && (options.turntable ?? this.opening);
     this.levels.lit = options.lit;
     this.levels.drawn = 0;
     this.expression = options.expression;
@@ -294,6 +351,7 @@ export class Viewer {
     else if (Object.hasOwn(avatar.poses, pose)) this.play({ pose });
     else this.play({ pose: Object.hasOwn(avatar.poses, "A") ? "A" : "T" });
     this.seek(options.seconds);
+    this.paused = this.calm && this.length > 0;
     camera.walked.fill(0);
     this.step(0);
     camera.fov = options.fov;
@@ -325,7 +383,42 @@ export class Viewer {
       });
     }
     for (const i of [0, 2]) walked[i] = this.pose.transl[i];
+    this.near = null;
     this.camera[how](low, high, this.canvas.width / this.canvas.height);
+    this.move();
+  }
+
+  /** @param {string | null} near "face", or a joint, that the camera glides to; null: the whole figure */
+  look(near) {
+    if (near === this.near) return;
+    this.near = near;
+    this.opening = this.turntable = false;
+    this.camera.glideTo(0);
+    this.reframe("glide");
+  }
+
+  // Frames anew what the camera looks at; how: as `frame`.
+  reframe(how) {
+    if (this.near === null) this.frame(how);
+    else this.approach(how);
+    if (this.calm) this.camera.behind.fill(0);
+  }
+
+  // Frames what is near: the vertices of the face, or of a joint and those that hang on it.
+  approach(how) {
+    this.resize();
+    const { avatar: { names, parents, skinIndex, skinWeight }, skin, camera, pose, near } = this, seen = [];
+    const meant = names.map((name, j) => (near === "face" ? FACE.test(name) : name === near || names[parents[j]] === near));
+    skin.update(pose, this.expression);
+    for (let v = 0; v < skinIndex.length / 4; v++) {
+      let share = 0;
+      for (let k = v * 4; k < v * 4 + 4; k++) if (meant[skinIndex[k]]) share += skinWeight[k];
+      if (share > 0.5) seen.push(...skin.vertices.subarray(v * 3, v * 3 + 3));
+    }
+    if (!seen.length) return;
+    const [low, high] = bounds(seen), half = low.map((l, i) => Math.max(LEAST_NEAR, (high[i] - l) / 2 * NEAR_MARGIN));
+    const middle = low.map((l, i) => (l + high[i]) / 2 - (i === 1 ? 0 : camera.walked[i]));
+    camera[how](middle.map((x, i) => x - half[i]), middle.map((x, i) => x + half[i]), this.canvas.width / this.canvas.height);
     this.move();
   }
 }

@@ -5,9 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from typing import Any
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
+from gsac.pipeline.batch_entry import Status
+from gsac.pipeline.batch_plan import BatchPlanner, ClipPlan
+from gsac.pipeline.batch_record import FILE, BatchRecord, read_request
 from gsac.pipeline.batch_reporter import BatchReporter, open_batch_reporter
+from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.commands.options import (
     add_json,
     add_params,
@@ -18,7 +23,8 @@ from gsac.pipeline.commands.options import (
     values_of_person,
 )
 from gsac.pipeline.executors import EXECUTORS, check_executor
-from gsac.pipeline.executors.executor import ClipResult
+from gsac.pipeline.executors.executor import ClipJob, ClipResult, Limits
+from gsac.pipeline.executors.memory import SHARE, machine_mb
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode
@@ -27,18 +33,37 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.quality import STANDARD, resolve_quality
 from gsac.pipeline.report.batch import PAGE, BatchPage
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run import Options
+from gsac.pipeline.unchanged import run_unchanged
 from gsac.stages.contract import BadInput
+
+REQUEST = ("source", "until", "start", "force", "anyway", "replace", "quality", "height", "body", "params", "set")
+"""Arguments that say which clips are run and how; `--resume` takes them from the batch that it goes on with."""
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    command.add_argument("source", type=Path, metavar="FOLDER|LIST",
+    command.add_argument("source", type=Path, nargs="?", metavar="FOLDER|LIST",
                          help="a folder of clips, or a file with one path a line")
     command.add_argument("--out", type=Path, default=Path("."), metavar="DIR",
-                         help=f"gets a folder a clip, and {PAGE}, which shows all of them (default: here)")
+                         help=f"gets a folder a clip, {PAGE}, which shows all of them, and {FILE} (default: here)")
     command.add_argument("--executor", default="local", metavar="NAME", help=f"one of: {', '.join(EXECUTORS)}")
-    command.add_argument("-j", "--jobs", type=int, metavar="N", help="clips at once (default: half as many as cores)")
+    command.add_argument("-j", "--jobs", type=int, metavar="N",
+                         help="clips at once (default: half as many as cores; 1 on a GPU)")
+    command.add_argument("--memory", type=float, metavar="GB",
+                         help=f"memory that clips at once may fill, by what they took before (default: {SHARE:g} of the machine's)")
+    command.add_argument("--address", metavar="HOST:PORT",
+                         help="of the Ray cluster (default: the one that RAY_ADDRESS names, else this machine alone)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
+    command.add_argument("--from", dest="start", metavar="STAGE", help="what this stage needs must be in the cache already")
+    command.add_argument("--force", action="append", default=[], metavar="STAGE", help="run this stage again; may be repeated")
+    command.add_argument("--anyway", action="store_true", help="go on where nothing can come of a clip, as without a person")
     command.add_argument("--replace", action="store_true", help="put a clip's avatar in place of another clip's in its folder")
+    command.add_argument("--resume", action="store_true",
+                         help="go on with the batch of --out that was stopped: its clips and arguments, but those that have ended")
+    command.add_argument("--changed-only", action="store_true",
+                         help="leave clips that the last batch of --out has done, and whose file is the same, as they are, though "
+                              "code or parameters are others")
+    command.add_argument("--dry-run", action="store_true", help="say what each clip needs, and how long it would take")
     add_quality(command)
     add_person(command)
     add_params(command)
@@ -48,36 +73,69 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     reporter = progress_reporter(arguments)
-    workers = max(1, (os.cpu_count() or 1) // 2) if arguments.jobs is None else arguments.jobs
-    if workers < 1:
+    request = take_request(arguments)
+    if arguments.jobs is not None and arguments.jobs < 1:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
+    if arguments.memory is not None and not arguments.memory > 0:
+        raise BadInput(f"--memory {arguments.memory:g}: expected GB above 0")
     check_executor(arguments.executor)
+    if arguments.address is not None and arguments.executor != "ray":
+        raise BadInput(f"--address {arguments.address}: only --executor ray has one")
     project = Project.at_hand()
     configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
-    stages = set(project.graph.steps)
-    if arguments.until:
-        project.graph.step(arguments.until)
-        stages = project.graph.above(arguments.until) | {arguments.until}
-    keys = Keys(project, configs, open_store(reporter))
-    keys.check(stages)  # one error now, not one a clip
+    options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
+    store = open_store(reporter)
+    planner = BatchPlanner(project, configs, store, options)
+    planner.keys.check(planner.steps)  # one error now, not one a clip
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
-    keys.pull_models(stages, reporter.note)
+    record = BatchRecord(arguments.out, request)
+    kept = {job: earlier for job in jobs if (earlier := record.earlier(job)) is not None
+            and arguments.resume and earlier.status.is_end}
+    plans = planner.plan_all(job for job in jobs if job not in kept)
+    if arguments.changed_only:
+        kept |= {plan.job: earlier for plan in plans if (earlier := record.earlier(plan.job)) is not None
+                 and earlier.status in (Status.DONE, Status.UNCHANGED, Status.KEPT) and earlier.digest == plan.digest}
+        plans = [plan for plan in plans if plan.job not in kept]
+    workers = arguments.jobs or count_workers(planner.keys)
+    limits = Limits(workers, arguments.memory * 1024 if arguments.memory else SHARE * machine_mb(), arguments.address)
+    due = [plan for plan in plans if not plan.unchanged]
+    reporter.note(foretell(plans, len(kept), workers))
+    if arguments.dry_run:
+        return dry_run(plans, reporter, arguments.json)
+    planner.keys.pull_models({stage for plan in due for stage in plan.due}, reporter.note)
     page = BatchPage(arguments.out, jobs)
-    reporter.note(f"{len(jobs)} clips, {min(workers, len(jobs))} at once")
-    with open_batch_reporter(reporter, len(jobs)) as table:
-        executor = EXECUTORS[arguments.executor](workers, lambda job, line: table.hear(job.name, line))
-        results = run_batch(jobs, executor, lambda result: end(result, table, page, reporter))
-    failed = [result for result in results if result.code != ExitCode.OK]
-    reporter.result(f"{len(results) - len(failed)} of {len(results)} clips are done")
-    for result in failed:
-        reporter.result(f"failed: {result.job.clip}: {result.error}")
-    if arguments.json:
-        emit({"outputs": {"page": str(page.path)} if page.path.exists() else {}, "clips": [{
-            "clip": str(r.job.clip), "out": str(r.job.out), "status": "failed" if r.code else "done", "code": r.code,
-            "seconds": round(r.seconds, 3), "error": r.error or None, **r.summary} for r in results]})
-    elif page.path.exists():
-        print(page.path)
-    return ExitCode.FAILED if failed else ExitCode.OK
+    for job, earlier in kept.items():
+        record.keep(job, earlier, earlier.status if arguments.resume else Status.KEPT)
+        page.keep(job)
+    record.plan(plans)
+    work = ClipWork(project, configs, store, options, reporter, arguments.replace)
+    unchanged = run_unchanged(work, [plan.job for plan in plans if plan.unchanged], planner.keys)
+    with open_batch_reporter(reporter, {plan.job.name: plan.seconds for plan in due}) as table:
+        def end(result: ClipResult) -> None:
+            record.end(result)
+            page.add(result, record.entries[result.job].before)
+            show(result, table, page, reporter)
+
+        executor = EXECUTORS[arguments.executor](limits, lambda job, line: table.hear(job.name, line))
+        results = run_batch([plan.told_job for plan in due], executor, end, unchanged)
+    record.write(now=True)
+    write_page(page, reporter)
+    return conclude(record, {result.job: result for result in results}, page, reporter, arguments.json)
+
+
+def take_request(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the batch is to do, as batch.json keeps it; with --resume it is taken from there."""
+    if arguments.resume:
+        if arguments.source is not None:
+            raise BadInput(f"--resume takes the clips from {arguments.out / FILE}; leave {arguments.source} out")
+        request = read_request(arguments.out.absolute() / FILE)
+        for name in REQUEST:
+            value = request.get(name)
+            setattr(arguments, name, Path(value) if name in ("source", "params") and value is not None else value)
+        return request
+    if arguments.source is None:
+        raise BadInput("no FOLDER or LIST was given; give a folder of clips, a file with one path a line, or --resume")
+    return {name: str(value.absolute()) if isinstance(value := getattr(arguments, name), Path) else value for name in REQUEST}
 
 
 def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
@@ -87,15 +145,71 @@ def forwarded_arguments(arguments: argparse.Namespace) -> tuple[str, ...]:
     told += [] if arguments.height is None else ["--height", str(arguments.height)]
     told += [] if arguments.body is None else ["--body", arguments.body]
     told += [word for text in arguments.set for word in ("--set", text)]
-    told += ["--replace"] if arguments.replace else []
+    told += [word for stage in arguments.force for word in ("--force", stage)]
+    told += ["--from", arguments.start] if arguments.start else []
+    told += [f"--{word}" for word in ("anyway", "replace") if getattr(arguments, word)]
     return tuple(told + (["--until", arguments.until] if arguments.until else []))
 
 
-def end(result: ClipResult, table: BatchReporter, page: BatchPage, reporter: PlainReporter) -> None:
-    """Tells of a clip's end, and shows it on the page; where that fails the batch goes on."""
-    table.end(result.job.name, describe(result))
+def count_workers(keys: Keys) -> int:
+    """Clips at once where nobody says: a GPU takes one, cores are shared by two."""
+    return 1 if keys.device == "cuda" else max(1, (os.cpu_count() or 1) // 2)
+
+
+def foretell(plans: list[ClipPlan], kept: int, workers: int) -> str:
+    """The line before the start: how many clips need what, and how long it may take."""
+    due = [plan for plan in plans if plan.due]
+    unchanged = sum(plan.unchanged for plan in plans)
+    parts = [f"{len(plans) + kept} clips"]
+    parts += [f"{unchanged} unchanged"] if unchanged else []
+    parts += [f"{kept} left as they are"] if kept else []
+    parts += [f"{broken} cannot be read"] if (broken := sum(bool(plan.error) for plan in plans)) else []
+    seconds = sum(plan.seconds for plan in due) / max(1, min(workers, len(due)))
+    work = f"{len(due)} to do, {min(workers, len(due))} at once" + (f", about {duration(seconds)}" if seconds else "")
+    return ", ".join([*parts, work if due else "nothing to do"])
+
+
+def dry_run(plans: list[ClipPlan], reporter: PlainReporter, json: bool) -> ExitCode:
+    """A line for each clip that needs something."""
+    for plan in plans:
+        if not plan.unchanged:
+            time = f", about {duration(plan.seconds)}" if plan.seconds else ""
+            reporter.result(f"{plan.job.name}: {plan.error or f'{plan.due[0]} to {plan.due[-1]}{time}'}")
+    if json:
+        emit({"outputs": {}, "clips": [plan.to_json() for plan in plans]})
+    return ExitCode.OK
+
+
+def conclude(record: BatchRecord, results: dict[ClipJob, ClipResult], page: BatchPage, reporter: PlainReporter,
+             json: bool) -> ExitCode:
+    """The last lines and the object of --json."""
+    failed = [entry for entry in record.entries.values() if entry.status is Status.FAILED]
+    reporter.result(f"{len(record.entries) - len(failed)} of {len(record.entries)} clips are done")
+    for entry in failed:
+        reporter.result(f"failed: {entry.clip}: {entry.error}")
+    if json:
+        files = {"page": page.path, "record": record.path}
+        emit({"outputs": {name: str(path) for name, path in files.items() if path.exists()}, "clips": [
+            (results[job].summary if job in results else {})
+            | {"clip": entry.clip, "out": entry.out, "status": entry.status.value, "code": entry.code,
+               "seconds": round(entry.seconds, 3), "error": entry.error or None} for job, entry in record.entries.items()]})
+    elif page.path.exists():
+        print(page.path)
+    return ExitCode.FAILED if failed else ExitCode.OK
+
+
+def show(result: ClipResult, table: BatchReporter, page: BatchPage, reporter: PlainReporter) -> None:
+    """Tells of a clip's end, and writes the page where that is due."""
+    if not result.unchanged or result.code:
+        table.end(result.job.name, describe(result))
+    if page.is_due:
+        write_page(page, reporter)
+
+
+def write_page(page: BatchPage, reporter: PlainReporter) -> None:
+    """Writes the page; where that fails the batch goes on."""
     try:
-        page.add(result)
+        page.write()
     except Exception as error:
         reporter.note(f"gsac: warning: {page.path} could not be written ({type(error).__name__}: {error})")
 

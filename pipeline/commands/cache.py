@@ -1,4 +1,4 @@
-"""gsac cache ls | verify | gc: what lies in the store, whether it is sound, and what may go."""
+"""gsac cache ls | verify | gc | push | pull: what lies in the store, whether it is sound, what may go, and what is shared."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from gsac.cache.key import KeyParts
 from gsac.cache.roots import find_roots
 from gsac.cache.store import Store
 from gsac.pipeline.commands.options import add_json, answer_reporter, find_store, open_store, progress_reporter
+from gsac.pipeline.commands.shared_cache import declare_pull, declare_push, require_results
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
@@ -25,7 +26,7 @@ UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 
 
 def declare(command: argparse.ArgumentParser) -> None:
-    does = command.add_subparsers(dest="does", required=True, metavar="ls|verify|gc")
+    does = command.add_subparsers(dest="does", required=True, metavar="ls|verify|gc|push|pull")
     one = does.add_parser("ls", help="every result with the clip and the folder that shows it, the last used first")
     add_json(one)
     one.set_defaults(do=do_ls)
@@ -38,8 +39,11 @@ def declare(command: argparse.ArgumentParser) -> None:
     one.add_argument("--max-size", metavar="SIZE", help="remove the longest unused until this much is left, e.g. 20G")
     one.add_argument("--force", action="store_true", help="take also what folders of runs show")
     one.add_argument("--dry-run", action="store_true", help="say what would go")
+    one.add_argument("--remote", action="store_true", help="in the place that GSAC_REMOTE names, and not here")
     add_json(one)
     one.set_defaults(do=do_gc)
+    declare_push(does.add_parser("push", help="put results into the place that GSAC_REMOTE names, for other machines"))
+    declare_pull(does.add_parser("pull", help="get results that other machines have put there"))
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
@@ -101,6 +105,10 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
     limit = parse_size(arguments.max_size) if arguments.max_size is not None else None
     if arguments.keep_days is not None and not arguments.keep_days >= 0:
         raise BadInput(f"--keep-days {arguments.keep_days}: expected 0 or more")
+    if arguments.remote:
+        if limit is not None or arguments.force:
+            raise BadInput("--remote goes with --keep-days and --dry-run alone; nobody knows there which results are in use")
+        return do_gc_remote(arguments)
     report = gc.collect(open_store(reporter), arguments.keep_days, limit, arguments.dry_run, force=arguments.force)
     verb = "would remove" if arguments.dry_run else "removed"
     left = len(report.temps) + len(report.partial)
@@ -110,6 +118,20 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
         reporter.note(line)
     if arguments.json:
         emit(dataclasses.asdict(report))
+    return ExitCode.OK
+
+
+def do_gc_remote(arguments: argparse.Namespace) -> ExitCode:
+    from gsac.cache.remote.sweep import sweep_remote
+
+    reporter, results = answer_reporter(arguments), require_results()
+    report = sweep_remote(results.bucket, arguments.keep_days, arguments.dry_run)
+    verb = "would remove" if arguments.dry_run else "removed"
+    reporter.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, "
+                  f"{len(report.claims) + len(report.unfinished)} left-overs from {results.bucket.url}: "
+                  f"{format_size(report.freed_bytes)}; {format_size(report.kept_bytes)} stay")
+    if arguments.json:
+        emit({"remote": results.bucket.url} | dataclasses.asdict(report))
     return ExitCode.OK
 
 

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from gsac.cache.half_made import half_made, temporary_folder
 from gsac.pipeline.clip_check import LAST, PARAMS, check_clip
-from gsac.pipeline.commands.options import add_clip, add_json, answer_reporter, open_store, progress_reporter, writable_store
+from gsac.pipeline.commands.options import add_clip, add_json, answer_reporter, open_store, progress_reporter
 from gsac.pipeline.commands.run import find_clip
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.own_store import writable_store
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
 from gsac.pipeline.reporter import QuietReporter

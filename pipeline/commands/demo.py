@@ -8,14 +8,17 @@ import time
 from pathlib import Path
 
 from gsac.cache.half_made import half_made
+from gsac.pipeline.clip_work import ClipWork
+from gsac.pipeline.closing import closing_lines
 from gsac.pipeline.commands.options import add_quality, open_store, progress_reporter
-from gsac.pipeline.commands.run import run_clip
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.placing import keep_aside
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import resolve_quality
 from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run import Options
+from gsac.pipeline.run_folder import RunFolder
 
 CLIP_FILE = "clip.mp4"
 
@@ -33,7 +36,11 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         configs = resolve_quality(arguments.quality, project)
         if not (root / "clip" / CLIP_FILE).is_file():
             Keys(project, configs, store).pull_models(project.graph.steps, reporter.note)
-        run_clip(make_truth_clip(root / "clip", reporter), root / "avatar", store, reporter, arguments.quality)
+        clip, folder = make_truth_clip(root / "clip", reporter), RunFolder(root / "avatar")
+        ClipWork(project, configs, store, Options(quality=arguments.quality), reporter).do(clip.resolve(), folder)
+        for line in closing_lines(folder):
+            reporter.note(line)
+        print(folder.root, flush=True)
     return ExitCode.OK
 
 

@@ -100,17 +100,6 @@ def open_store(reporter: PlainReporter) -> Store:
     return store
 
 
-def writable_store(store: Store, instead: Path, reporter: PlainReporter) -> Store:
-    """The store; where it may only be read one at `instead`, which gets the results of this run and still uses what it holds.
-
-    To be called when nothing of the user's can be at fault any more, since it makes a folder.
-    """
-    if store.writable:
-        return store
-    reporter.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")
-    return Store(instead, say=reporter.note, below=store)
-
-
 def find_store(reporter: PlainReporter) -> Store:
     """The store of GSAC_CACHE as it is, of which nothing is made. CacheFolderError where a file is in its place."""
     store = Store.open(say=reporter.note, make=False)

@@ -174,13 +174,14 @@ def find_avatar(path: Path) -> Path:
 
 
 def default_name(file: Path, motion: str | None) -> str:
-    """`<avatar>-turn.mp4` or `<avatar>-<motion>.mp4`. The avatar has the name of the run's folder, or where it lies alone its own.
+    """`<avatar>-turn.mp4` or `<avatar>-<motion>.mp4`. file: the avatar.gsac; motion: a file's path or a clip's name."""
+    return f"{name_avatar(file)}-{Path(motion).stem if motion else 'turn'}.mp4"
 
-    file: the avatar.gsac; motion: a file's path or a clip's name.
-    """
+
+def name_avatar(file: Path) -> str:
+    """The avatar's name: that of the run's folder, or where its file lies alone the file's own."""
     folder = file.absolute().parent
-    name = folder.parent.name if folder.name == "export" else file.stem
-    return f"{name}-{Path(motion).stem if motion else 'turn'}.mp4"
+    return folder.parent.name if folder.name == "export" else file.stem
 
 
 def refuse_footage(out: Path, file: Path) -> None:

@@ -6,7 +6,7 @@ import argparse
 import shlex
 from pathlib import Path
 
-from gsac.cache.store import Store
+from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.closing import closing_lines
 from gsac.pipeline.commands.options import (
     add_clip,
@@ -17,23 +17,16 @@ from gsac.pipeline.commands.options import (
     open_store,
     progress_reporter,
     values_of_person,
-    writable_store,
 )
-from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
 from gsac.pipeline.json_output import emit
-from gsac.pipeline.other_clip import find_other_clip, forget_results
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import STANDARD, find_quality, name_of, quality_entry, resolve_quality
-from gsac.pipeline.report.refresh import EarlySections, refresh_report
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run import ClipRun, Options
-from gsac.pipeline.run_folder import DAG, OWN_STORE, RUN, RunFolder, avatar_name
+from gsac.pipeline.run_folder import DAG, RUN, RunFolder, avatar_name
 from gsac.stages.contract import BadInput
-
-MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
-"""Ends of a run that are the command line's or the clip's fault."""
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -71,50 +64,14 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
             return dry_run(clip_run, clip, options, reporter, arguments.json)
-        run_folder.say = reporter.note
-        run_folder.refuse_foreign(clip, project)
-        with run_folder.hold():
-            other = find_other_clip(run_folder, clip, store)
-            if other is not None and not arguments.replace:
-                raise BadInput(f"{run_folder.root} holds the avatar of {other}; give another --out, or --replace to put this "
-                               "clip's there")
-            run_folder.prepare(clip, project, configs)
-            if other is not None:
-                forget_results(run_folder)
-            own = writable_store(store, run_folder.root / OWN_STORE, reporter)
-            if own is not store:
-                clip_run = ClipRun(project, configs, own, run_folder, reporter)
-            return carry_out(clip_run, clip, options, reporter, arguments.json)
-
-
-def carry_out(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
-    """The run, its report and the last lines; stdout gets the folder, or the JSON object, which lists the stages done whether it
-    ends well or not."""
-    early = EarlySections(clip_run.folder)
-    try:
-        clip_run.pull_models(clip, options)
-        clip_run.run(clip, options, early.start)
-        write_report(clip_run, reporter, early)
-    except BaseException as error:
-        attach_summary(error, clip_run.summary())
-        if exit_code(error) in MISTAKES and not clip_run.finished:
-            clip_run.folder.discard()
-        elif isinstance(error, StageFailedError):
-            write_report(clip_run, reporter)
-        raise
-    for line in closing_lines(clip_run.folder):
-        reporter.note(line)
-    if json:
-        emit(clip_run.summary())
-    else:
-        print(clip_run.folder.root, flush=True)
+        finished = ClipWork(project, configs, store, options, reporter, arguments.replace).do(clip, run_folder)
+        for line in closing_lines(run_folder):
+            reporter.note(line)
+        if arguments.json:
+            emit(finished.summary())
+        else:
+            print(run_folder.root, flush=True)
     return ExitCode.OK
-
-
-def write_report(clip_run: ClipRun, reporter: PlainReporter, early: EarlySections | None = None) -> None:
-    """Writes report.html if it is due; a failure is only a warning."""
-    if (warning := refresh_report(clip_run.folder, early)) is not None:
-        reporter.note(f"gsac: warning: {warning}")
 
 
 def dry_run(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
@@ -169,17 +126,3 @@ def find_clip(path: Path | None) -> Path:
 def default_out(clip: Path) -> Path:
     """`<clip>-avatar` here."""
     return Path.cwd() / avatar_name(clip)
-
-
-def run_clip(clip: Path, out: Path, store: Store, reporter: PlainReporter, quality: str) -> None:
-    """All stages as a preset has them."""
-    project = Project.at_hand()
-    configs = resolve_quality(quality, project)
-    run_folder = RunFolder(out)
-    run_folder.say = reporter.note
-    run_folder.refuse_foreign(find_clip(clip), project)
-    with run_folder.hold():
-        run_folder.prepare(find_clip(clip), project, configs)
-        store = writable_store(store, out / OWN_STORE, reporter)
-        carry_out(ClipRun(project, configs, store, run_folder, reporter), find_clip(clip), Options(quality=quality), reporter,
-                  json=False)

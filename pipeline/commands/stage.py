@@ -19,13 +19,13 @@ from gsac.pipeline.commands.options import (
     open_run_folder,
     open_store,
     progress_reporter,
-    writable_store,
 )
 from gsac.pipeline.errors import StageFailedError, attach_summary
 from gsac.pipeline.fixtures import fixture_paths
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.own_store import writable_store
 from gsac.pipeline.params import resolve
 from gsac.pipeline.plan import plan_stage
 from gsac.pipeline.project import Project

@@ -6,7 +6,9 @@ import base64
 import functools
 import os
 import re
-from dataclasses import dataclass
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -14,6 +16,7 @@ from urllib.parse import quote
 from gsac.pipeline.closing import RESULTS
 from gsac.pipeline.executors.executor import ClipJob, ClipResult
 from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.report.batch_figures import FIGURES, find_outliers, list_changes, list_words, read_figures
 from gsac.pipeline.report.origin import HEAD_BYTES, read_origin
 from gsac.pipeline.report.page import make_template
 from gsac.pipeline.report.results import Results
@@ -30,6 +33,8 @@ MARK = '<meta name="gsac-page" content="batch">'
 """Tells the page from a file of the user's by the same name."""
 STRIP = re.compile(r'<div class="turning" style="--views:(\d+)[^<]*<div class="turn"><img src="data:image/webp;base64,([^"]+)"')
 """The turning avatar in report.html: how many views stand side by side, and the picture."""
+GAP_S = 5.0
+"""s between two writings of the page while clips end."""
 VIEW_HEIGHT = 264
 """px of a view on a card."""
 
@@ -52,6 +57,24 @@ class Card:
     """Name and address, relative to the page, of what there is to open."""
     found: tuple[str, ...] = ()
     """What contradicts itself in the clip: codes of findings, as words."""
+    figures: Mapping[str, float] = field(default_factory=dict)
+    """Name in metrics.json -> value."""
+    changes: tuple[str, ...] = ()
+    """Figures that differ from those of the batch before, in words."""
+    outliers: tuple[str, ...] = ()
+    """Figures that are far worse than the other clips', in words."""
+
+    @property
+    def figure_words(self) -> str:
+        """The figures in one line."""
+        return ", ".join(list_words(self.figures))
+
+    @property
+    def state(self) -> str:
+        """The word by which the page filters."""
+        if self.outcome in (Outcome.FAILED, Outcome.PLANNED):
+            return self.outcome.value
+        return self.grade.name.lower() if self.grade else "unknown"
 
     def address(self, name: str) -> str:
         """Of the link of that name; empty without it."""
@@ -66,6 +89,7 @@ class BatchPage:
         if self.path.exists() and not is_ours(self.path):
             raise BadInput(f"{self.path} was not written by `gsac batch`, which would write over it; move it away, or give another "
                            "--out")
+        self._written = -GAP_S
         self._cards = {job: Card(job.clip.name, job.out.name, Outcome.PLANNED) for job in jobs}
 
     @functools.cached_property
@@ -75,12 +99,29 @@ class BatchPage:
         folders = sorted(path.parent for path in self.path.parent.glob(f"*/{RUN}") if path.parent not in ours)
         return [make_card(folder) for folder in folders]
 
-    def add(self, result: ClipResult) -> None:
-        """Writes the page with the end of one clip. Raises OSError."""
-        self._cards[result.job] = end_card(result)
-        cards = sorted(self._cards.values(), key=lambda card: card.outcome is not Outcome.FAILED)
+    def add(self, result: ClipResult, before: Mapping[str, Any] | None = None) -> None:
+        """Takes in the end of one clip. before: its metrics in the batch before."""
+        card = end_card(result)
+        self._cards[result.job] = replace(card, changes=tuple(list_changes(card.figures, read_figures(before or {}))))
+
+    def keep(self, job: ClipJob) -> None:
+        """Takes in a clip that is left as it lies in its folder."""
+        self._cards[job] = make_card(job.out)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the page was last written long enough ago; with many clips each writing takes a while."""
+        return time.monotonic() - self._written >= GAP_S
+
+    def write(self) -> None:
+        """Writes the page as it stands. Raises OSError."""
+        cards = list(self._cards.values())
+        cards = [replace(card, outliers=tuple(words)) for card, words in
+                 zip(cards, find_outliers([card.figures for card in cards]), strict=True)]
+        cards.sort(key=lambda card: (card.outcome is not Outcome.FAILED, not card.outliers))
         self.path.parent.mkdir(parents=True, exist_ok=True)
         write_text(self.path, render(self.path.parent.name, cards, self._others))
+        self._written = time.monotonic()
 
 
 def is_ours(page: Path) -> bool:
@@ -95,8 +136,8 @@ def is_ours(page: Path) -> bool:
 def render(name: str, cards: list[Card], others: list[Card]) -> str:
     """The page's HTML. name: of the batch's folder."""
     outcomes = [card.outcome for card in cards]
-    return read_template().render(mark=MARK, name=name, cards=cards, others=others, done=outcomes.count(Outcome.RAN),
-                                  failed=outcomes.count(Outcome.FAILED), outcomes=Outcome)
+    return read_template().render(mark=MARK, name=name, cards=cards, others=others, figures=FIGURES,
+                                  done=outcomes.count(Outcome.RAN), failed=outcomes.count(Outcome.FAILED), outcomes=Outcome)
 
 
 @functools.cache
@@ -131,7 +172,8 @@ def make_card(folder: Path) -> Card:
         return Card(results.clip_name, folder.name, Outcome.RAN, words, links=links)
     strip, views = cut_strip(page)
     grade = Grade.__members__.get(origin.grade)
-    return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, views, links, name_findings(results))
+    return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, views, links, name_findings(results),
+                read_figures(results.run.get("metrics") or {}))
 
 
 def name_findings(results: Results) -> tuple[str, ...]:

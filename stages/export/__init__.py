@@ -4,8 +4,8 @@ takes  split/clip.json, train/avatar.npz, train/body.npz
 gives  avatar.gsac: everything in one container (docs/gsac-format.md)
        avatar.ply: the gaussians in one pose as a standard 3DGS file
        avatar.spz: the same, compressed
-       avatar.glb: skinned animated mesh, and the gaussians with KHR_gaussian_splatting
-       avatar.fbx: skinned animated mesh with expressions, without gaussians
+       avatar.glb: skinned, textured, animated mesh; not shown beside it the gaussians, with KHR_gaussian_splatting
+       avatar.fbx: skinned, textured, animated mesh with expressions, without gaussians
        viewer.html: a page that opens from disk
        unity: the Unity package with this person, as a folder, a tarball and a .unitypackage
 """
@@ -27,6 +27,6 @@ STAGE = Stage(
         Output("unity", check_folder),
     ),
     config=ExportConfig,
-    packages=("gsac", "numpy", "scipy", "numba", "llvmlite"),
+    packages=("gsac", "numpy", "scipy", "numba", "llvmlite", "pillow"),
     models=lambda config: config.models(),
 )

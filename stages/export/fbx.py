@@ -1,4 +1,4 @@
-"""`avatar.fbx`, for tools that read no glTF: skinned, vertex-coloured mesh, 55 joints, expressions, animations.
+"""`avatar.fbx`, for tools that read no glTF: skinned, textured mesh, 55 joints, expressions, animations.
 
 Metres, y up, facing +z, feet at y = 0; joints rest without rotation, so a joint's rotation is SMPL-X's. Expressions are
 blend shapes by their ARKit names; each animation is a take. FBX cannot hold gaussians.
@@ -15,25 +15,27 @@ from gsac.avatar.gsac_file.animation import Animation
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.mesh import vertex_normals
 from gsac.stages.export.fbx_file import CREATED, FILE_ID, Long, Node, fbx_bytes
-from gsac.stages.export.glb import vertex_colours
+from gsac.stages.export.texture import Surface
 
 SECOND = 46186158000
 """Ticks of FBX's time in a second."""
 LEAST_WEIGHT = 1e-6
 LINEAR_KEYS = 0x00006004
 """Interpolation of a curve's keys."""
+PICTURE = "avatar.jpg"
+"""Name of the picture inside."""
 ROTATION, TRANSLATION = ("Lcl Rotation", "R"), ("Lcl Translation", "T")
 
 
-def avatar_fbx(avatar: RiggedAvatar, means: np.ndarray) -> bytes:
-    """The file's bytes. means: (N, 3) m, the gaussians in T-pose, feet at y = 0; the mesh takes its colours from them."""
-    return _Scene(avatar, means).bytes()
+def avatar_fbx(avatar: RiggedAvatar, surface: Surface) -> bytes:
+    """The file's bytes; the mesh has the body's vertices, with the surface's texture coordinates at the corners of its faces."""
+    return _Scene(avatar, surface).bytes()
 
 
 class _Scene:
     """Objects and connections, filled in order."""
 
-    def __init__(self, avatar: RiggedAvatar, means: np.ndarray) -> None:
+    def __init__(self, avatar: RiggedAvatar, surface: Surface) -> None:
         self.avatar, self.ids = avatar, count(1000)
         ground = np.array([0, avatar.ground, 0], np.float32)
         self.vertices, self.places = avatar.vertices - ground, (avatar.joints - ground).astype(float)
@@ -42,9 +44,9 @@ class _Scene:
         mesh.add("Version", 232)
         mesh.properties(("InheritType", "enum", "", "", 1))
         self.connect(mesh, 0)
-        self.geometry = self.mesh(vertex_colours(self.vertices, means, avatar.gaussians.rgb, avatar.gaussians.opacity))
+        self.geometry = self.mesh(surface)
         self.connect(self.geometry, mesh)
-        self.connect(self.material(), mesh)
+        self.connect(self.material(surface.jpeg), mesh)
         self.joints: list[Node] = []
         for j in range(len(avatar.joints)):
             self.joints.append(self.joint(j))
@@ -64,8 +66,7 @@ class _Scene:
         ends = [child.values[0], Long(above)]
         self.connections.add("C", *(["OO", *ends] if at is None else ["OP", *ends, at]))
 
-    def mesh(self, colours: np.ndarray) -> Node:
-        """colours: (V, 3) in 0..1, as shown on a screen."""
+    def mesh(self, surface: Surface) -> Node:
         faces = self.avatar.faces.astype(np.int32).copy()
         faces[:, 2] = ~faces[:, 2]
         geometry = self.object("Geometry", "body", "Mesh")
@@ -74,18 +75,19 @@ class _Scene:
         geometry.add("PolygonVertexIndex", faces.reshape(-1))
         geometry.add("GeometryVersion", 124)
         normals = vertex_normals(self.vertices, self.avatar.faces)
-        rgba = np.column_stack([colours, np.ones(len(colours))]).astype(np.float64)
+        uv = (surface.uv * (1, -1) + (0, 1)).astype(np.float64)
         layer = Node("Layer", [0])
         layer.add("Version", 100)
-        for name, field, values in (("LayerElementNormal", "Normals", normals), ("LayerElementColor", "Colors", rgba)):
-            corners = self.avatar.faces.reshape(-1).astype(np.int32)
+        for name, label, field, values, order in (
+                ("LayerElementNormal", "", "Normals", normals, self.avatar.faces),
+                ("LayerElementUV", "UV", "UV", uv, surface.faces)):
             element = geometry.add(name, 0)
             element.add("Version", 101)
-            element.add("Name", "")
+            element.add("Name", label)
             element.add("MappingInformationType", "ByPolygonVertex")
             element.add("ReferenceInformationType", "IndexToDirect")
             element.add(field, values.reshape(-1))
-            element.add("NormalsIndex" if field == "Normals" else "ColorIndex", corners)
+            element.add(f"{field}Index", order.reshape(-1).astype(np.int32))
             entry = layer.add("LayerElement")
             entry.add("Type", name)
             entry.add("TypedIndex", 0)
@@ -99,11 +101,24 @@ class _Scene:
         geometry.children.append(layer)
         return geometry
 
-    def material(self) -> Node:
-        material = self.object("Material", "vertex colours", "")
+    def material(self, jpeg: bytes) -> Node:
+        """Adds a material that shows a picture, which lies in the file."""
+        material = self.object("Material", "body", "")
         material.add("Version", 102)
         material.add("ShadingModel", "lambert")
         material.properties(("DiffuseColor", "Color", "", "A", 1.0, 1.0, 1.0))
+        texture = self.object("Texture", "body", "")
+        for name, value in (("Type", "TextureVideoClip"), ("Version", 202), ("TextureName", "body\0\x01Texture"),
+                            ("Media", "body\0\x01Video"), ("FileName", PICTURE), ("RelativeFilename", PICTURE)):
+            texture.add(name, value)
+        texture.properties(("UVSet", "KString", "", "", "UV"), ("UseMaterial", "bool", "", "", 1))
+        video = self.object("Video", "body", "Clip")
+        video.add("Type", "Clip")
+        video.properties(("Path", "KString", "XRefUrl", "", PICTURE))
+        for name, value in (("UseMipMap", 0), ("Filename", PICTURE), ("RelativeFilename", PICTURE), ("Content", jpeg)):
+            video.add(name, value)
+        self.connect(texture, material, "DiffuseColor")
+        self.connect(video, texture)
         return material
 
     def joint(self, j: int) -> Node:

@@ -25,6 +25,7 @@ from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.levels import MEMBERS, merge_level
 from gsac.stages.export.ply import ply_bytes
 from gsac.stages.export.spz import spz_bytes
+from gsac.stages.export.texture import paint_surface
 from gsac.stages.export.warmup import rehearse
 from gsac.unity.package import write_unity
 from gsac.viewer.page import page_bytes
@@ -54,12 +55,13 @@ def run(job: Job) -> None:
     pose = avatar.pose(job.config.ply_pose.upper())
     splats = (*pose_gaussians(avatar, pose), avatar.gaussians.rgb, avatar.gaussians.opacity)
     rest = pose_gaussians(avatar, avatar.pose("T"))
+    surface = paint_surface(avatar, *rest)
     files = {
         "avatar.gsac": lambda: container,
         "avatar.ply": lambda: ply_bytes(*splats, job.config.ply_pad_sh),
         "avatar.spz": lambda: spz_bytes(*splats),
-        "avatar.glb": lambda: glb_bytes(avatar, *rest),
-        "avatar.fbx": lambda: avatar_fbx(avatar, rest[0]),
+        "avatar.glb": lambda: glb_bytes(avatar, surface, *rest),
+        "avatar.fbx": lambda: avatar_fbx(avatar, surface),
         "viewer.html": lambda: page_bytes(container),
     }
 

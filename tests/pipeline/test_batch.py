@@ -119,11 +119,12 @@ def test_a_batch_names_each_error_once(toy, clips):
 
 
 def test_the_table_of_a_batch_has_a_row_for_each_clip_at_work():
-    with open_batch_reporter(TerminalReporter(io.StringIO()), clips=2) as table:
+    with open_batch_reporter(TerminalReporter(io.StringIO()), {"one.mp4": 8.0, "two.mp4": 4.0}) as table:
         table.hear("one.mp4", "1/8 split: starts (first run)")
         table.hear("two.mp4", "1/8 split: starts (first run)")
         table.hear("one.mp4", "2/8 keypoints: 30/60 frames")
-        assert list(table.draw().columns[0]._cells) == [Text("one.mp4"), Text("two.mp4")]
+        assert list(table.draw().columns[0]._cells) == [Text("one.mp4"), Text("two.mp4"), Text("batch", style="bold")]
         assert table.draw().columns[1]._cells[0] == Text("2/8 keypoints: 30/60 frames")
         table.end("one.mp4", "one.mp4: done")
-        assert list(table.draw().columns[0]._cells) == [Text("two.mp4")]
+        assert list(table.draw().columns[0]._cells) == [Text("two.mp4"), Text("batch", style="bold")]
+        assert table.draw().columns[1]._cells[1] == Text("1 of 2 clips")

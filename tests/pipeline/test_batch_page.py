@@ -62,12 +62,19 @@ def out(tmp_path_factory):
     page.add(ClipResult(jobs["eva"], 1, 1.0, "stage keypoints failed", {"stages": [failed]}))
     refused = {"name": "split", "status": "failed"}
     page.add(ClipResult(jobs["gone"], 2, 0.1, "stage split failed: /home/somebody/gone.mp4: no video in it", {"stages": [refused]}))
+    page.write()
     return out
+
+
+def write_page(folder, result):
+    page = BatchPage(folder, [result.job])
+    page.add(result)
+    page.write()
 
 
 def read_cards(page):
     """Clip -> text and HTML of its card, in the page's order."""
-    cards = re.findall(r'<li class="card">(.*?)</li>', page.read_text(), re.DOTALL)
+    cards = re.findall(r'<li class="card"[^>]*>(.*?)</li>', page.read_text(), re.DOTALL)
     texts = {unescape(re.search("<h3>(.*?)</h3>", card)[1]): card for card in cards}
     return {clip: (" ".join(unescape(re.sub("<[^>]+>", " ", card)).split()), card) for clip, card in texts.items()}
 
@@ -95,7 +102,7 @@ def test_every_link_leads_to_a_file_beside_the_page_and_nothing_tells_where_the_
 def test_a_clip_that_was_refused_does_not_show_the_other_avatar_in_its_folder(out, tmp_path):
     write_avatar(tmp_path / "ada-avatar", "ada.mp4", 0.97)
     job = ClipJob(Path("/elsewhere/ada.mp4"), tmp_path / "ada-avatar")
-    BatchPage(tmp_path, [job]).add(ClipResult(job, 2, 0.1, f"{tmp_path}/ada-avatar holds the avatar of /home/ada.mp4"))
+    write_page(tmp_path, ClipResult(job, 2, 0.1, f"{tmp_path}/ada-avatar holds the avatar of /home/ada.mp4"))
     text, html = read_cards(tmp_path / "batch.html")["ada.mp4"]
     assert "✕ Failed ada-avatar holds the avatar of /home/ada.mp4" in text and "<img" not in html and "href" not in html
 
@@ -105,7 +112,7 @@ def test_an_unreadable_report_costs_its_own_verdict_only(tmp_path):
     write_run(tmp_path / "old-avatar", "old.mp4", {"name": "train", "status": "ran"})
     (tmp_path / "old-avatar" / "report.html").write_bytes(b"\xff of another version")
     job = ClipJob(Path("/elsewhere/ada.mp4"), tmp_path / "ada-avatar")
-    BatchPage(tmp_path, [job]).add(ClipResult(job, 0, 1.0))
+    write_page(tmp_path, ClipResult(job, 0, 1.0))
     cards = read_cards(tmp_path / "batch.html")
     assert "`gsac report old-avatar` writes it" in cards["old.mp4"][0] and "✓ Good" in cards["ada.mp4"][0]
 
@@ -136,6 +143,13 @@ def test_everybody_can_read_the_page_and_its_avatars_turn_under_the_pointer(out,
         assert browser.picture()[int(y), int(x), 0] > 150 > browser.picture()[int(y), int(x), 1], "the front is red"
         browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         assert browser.run(f"getComputedStyle({front}).animationName") == "turn"
+        shown = "[...document.querySelectorAll('.card:not([hidden]) h3')].map(e => e.textContent)"
+        choose = ("((id, to) => {{let e = document.getElementById(id); e.value = to; e.dispatchEvent(new Event('input'))}})"
+                  "('{}', '{}');")
+        assert browser.run(choose.format("show", "failed") + shown)[:2] == ["eva.mp4", "gone.mp4"]
+        assert "ada.mp4" not in browser.run(shown)
+        by_name = browser.run(choose.format("show", "") + choose.format("sort", "clip") + shown)
+        assert by_name[:3] == ["ada.mp4", "bob.mp4", "eva.mp4"]
         assert not browser.errors and {address.partition(":")[0] for address in browser.requests} <= {"file", "data"}
     finally:
         browser.close()

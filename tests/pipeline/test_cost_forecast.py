@@ -11,7 +11,7 @@ from gsac.cache.publish import publish
 from gsac.cache.record import RunInfo
 from gsac.cache.store import Store
 from gsac.pipeline import cost_model
-from gsac.pipeline.cost_forecast import Forecast, Time, count_cores, foretell
+from gsac.pipeline.cost_forecast import Forecast, Forecaster, Time, count_cores
 from gsac.pipeline.cost_model import stage_cost
 from gsac.pipeline.footage import Footage
 from gsac.pipeline.keys import Keys
@@ -106,7 +106,7 @@ def tell(store: Store, tmp_path: Path, *sets: str, stages: list[str] = STAGES) -
     keys = Keys(PROJECT, resolve(PROJECT, None, ("split.count=4", "split.max_height=1280", *sets)), store)
     clip = tmp_path / "clip.webm"
     clip.touch()
-    return foretell([plan_waiting(name, []) for name in stages], keys, store, clip)
+    return Forecaster(keys, store).foretell([plan_waiting(name, []) for name in stages], clip)
 
 
 def test_the_first_run_goes_by_the_machine_that_was_measured(tmp_path):

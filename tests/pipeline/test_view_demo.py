@@ -24,6 +24,7 @@ from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.ply import ply_bytes
 from gsac.stages.export.spz import spz_bytes
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 from gsac.turntable import clip as turntable
 from gsac.viewer.page import page_bytes
 from support.figure import make_figure
@@ -126,9 +127,10 @@ def test_an_odd_request_is_answered_and_never_by_a_file(folder):
 def test_every_file_that_export_writes_is_served(folder):
     figure, export = make_figure(), folder / "export"
     gaussians = pose_gaussians(figure, figure.pose("T"))
+    surface = paint_surface(figure, *gaussians)
     splats = (*gaussians, figure.gaussians.rgb, figure.gaussians.opacity)
     written = {"viewer.html": page_bytes(avatar_bytes(figure)), "avatar.gsac": avatar_bytes(figure),
-               "avatar.glb": glb_bytes(figure, *gaussians), "avatar.fbx": avatar_fbx(figure, gaussians[0]),
+               "avatar.glb": glb_bytes(figure, surface, *gaussians), "avatar.fbx": avatar_fbx(figure, surface),
                "avatar.ply": ply_bytes(*splats), "avatar.spz": spz_bytes(*splats)}
     assert written.keys() == page_server.FILES.keys()
     (export / "viewer.html").unlink()

@@ -56,7 +56,7 @@ def spz(path):
 
 def glb_mesh(path):
     mesh = trimesh.load(io.BytesIO(path.read_bytes()), file_type="glb").geometry["body"]
-    return mesh.vertices, mesh.visual.vertex_attributes["color"][:, :3]
+    return mesh.vertices, mesh.visual.to_color().vertex_colors[:, :3] / 255
 
 
 def glb_points(path):
@@ -65,13 +65,13 @@ def glb_points(path):
 
 
 def fbx(path):
-    """assimp turns it into a PLY with colours."""
+    """assimp turns it into a glTF file with its picture inside."""
     if not shutil.which("assimp"):
         pytest.skip("needs assimp (Debian package assimp-utils)")
-    out = path.with_name("from_fbx.ply")
-    subprocess.run(["assimp", "export", path, out], check=True, capture_output=True)
-    mesh = trimesh.load(out, process=False)
-    return mesh.vertices, np.asarray(mesh.visual.vertex_colors)[:, :3] / 255
+    out = path.with_name("from_fbx.glb")
+    subprocess.run(["assimp", "export", path, out, "-fglb2"], check=True, capture_output=True)
+    mesh = trimesh.load(out, process=False).to_geometry()
+    return mesh.vertices, mesh.visual.to_color().vertex_colors[:, :3] / 255
 
 
 @pytest.mark.slow

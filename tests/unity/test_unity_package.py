@@ -124,7 +124,8 @@ def test_scripts_ask_for_resources_and_kernels_that_are_there(upm):
     source = "".join(content.decode() for path, content in upm.items() if path.startswith("Runtime/") and path.endswith(".cs"))
     for name in re.findall(r'Resources\.Load<\w+>\("([^"]+)"\)', source):
         assert any(path.startswith(f"Runtime/Resources/{name}.") and not path.endswith(".meta") for path in upm), name
-    kernels = set(re.findall(r"#pragma kernel (\w+)", upm["Runtime/Resources/Gsac/Gsac.compute"].decode()))
+    computes = "".join(content.decode() for path, content in upm.items() if path.endswith(".compute"))
+    kernels = set(re.findall(r"#pragma kernel (\w+)", computes))
     assert set(re.findall(r'FindKernel\("(\w+)"\)', source)) <= kernels
     shaders = "".join(content.decode() for path, content in upm.items() if path.startswith("Runtime/Resources/"))
     for name in re.findall(r'PropertyToID\("(\w+)"\)', source):

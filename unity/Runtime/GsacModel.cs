@@ -34,7 +34,18 @@ namespace Gsac
         /// <summary>Keys to sort at the finest level.</summary>
         public int KeyCount { get; private set; }
 
+        /// <summary>The body's mesh, for avatars that no importer gave one.</summary>
+        public Mesh Body
+        {
+            get
+            {
+                if (body == null) body = GsacMesh.Build(Data);
+                return body;
+            }
+        }
+
         readonly object source;
+        Mesh body;
         int users;
 
         GsacModel(object source, byte[] bytes)
@@ -61,6 +72,7 @@ namespace Gsac
         {
             if (--users > 0) return;
             Shared.Remove(source);
+            GsacCameras.Free(body);
             if (Rest == null) return;
             Rest.Dispose();
             Skin.Dispose();
@@ -108,9 +120,16 @@ namespace Gsac
                 };
             }
             foreach (Level level in Levels) KeyCount = Math.Max(KeyCount, level.Sort.KeyCount);
-            uint[] quads = GsacPacking.Quads(Math.Max(most, 1));
-            Quads = new GraphicsBuffer(GraphicsBuffer.Target.Index, quads.Length, 4);
-            Quads.SetData(quads);
+            Quads = Indices(Math.Max(most, 1));
+        }
+
+        /// <summary>Two triangles a splat, for `count` of them.</summary>
+        public static GraphicsBuffer Indices(int count)
+        {
+            uint[] quads = GsacPacking.Quads(count);
+            var indices = new GraphicsBuffer(GraphicsBuffer.Target.Index, quads.Length, 4);
+            indices.SetData(quads);
+            return indices;
         }
 
         /// <summary>width: numbers of four bytes an element. Unity knows no empty buffer.</summary>

@@ -5,8 +5,9 @@ using UnityEngine;
 namespace Gsac
 {
     /// <summary>
-    /// Draws a GsacAvatar, in every render pipeline: per frame skin and bind, per camera sort and one indexed draw among
-    /// the transparent things. All on the GPU: nothing is read back, nothing is allocated after the first frame.
+    /// Draws a GsacAvatar, in every render pipeline: skins and binds where the pose changed, for each camera that sees it sorts
+    /// where one of them moved, and one indexed draw among the transparent things. All on the GPU: nothing is read back,
+    /// nothing is allocated after the first frame.
     /// </summary>
     [AddComponentMenu("Gsac/Gsac Renderer")]
     [DisallowMultipleComponent]
@@ -15,7 +16,6 @@ namespace Gsac
     public sealed class GsacRenderer : MonoBehaviour
     {
         const int ThreadsPerGroup = 64;
-        const float Slack = 0.9f;
         static readonly int VertexCountId = Shader.PropertyToID("GsacVertexCount");
         static readonly int SplatCountId = Shader.PropertyToID("GsacSplatCount");
         static readonly int RestId = Shader.PropertyToID("GsacRest");
@@ -36,31 +36,45 @@ namespace Gsac
             Shader.PropertyToID("GsacLightRed"), Shader.PropertyToID("GsacLightGreen"), Shader.PropertyToID("GsacLightBlue"),
         };
 
-        /// <summary>Cameras beyond those of the scene; the editor adds its scene views.</summary>
-        public static readonly List<Camera> ExtraCameras = new List<Camera>();
-
-        static Camera[] cameras = new Camera[8];
-
-        [SerializeField, Tooltip("m: where coarser levels of detail begin, if the file does not say at which height; each doubling takes the next.")]
+        [SerializeField, Tooltip("m: where coarser levels of detail begin for a lens of 60 degrees, if the file does not say at which height; each doubling takes the next.")]
         float finestWithin = 8;
 
         [SerializeField, Tooltip("0..1: how far the avatar stands in the light of the room in which its clip was filmed; 0 is even light.")]
         float clipLight = 1;
+
+        [SerializeField, Tooltip("A material with the shader Gsac/Splats, for a render queue, stencil or depth test of its own; the package's where this is empty.")]
+        Material material;
+
+        [SerializeField, Tooltip("Multiplies the colours.")]
+        Color tint = Color.white;
+
+        [SerializeField, Tooltip("0..1: how much of the person is there; less fades her by pixels.")]
+        float opacity = 1;
+
+        [SerializeField, Tooltip("Whether the scene's fog lies over the person; not in HDRP.")]
+        bool fog = true;
 
         readonly List<GsacView> views = new List<GsacView>();
         GsacAvatar avatar;
         GsacModel model;
         ComputeShader kernels;
         int correctKernel, skinKernel, bindKernel;
-        Material material;
-        GraphicsBuffer bones, weights, posed, splats;
+        GraphicsBuffer bones, weights, posed;
+        GraphicsBuffer[] splats; // of each level
         GraphicsBuffer turns, bent; // null where the body has no pose correctives
         float[] turnRows;
         Vector4[] boneRows;
-        int drawn;
+        readonly Vector4[] light = new Vector4[3];
+        Vector4[] shownBones; // what `shape` stands for
+        float[] shownWeights;
+        readonly Vector4[] shownLight = new Vector4[3];
+        int shape; // counts the poses, weights and lights that were drawn
+        int skinned;
+        int[] bound; // the shape that each level was bound to
+        bool gathered;
         string trouble;
 
-        /// <summary>m: where an avatar begins to use coarser levels of detail, if its file does not say at which height in px.</summary>
+        /// <summary>m: where a lens of 60 degrees begins to see coarser levels of detail, if the file does not say at which height in px.</summary>
         public float FinestWithin
         {
             get { return finestWithin; }
@@ -74,13 +88,43 @@ namespace Gsac
             set { clipLight = value; }
         }
 
+        /// <summary>A material with the shader Gsac/Splats, for a render queue, stencil or depth test of its own; null: the package's.</summary>
+        public Material Material
+        {
+            get { return material; }
+            set { material = value; }
+        }
+
+        /// <summary>Multiplies the colours; its alpha counts for nothing.</summary>
+        public Color Tint
+        {
+            get { return tint; }
+            set { tint = value; }
+        }
+
+        /// <summary>0..1: how much of the person is there. Less fades her by pixels; at 0 she costs nothing.</summary>
+        public float Opacity
+        {
+            get { return opacity; }
+            set { opacity = value; }
+        }
+
+        /// <summary>Whether the scene's fog lies over the person; not in HDRP, whose fog knows no such things.</summary>
+        public bool Fog
+        {
+            get { return fog; }
+            set { fog = value; }
+        }
+
         void OnEnable()
         {
             trouble = null;
+            GsacCameras.Add(this);
         }
 
         void OnDisable()
         {
+            GsacCameras.Remove(this);
             Drop();
         }
 
@@ -93,7 +137,7 @@ namespace Gsac
             bones.Dispose();
             weights.Dispose();
             posed.Dispose();
-            splats.Dispose();
+            foreach (GraphicsBuffer buffer in splats) buffer.Dispose();
             if (bent != null)
             {
                 turns.Dispose();
@@ -104,30 +148,84 @@ namespace Gsac
 
         void LateUpdate()
         {
+            Refresh();
+        }
+
+        /// <summary>
+        /// Has the next camera take the joints anew. Each frame does; call it where a script turns joints after that and then
+        /// renders a camera by hand.
+        /// </summary>
+        public void Refresh()
+        {
+            gathered = false;
+        }
+
+        /// <summary>What this camera sees of the avatar, null where that is nothing; called just before the camera culls.</summary>
+        internal GsacView See(Camera camera)
+        {
             if (avatar == null) avatar = GetComponent<GsacAvatar>();
-            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null) return;
+            if (avatar == null || !avatar.isActiveAndEnabled || !avatar.CanOpen || trouble != null || opacity <= 0) return null;
             try
             {
-                if (!Ready()) return;
+                if (!Ready()) return null;
             }
             catch (GsacException e)
             {
                 Complain(e.Message);
-                return;
+                return null;
             }
-            int count = Cameras();
-            if (count == 0) return;
-            GsacSkeleton.Bones(model.Data, transform, avatar.Joints, boneRows);
-            GsacModel.Level level = model.Levels[Level(count)];
-            if (level.Count == 0) return;
-            Bind(level);
-            float low, high;
-            for (int i = 0; i < count; i++)
+            Gather();
+            GsacView view = View(camera);
+            if (!view.Look(transform, boneRows, model)) return null;
+            view.Choose(finestWithin, Finish());
+            return view.Level.Count > 0 ? view : null;
+        }
+
+        GsacFinish Finish()
+        {
+            Color shown = QualitySettings.activeColorSpace == ColorSpace.Linear ? tint.linear : tint;
+            return new GsacFinish
             {
-                if (!IsSeenBy(cameras[i])) continue;
-                GsacView view = View(cameras[i]);
-                if (view.Depths(transform, boneRows, model, out low, out high)) view.Draw(kernels, splats, level, model, transform, low, high);
+                Material = material != null ? material : GsacCameras.Material, Tint = new Vector4(shown.r, shown.g, shown.b, Mathf.Clamp(opacity, 0, 1)),
+                Fog = fog, Layer = gameObject.layer,
+            };
+        }
+
+        /// <summary>Takes the joints, weights and light of this frame; `shape` counts on where they differ from those before.</summary>
+        void Gather()
+        {
+            // nothing tells that somebody turns a joint in a scene that is edited
+            if (gathered && Application.isPlaying) return;
+            gathered = true;
+            GsacSkeleton.Bones(model.Data, transform, avatar.Joints, boneRows);
+            avatar.CollectWeights();
+            float lit = model.Data.Light == null ? 0 : Mathf.Clamp(clipLight, 0, 1);
+            for (int c = 0; c < 3; c++) light[c] = Light(c, lit);
+            bool same = Keep(boneRows, shownBones) & Keep(avatar.DrawnWeights, shownWeights) & Keep(light, shownLight);
+            if (!same) shape++;
+        }
+
+        /// <summary>Copies `now` to `kept`; whether they were equal.</summary>
+        static bool Keep(Vector4[] now, Vector4[] kept)
+        {
+            bool same = true;
+            for (int i = 0; i < now.Length; i++)
+            {
+                same &= now[i].x == kept[i].x && now[i].y == kept[i].y && now[i].z == kept[i].z && now[i].w == kept[i].w;
+                kept[i] = now[i];
             }
+            return same;
+        }
+
+        static bool Keep(float[] now, float[] kept)
+        {
+            bool same = true;
+            for (int i = 0; i < now.Length; i++)
+            {
+                same &= now[i] == kept[i];
+                kept[i] = now[i];
+            }
+            return same;
         }
 
         /// <summary>Buffers of the avatar that is there now. False where this device cannot draw it.</summary>
@@ -138,7 +236,7 @@ namespace Gsac
 
         bool Prepare()
         {
-            if (!SystemInfo.supportsComputeShaders || SystemInfo.maxComputeBufferInputsVertex < 3)
+            if (!SystemInfo.supportsComputeShaders || SystemInfo.maxComputeBufferInputsVertex < 4)
             {
                 Complain("this graphics API (" + SystemInfo.graphicsDeviceType + ") has no compute shaders or no buffers in vertex shaders;"
                          + " use Direct3D 11 or 12, Vulkan or Metal");
@@ -147,13 +245,19 @@ namespace Gsac
             Drop();
             model = avatar.Model;
             model.Upload();
-            int V = model.Data.VertexCount, most = 1;
-            foreach (GsacModel.Level level in model.Levels) most = Math.Max(most, level.Count);
+            int V = model.Data.VertexCount;
             bones = GsacModel.Empty(model.Data.JointCount * 3, 4);
             weights = GsacModel.Empty(model.Data.Expressions.Length, 1);
             posed = GsacModel.Empty(V, 4);
-            splats = GsacModel.Empty(most * 3, 4);
+            splats = new GraphicsBuffer[model.Levels.Length];
+            for (int n = 0; n < splats.Length; n++) splats[n] = GsacModel.Empty(model.Levels[n].Count * 3, 4);
             boneRows = new Vector4[model.Data.JointCount * 3];
+            shownBones = new Vector4[boneRows.Length];
+            shownWeights = new float[model.Data.Expressions.Length];
+            bound = new int[splats.Length];
+            skinned = 0;
+            shape = 1;
+            gathered = false;
             if (model.Data.Correctives != null)
             {
                 turns = GsacModel.Empty(model.Data.JointCount * 3, 4);
@@ -164,7 +268,6 @@ namespace Gsac
             correctKernel = kernels.FindKernel("Correct");
             skinKernel = kernels.FindKernel("Skin");
             bindKernel = kernels.FindKernel("Bind");
-            if (material == null) material = new Material(Resources.Load<Shader>("Gsac/GsacSplats")) { hideFlags = HideFlags.HideAndDontSave };
             return true;
         }
 
@@ -174,13 +277,22 @@ namespace Gsac
             Debug.LogError(name + ": the avatar cannot be drawn: " + what, this);
         }
 
-        void Bind(GsacModel.Level level)
+        /// <summary>Skins and binds what is not yet of this moment's shape, for the level that the view has chosen.</summary>
+        internal void Pose(GsacView view)
         {
-            avatar.CollectWeights();
+            int n = view.LevelNumber;
+            if (skinned != shape) Skin();
+            if (bound[n] != shape) Bind(view.Level, splats[n]);
+            skinned = bound[n] = shape;
+            view.Shape = shape;
+            view.Splats = splats[n];
+        }
+
+        void Skin()
+        {
             bones.SetData(boneRows);
             if (avatar.DrawnWeights.Length > 0) weights.SetData(avatar.DrawnWeights);
             kernels.SetInt(VertexCountId, model.Data.VertexCount);
-            kernels.SetInt(SplatCountId, level.Count);
             if (bent != null) Correct();
             kernels.SetBuffer(skinKernel, RestId, bent ?? model.Rest);
             kernels.SetBuffer(skinKernel, SkinId, model.Skin);
@@ -189,8 +301,12 @@ namespace Gsac
             kernels.SetBuffer(skinKernel, BonesId, bones);
             kernels.SetBuffer(skinKernel, PosedId, posed);
             kernels.Dispatch(skinKernel, Groups(model.Data.VertexCount), 1, 1);
-            float lit = model.Data.Light == null ? 0 : Mathf.Clamp(clipLight, 0, 1);
-            for (int c = 0; c < 3; c++) kernels.SetVector(LightIds[c], Light(c, lit));
+        }
+
+        void Bind(GsacModel.Level level, GraphicsBuffer splats)
+        {
+            kernels.SetInt(SplatCountId, level.Count);
+            for (int c = 0; c < 3; c++) kernels.SetVector(LightIds[c], light[c]);
             kernels.SetBuffer(bindKernel, CornersId, level.Corners);
             kernels.SetBuffer(bindKernel, LocalId, level.Local);
             kernels.SetBuffer(bindKernel, PosedId, posed);
@@ -228,58 +344,6 @@ namespace Gsac
             return (count + ThreadsPerGroup - 1) / ThreadsPerGroup;
         }
 
-        /// <summary>Fills `cameras` with those that are on; returns how many.</summary>
-        static int Cameras()
-        {
-            int most = Camera.allCamerasCount + ExtraCameras.Count;
-            if (cameras.Length < most) Grow(most * 2);
-            int count = Camera.GetAllCameras(cameras);
-            for (int i = 0; i < ExtraCameras.Count; i++)
-            {
-                if (ExtraCameras[i] != null) cameras[count++] = ExtraCameras[i];
-            }
-            return count;
-        }
-
-        static void Grow(int most)
-        {
-            cameras = new Camera[most];
-        }
-
-        bool IsSeenBy(Camera camera)
-        {
-            return (camera.cullingMask & (1 << gameObject.layer)) != 0;
-        }
-
-        /// <summary>
-        /// Level of detail for the camera that sees the person largest; the one of before while that is about where they change.
-        /// </summary>
-        int Level(int count)
-        {
-            if (!model.Data.HasHeights) return LevelByDistance(count);
-            float height = 0;
-            for (int i = 0; i < count; i++)
-            {
-                if (IsSeenBy(cameras[i])) height = Math.Max(height, View(cameras[i]).Height(transform, boneRows, model));
-            }
-            return drawn = Math.Min(Math.Max(drawn, model.Data.LevelAt(height / Slack)), model.Data.LevelAt(height));
-        }
-
-        /// <summary>As Level, of files that say no heights: for the nearest camera.</summary>
-        int LevelByDistance(int count)
-        {
-            float nearest = float.MaxValue;
-            for (int i = 0; i < count; i++) nearest = Math.Min(nearest, Vector3.Distance(cameras[i].transform.position, transform.position));
-            return drawn = Math.Min(Math.Max(drawn, LevelAt(nearest * Slack)), LevelAt(nearest));
-        }
-
-        int LevelAt(float distance)
-        {
-            int level = 0;
-            for (float within = finestWithin; level + 1 < model.Levels.Length && distance > within; within *= 2) level++;
-            return level;
-        }
-
         GsacView View(Camera camera)
         {
             for (int i = views.Count - 1; i >= 0; i--)
@@ -294,7 +358,7 @@ namespace Gsac
 
         GsacView NewView(Camera camera)
         {
-            var view = new GsacView(camera, material);
+            var view = new GsacView(camera, this);
             views.Add(view);
             return view;
         }

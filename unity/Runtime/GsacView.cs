@@ -1,113 +1,214 @@
 using System;
 using UnityEngine;
-using UnityEngine.Rendering;
 
 namespace Gsac
 {
     /// <summary>What one camera sees of one avatar: its own sorted order, its own draw, both eyes of a headset included.</summary>
     public sealed class GsacView : IDisposable
     {
-        static readonly int SplatCountId = Shader.PropertyToID("GsacSplatCount");
-        static readonly int IndexBitsId = Shader.PropertyToID("GsacIndexBits");
-        static readonly int SortStageId = Shader.PropertyToID("GsacSortStage");
-        static readonly int SortShiftId = Shader.PropertyToID("GsacSortShift");
-        static readonly int SortStridesId = Shader.PropertyToID("GsacSortStrides");
-        static readonly int DepthRangeId = Shader.PropertyToID("GsacDepthRange");
-        static readonly int DepthRowId = Shader.PropertyToID("GsacDepthRow");
-        static readonly int SplatsId = Shader.PropertyToID("GsacSplats");
-        static readonly int KeysId = Shader.PropertyToID("GsacKeys");
-        static readonly int ColoursId = Shader.PropertyToID("GsacColours");
-        static readonly int BlendId = Shader.PropertyToID("GsacBlend");
-        static readonly int KeepsEnergyId = Shader.PropertyToID("GsacKeepsEnergy");
-        static readonly int[] ModelIds =
-        {
-            Shader.PropertyToID("GsacModel0"), Shader.PropertyToID("GsacModel1"), Shader.PropertyToID("GsacModel2"),
-        };
-        static readonly string[] SortNames = { "SortBlocks", "SortAcross", "SortMerge" };
+        const float Slack = 0.9f;
+        const float UsualLens = 1.7320508f; // m11 of a projection that sees 60 degrees
 
         public readonly Camera Camera;
-        readonly Material material;
-        readonly MaterialPropertyBlock properties = new MaterialPropertyBlock();
-        readonly int[] sortKernels = new int[3];
-        GraphicsBuffer keys;
-        bool found;
-        Vector4 depthRow;
-        Bounds bounds;
+        public readonly GsacRenderer Renderer;
+        readonly GsacSorted sorted = new GsacSorted();
+        readonly Matrix4x4[] toEye = new Matrix4x4[2], lens = new Matrix4x4[2]; // of each eye: the avatar's space to the eye's, projection
+        readonly ComputeShader kernels;
+        int eyes;
+        int drawn; // level of before
 
-        public GsacView(Camera camera, Material material)
+        public GsacModel Model { get; private set; }
+        public GsacFinish Finish { get; private set; }
+
+        /// <summary>Of the splats, to the world.</summary>
+        public Matrix4x4 Space { get; private set; }
+
+        /// <summary>Depth of a point of the world before the camera: dot(xyz, point) + w.</summary>
+        public Vector4 WorldRow { get; private set; }
+
+        /// <summary>Depths that the avatar can have.</summary>
+        public GsacDepths Depths { get { return depths; } }
+        GsacDepths depths;
+
+        /// <summary>In the world.</summary>
+        public Bounds Bounds { get; private set; }
+
+        /// <summary>m from an eye to a joint.</summary>
+        public float Nearest { get; private set; }
+
+        public int LevelNumber { get; private set; }
+        public GsacModel.Level Level { get { return Model.Levels[LevelNumber]; } }
+        public bool CanBeCoarser { get { return LevelNumber + 1 < Model.Levels.Length; } }
+
+        /// <summary>The gaussians of the level, bound; and of which pose, other than 0.</summary>
+        public GraphicsBuffer Splats { get; internal set; }
+        public int Shape { get; internal set; }
+
+        public GsacView(Camera camera, GsacRenderer renderer)
         {
             Camera = camera;
-            this.material = material;
+            Renderer = renderer;
+            kernels = Resources.Load<ComputeShader>("Gsac/Gsac");
         }
 
         public void Dispose()
         {
-            if (keys != null) keys.Dispose();
-            keys = null;
+            sorted.Dispose();
         }
 
         /// <summary>
-        /// Nearest and farthest depth that the avatar can have for this camera's centre eye, from its joints alone.
-        /// False where all of it lies behind.
+        /// Takes where the camera is and how far the avatar can reach there, from its joints alone. False where no eye sees any of it.
         /// </summary>
-        public bool Depths(Transform root, Vector4[] bones, GsacModel model, out float low, out float high)
+        public bool Look(Transform root, Vector4[] bones, GsacModel model)
         {
-            Transform eye = Camera.transform;
-            Vector3 ahead = eye.forward, at = eye.position;
-            Matrix4x4 m = root.localToWorldMatrix;
-            depthRow = new Vector4(ahead.x * m.m00 + ahead.y * m.m10 + ahead.z * m.m20, ahead.x * m.m01 + ahead.y * m.m11 + ahead.z * m.m21,
-                                   ahead.x * m.m02 + ahead.y * m.m12 + ahead.z * m.m22,
-                                   ahead.x * (m.m03 - at.x) + ahead.y * (m.m13 - at.y) + ahead.z * (m.m23 - at.z));
-            float size = Mathf.Sqrt(depthRow.x * depthRow.x + depthRow.y * depthRow.y + depthRow.z * depthRow.z);
-            low = float.MaxValue;
-            high = float.MinValue;
-            Vector3 least = new Vector3(float.MaxValue, float.MaxValue, float.MaxValue), most = -least;
-            for (int j = 0; j < model.Data.JointCount; j++)
+            Model = model;
+            Matrix4x4 m = Space = root.localToWorldMatrix;
+            eyes = Camera.stereoEnabled ? 2 : 1;
+            WorldRow = new Vector4(0, 0, 0, 0);
+            for (int e = 0; e < eyes; e++)
             {
-                float radius = model.Extent.Radius[j];
+                var eye = (Camera.StereoscopicEye)e;
+                Matrix4x4 view = eyes == 2 ? Camera.GetStereoViewMatrix(eye) : Camera.worldToCameraMatrix;
+                WorldRow -= view.GetRow(2) * (1f / eyes); // of two eyes the middle
+                toEye[e] = view * m;
+                lens[e] = eyes == 2 ? Camera.GetStereoProjectionMatrix(eye) : Camera.projectionMatrix;
+            }
+            Vector4 w = WorldRow;
+            depths.Row = new Vector4(w.x * m.m00 + w.y * m.m10 + w.z * m.m20, w.x * m.m01 + w.y * m.m11 + w.z * m.m21,
+                                     w.x * m.m02 + w.y * m.m12 + w.z * m.m22, w.x * m.m03 + w.y * m.m13 + w.z * m.m23 + w.w);
+            Measure(bones, m);
+            if (!(depths.High > depths.Low)) return false;
+            for (int e = 0; e < eyes; e++)
+            {
+                if (Sees(lens[e] * toEye[e], bones)) return true;
+            }
+            return false;
+        }
+
+        /// <summary>Fills Depths, Nearest and Bounds.</summary>
+        void Measure(Vector4[] bones, Matrix4x4 m)
+        {
+            Vector4 row = depths.Row;
+            float size = Mathf.Sqrt(row.x * row.x + row.y * row.y + row.z * row.z);
+            float nearest = float.MaxValue;
+            depths.Low = float.MaxValue;
+            depths.High = float.MinValue;
+            Vector3 least = new Vector3(float.MaxValue, float.MaxValue, float.MaxValue), most = -least;
+            for (int j = 0; j < Model.Data.JointCount; j++)
+            {
+                Vector3 place = GsacSkeleton.Posed(Model.Data, bones, j);
+                for (int e = 0; e < eyes; e++) nearest = Math.Min(nearest, toEye[e].MultiplyPoint3x4(place).magnitude);
+                float radius = Model.Extent.Radius[j];
                 if (radius == 0) continue;
-                radius += model.Extent.Pad;
-                Vector3 place = GsacSkeleton.Posed(model.Data, bones, j);
-                float depth = depthRow.x * place.x + depthRow.y * place.y + depthRow.z * place.z + depthRow.w;
-                low = Math.Min(low, depth - radius * size);
-                high = Math.Max(high, depth + radius * size);
+                radius += Model.Extent.Pad;
+                float depth = row.x * place.x + row.y * place.y + row.z * place.z + row.w;
+                depths.Low = Math.Min(depths.Low, depth - radius * size);
+                depths.High = Math.Max(depths.High, depth + radius * size);
                 var ball = new Vector3(radius, radius, radius);
                 least = Vector3.Min(least, place - ball);
                 most = Vector3.Max(most, place + ball);
             }
-            bounds = WorldBounds(m, least, most);
+            Nearest = nearest;
+            Bounds = WorldBounds(m, least, most);
             // keys are spent on what lies before the eye
-            low = Math.Max(low, 0);
-            return high > low;
+            if (!IsFlat(lens[0])) depths.Low = Math.Max(depths.Low, 0);
+        }
+
+        static bool IsFlat(Matrix4x4 projection)
+        {
+            return projection.m33 > 0.5f;
+        }
+
+        /// <summary>Whether a ball about a joint reaches into the frustum's each plane. toClip: from the avatar's space.</summary>
+        bool Sees(Matrix4x4 toClip, Vector4[] bones)
+        {
+            Vector4 w = toClip.GetRow(3);
+            for (int side = 0; side < 6; side++)
+            {
+                Vector4 row = toClip.GetRow(side / 2);
+                float sign = side % 2 == 0 ? 1 : -1;
+                if (!Reaches(new Vector4(w.x + sign * row.x, w.y + sign * row.y, w.z + sign * row.z, w.w + sign * row.w), bones)) return false;
+            }
+            return true;
+        }
+
+        /// <summary>Whether some of the avatar lies before a plane.</summary>
+        bool Reaches(Vector4 plane, Vector4[] bones)
+        {
+            float size = Mathf.Sqrt(plane.x * plane.x + plane.y * plane.y + plane.z * plane.z);
+            for (int j = 0; j < Model.Data.JointCount; j++)
+            {
+                float radius = Model.Extent.Radius[j];
+                if (radius == 0) continue;
+                Vector3 place = GsacSkeleton.Posed(Model.Data, bones, j);
+                // what is not a number is seen
+                if (!(plane.x * place.x + plane.y * place.y + plane.z * place.z + plane.w < -(radius + Model.Extent.Pad) * size)) return true;
+            }
+            return false;
+        }
+
+        /// <summary>
+        /// Takes the level of detail by the person's height in this camera's picture; the one of before while that is about where they change.
+        /// finestWithin: m, for files that say no heights.
+        /// </summary>
+        public void Choose(float finestWithin, GsacFinish finish)
+        {
+            Finish = finish;
+            LevelNumber = drawn = Wanted(finestWithin);
+        }
+
+        int Wanted(float finestWithin)
+        {
+            if (Model.Data.HasHeights)
+            {
+                float height = Height();
+                return Math.Min(Math.Max(drawn, Model.Data.LevelAt(height / Slack)), Model.Data.LevelAt(height));
+            }
+            float distance = Distance();
+            int most = Model.Levels.Length - 1;
+            return Math.Min(Math.Max(drawn, LevelAt(distance * Slack, finestWithin, most)), LevelAt(distance, finestWithin, most));
+        }
+
+        /// <summary>Takes the next coarser level this time.</summary>
+        public void Coarsen()
+        {
+            LevelNumber++;
+        }
+
+        static int LevelAt(float distance, float finestWithin, int most)
+        {
+            int level = 0;
+            for (float within = finestWithin; level < most && distance > within; within *= 2) level++;
+            return level;
         }
 
         /// <summary>
         /// Height of the person in the camera's picture, px: of the rest mesh, where the joint nearest to the eye is. Of the
         /// two eyes of a headset the larger.
         /// </summary>
-        public float Height(Transform root, Vector4[] bones, GsacModel model)
+        float Height()
         {
-            Matrix4x4 m = root.localToWorldMatrix;
-            if (!Camera.stereoEnabled) return Height(Camera.projectionMatrix, Camera.worldToCameraMatrix * m, bones, model);
-            return Math.Max(Height(Camera.StereoscopicEye.Left, m, bones, model), Height(Camera.StereoscopicEye.Right, m, bones, model));
-        }
-
-        float Height(Camera.StereoscopicEye eye, Matrix4x4 m, Vector4[] bones, GsacModel model)
-        {
-            return Height(Camera.GetStereoProjectionMatrix(eye), Camera.GetStereoViewMatrix(eye) * m, bones, model);
-        }
-
-        float Height(Matrix4x4 projection, Matrix4x4 toEye, Vector4[] bones, GsacModel model)
-        {
-            float size = Mathf.Sqrt(toEye.m01 * toEye.m01 + toEye.m11 * toEye.m11 + toEye.m21 * toEye.m21);
-            float height = Math.Abs(projection.m11) * Camera.pixelHeight / 2 * size * model.Extent.Stature;
-            if (Camera.orthographic) return height;
-            float nearest = float.MaxValue;
-            for (int j = 0; j < model.Data.JointCount; j++)
+            float largest = 0;
+            for (int e = 0; e < eyes; e++)
             {
-                nearest = Math.Min(nearest, toEye.MultiplyPoint3x4(GsacSkeleton.Posed(model.Data, bones, j)).magnitude);
+                Matrix4x4 m = toEye[e];
+                float size = Mathf.Sqrt(m.m01 * m.m01 + m.m11 * m.m11 + m.m21 * m.m21);
+                float height = Math.Abs(lens[e].m11) * Camera.pixelHeight / 2 * size * Model.Extent.Stature;
+                largest = Math.Max(largest, IsFlat(lens[e]) ? height : height / Nearest);
             }
-            return height / nearest;
+            return largest;
+        }
+
+        /// <summary>m: from where a lens of 60 degrees would show the person as large. Of the two eyes of a headset the nearer.</summary>
+        float Distance()
+        {
+            float least = float.MaxValue;
+            for (int e = 0; e < eyes; e++)
+            {
+                float away = IsFlat(lens[e]) ? 1 : toEye[e].MultiplyPoint3x4(Vector3.zero).magnitude;
+                least = Math.Min(least, away * UsualLens / Math.Abs(lens[e].m11));
+            }
+            return least;
         }
 
         static Bounds WorldBounds(Matrix4x4 m, Vector3 least, Vector3 most)
@@ -119,56 +220,11 @@ namespace Gsac
             return new Bounds(m.MultiplyPoint3x4((most + least) * 0.5f), extents * 2);
         }
 
-        /// <summary>Sorts for this camera and asks Unity to draw.</summary>
-        public void Draw(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, GsacModel model, Transform root, float low, float high)
+        /// <summary>Sorts for this camera where that is not done, and asks Unity to draw the avatar by itself.</summary>
+        public void Draw()
         {
-            if (keys == null || keys.count != model.KeyCount) Resize(model.KeyCount);
-            Sort(kernels, splats, level, low, high);
-            Matrix4x4 m = root.localToWorldMatrix;
-            for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], m.GetRow(r));
-            bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
-            properties.SetVector(BlendId, new Vector4(model.Data.LowPass, model.Data.AlphaMax, model.Data.AlphaMin, linear ? 1 : 0));
-            properties.SetInteger(KeepsEnergyId, model.Data.KeepsEnergy ? 1 : 0);
-            properties.SetInteger(IndexBitsId, level.Sort.IndexBits);
-            properties.SetBuffer(SplatsId, splats);
-            properties.SetBuffer(ColoursId, level.Colours);
-            properties.SetBuffer(KeysId, keys);
-            var draw = new RenderParams(material)
-            {
-                camera = Camera, worldBounds = bounds, matProps = properties, layer = root.gameObject.layer,
-                shadowCastingMode = ShadowCastingMode.Off, receiveShadows = false,
-            };
-            Graphics.RenderPrimitivesIndexed(draw, MeshTopology.Triangles, model.Quads, level.Count * 6);
-        }
-
-        void Resize(int count)
-        {
-            Dispose();
-            keys = GsacModel.Empty(count, 1);
-        }
-
-        void Sort(ComputeShader kernels, GraphicsBuffer splats, GsacModel.Level level, float low, float high)
-        {
-            if (!found)
-            {
-                for (int i = 0; i < 3; i++) sortKernels[i] = kernels.FindKernel(SortNames[i]);
-                found = true;
-            }
-            kernels.SetInt(SplatCountId, level.Count);
-            kernels.SetInt(IndexBitsId, level.Sort.IndexBits);
-            kernels.SetVector(DepthRangeId, new Vector4(low, 1 / (high - low), 0, 0));
-            kernels.SetVector(DepthRowId, depthRow);
-            kernels.SetBuffer(sortKernels[(int)GsacSortKernel.Blocks], SplatsId, splats);
-            GsacSortStep[] steps = level.Sort.Steps;
-            for (int i = 0; i < steps.Length; i++)
-            {
-                int kernel = sortKernels[(int)steps[i].Kernel];
-                kernels.SetInt(SortStageId, steps[i].Stage);
-                kernels.SetInt(SortShiftId, steps[i].Shift);
-                kernels.SetInt(SortStridesId, steps[i].Strides);
-                kernels.SetBuffer(kernel, KeysId, keys);
-                kernels.Dispatch(kernel, steps[i].Groups, 1, 1);
-            }
+            sorted.Sort(kernels, Splats, Level.Count, Level.Sort, Model.KeyCount, depths, Shape, LevelNumber);
+            sorted.Draw(Camera, Finish, Model.Data, Space, Splats, Level.Colours, Model.Quads, Level.Count, Level.Sort, Bounds);
         }
     }
 }

@@ -1,5 +1,6 @@
 """avatar.fbx read back by three independent readers: ufbx, assimp and three's loader, which also poses it."""
 
+import io
 import json
 import re
 import shutil
@@ -8,9 +9,11 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 
 UFBX = """
 import json, sys
@@ -24,7 +27,8 @@ print(json.dumps(QUESTION), flush=True)
 QUESTIONS = {
     "vertices": "[xyz(mesh.vertices[i]) for i in range(mesh.num_vertices)]",
     "faces": "[mesh.vertex_indices[i] for i in range(mesh.num_indices)]",
-    "colours": "[xyz(mesh.vertex_color.values[mesh.vertex_color.indices[i]]) for i in range(mesh.num_indices)]",
+    "uv": "[[v.x, v.y] for i in range(mesh.num_indices) for v in [mesh.vertex_uv.values[mesh.vertex_uv.indices[i]]]]",
+    "picture": "list(bytes(scene.materials[0].fbx.diffuse_color.texture.content))",
     "normals": "[xyz(mesh.vertex_normal.values[mesh.vertex_normal.indices[i]]) for i in range(mesh.num_indices)]",
     "clusters": "{c.bone_node.name: [list(c.vertices), list(c.weights)] for c in skin.clusters}",
     "to_bone": "{c.bone_node.name: xyz(c.geometry_to_bone.c3) for c in skin.clusters}",
@@ -41,6 +45,7 @@ import * as THREE from 'three';
 import { FBXLoader } from 'three/examples/jsm/loaders/FBXLoader.js';
 import fs from 'fs';
 globalThis.window = globalThis;
+globalThis.document = { createElementNS: () => new EventTarget() };  // node decodes no pictures
 const bytes = fs.readFileSync('avatar.fbx'), times = JSON.parse(process.argv[2]);
 const scene = new FBXLoader().parse(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), '');
 let mesh = null;
@@ -72,8 +77,13 @@ KEYS = (0, 4, 9)
 
 
 @pytest.fixture(scope="module")
-def fbx(figure):
-    return avatar_fbx(figure, pose_gaussians(figure, figure.pose("T"))[0])
+def surface(figure):
+    return paint_surface(figure, *pose_gaussians(figure, figure.pose("T")))
+
+
+@pytest.fixture(scope="module")
+def fbx(figure, surface):
+    return avatar_fbx(figure, surface)
 
 
 @pytest.fixture(scope="module")
@@ -116,10 +126,11 @@ def test_mesh_weights_and_skeleton_are_exact(figure, read):
     assert read["metres"] == 1
 
 
-def test_the_left_hand_is_red_on_the_left_and_normals_look_outwards(figure, read):
-    corners = figure.faces.reshape(-1)
-    x = (figure.vertices[corners])[:, 0]
-    colours, normals = np.array(read["colours"]), np.array(read["normals"])
+def test_the_left_hand_is_red_on_the_left_in_the_picture_inside_and_normals_look_outwards(figure, surface, read):
+    assert bytes(read["picture"]) == surface.jpeg
+    picture = np.asarray(Image.open(io.BytesIO(bytes(read["picture"]))).convert("RGB"), float)[::-1] / 255
+    column, row = (np.reshape(read["uv"], (-1, 3, 2)).mean(1) * picture.shape[:2]).astype(int).T
+    x, colours, normals = figure.vertices[figure.faces].mean(1)[:, 0], picture[row, column], np.array(read["normals"])
     assert colours[x > .74].mean(0)[0] > .6 > 4 * colours[x > .74].mean(0)[2]
     assert colours[x < -.74].mean(0)[2] > .6 > 4 * colours[x < -.74].mean(0)[0]
     v = figure.vertices[figure.faces]
@@ -136,13 +147,13 @@ def test_expressions_are_blend_shapes_by_name(figure, read):
         figure.expression_names, np.diff(figure.expression_start), strict=True)}
 
 
-def test_assimp_opens_it_with_all_bones_and_takes(figure, path):
+def test_assimp_opens_it_with_all_bones_and_takes(figure, surface, path):
     if not shutil.which("assimp"):
         pytest.skip("needs assimp (Debian package assimp-utils)")
     said = subprocess.run(["assimp", "info", path], capture_output=True, text=True, check=True).stdout
     found = dict(re.findall(r"^(Meshes|Animations|Vertices|Faces|Bones): +(\d+)", said, re.MULTILINE))
-    assert found == {"Meshes": "1", "Animations": "2", "Vertices": str(len(figure.vertices)), "Faces": str(len(figure.faces)),
-                     "Bones": "55"}
+    assert 1 <= int(found.pop("Vertices")) / len(surface.vertex) < 1.02, "it joins corners that share all their values"
+    assert found == {"Meshes": "1", "Animations": "2", "Faces": str(len(figure.faces)), "Bones": "55"}
     low, high = (np.array(re.search(rf"{which} point +\((.*)\)", said)[1].split(), float) for which in ("Minimum", "Maximum"))
     size = figure.vertices - (0, figure.ground, 0)
     np.testing.assert_allclose([low, high], [size.min(0), size.max(0)], atol=1e-5)
@@ -173,10 +184,9 @@ def test_threes_loader_poses_it_as_the_avatar(figure, fbx, node_package):
             np.testing.assert_allclose(got, want[corners], atol=2e-4)
 
 
-def test_same_input_same_bytes_and_no_expression_no_clip_is_a_file_too(figure, fbx, tmp_path):
+def test_same_input_same_bytes_and_no_expression_no_clip_is_a_file_too(figure, surface, fbx):
     from dataclasses import replace
-    means = pose_gaussians(figure, figure.pose("T"))[0]
-    assert avatar_fbx(figure, means) == fbx
+    assert avatar_fbx(figure, surface) == fbx
     bare = replace(figure, expression_names=[], expression_start=np.zeros(1, np.int32), expression_vertex=np.empty(0, np.int32),
                    expression_delta=np.empty((0, 3), np.float32), jaw_actions=np.empty((0, 3), np.float32), clips={})
-    assert b"BlendShape" not in avatar_fbx(bare, means) and len(avatar_fbx(bare, means)) < len(fbx)
+    assert b"BlendShape" not in avatar_fbx(bare, surface) and len(avatar_fbx(bare, surface)) < len(fbx)

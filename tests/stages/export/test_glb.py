@@ -8,24 +8,36 @@ import subprocess
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.stages.export.glb import glb_bytes
+from gsac.stages.export.glb import glb_bytes, splats_glb_bytes
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 
 VALIDATOR = "gltf-validator@2.0.0-dev.3.10"
 KNOWN_FALSE = {f"/meshes/1/primitives/0/attributes/KHR_gaussian_splatting:{n}"
                for n in ("ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0")}
 """The validator does not know the extension and calls its attributes badly named."""
 TYPES = {5126: "<f4", 5123: "<u2", 5125: "<u4", 5121: "u1"}
-WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 @pytest.fixture(scope="module")
-def glb(figure):
-    return glb_bytes(figure, *pose_gaussians(figure, figure.pose("T")))
+def rest(figure):
+    return pose_gaussians(figure, figure.pose("T"))
+
+
+@pytest.fixture(scope="module")
+def surface(figure, rest):
+    return paint_surface(figure, *rest)
+
+
+@pytest.fixture(scope="module")
+def glb(figure, surface, rest):
+    return glb_bytes(figure, surface, *rest)
 
 
 class Gltf:
@@ -91,7 +103,7 @@ def test_joints_rest_without_rotation_and_inverse_bind_matrices_undo_them(figure
     np.testing.assert_allclose(gltf.skinned(0, {}, {}), gltf.attributes(0)["POSITION"], atol=1e-6)
 
 
-def test_every_key_of_every_clip_poses_the_mesh_as_the_avatar_does(figure, gltf):
+def test_every_key_of_every_clip_poses_the_mesh_as_the_avatar_does(figure, surface, gltf):
     for animation in gltf.doc["animations"]:
         clip = figure.clips[animation["name"]]
         for key in (0, len(clip.rotation) // 3, len(clip.rotation)):
@@ -104,7 +116,7 @@ def test_every_key_of_every_clip_poses_the_mesh_as_the_avatar_does(figure, gltf)
             pose = np.zeros((55, 3), np.float32)
             pose[[figure.joint_names.index(j) for j in clip.joints]] = clip.rotation[key % len(clip.rotation)]
             expected = figure.posed(pose) + clip.transl[key % len(clip.rotation)] - (0, figure.ground, 0)
-            np.testing.assert_allclose(gltf.skinned(0, rotations, translations), expected, atol=2e-5)
+            np.testing.assert_allclose(gltf.skinned(0, rotations, translations), expected[surface.vertex], atol=2e-5)
 
 
 def test_points_are_the_gaussians_in_linear_units(figure, gltf):
@@ -134,40 +146,66 @@ def test_points_keep_the_rules_of_the_extensions_release_candidate(figure, gltf)
     np.testing.assert_allclose(np.linalg.norm(a["ROTATION"], axis=1), 1, atol=1e-5)
     assert a["SCALE"].min() >= 0 and a["OPACITY"].min() >= 0 and a["OPACITY"].max() <= 1
     np.testing.assert_allclose(a["SH_DEGREE_0_COEF_0"] * .2820947917738781 + .5, figure.gaussians.rgb, atol=1e-6)
-    node = gltf.doc["nodes"][gltf.node["gaussians"]]
-    assert not {"scale", "matrix", "rotation"} & node.keys()
 
 
-def test_points_move_with_the_skin(figure, gltf):
-    elbow = gltf.node["left_elbow"]
-    turned = gltf.skinned(1, {elbow: Rotation.from_rotvec([0, -1.2, 0]).as_quat()}, {})
-    moved = np.linalg.norm(turned - gltf.attributes(1)["POSITION"], axis=1) > 0.05
-    assert moved.any() and (gltf.attributes(1)["POSITION"][moved, 0] > 0.4).all()
+def test_what_is_shown_is_one_person_and_the_gaussians_are_a_mesh_that_no_node_shows(gltf):
+    assert len(gltf.doc["scenes"]) == 1, "PlayCanvas shows all scenes"
+    assert [n["name"] for n in gltf.doc["nodes"] if "mesh" in n] == ["body"], "Blender shows nodes that are in no scene"
+    assert [mesh["name"] for mesh in gltf.doc["meshes"]] == ["body", "gaussians"]
+
+
+def test_a_file_of_the_gaussians_alone_holds_the_same_and_shows_them(figure, rest, gltf):
+    alone = Gltf(splats_glb_bytes(figure, *rest))
+    assert alone.doc["nodes"] == [{"name": "gaussians", "mesh": 0}] and alone.doc["scenes"][0]["nodes"] == [0]
+    assert alone.doc["meshes"][0]["primitives"][0]["extensions"] == gltf.doc["meshes"][1]["primitives"][0]["extensions"]
+    assert alone.doc["extensionsUsed"] == ["KHR_gaussian_splatting"]
+    for name, values in gltf.attributes(1).items():
+        np.testing.assert_array_equal(alone.attributes(0)[name], values)
 
 
 def test_left_hand_is_on_the_left_and_red_in_mesh_and_points(gltf):
-    for mesh in (0, 1):
-        a = gltf.attributes(mesh)
-        hand = a["POSITION"][:, 0] > 0.72
+    for places, colours in (painted(gltf), (gltf.attributes(1)["POSITION"], gltf.attributes(1)["COLOR_0"])):
+        hand = places[:, 0] > 0.72
         assert hand.any()
-        mean = a["COLOR_0"][hand, :3].mean(0)
+        mean = colours[hand, :3].mean(0)
         assert mean[0] > 0.5 and mean[1] < 0.15 and mean[2] < 0.15
     toes = gltf.attributes(0)["POSITION"][gltf.attributes(0)["POSITION"][:, 1] < 0.03]
     assert toes[:, 2].max() > 0.1, "faces +z"
 
 
+def painted(gltf):
+    """Centres of the mesh's faces, and the picture's linear colours there."""
+    material = gltf.doc["materials"][gltf.doc["meshes"][0]["primitives"][0]["material"]]["pbrMetallicRoughness"]
+    image = gltf.doc["images"][gltf.doc["textures"][material["baseColorTexture"]["index"]]["source"]]
+    view = gltf.doc["bufferViews"][image["bufferView"]]
+    raw = gltf.bin[view["byteOffset"]:view["byteOffset"] + view["byteLength"]]
+    picture = np.asarray(Image.open(io.BytesIO(raw)).convert("RGB"), float) / 255
+    corners = gltf.array(gltf.doc["meshes"][0]["primitives"][0]["indices"]).reshape(-1, 3)
+    a = gltf.attributes(0)
+    column, row = (a["TEXCOORD_0"][corners].mean(1) * picture.shape[:2]).astype(int).T
+    return a["POSITION"][corners].mean(1), picture[row, column] ** 2.2
+
+
+def test_the_mesh_is_coloured_by_its_picture_alone(gltf):
+    assert "COLOR_0" not in gltf.attributes(0), "readers multiply vertex colours and picture"
+
+
 def test_the_52_expressions_of_arkit_are_morph_targets_and_move_the_mesh_as_the_avatar_s_do(exported):
     avatar, gltf = RiggedAvatar.read(exported / "avatar.gsac"), Gltf((exported / "avatar.glb").read_bytes())
     mesh = gltf.doc["meshes"][0]
+    vertex = paint_surface(avatar, *pose_gaussians(avatar, avatar.pose("T"))).vertex
     names, targets = mesh["extras"]["targetNames"], mesh["primitives"][0]["targets"]
     assert names == avatar.expression_names and len(names) == len(targets) == len(mesh["weights"]) == 52
     assert {"jawOpen", "eyeBlinkLeft", "mouthSmileRight", "tongueOut"} <= set(names)
     for e, target in enumerate(targets):
         rows, values = gltf.sparse(target["POSITION"])
         span = slice(*avatar.expression_start[e:e + 2])
-        order = np.argsort(avatar.expression_vertex[span])
-        np.testing.assert_array_equal(rows, avatar.expression_vertex[span][order])
-        np.testing.assert_allclose(values, avatar.expression_delta[span][order], atol=1e-5)
+        want = np.zeros_like(avatar.vertices)
+        want[avatar.expression_vertex[span]] = avatar.expression_delta[span]
+        got = np.zeros((len(vertex), 3))
+        got[rows] = values
+        np.testing.assert_allclose(got, want[vertex], atol=1e-5)
+        assert (np.diff(rows.astype(int)) > 0).all(), "glTF wants ascending indices"
     assert "targets" not in gltf.doc["meshes"][1]["primitives"][0], "gaussians follow faces, which glTF cannot say"
 
 
@@ -214,7 +252,7 @@ console.log(JSON.stringify(out));
 
 
 @pytest.mark.slow
-def test_expressions_are_morph_targets_that_threes_loader_moves(figure, glb, node_package):
+def test_expressions_are_morph_targets_that_threes_loader_moves(figure, surface, glb, node_package):
     folder = node_package(THREE)
     (folder / "avatar.glb").write_bytes(glb)
     (folder / "morph.mjs").write_text(LOOK)
@@ -223,7 +261,7 @@ def test_expressions_are_morph_targets_that_threes_loader_moves(figure, glb, nod
     seen = json.loads(done.stdout.splitlines()[-1])
     assert seen["names"] == {name: e for e, name in enumerate(figure.expression_names)}
     rest = figure.vertices - np.float32([0, figure.ground, 0])
-    np.testing.assert_allclose(seen["rest"], rest, atol=1e-6)
+    np.testing.assert_allclose(seen["rest"], rest[surface.vertex], atol=1e-6)
     span = slice(figure.expression_start[0], figure.expression_start[1])
     rest[figure.expression_vertex[span]] += 0.5 * figure.expression_delta[span]
-    np.testing.assert_allclose(seen["jawOpen"], rest, atol=1e-6)
+    np.testing.assert_allclose(seen["jawOpen"], rest[surface.vertex], atol=1e-6)

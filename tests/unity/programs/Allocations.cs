@@ -20,6 +20,8 @@ public static class Allocations
         }
         var waiting = new Queue<MethodBase>();
         var seen = new HashSet<MethodBase>();
+        waiting.Enqueue(typeof(Gsac.GsacCameras).GetMethod("Draw", All, null, new[] { typeof(Camera) }, null));
+        Console.WriteLine("frame GsacCameras.Draw");
         foreach (Type type in package.GetTypes())
         {
             if (!typeof(MonoBehaviour).IsAssignableFrom(type)) continue;

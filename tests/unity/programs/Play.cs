@@ -17,7 +17,7 @@ public static class Play
         CultureInfo.DefaultThreadCurrentCulture = CultureInfo.CurrentCulture = new CultureInfo("de-DE"); // commas for points
         switch (args[0])
         {
-            case "frame": Frame(args[1], args[2], args[3]); break;
+            case "frame": Frame(args[1], args[2], args[3], args.Length > 4 ? args[4] : null); break;
             case "sort": Sort(args); break;
             case "pose": Pose(args[1], args[2], args[3]); break;
             case "allocations": Allocations.Print(typeof(GsacAvatar).Assembly, args); break;
@@ -32,12 +32,19 @@ public static class Play
             case "inspector": Inspector(args[1]); break;
             case "demo": Demo(args[1]); break;
             case "life": Life(args[1]); break;
-            default: return 2;
+            case "cameras": Drawing.Cameras(args[1]); break;
+            case "zoom": Drawing.Zoom(args[1]); break;
+            case "finish": Drawing.Finish(args[1]); break;
+            case "crowd": Crowd.Print(args); break;
+            case "crowds": Crowd.Count(args[1]); break;
+            case "repeated": Drawing.Repeated(args[1]); break;
+            case "freed": Drawing.Freed(args[1]); break;
+            default: return Drive.Run(args);
         }
         return 0;
     }
 
-    static float[] Numbers(string path)
+    public static float[] Numbers(string path)
     {
         string[] words = File.ReadAllText(path).Split(new[] { ' ', '\n' }, StringSplitOptions.RemoveEmptyEntries);
         return Array.ConvertAll(words, w => float.Parse(w, CultureInfo.InvariantCulture));
@@ -51,7 +58,7 @@ public static class Play
     }
 
     /// <summary>numbers: 165 of SMPL-X's pose, 3 of transl, the weights.</summary>
-    static GsacAvatar Posed(string file, float[] numbers)
+    public static GsacAvatar Posed(string file, float[] numbers)
     {
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
         avatar.SetSmplx(Part(numbers, 0, 3), Part(numbers, 3, 63), Part(numbers, 75, 45), Part(numbers, 120, 45), Part(numbers, 66, 3),
@@ -62,10 +69,17 @@ public static class Play
         return avatar;
     }
 
-    /// <summary>One frame: every buffer, dispatch and draw, to be run on a GPU by the test.</summary>
-    static void Frame(string file, string numbers, string path)
+    /// <summary>One frame: every buffer, dispatch and draw, to be run on a GPU by the test. shape: what alone a clip of Unity's moves, to 0.6.</summary>
+    static void Frame(string file, string numbers, string path, string shape)
     {
         GsacAvatar avatar = Posed(file, Numbers(numbers));
+        if (shape != null)
+        {
+            avatar.ClearExpressions();
+            var clip = new AnimationClip();
+            clip.SetCurve("Body", typeof(SkinnedMeshRenderer), "blendShape." + shape, new AnimationCurve(new Keyframe(0, 0, 0, 100), new Keyframe(1, 100, 100, 0)));
+            clip.SampleAnimation(avatar.gameObject, 0.6f);
+        }
         avatar.transform.localPosition = new Vector3(0.4f, 0.1f, -0.7f);
         avatar.transform.localRotation = Quaternion.Euler(5, 40, -3);
         avatar.transform.localScale = new Vector3(1.2f, 1.2f, 1.2f);
@@ -168,8 +182,12 @@ public static class Play
         Player.AddCamera("second eye").transform.SetPositionAndRotation(new Vector3(0, 1, 9), Quaternion.Euler(0, 180, 0));
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
+        var reach = avatar.gameObject.AddComponent<GsacReach>();
+        foreach (GsacEnd end in GsacLimb.Ends) reach.SetGoal(end, camera.transform);
+        reach.Turn = true;
         Action frame = Player.Frame(new[] { avatar.gameObject });
         var message = new GsacPoseMessage(avatar.Data);
+        var heard = new GsacLivePose(avatar.Data);
         byte[] osc = Bundle(Osc("/gsac/joint/left_knee", 0.1f, 0, 0), Osc("/gsac/expression/jawOpen", 0.25f), Osc("/other", 1));
         byte[] text = Encoding.UTF8.GetBytes("{\"joints\":{\"left_elbow\":[0.1,-1.25e-1,0]},\"expression\":{\"jawOpen\":0.5},\"other\":[1,{\"a\":\"b\"}]}");
         foreach (GsacSource source in new[] { GsacSource.Animator, GsacSource.Script, GsacSource.Clip })
@@ -183,7 +201,7 @@ public static class Play
             {
                 camera.transform.SetPositionAndRotation(new Vector3(0, 1, 3 + i * 1e-4f), Quaternion.Euler(0, 180, 0));
                 byte[] sent = i % 2 == 0 ? text : osc;
-                if (message.Read(sent, sent.Length, avatar.Pose, avatar.Weights) == GsacMessageFault.None) understood++;
+                if (message.Read(sent, sent.Length, heard) == GsacMessageFault.None) understood++;
                 frame();
             }
             Console.WriteLine(source + " " + draws + " " + understood + " " + (GC.CollectionCount(0) - before));
@@ -220,24 +238,15 @@ public static class Play
         var empty = new GameObject("empty").AddComponent<GsacAvatar>();
         new GsacAvatarEditor { target = empty }.OnInspectorGUI();
 
-        System.Runtime.CompilerServices.RuntimeHelpers.RunClassConstructor(typeof(GsacImporter).Assembly.GetType("Gsac.GsacSceneViews").TypeHandle);
         var eye = new GameObject("scene view").AddComponent<Camera>();
         eye.transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
-        var view = new UnityEditor.SceneView { camera = eye };
-        int asked0 = Player.UpdatesAsked;
-        view.Draw();
-        view.Draw();
-        int still = Player.UpdatesAsked - asked0;
-        eye.transform.SetPositionAndRotation(new Vector3(0, 1, 5), Quaternion.Euler(0, 180, 0));
-        view.Draw();
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
-        Action frame = Player.Frame(new[] { avatar.gameObject });
-        frame();
+        eye.Render();
         avatar.enabled = false;
         Player.Call(avatar, "OnDisable");
-        frame();
-        Console.WriteLine("draws " + draws + " updates " + still + " " + (Player.UpdatesAsked - asked0));
+        eye.Render();
+        Console.WriteLine("draws " + draws);
     }
 
     /// <summary>The demo scene as its file describes it, opened and played; the user presses buttons, drags and turns the wheel.</summary>
@@ -310,8 +319,8 @@ public static class Play
             float focal = float.Parse(args[i + 1], CultureInfo.InvariantCulture);
             string how = args[i + 3];
             camera.transform.SetPositionAndRotation(new Vector3(0, 1, float.Parse(args[i], CultureInfo.InvariantCulture)), Quaternion.Euler(0, 180, 0));
-            camera.projectionMatrix = new Matrix4x4 { m00 = focal, m11 = focal };
-            camera.orthographic = how == "flat";
+            camera.projectionMatrix = how == "flat" ? new Matrix4x4 { m00 = focal, m11 = focal, m22 = -1e-4f, m33 = 1 }
+                : new Matrix4x4 { m00 = focal, m11 = focal, m22 = -1, m23 = -0.02f, m32 = -1 };
             Player.SetPixelHeight(camera, int.Parse(args[i + 2]));
             Player.SetEyes(camera, how == "left" ? new[] { focal, focal / 2 } : how == "right" ? new[] { focal / 2, focal } : null);
             camera.cullingMask = how == "hidden" ? 0 : -1;
@@ -369,8 +378,8 @@ public static class Play
         for (int i = 0; i < 40; i++)
         {
             frame();
-            float[] r = avatar.Pose.Rotation;
-            double degrees = 2 * Math.Atan2(r[elbow * 4 + 1], r[elbow * 4 + 3]) * 180 / Math.PI;
+            Quaternion q = avatar.Joints[elbow].localRotation;
+            double degrees = 2 * Math.Atan2(q.y, q.w) * 180 / Math.PI;
             Console.WriteLine(degrees.ToString(CultureInfo.InvariantCulture) + " " + avatar.Weights[jaw].ToString(CultureInfo.InvariantCulture));
         }
         // another file while the stream runs
@@ -431,13 +440,12 @@ public static class Play
         {
             foreach (string name in Directory.GetFiles(folder))
             {
-                var pose = new GsacPose(data.JointCount);
-                var weights = new float[data.Expressions.Length];
+                var heard = new GsacLivePose(data);
                 byte[] raw = File.ReadAllBytes(name);
-                Console.WriteLine(Path.GetFileName(name) + " " + message.Read(raw, raw.Length, pose, weights));
-                dump.Put(Path.GetFileName(name) + ".rotation", pose.Rotation);
-                dump.Put(Path.GetFileName(name) + ".transl", pose.Transl);
-                dump.Put(Path.GetFileName(name) + ".weights", weights);
+                Console.WriteLine(Path.GetFileName(name) + " " + message.Read(raw, raw.Length, heard));
+                dump.Put(Path.GetFileName(name) + ".rotation", heard.Pose.Rotation);
+                dump.Put(Path.GetFileName(name) + ".transl", heard.Pose.Transl);
+                dump.Put(Path.GetFileName(name) + ".weights", heard.Weights);
             }
         }
     }
@@ -508,6 +516,7 @@ public static class Play
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
         var both = new[] { GsacLoader.Load(bytes, "one").gameObject, GsacLoader.Load(bytes, "two").gameObject };
+        both[1].transform.SetPositionAndRotation(new Vector3(0, 0, -5), Quaternion.identity); // not among each other
         Player.Frame(both)();
         int two = Player.BuffersAlive;
         Console.WriteLine("draws " + draws);

@@ -9,3 +9,9 @@
 float4x4 unity_MatrixV;
 float4x4 glstate_matrix_projection;
 float4 _ScreenParams;
+#ifdef FOG_EXP2
+float4 unity_FogParams;
+float4 unity_FogColor;
+#define UNITY_Z_0_FAR_FROM_CLIPSPACE(z) max(z, 0)
+#define UNITY_CALC_FOG_FACTOR_RAW(z) float unityFogFactor = unity_FogParams.x * (z); unityFogFactor = exp2(-unityFogFactor * unityFogFactor)
+#endif

@@ -23,7 +23,7 @@ namespace UnityEngine
 
     public sealed class Material : Object
     {
-        public Material(Shader shader) { }
+        public Material(Shader shader) { Made.Add(this); }
     }
 
     public sealed class GraphicsBuffer : IDisposable
@@ -69,10 +69,10 @@ namespace UnityEngine
 
     public sealed class ComputeShader : Object
     {
-        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct" };
+        internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct", "Join" };
         // by property, and by property and kernel
-        internal readonly Vector4[] Values = new Vector4[64];
-        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 64];
+        internal readonly Vector4[] Values = new Vector4[96];
+        internal readonly GraphicsBuffer[,] Buffers = new GraphicsBuffer[Kernels.Length, 96];
         public int FindKernel(string name)
         {
             int kernel = Array.IndexOf(Kernels, name);
@@ -87,8 +87,8 @@ namespace UnityEngine
 
     public sealed class MaterialPropertyBlock
     {
-        internal readonly Vector4[] Values = new Vector4[64];
-        internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[64];
+        internal readonly Vector4[] Values = new Vector4[96];
+        internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[96];
         public void SetVector(int nameID, Vector4 value) { Values[nameID] = value; }
         public void SetInteger(int nameID, int value) { Values[nameID] = new Vector4(value, 0, 0, 0); }
         public void SetBuffer(int nameID, GraphicsBuffer value) { Buffers[nameID] = value; }
@@ -96,7 +96,8 @@ namespace UnityEngine
 
     public struct RenderParams
     {
-        public RenderParams(Material mat) : this() { }
+        public RenderParams(Material mat) : this() { material = mat; }
+        public Material material { get; set; }
         public Camera camera { get; set; }
         public Bounds worldBounds { get; set; }
         public MaterialPropertyBlock matProps { get; set; }
@@ -114,19 +115,29 @@ namespace UnityEngine
         }
     }
 
+    public enum CameraType { Game = 1, SceneView = 2, Preview = 4, VR = 8, Reflection = 16 }
+
     public sealed class Camera : Behaviour
     {
         internal static readonly List<Camera> All = new List<Camera>();
+        public delegate void CameraCallback(Camera cam);
+        public static CameraCallback onPreCull;
+        public CameraType cameraType { get; set; } = CameraType.Game;
         public enum StereoscopicEye { Left, Right }
         internal float[] EyeFocal;
         public int cullingMask { get; set; } = -1;
         public int pixelHeight { get; internal set; } = 1080;
-        public bool orthographic { get; set; }
         public bool stereoEnabled { get { return EyeFocal != null; } }
-        public Matrix4x4 projectionMatrix { get; set; } = new Matrix4x4 { m00 = 1, m11 = 1.7320508f };
+        public Matrix4x4 projectionMatrix { get; set; } = Lens(1, 1.7320508f);
         public Matrix4x4 worldToCameraMatrix { get { return ViewAt(0); } }
         public Matrix4x4 GetStereoViewMatrix(StereoscopicEye eye) { return ViewAt(eye == StereoscopicEye.Left ? 0.032f : -0.032f); }
-        public Matrix4x4 GetStereoProjectionMatrix(StereoscopicEye eye) { return new Matrix4x4 { m00 = 1, m11 = EyeFocal[(int)eye] }; }
+        public Matrix4x4 GetStereoProjectionMatrix(StereoscopicEye eye) { return Lens(1, EyeFocal[(int)eye]); }
+        internal static Matrix4x4 Lens(float x, float y) { return new Matrix4x4 { m00 = x, m11 = y, m22 = -1, m23 = -0.02f, m32 = -1 }; }
+        public void Render()
+        {
+            if (Player.HasPipeline) Rendering.RenderPipelineManager.Begin(this);
+            else if (onPreCull != null) onPreCull(this);
+        }
         Matrix4x4 ViewAt(float side)
         {
             Matrix4x4 m = transform.worldToLocalMatrix;
@@ -136,12 +147,6 @@ namespace UnityEngine
             m.m22 = -m.m22;
             m.m23 = -m.m23;
             return m;
-        }
-        public static int allCamerasCount { get { return All.Count; } }
-        public static int GetAllCameras(Camera[] cameras)
-        {
-            All.CopyTo(cameras);
-            return All.Count;
         }
     }
 
@@ -164,6 +169,14 @@ namespace UnityEngine
         public int[] triangles { get; set; }
         public BoneWeight[] boneWeights { get; set; }
         public Matrix4x4[] bindposes { get; set; }
+        internal readonly List<KeyValuePair<string, Vector3[]>> Shapes = new List<KeyValuePair<string, Vector3[]>>();
+        public int blendShapeCount { get { return Shapes.Count; } }
+        public void AddBlendShapeFrame(string shapeName, float frameWeight, Vector3[] deltaVertices, Vector3[] deltaNormals, Vector3[] deltaTangents)
+        {
+            if (frameWeight != 100 || deltaVertices.Length != vertices.Length || deltaNormals != null || deltaTangents != null) throw new ArgumentException(shapeName);
+            Shapes.Add(new KeyValuePair<string, Vector3[]>(shapeName, (Vector3[])deltaVertices.Clone()));
+        }
+        public int GetBlendShapeIndex(string blendShapeName) { return Shapes.FindIndex(shape => shape.Key == blendShapeName); }
         public void RecalculateNormals() { }
         public void RecalculateBounds() { }
     }
@@ -179,6 +192,23 @@ namespace UnityEngine
         public Mesh sharedMesh { get; set; }
         public Transform[] bones { get; set; }
         public Transform rootBone { get; set; }
+        public Bounds localBounds { get; set; }
+        internal readonly Dictionary<int, float> Weights = new Dictionary<int, float>();
+        public float GetBlendShapeWeight(int index)
+        {
+            Check(index);
+            float weight;
+            return Weights.TryGetValue(index, out weight) ? weight : 0;
+        }
+        public void SetBlendShapeWeight(int index, float value)
+        {
+            Check(index);
+            Weights[index] = value;
+        }
+        void Check(int index)
+        {
+            if (index < 0 || index >= sharedMesh.blendShapeCount) throw new ArgumentOutOfRangeException(index.ToString());
+        }
     }
 
     public static class QualitySettings
@@ -207,6 +237,14 @@ namespace UnityEngine
 
 namespace UnityEngine.Rendering
 {
+    public struct ScriptableRenderContext { }
+
+    public static class RenderPipelineManager
+    {
+        public static event Action<ScriptableRenderContext, Camera> beginCameraRendering;
+        internal static void Begin(Camera camera) { if (beginCameraRendering != null) beginCameraRendering(new ScriptableRenderContext(), camera); }
+    }
+
     public enum GraphicsDeviceType { Vulkan }
     public enum IndexFormat { UInt16, UInt32 }
     public enum ShadowCastingMode { Off, ShadowsOnly = 3 }

@@ -13,7 +13,15 @@ namespace UnityEngine
 
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;
+        public static string Typed;
         public static int UpdatesAsked;
+        public static int FilesRead;
+        public static int HandlesSeen;
+        public static readonly Dictionary<int, Vector3> Drags = new Dictionary<int, Vector3>();
+        public static int Heads; // for the made-up human poses: their turns come with either sign
+
+        /// <summary>The objects that an inspector shows at once; null: its own target.</summary>
+        public static Object[] Chosen;
         public static readonly List<string> Labels = new List<string>();
         public static readonly Dictionary<string, float> Slides = new Dictionary<string, float>();
 
@@ -33,10 +41,13 @@ namespace UnityEngine
             return on.GetType().GetMethod(message, BindingFlags.Instance | BindingFlags.NonPublic | BindingFlags.Public, null, Type.EmptyTypes, null);
         }
 
-        /// <summary>A frame of these components as one call, in their execution order.</summary>
+        /// <summary>Whether cameras are rendered by a scriptable pipeline.</summary>
+        public static bool HasPipeline;
+
+        /// <summary>A frame of these components as one call, in their execution order, and then of all cameras.</summary>
         public static Action Frame(GameObject[] objects)
         {
-            Action all = () => { };
+            Action all = () => Time.frameCount++;
             foreach (string message in new[] { "Update", "LateUpdate" })
             {
                 var ordered = new List<KeyValuePair<int, Action>>();
@@ -53,9 +64,50 @@ namespace UnityEngine
                 ordered.Sort((a, b) => a.Key.CompareTo(b.Key));
                 foreach (KeyValuePair<int, Action> pair in ordered) all += pair.Value;
             }
+            return all + RenderCameras;
+        }
+
+        static void RenderCameras()
+        {
+            for (int i = 0; i < Camera.All.Count; i++) if (Camera.All[i].enabled) Camera.All[i].Render();
+        }
+
+        /// <summary>What brings back an object's saved state: a transform's place and turn, blend shapes, serialized fields.</summary>
+        public static Action Restore(Object of)
+        {
+            Action all = () => { };
+            var transform = of as Transform;
+            if (transform != null)
+            {
+                Vector3 place = transform.localPosition;
+                Quaternion turn = transform.localRotation;
+                return () =>
+                {
+                    transform.localPosition = place;
+                    transform.localRotation = turn;
+                };
+            }
+            var body = of as SkinnedMeshRenderer;
+            if (body != null)
+            {
+                var weights = new Dictionary<int, float>(body.Weights);
+                return () =>
+                {
+                    body.Weights.Clear();
+                    foreach (KeyValuePair<int, float> pair in weights) body.Weights.Add(pair.Key, pair.Value);
+                };
+            }
+            foreach (FieldInfo field in of.GetType().GetFields(BindingFlags.Instance | BindingFlags.NonPublic | BindingFlags.Public))
+            {
+                if (!field.IsPublic && !Attribute.IsDefined(field, typeof(SerializeField))) continue;
+                object value = field.GetValue(of);
+                all += () => field.SetValue(of, value);
+            }
             return all;
         }
 
+        public static Dictionary<string, AnimationCurve> Curves(AnimationClip clip) { return clip.Curves; }
+        public static Vector3[] Shape(Mesh mesh, int index) { return mesh.Shapes[index].Value; }
         public static string PropertyName(int id) { return Shader.NameOf(id); }
         public static string KernelName(int kernel) { return ComputeShader.Kernels[kernel]; }
         public static uint[] Words(GraphicsBuffer buffer) { return buffer.Words; }
@@ -64,6 +116,7 @@ namespace UnityEngine
         public static Vector4 Value(MaterialPropertyBlock block, int id) { return block.Values[id]; }
         public static GraphicsBuffer Buffer(MaterialPropertyBlock block, int id) { return block.Buffers[id]; }
         public static int BuffersAlive { get { return GraphicsBuffer.Alive; } }
+        public static int Alive<T>() { return UnityEngine.Object.Made.FindAll(o => o is T && o != null).Count; }
         public static List<string> Errors { get { return Debug.Errors; } }
         public static HumanDescription Description(Avatar avatar) { return avatar.Description; }
         public static void SetDeltaTime(float seconds) { Time.deltaTime = seconds; }
@@ -82,6 +135,10 @@ namespace UnityEngine
         {
             on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);
         }
-        public static TextAsset Text(byte[] bytes) { return new TextAsset { bytes = bytes }; }
+        public static object Field(Component of, string field)
+        {
+            return of.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).GetValue(of);
+        }
+        public static TextAsset Text(byte[] bytes) { return new TextAsset { Bytes = bytes }; }
     }
 }

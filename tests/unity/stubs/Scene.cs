@@ -11,7 +11,34 @@ namespace UnityEngine
         public string name { get; set; }
         public HideFlags hideFlags { get; set; }
         internal bool Destroyed;
-        public static void Destroy(Object o) { o.Destroyed = true; }
+        /// <summary>Materials and Avatars, which stay until somebody destroys them.</summary>
+        internal static readonly List<Object> Made = new List<Object>();
+        public static void Destroy(Object o)
+        {
+            if (!Application.isPlaying) throw new InvalidOperationException("Destroy may not be called from edit mode");
+            End(o);
+        }
+        public static void DestroyImmediate(Object o)
+        {
+            var holder = o as GameObject;
+            if (holder != null) holder.transform.SetParent(null, false);
+            End(o);
+        }
+        static void End(Object o)
+        {
+            var holder = o as GameObject;
+            if (!ReferenceEquals(holder, null))
+            {
+                foreach (Component c in holder.Components)
+                {
+                    Player.Call(c, "OnDisable");
+                    Player.Call(c, "OnDestroy");
+                    c.Destroyed = true;
+                }
+                foreach (Transform child in holder.transform.Children) End(child.gameObject);
+            }
+            o.Destroyed = true;
+        }
         public static bool operator ==(Object a, Object b)
         {
             bool noA = ReferenceEquals(a, null) || a.Destroyed, noB = ReferenceEquals(b, null) || b.Destroyed;
@@ -91,6 +118,7 @@ namespace UnityEngine
         Quaternion turn = Quaternion.identity;
         public Transform parent { get; private set; }
         public int childCount { get { return Children.Count; } }
+        public Transform GetChild(int index) { return Children[index]; }
         public Vector3 localPosition { get { return place; } set { place = value; } }
         public Quaternion localRotation { get { return turn; } set { turn = value; } }
         public Vector3 localScale { get { return scale; } set { scale = value; } }
@@ -101,6 +129,11 @@ namespace UnityEngine
                 Matrix4x4 m = localToWorldMatrix;
                 return new Vector3(m.m03, m.m13, m.m23);
             }
+        }
+        public Quaternion rotation
+        {
+            get { return parent == null ? turn : parent.rotation * turn; }
+            set { turn = (parent == null ? value : Quaternion.Inverse(parent.rotation) * value).Whole(); }
         }
         public Vector3 forward
         {
@@ -122,16 +155,15 @@ namespace UnityEngine
         public Matrix4x4 worldToLocalMatrix { get { return localToWorldMatrix.Inverted(); } }
         public void SetParent(Transform to, bool worldPositionStays)
         {
-            if (worldPositionStays) throw new NotImplementedException();
+            Matrix4x4 there = localToWorldMatrix;
             if (parent != null) parent.Children.Remove(this);
             parent = to;
             if (to != null) to.Children.Add(this);
-        }
-        public int GetSiblingIndex() { return parent == null ? 0 : parent.Children.IndexOf(this); }
-        public void SetSiblingIndex(int index)
-        {
-            parent.Children.Remove(this);
-            parent.Children.Insert(index, this);
+            if (!worldPositionStays) return;
+            // of transforms without scale
+            if (to != null) there = to.worldToLocalMatrix * there;
+            place = new Vector3(there.m03, there.m13, there.m23);
+            turn = there.Turn();
         }
         public void SetPositionAndRotation(Vector3 position, Quaternion rotation)
         {
@@ -148,7 +180,15 @@ namespace UnityEngine
 
     public class TextAsset : Object
     {
-        public byte[] bytes { get; internal set; }
+        internal byte[] Bytes;
+        public byte[] bytes
+        {
+            get
+            {
+                Player.FilesRead++;
+                return Bytes;
+            }
+        }
     }
 
     public sealed class Avatar : Object
@@ -201,7 +241,9 @@ namespace UnityEngine
     {
         public static Avatar BuildHumanAvatar(GameObject go, HumanDescription humanDescription)
         {
-            return new Avatar { Description = humanDescription };
+            var made = new Avatar { Description = humanDescription };
+            Object.Made.Add(made);
+            return made;
         }
     }
 
@@ -217,6 +259,7 @@ namespace UnityEngine
 
     public static class Time
     {
+        public static int frameCount { get; internal set; }
         public static float deltaTime { get; internal set; } = 1 / 60f;
         public static float unscaledDeltaTime { get { return deltaTime; } }
     }

@@ -22,6 +22,40 @@ struct GsacCorner
     float4 colour;
 };
 
+// What the projection makes of the eye's x and y: where in clip space they point (the picture may be turned or upside down), how long
+// they are there, where the frustum's middle is; and whether all lines of sight run side by side.
+struct GsacLens
+{
+    float2 right;
+    float2 up;
+    float2 size;
+    float2 middle;
+    bool flat;
+};
+
+GsacLens GsacLensOf(float4x4 projection)
+{
+    GsacLens lens;
+    float2 right = float2(projection[0][0], projection[1][0]);
+    float2 up = float2(projection[0][1], projection[1][1]);
+    float2 shift = float2(projection[0][2], projection[1][2]);
+    lens.size = float2(length(right), length(up));
+    lens.right = right / lens.size.x;
+    lens.up = up / lens.size.y;
+    lens.middle = float2(dot(lens.right, shift), dot(lens.up, shift)) / lens.size;
+    lens.flat = projection[3][3] > 0.5;
+    return lens;
+}
+
+// The screen as the eye has it. Where the picture is turned by a right angle, some say its size before and some after: pixels are square.
+float2 GsacUpright(float2 screen, GsacLens lens)
+{
+    float2 same = screen * lens.size;
+    float2 other = screen.yx * lens.size;
+    bool turned = abs(lens.right.x) < abs(lens.right.y);
+    return turned && abs(other.x - other.y) < abs(same.x - same.y) ? screen.yx : screen;
+}
+
 // vertex: 4 a splat, from the farthest on; view: world (less `origin`) -> eye, -z ahead; screen: px.
 GsacCorner GsacSplatCorner(uint vertex, float4x4 view, float4x4 projection, float2 screen, float3 origin)
 {
@@ -41,8 +75,9 @@ GsacCorner GsacSplatCorner(uint vertex, float4x4 view, float4x4 projection, floa
     float3 world = x * s0.x + y * s0.y + z * s0.z + (float3(GsacModel0.w, GsacModel1.w, GsacModel2.w) - origin);
     float4 eye = mul(view, float4(world, 1));
     float depth = -eye.z;
+    GsacLens lens = GsacLensOf(projection);
     // all corners in one place outside the view: nothing is drawn
-    if (!(depth > GSAC_NEAR) || corner.colour.a < GsacBlend.z)
+    if (!(lens.flat || depth > GSAC_NEAR) || corner.colour.a < GsacBlend.z)
     {
         corner.clip = float4(2, 2, 2, 1);
         return corner;
@@ -50,18 +85,18 @@ GsacCorner GsacSplatCorner(uint vertex, float4x4 view, float4x4 projection, floa
     float3 ex = mul(view, float4(x, 0)).xyz;
     float3 ey = mul(view, float4(y, 0)).xyz;
     float3 ez = mul(view, float4(z, 0)).xyz;
-    float2 lens = float2(projection[0][0], projection[1][1]);
-    float2 shift = float2(projection[0][2], projection[1][2]);
-    float2 extent = 1 / abs(lens);
+    screen = GsacUpright(screen, lens);
+    // seen along the axis from a distance of 1, a flat picture's splat has its size everywhere
+    float3 place = lens.flat ? float3(lens.middle, 1) : float3(eye.xy, depth);
     GsacEllipse e = GsacProject(float3(ex.x, ey.x, ez.x), float3(ex.y, ey.y, ez.y), -float3(ex.z, ey.z, ez.z),
-                                float3(eye.xy, depth), float3(s0.w, s1.xy), float3(s1.zw, s2.x),
-                                0.5 * screen * abs(lens), shift / lens, extent, GsacBlend.x);
+                                place, float3(s0.w, s1.xy), float3(s1.zw, s2.x),
+                                0.5 * screen * lens.size, lens.middle, 1 / lens.size, GsacBlend.x);
     if (GsacKeepsEnergy) corner.colour.a *= e.kept;
     float reach = GsacReach(corner.colour.a, GsacBlend.z);
     corner.sigmas = reach * float2((vertex & 1) ? 1.0 : -1.0, (vertex & 2) ? 1.0 : -1.0);
-    float2 pixels = corner.sigmas.x * e.large + corner.sigmas.y * e.small;
+    float2 away = (corner.sigmas.x * e.large + corner.sigmas.y * e.small) * 2 / screen;
     corner.clip = mul(projection, float4(eye.xyz, 1));
-    corner.clip.xy += pixels * 2 / screen * sign(lens) * corner.clip.w;
+    corner.clip.xy += (lens.right * away.x + lens.up * away.y) * corner.clip.w;
     if (GsacBlend.w > 0.5) corner.colour.rgb = GsacLinear(corner.colour.rgb);
     return corner;
 }

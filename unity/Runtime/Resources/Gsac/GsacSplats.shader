@@ -1,6 +1,16 @@
 // Draws the sorted gaussians as one indexed draw among the transparent things; one SubShader a render pipeline.
 Shader "Gsac/Splats"
 {
+    Properties
+    {
+        _Stencil ("Stencil reference", Float) = 0
+        [Enum(UnityEngine.Rendering.CompareFunction)] _StencilComp ("Stencil comparison", Float) = 8
+        [Enum(UnityEngine.Rendering.StencilOp)] _StencilOp ("Stencil operation", Float) = 0
+        _StencilReadMask ("Stencil read mask", Float) = 255
+        _StencilWriteMask ("Stencil write mask", Float) = 255
+        [Enum(UnityEngine.Rendering.CompareFunction)] _ZTest ("Depth test", Float) = 4
+    }
+
     SubShader
     {
         PackageRequirements { "com.unity.render-pipelines.high-definition": "12.0.0" }
@@ -10,7 +20,15 @@ Shader "Gsac/Splats"
             Name "Gsac"
             Tags { "LightMode" = "ForwardOnly" }
             ZWrite Off
-            ZTest LEqual
+            ZTest [_ZTest]
+            Stencil
+            {
+                Ref [_Stencil]
+                Comp [_StencilComp]
+                Pass [_StencilOp]
+                ReadMask [_StencilReadMask]
+                WriteMask [_StencilWriteMask]
+            }
             Cull Off
             Blend One OneMinusSrcAlpha
 
@@ -38,7 +56,15 @@ Shader "Gsac/Splats"
             Name "Gsac"
             Tags { "LightMode" = "UniversalForward" }
             ZWrite Off
-            ZTest LEqual
+            ZTest [_ZTest]
+            Stencil
+            {
+                Ref [_Stencil]
+                Comp [_StencilComp]
+                Pass [_StencilOp]
+                ReadMask [_StencilReadMask]
+                WriteMask [_StencilWriteMask]
+            }
             Cull Off
             Blend One OneMinusSrcAlpha
 
@@ -47,7 +73,9 @@ Shader "Gsac/Splats"
             #pragma vertex Vertex
             #pragma fragment Fragment
             #pragma multi_compile_instancing
+            #pragma multi_compile_fog
             #include "Packages/com.unity.render-pipelines.universal/ShaderLibrary/Core.hlsl"
+            #define GSAC_FOGGED(colour, z) MixFog(colour, ComputeFogFactor(z))
             #define GSAC_SCREEN _ScaledScreenParams.xy
             #define GSAC_ORIGIN float3(0, 0, 0)
             #include "GsacPass.hlsl"
@@ -62,7 +90,15 @@ Shader "Gsac/Splats"
         {
             Name "Gsac"
             ZWrite Off
-            ZTest LEqual
+            ZTest [_ZTest]
+            Stencil
+            {
+                Ref [_Stencil]
+                Comp [_StencilComp]
+                Pass [_StencilOp]
+                ReadMask [_StencilReadMask]
+                WriteMask [_StencilWriteMask]
+            }
             Cull Off
             Blend One OneMinusSrcAlpha
 
@@ -71,7 +107,16 @@ Shader "Gsac/Splats"
             #pragma vertex Vertex
             #pragma fragment Fragment
             #pragma multi_compile_instancing
+            #pragma multi_compile_fog
             #include "UnityCG.cginc"
+            #if defined(FOG_LINEAR) || defined(FOG_EXP) || defined(FOG_EXP2)
+            float3 Fogged(float3 colour, float z)
+            {
+                UNITY_CALC_FOG_FACTOR_RAW(UNITY_Z_0_FAR_FROM_CLIPSPACE(z));
+                return lerp(unity_FogColor.rgb, colour, saturate(unityFogFactor));
+            }
+            #define GSAC_FOGGED(colour, z) Fogged(colour, z)
+            #endif
             #define GSAC_SCREEN _ScreenParams.xy
             #define GSAC_ORIGIN float3(0, 0, 0)
             #include "GsacPass.hlsl"

@@ -1,0 +1,116 @@
+"""What each clip of a batch needs, found in one process before anything runs."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gsac.cache.store import Store
+from gsac.pipeline.cost_forecast import Forecaster
+from gsac.pipeline.executors.executor import ClipJob
+from gsac.pipeline.graph import CLIP
+from gsac.pipeline.keys import KeysOfOneMoment
+from gsac.pipeline.plan import Reason, StagePlan, plan_waiting
+from gsac.pipeline.project import Project
+from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.run import ClipRun, Options
+from gsac.pipeline.run_folder import RunFolder
+from gsac.pipeline.sources import source_digest
+from gsac.stages.contract import BadInput
+
+PEAK_MB = 2500.0
+"""Memory of a clip's run where no stage of it has run here: the bound of 120 frames of 1080x1920 on two cores."""
+EARLIER_RUNS = 5
+"""Runs of a stage, the newest, whose largest memory is reckoned with."""
+
+
+@dataclass(frozen=True)
+class ClipPlan:
+    """What a clip's run would do."""
+
+    job: ClipJob
+    due: tuple[str, ...] = ()
+    """Stages that would run; those below a stage that runs are among them, though an equal result may spare them."""
+    seconds: float = 0.0
+    """That they may take by the clock."""
+    peak_mb: float = 0.0
+    """Memory of the largest of them."""
+    digest: str = ""
+    """Of the clip; empty where it cannot be read."""
+    error: str = ""
+    """Why it cannot be read."""
+    before_gpu: str = ""
+    """Last stage before those that a GPU computes; empty where none of those is due."""
+
+    @property
+    def told_job(self) -> ClipJob:
+        """The job with what the plan knows of its needs."""
+        return replace(self.job, peak_mb=self.peak_mb, before_gpu=self.before_gpu)
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether all results are in the cache."""
+        return not self.due and not self.error
+
+    def to_json(self) -> dict[str, Any]:
+        """As --dry-run --json holds it."""
+        return {"clip": str(self.job.clip), "out": str(self.job.out), "due": list(self.due), "seconds": round(self.seconds, 1),
+                "peak_rss_mb": round(self.peak_mb), "error": self.error or None}
+
+
+class BatchPlanner:
+    """Plans clips over one store, with one set of parameters."""
+
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, options: Options):
+        self.keys, self.store = KeysOfOneMoment(project, configs, store), store
+        self._graph, self._force = project.graph, options.force
+        nowhere = RunFolder(store.root)  # only asked for the stages
+        self.steps = ClipRun(project, configs, store, nowhere, PlainReporter(), self.keys).select(options)
+        self._outputs = {name: project.outputs(name) for name in self.steps}
+        self._forecaster = Forecaster(self.keys, store)
+        self._peak_mb = functools.cache(lambda name: _peak_mb(name, store))
+
+    def plan_all(self, jobs: Iterable[ClipJob]) -> list[ClipPlan]:
+        """Plans in the order of the jobs. A clip that cannot be read is planned as such: its run says so, too."""
+        return [self.plan(job) for job in jobs]
+
+    def plan(self, job: ClipJob) -> ClipPlan:
+        """What the run of one clip would do."""
+        try:
+            digest = source_digest(job.clip, self.store)
+        except BadInput as error:
+            return ClipPlan(job, error=str(error))
+        plans = self._plan_stages(digest)
+        due = tuple(plan.stage for plan in plans if plan.cached is None)
+        if not due:
+            return ClipPlan(job, digest=digest)
+        seconds = self._forecaster.foretell(plans, job.clip).whole.seconds
+        return ClipPlan(job, due, seconds, max(map(self._peak_mb, due)), digest, before_gpu=self._before_gpu(due))
+
+    def _before_gpu(self, due: tuple[str, ...]) -> str:
+        first = next((n for n, name in enumerate(self.steps) if name in due and self.keys.project.stage(name).uses_device), 0)
+        return self.steps[first - 1] if first else ""
+
+    def _plan_stages(self, digest: str) -> list[StagePlan]:
+        """Like ClipRun.plan, without looking for what has changed since earlier runs."""
+        digests, plans = {CLIP: digest}, []
+        for name in self.steps:
+            deps = self._graph.step(name).deps
+            if any(port not in digests for port in deps):
+                plans.append(plan_waiting(name, []))
+                continue
+            parts = self.keys.parts(name, {port: digests[port] for port in deps})
+            record = self.store.lookup(parts.key, self._outputs[name])
+            forced = name in self._force
+            reason = Reason.FORCED if forced else Reason.FIRST_RUN if record is None else Reason.UP_TO_DATE
+            plans.append(StagePlan(name, reason, parts, record))
+            if record is not None and not forced:
+                digests |= {f"{name}/{output}": digest for output, digest in record.outputs.items()}
+        return plans
+
+
+def _peak_mb(name: str, store: Store) -> float:
+    """Largest memory of the stage's earlier runs."""
+    return max((record.info.peak_rss_mb for record in store.recent(name, EARLIER_RUNS)), default=PEAK_MB)
