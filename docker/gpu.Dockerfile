@@ -4,7 +4,9 @@ ENV GSAC_CACHE=/cache GSAC_COPY=1 PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1
 ENV NVIDIA_VISIBLE_DEVICES=all NVIDIA_DRIVER_CAPABILITIES=compute,utility
 RUN pip install torch==2.13.0
 COPY . /src
-RUN pip install '/src[gpu]' && rm -rf /src && gsac models pull
+RUN pip install '/src[gpu]' && rm -rf /src && gsac models pull && useradd --create-home gsac && mkdir /avatars \
+    && chown -R gsac /cache /avatars
+USER gsac
 VOLUME /cache
 ENTRYPOINT ["gsac"]
 CMD ["batch", "/clips", "--out", "/avatars"]

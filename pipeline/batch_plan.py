@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gsac.cache.store import Store
@@ -41,6 +41,13 @@ class ClipPlan:
     """Of the clip; empty where it cannot be read."""
     error: str = ""
     """Why it cannot be read."""
+    before_gpu: str = ""
+    """Last stage before those that a GPU computes; empty where none of those is due."""
+
+    @property
+    def told_job(self) -> ClipJob:
+        """The job with what the plan knows of its needs."""
+        return replace(self.job, peak_mb=self.peak_mb, before_gpu=self.before_gpu)
 
     @property
     def unchanged(self) -> bool:
@@ -80,7 +87,11 @@ class BatchPlanner:
         if not due:
             return ClipPlan(job, digest=digest)
         seconds = self._forecaster.foretell(plans, job.clip).whole.seconds
-        return ClipPlan(job, due, seconds, max(map(self._peak_mb, due)), digest)
+        return ClipPlan(job, due, seconds, max(map(self._peak_mb, due)), digest, before_gpu=self._before_gpu(due))
+
+    def _before_gpu(self, due: tuple[str, ...]) -> str:
+        first = next((n for n, name in enumerate(self.steps) if name in due and self.keys.project.stage(name).uses_device), 0)
+        return self.steps[first - 1] if first else ""
 
     def _plan_stages(self, digest: str) -> list[StagePlan]:
         """Like ClipRun.plan, without looking for what has changed since earlier runs."""

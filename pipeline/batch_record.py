@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gsac.pipeline.batch_entry import Entry, Status, status_of
+from gsac.pipeline.batch_metrics import write_metrics
 from gsac.pipeline.batch_plan import ClipPlan
 from gsac.pipeline.executors.executor import ClipJob, ClipResult
-from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run_folder import write_text
 from gsac.stages.contract import BadInput
@@ -20,56 +20,6 @@ FILE = "batch.json"
 VERSION = 1
 GAP_S = 2.0
 """s between two writings while clips end; a batch that is killed does at most so much again, which the cache answers."""
-
-
-class Status(StrEnum):
-    """What became of a clip."""
-
-    PLANNED = "planned"
-    """Not ended yet."""
-    UNCHANGED = "unchanged"
-    """All results were in the cache."""
-    DONE = "done"
-    FAILED = "failed"
-    KEPT = "kept"
-    """Left as the last batch has left it, since its file is the same."""
-
-    @property
-    def is_end(self) -> bool:
-        return self is not Status.PLANNED
-
-
-@dataclass
-class Entry:
-    """One clip."""
-
-    clip: str
-    out: str
-    status: Status = Status.PLANNED
-    digest: str = ""
-    """Of the clip's file or folder when the batch was planned."""
-    code: int | None = None
-    """Exit code of its run."""
-    seconds: float = 0.0
-    error: str = ""
-    killed: int = 0
-    """How often a signal ended its run."""
-    metrics: dict[str, Any] = field(default_factory=dict)
-    before: dict[str, Any] = field(default_factory=dict)
-    """Metrics of the batch before."""
-
-    @classmethod
-    def read(cls, raw: Any) -> Entry | None:
-        """Of a file's object; None where it is none."""
-        try:
-            known: dict[str, Any] = {name: raw[name] for name in cls.__dataclass_fields__ if name in raw}
-            known["status"] = Status(raw["status"])
-            return cls(**known)
-        except (TypeError, KeyError, ValueError):
-            return None
-
-    def to_json(self) -> dict[str, Any]:
-        return self.__dict__ | {"seconds": round(self.seconds, 3)}
 
 
 class BatchRecord:
@@ -113,6 +63,7 @@ class BatchRecord:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             content = {"version": VERSION, "request": self.request, "clips": [entry.to_json() for entry in self.entries.values()]}
             write_text(self.path, json.dumps(content, indent=1) + "\n")
+            write_metrics(self.path.parent, self.entries.values())
             self._written = time.monotonic()
 
 
@@ -137,10 +88,3 @@ def _content(path: Path) -> dict[str, Any]:
             or "clips" not in content:
         raise BadInput(f"{path} was not written by this version of `gsac batch`; move it away, or give another --out")
     return content
-
-
-def status_of(result: ClipResult) -> Status:
-    """Of a clip whose run has ended."""
-    if result.code != ExitCode.OK:
-        return Status.FAILED
-    return Status.UNCHANGED if result.unchanged else Status.DONE

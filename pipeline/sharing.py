@@ -151,9 +151,11 @@ class Sharing:
     def _work(self) -> None:
         while (due := self._due.get()) is not None and not self._stopped:
             record, claim = due
-            self._upload(record)
-            if claim is not None:
-                claim.release()
+            try:
+                self._upload(record)
+            finally:
+                if claim is not None:
+                    claim.release()
 
     def _upload(self, record: Record) -> None:
         from gsac.cache.remote.bucket import RemoteError

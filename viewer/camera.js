@@ -29,6 +29,8 @@ export class OrbitCamera {
     this.covered = 0;
     // Share of its width that they cover at the right.
     this.beside = 0;
+    // Share of what is free above them that is kept free over the head.
+    this.above = 0;
     // How far the figure has walked from where it was framed, m; the camera follows.
     this.walked = [0, 0, 0];
     this.view = new Float32Array(12);
@@ -49,7 +51,7 @@ export class OrbitCamera {
     this.moved = false;
     this.behind = [0, 0, 0, 0, 0, 0];
     this.target = low.map((l, i) => (l + high[i]) / 2);
-    const tall = (high[1] - low[1]) * MARGIN_TALL / (1 - this.covered);
+    const tall = (high[1] - low[1]) * Math.max(MARGIN_TALL, 0.5 / (1 - 2 * this.above)) / (1 - this.covered);
     const wide = (high[0] - low[0]) * MARGIN_WIDE / aspect / (1 - this.beside);
     this.distance = Math.max(tall, wide) / Math.tan(this.fov * Math.PI / 360) + (high[2] - low[2]) / 2;
   }

@@ -13,6 +13,8 @@ import { addFaceSliders, addJointSliders, addPresets } from "./sliders.js";
 const NOTE_MS = 9000;
 // Where all but the motions is folded away at first: on a phone, and in a small frame of another page.
 const FOLDS = "(max-width: 600px) and (pointer: coarse), (max-width: 340px), (max-height: 480px)";
+// Where the figure stands below the buttons at the top; elsewhere they are beside it, or nearly all are away.
+const STACKED = "(max-width: 600px) and (min-height: 481px)";
 // Renderer's kind -> its name on the page.
 const RENDERERS = { webgpu: "WebGPU", webgl: "WebGL", software: "no graphics card" };
 
@@ -117,7 +119,9 @@ export class Controls {
     const drawer = Object.keys(this.drawers).map(find).find((it) => !it.hidden && getComputedStyle(it).position === "fixed");
     if (bottom !== this.bottom) document.documentElement.style.setProperty("--panel", `${bottom}px`);
     this.bottom = bottom;
-    return { bottom, right: drawer?.offsetWidth ? window.innerWidth - drawer.offsetLeft : 0 };
+    const buttons = find("top"), stacked = bottom > 0 && matchMedia(STACKED).matches;
+    const top = stacked ? buttons.offsetTop + buttons.offsetHeight : 0;
+    return { bottom, right: drawer?.offsetWidth ? window.innerWidth - drawer.offsetLeft : 0, top };
   }
 
   onClick(id, act) {

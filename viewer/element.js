@@ -110,7 +110,7 @@ export class GsacAvatar extends Element {
     } else if (name === "controls") {
       const bar = value !== null && value !== "none";
       this.inside("bar").hidden = !bar;
-      this.viewer.cover = () => ({ bottom: bar ? BAR_PX : 0, right: 0 });
+      this.viewer.cover = () => ({ bottom: bar ? BAR_PX : 0, right: 0, top: 0 });
     } else if (this.file && name !== "draw") {
       this.follow(readOptions(this.given));
     }

@@ -22,8 +22,9 @@ const RECOVER_MS = 1000;
 // Of the shadow: its radius as a share of the figure's height, and how dark its middle is, 0..1.
 const SHADOW_RADIUS = 0.3;
 const SHADOW_STRENGTH = 0.4;
-// Share of the picture, at most, that the figure makes room for.
+// Share of the picture, at most, that the figure makes room for at the bottom and the right, and at the top of the rest.
 const MOST_COVERED = 0.5;
+const MOST_ABOVE = 0.2;
 // Joints whose vertices are the face; and of what is looked at: the box that is framed, as a multiple of its own.
 const FACE = /^(head|jaw|left_eye|right_eye)/;
 const NEAR_MARGIN = 1.25;
@@ -41,8 +42,8 @@ const LEAST_NEAR = 0.12;
  */
 
 /**
- * What lies over the picture: px from its bottom and from its right.
- * @typedef {{bottom: number, right: number}} Cover
+ * What lies over the picture: px from its bottom, from its right and from its top.
+ * @typedef {{bottom: number, right: number, top: number}} Cover
  */
 
 export class Viewer {
@@ -59,7 +60,7 @@ export class Viewer {
     this.camera = new OrbitCamera();
     this.rate = new FrameRate();
     /** @type {() => Cover} told by whoever lays something over the picture */
-    this.cover = () => ({ bottom: 0, right: 0 });
+    this.cover = () => ({ bottom: 0, right: 0, top: 0 });
     /** @type {Object<string, number>} weights by name */
     this.expression = {};
     /** @type {Object<string, number[]>} joint -> axis-angle, degrees, on top of what plays */
@@ -285,7 +286,7 @@ export class Viewer {
     const ratio = Math.min(window.devicePixelRatio || 1, this.renderer?.kind === "software" ? 1 : MAX_PIXEL_RATIO);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
-    const { bottom, right } = this.cover(), { camera, canvas, stage } = this;
+    const { bottom, right, top } = this.cover(), { camera, canvas, stage } = this;
     const covered = Math.min(MOST_COVERED, bottom / (stage.clientHeight || 1));
     const beside = Math.min(MOST_COVERED, right / (stage.clientWidth || 1));
     const same = canvas.width === width && canvas.height === height;
@@ -293,6 +294,7 @@ export class Viewer {
     if (!same) Object.assign(canvas, { width, height });
     camera.covered = covered;
     camera.beside = beside;
+    camera.above = Math.min(MOST_ABOVE, top / (stage.clientHeight * (1 - covered) || 1));
     return other;
   }
 

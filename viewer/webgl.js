@@ -7,8 +7,7 @@ import { indexQuads } from "./pack.js";
 import { NEAR, WIDE } from "./projection.js";
 import { DepthSort } from "./sort.js";
 
-const SPLAT_VERTEX = `#version 300 es
-precision highp float;
+const SPLAT_VERTEX = `precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp usampler2D;
@@ -20,6 +19,7 @@ uniform vec2 size;
 uniform vec2 focal;
 uniform vec2 centre;
 uniform vec4 blend; // lowPass, alphaMax, alphaMin, 1 if the low-pass keeps energy
+uniform vec2 depth;
 out vec4 colour;
 out vec2 sigmas;
 
@@ -56,11 +56,10 @@ void main() {
   sigmas = reach * vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
   vec2 offset = sigmas.x * sqrt(large) * axis + sigmas.y * sqrt(small) * vec2(-axis.y, axis.x);
   vec2 pixel = focal * c.xy / c.z + offset + centre;
-  gl_Position = vec4(2.0 * pixel / size * vec2(1, -1), 0, 1);
+  gl_Position = vec4(2.0 * pixel / size * vec2(1, -1), DEPTH, 1);
 }`;
 
-const SPLAT_FRAGMENT = `#version 300 es
-precision highp float;
+const SPLAT_FRAGMENT = `precision highp float;
 uniform vec4 blend;
 in vec4 colour;
 in vec2 sigmas;
@@ -99,6 +98,30 @@ void main() {
   pixel = vec4(0, 0, 0, strength * smoothstep(1.0, 0.0, r) * smoothstep(1.0, 0.0, r));
 }`;
 
+/**
+ * The gaussians' shaders, without the line of their version.
+ * @param {string} depth in words of the shader: where a gaussian lies between near and far
+ */
+export function splatShaders(depth) {
+  const constants = { ORDER_ROW: DepthSort.PER_ROW, DATA_ROW: Binding.PER_ROW, NEAR: NEAR.toFixed(3), WIDE: WIDE.toFixed(3),
+    DEPTH: depth };
+  const vertex = Object.entries(constants).reduce((text, [name, value]) => text.replaceAll(name, String(value)), SPLAT_VERTEX);
+  return { vertex, fragment: SPLAT_FRAGMENT };
+}
+
+/**
+ * Colours and opacities of a level, as the shaders read them.
+ * @param {Binding} binding
+ */
+export function fillColours({ count, rows, level: { rgb, opacity } }) {
+  const colours = new Float32Array(rows * Binding.PER_ROW * 4);
+  for (let i = 0; i < count; i++) {
+    colours.set(rgb.subarray(i * 3, i * 3 + 3), i * 4);
+    colours[i * 4 + 3] = opacity[i];
+  }
+  return colours;
+}
+
 export class WebglRenderer {
   /**
    * @param {HTMLCanvasElement} canvas
@@ -120,9 +143,8 @@ export class WebglRenderer {
     canvas.addEventListener("webglcontextlost", () => this.onLost("the graphics driver stopped"));
     const { lowPass, alphaMax, alphaMin, keepsEnergy } = avatar.blend;
     this.blend = [lowPass, alphaMax, alphaMin, Number(keepsEnergy)];
-    const constants = { ORDER_ROW: DepthSort.PER_ROW, DATA_ROW: Binding.PER_ROW, NEAR: NEAR.toFixed(3), WIDE: WIDE.toFixed(3) };
-    const vertex = Object.entries(constants).reduce((text, [name, value]) => text.replaceAll(name, String(value)), SPLAT_VERTEX);
-    this.splats = this.program(vertex, SPLAT_FRAGMENT);
+    const { vertex, fragment } = splatShaders("0.0");
+    this.splats = this.program(`#version 300 es\n${vertex}`, `#version 300 es\n${fragment}`);
     this.floor = this.program(FLOOR_VERTEX, FLOOR_FRAGMENT);
     const rows = Math.max(...levels.bindings.map((binding) => binding.rows));
     this.gaussians = this.texture(gl.RGBA32F, Binding.PER_ROW * 3, rows);
@@ -177,20 +199,15 @@ export class WebglRenderer {
   prepare(view) {
     const { gl, levels: { binding, sort } } = this;
     sort.update(binding.data, view);
-    if (this.coloured !== binding) this.fillColours(binding);
+    if (this.coloured !== binding) this.upload(binding);
     this.fill(this.gaussians, Binding.PER_ROW * 3, binding.rows, gl.RGBA, gl.FLOAT, binding.data);
     this.fill(this.order, DepthSort.PER_ROW, sort.rows, gl.RED_INTEGER, gl.UNSIGNED_INT, sort.order);
   }
 
   // Uploads the colours and opacities of a level.
-  fillColours(binding) {
-    const { gl } = this, { count, rows, level: { rgb, opacity } } = binding;
-    const colours = new Float32Array(rows * Binding.PER_ROW * 4);
-    for (let i = 0; i < count; i++) {
-      colours.set(rgb.subarray(i * 3, i * 3 + 3), i * 4);
-      colours[i * 4 + 3] = opacity[i];
-    }
-    this.fill(this.colours, Binding.PER_ROW, rows, gl.RGBA, gl.FLOAT, colours);
+  upload(binding) {
+    const { gl } = this;
+    this.fill(this.colours, Binding.PER_ROW, binding.rows, gl.RGBA, gl.FLOAT, fillColours(binding));
     this.coloured = binding;
   }
 

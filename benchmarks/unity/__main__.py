@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
-from gsac.benchmarks.unity.frame import Frame
+from gsac.benchmarks.unity.frame import Crowd, Frame
 from gsac.benchmarks.unity.gpu import Gpu, Painting
 from gsac.benchmarks.unity.shaders import compile_frame, missing_packages, read_frame
 from gsac.benchmarks.unity.spirv import Program
@@ -24,6 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m gsac.benchmarks.unity", description=__doc__)
     parser.add_argument("--avatar", type=Path, help="a .gsac file; without one the open body with --count gaussians")
     parser.add_argument("--count", type=int, default=25000)
+    parser.add_argument("--people", type=int, default=1, help="so many of the person, joined and sorted together")
     parser.add_argument("--shaders", type=Path, help="folder of compiled shaders: written with --compile, otherwise read")
     parser.add_argument("--compile", action="store_true", help="compile into --shaders and exit: for a machine without glslang")
     parser.add_argument("--software", action="store_true", help="on lavapipe instead of a graphics card")
@@ -67,6 +68,13 @@ def report(options: argparse.Namespace, programs: dict[str, Program]) -> None:
     for p in frame.passes:
         print_row(p.name, len(p.jobs), times[p.name], p.moved)
     print_row("frame: all of them, once", len(frame.order), times["frame"], sum(p.moved for p in frame.passes))
+    if options.people > 1:
+        crowd = Crowd(frame, programs, options.people)
+        times = pass_times(clock, crowd, options.repeats)
+        print(f"{options.people} people together, {crowd.count} gaussians:" + ("" if crowd.is_sorted() else " order MISSED"))
+        for p in crowd.passes:
+            print_row(p.name, len(p.jobs), times[p.name], p.moved)
+        print_row("join and sort, once", len(crowd.order), times["frame"], sum(p.moved for p in crowd.passes))
     vertex, fragment = programs["Vertex"], programs["Fragment"]
     paintings = tuple(Painting(gpu, vertex, fragment, options.size, options.size, frame.count) for _ in range(2))
     for distance in options.distances:

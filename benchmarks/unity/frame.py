@@ -60,6 +60,16 @@ class Pass:
     """Least bytes to move: inputs read once, outputs written once."""
 
 
+def sort_passes(gpu: Gpu, programs: dict[str, Program], base: Parameters, count: int) -> tuple[list[Pass], list[Job]]:
+    """The sort of `count` splats as passes by kernel, and its dispatches in order. base: parameters of every kernel."""
+    keys, steps = sort_steps(count)
+    base = base | {"GsacSplatCount": count, "GsacIndexBits": index_bits(count)}
+    order = [gpu.job(programs[name], base | parameters, groups) for name, parameters, groups in steps]
+    moved = {"SortBlocks": 16 * count + 4 * keys, "SortAcross": 8 * keys, "SortMerge": 8 * keys}
+    jobs = {name: [job for job, step in zip(order, steps, strict=True) if step[0] == name] for name in moved}
+    return [Pass(name, jobs[name], moved[name] * len(jobs[name])) for name in moved if jobs[name]], order
+
+
 class Frame:
     """An avatar in its A-pose, each fourth expression at a half, in the avatar's own (unmirrored) axes."""
 
@@ -68,7 +78,7 @@ class Frame:
         V, N, E, J = len(avatar.vertices), len(avatar.gaussians), len(avatar.expression_names), len(avatar.joints)
         self.count, self.weights = N, np.where(np.arange(E) % 4 == 0, np.float32(.5), np.float32(0))
         self.bones = joint_transforms(avatar.pose("A")[None], avatar.joints, avatar.parents)[0].astype(np.float32)
-        keys, steps = sort_steps(N)
+        keys, _ = sort_steps(N)
         for name, array in pack_avatar(avatar).items():
             gpu.put(name, array)
         gpu.put("GsacWeights", self.weights)
@@ -78,21 +88,18 @@ class Frame:
         gpu.put("GsacKeys", np.zeros(keys, np.uint32))
         gpu.put("GsacLatest", np.zeros(1, np.uint32))
         low, high = -1.5, 1.5
-        base = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacIndexBits": index_bits(N), "GsacSortStage": 0,
+        base = self.base = EVEN | {"GsacVertexCount": V, "GsacSplatCount": N, "GsacIndexBits": index_bits(N), "GsacSortStage": 0,
                        "GsacSortShift": 0, "GsacSortStrides": 0, "GsacDepthRange": np.array([low, 1 / (high - low)]),
                        "GsacDepthRow": np.array([0, 0, -1.0, 0])}
         M = len(avatar.expression_vertex)
-        moved = {"SortBlocks": 16 * N + 4 * keys, "SortAcross": 8 * keys, "SortMerge": 8 * keys}
         self.passes = [
             Pass("Skin", [gpu.job(programs["Skin"], base, -(-V // THREADS))], 48 * V + 16 + 16 * M + 4 * E + 48 * J),
             Pass("Bind", [gpu.job(programs["Bind"], base, -(-N // THREADS))], 16 * V + (16 + 48 + 48) * N)]
         self.order = [job for p in self.passes for job in p.jobs]
         """Every dispatch of the frame, in order."""
-        for name in moved:
-            jobs = [gpu.job(programs[name], base | parameters, groups) for kernel, parameters, groups in steps if kernel == name]
-            if jobs:
-                self.passes.append(Pass(name, jobs, moved[name] * len(jobs)))
-        self.order += [gpu.job(programs[name], base | parameters, groups) for name, parameters, groups in steps]
+        sort, order = sort_passes(gpu, programs, base, N)
+        self.passes += sort
+        self.order += order
 
     def errors(self) -> dict[str, float]:
         """Largest differences of the last frame from the trainer's skinning and binding, m; order: 0 if sorted from far to near."""
@@ -123,3 +130,33 @@ class Frame:
         return {"unity_StereoMatrixV": views, "unity_StereoMatrixP": [projection(camera).T] * 2,
                 "_ScreenParams": [size, size, 0, 0], "GsacIndexBits": index_bits(self.count),
                 **draw_rule(self.avatar.gaussians.low_pass), **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}
+
+
+class Crowd:
+    """Copies of a frame's person, half an arm apart, joined and sorted together as the package does with people who touch."""
+
+    def __init__(self, frame: Frame, programs: dict[str, Program], people: int) -> None:
+        gpu, N = frame.gpu, frame.count
+        self.gpu, self.count = gpu, N * people
+        gpu.put("GsacJoined", np.zeros((self.count, 12), np.float32))
+        gpu.put("GsacJoinedColours", np.zeros((self.count, 4), np.float32))
+        joins = []
+        for i in range(people):
+            rows = np.eye(4)[:3]
+            rows[0, 3] = .3 * i
+            parameters = {"GsacSplatCount": N, "GsacJoinFirst": i * N} | {f"GsacJoinModel{r}": rows[r] for r in range(3)}
+            joins.append(gpu.job(programs["Join"], parameters, -(-N // THREADS)))
+        alone = dict(gpu.buffers)
+        gpu.buffers["GsacSplats"] = gpu.buffers["GsacJoined"]
+        gpu.put("GsacKeys", np.zeros(sort_steps(self.count)[0], np.uint32))
+        sort, order = sort_passes(gpu, programs, frame.base, self.count)
+        gpu.buffers |= {"CrowdKeys": gpu.buffers["GsacKeys"]} | {name: alone[name] for name in ("GsacSplats", "GsacKeys")}
+        self.passes = [Pass("Join", joins, 2 * (48 + 16) * self.count), *sort]
+        self.order = joins + order
+
+    def is_sorted(self) -> bool:
+        """Whether the last joined frame has each gaussian once, from far to near."""
+        keys = self.gpu.get("CrowdKeys", np.uint32)
+        order = keys[:self.count] & ((1 << index_bits(self.count)) - 1)
+        depth = -self.gpu.get("GsacJoined").reshape(-1, 12)[order, 2]
+        return bool((np.sort(order) == np.arange(self.count)).all() and np.diff(depth).max() < 2e-4)

@@ -15,6 +15,8 @@ PROGRAMS = {"glslangValidator": "glslang-tools", "spirv-val": "spirv-tools"}
 STEREO = Path(__file__).parent / "stereo"
 """Folder with a stand-in for Unity's own shader file, as in a headset."""
 KERNELS = ("Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct")
+JOIN = "Join"
+"""The kernel of GsacJoin.compute."""
 EYES = ("Vertex", "Fragment")
 
 
@@ -56,9 +58,10 @@ def compile_frame(folder: Path) -> None:
     """Compiles all shaders of a headset's frame to files that `read_frame` reads, also on a machine without a compiler."""
     for name in KERNELS:
         compile_hlsl(CORE / "Gsac.compute", name, "comp", folder)
+    compile_hlsl(CORE / "GsacJoin.compute", JOIN, "comp", folder)
     compile_pass(shader_passes()[""], folder, STEREO)
 
 
 def read_frame(folder: Path) -> dict[str, Program]:
     """Reads the files of `compile_frame`: entry point -> Program."""
-    return {name: Program((Path(folder) / f"{name}.spv").read_bytes()) for name in (*KERNELS, *EYES)}
+    return {name: Program((Path(folder) / f"{name}.spv").read_bytes()) for name in (*KERNELS, JOIN, *EYES)}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gsac.benchmarks.unity.frame import Frame
+from gsac.benchmarks.unity.frame import Crowd, Frame
 from gsac.benchmarks.unity.gpu import Gpu, Job, Painting, Parameters
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Clock:
         return np.array(took[-repeats:]) * self.nanoseconds / 1e3
 
 
-def pass_times(clock: Clock, frame: Frame, repeats: int) -> dict[str, np.ndarray]:
+def pass_times(clock: Clock, frame: Frame | Crowd, repeats: int) -> dict[str, np.ndarray]:
     """Pass -> time (repeats,) us of all its dispatches in a frame; `frame`: of the whole frame, once, as Unity runs it."""
 
     def encoder_of(jobs: list[Job]) -> Callable[[GPUCommandEncoder], int]:

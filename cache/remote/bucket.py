@@ -180,9 +180,13 @@ class Bucket:
         """Removes objects; those that are not there are passed over."""
         import obstore
 
-        for name in names:
-            with self._failing(f"remove {name}"), contextlib.suppress(FileNotFoundError):
-                obstore.delete(self._small, name)
+        with self._failing(f"remove {len(names)} objects"):
+            if self.folder is None:
+                obstore.delete(self._large, names)
+                return
+            for name in names:
+                with contextlib.suppress(FileNotFoundError):
+                    obstore.delete(self._small, name)
 
     def now(self) -> datetime:
         """The time by the server's clock: that of an object which is put and removed for it."""

@@ -68,7 +68,6 @@ def sweep_remote(bucket: Bucket, keep_days: float | None = None, dry_run: bool =
     sizes: Counter[bool] = Counter()
     for entry in packs:
         sizes[_pack_of(entry) in rubbish] += entry.bytes
-    doomed += [entry.name for entry in packs if _pack_of(entry) in rubbish]
     report.freed_bytes, report.kept_bytes = report.freed_bytes + sizes[True], sizes[False]
     for entry in bucket.list(LEASES):
         if is_older(entry, 0.0):
@@ -78,7 +77,9 @@ def sweep_remote(bucket: Bucket, keep_days: float | None = None, dry_run: bool =
     report.unfinished = [str(file) for file in left]
     report.freed_bytes += sum(file.lstat().st_size for file in left)
     if not dry_run:
-        bucket.delete(doomed)  # records first
+        bucket.delete(doomed)
+        # Last parts first: who pushes takes an object for whole whose last part is there.
+        bucket.delete([entry.name for entry in reversed(packs) if _pack_of(entry) in rubbish])
         for file in left:
             file.unlink(missing_ok=True)
     return report

@@ -22,7 +22,7 @@ COMMANDS = {
     "stage": "run one stage, on a run's folder or on fixture artifacts",
     "fixtures": "cut what every stage of a run read, as plain files that replay it elsewhere",
     "batch": "run many clips over one cache",
-    "cache": "list, check and clean the cache",
+    "cache": "list, check, clean and share the cache",
     "models": "list, pull, add and remove model files",
     "data": "import a data set that you downloaded: frames, masks, cameras, poses and the published split",
     "view": "show an avatar in the browser",
@@ -30,6 +30,8 @@ COMMANDS = {
     "convert": "write an avatar as VRM, USDZ, SOG or splats in glTF",
     "report": "write report.html of a run's folder",
     "pack": "make one zip of an avatar with viewer, report and exports, which opens anywhere",
+    "lineage": "where an artifact comes from: clip, parameters, code, model files, packages, device, time",
+    "bundle": "move a clip's results as one verified file",
     "compare": "write a page that shows two runs side by side",
 }
 """Name -> help, of the modules beside this file."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
+from gsac.pipeline.batch_entry import Status
 from gsac.pipeline.batch_plan import BatchPlanner, ClipPlan
-from gsac.pipeline.batch_record import FILE, BatchRecord, Status, read_request
+from gsac.pipeline.batch_record import FILE, BatchRecord, read_request
 from gsac.pipeline.batch_reporter import BatchReporter, open_batch_reporter
 from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.commands.options import (
@@ -23,7 +23,7 @@ from gsac.pipeline.commands.options import (
     values_of_person,
 )
 from gsac.pipeline.executors import EXECUTORS, check_executor
-from gsac.pipeline.executors.executor import ClipJob, ClipResult
+from gsac.pipeline.executors.executor import ClipJob, ClipResult, Limits
 from gsac.pipeline.executors.memory import SHARE, machine_mb
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
@@ -51,6 +51,8 @@ def declare(command: argparse.ArgumentParser) -> None:
                          help="clips at once (default: half as many as cores; 1 on a GPU)")
     command.add_argument("--memory", type=float, metavar="GB",
                          help=f"memory that clips at once may fill, by what they took before (default: {SHARE:g} of the machine's)")
+    command.add_argument("--address", metavar="HOST:PORT",
+                         help="of the Ray cluster (default: the one that RAY_ADDRESS names, else this machine alone)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
     command.add_argument("--from", dest="start", metavar="STAGE", help="what this stage needs must be in the cache already")
     command.add_argument("--force", action="append", default=[], metavar="STAGE", help="run this stage again; may be repeated")
@@ -77,6 +79,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if arguments.memory is not None and not arguments.memory > 0:
         raise BadInput(f"--memory {arguments.memory:g}: expected GB above 0")
     check_executor(arguments.executor)
+    if arguments.address is not None and arguments.executor != "ray":
+        raise BadInput(f"--address {arguments.address}: only --executor ray has one")
     project = Project.at_hand()
     configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
     options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
@@ -93,6 +97,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
                  and earlier.status in (Status.DONE, Status.UNCHANGED, Status.KEPT) and earlier.digest == plan.digest}
         plans = [plan for plan in plans if plan.job not in kept]
     workers = arguments.jobs or count_workers(planner.keys)
+    limits = Limits(workers, arguments.memory * 1024 if arguments.memory else SHARE * machine_mb(), arguments.address)
     due = [plan for plan in plans if not plan.unchanged]
     reporter.note(foretell(plans, len(kept), workers))
     if arguments.dry_run:
@@ -111,9 +116,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
             page.add(result, record.entries[result.job].before)
             show(result, table, page, reporter)
 
-        executor = EXECUTORS[arguments.executor](
-            workers, lambda job, line: table.hear(job.name, line), (arguments.memory or SHARE * machine_mb() / 1024) * 1024)
-        results = run_batch([replace(plan.job, peak_mb=plan.peak_mb) for plan in due], executor, end, unchanged)
+        executor = EXECUTORS[arguments.executor](limits, lambda job, line: table.hear(job.name, line))
+        results = run_batch([plan.told_job for plan in due], executor, end, unchanged)
     record.write(now=True)
     write_page(page, reporter)
     return conclude(record, {result.job: result for result in results}, page, reporter, arguments.json)

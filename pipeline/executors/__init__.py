@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gsac.pipeline.executors.executor import Executor, Hear
+from gsac.pipeline.executors.executor import Executor, Hear, Limits
 from gsac.stages.contract import BadInput, did_you_mean
 
 
-def _local(workers: int, hear: Hear, memory_mb: float) -> Executor:
+def _local(limits: Limits, hear: Hear) -> Executor:
     from gsac.pipeline.executors.local import LocalExecutor
 
-    return LocalExecutor(workers, hear, memory_mb)
+    return LocalExecutor(limits, hear)
 
 
-EXECUTORS: dict[str, Callable[[int, Hear, float], Executor]] = {"local": _local}
+def _ray(limits: Limits, hear: Hear) -> Executor:
+    from gsac.pipeline.executors.ray_cluster import RayExecutor
+
+    return RayExecutor(limits, hear)
+
+
+EXECUTORS: dict[str, Callable[[Limits, Hear], Executor]] = {"local": _local, "ray": _ray}
 
 
 def check_executor(name: str) -> None:

@@ -20,6 +20,8 @@ class ClipJob:
     arguments: tuple[str, ...] = ()
     peak_mb: float = field(default=0.0, compare=False)
     """Memory that it is reckoned to need."""
+    before_gpu: str = field(default="", compare=False)
+    """Last of its stages before those that a GPU computes; empty where none has to run."""
 
     @property
     def name(self) -> str:
@@ -47,6 +49,25 @@ class ClipResult:
     def was_killed(self) -> bool:
         """Whether a signal ended its run or a stage of it, as where memory runs out."""
         return self.code < 0 or any(row.get("killed") for row in self.summary.get("stages", []))
+
+    def set_aside(self, killed: int, where: str) -> ClipResult:
+        """The same with how often a signal ended it, which is said where it was not once alone. where: its last run was."""
+        self.killed = killed
+        if killed > 1:
+            self.error += f" ({killed} times, the last time {where}: it is not tried again)"
+        return self
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much may run at once."""
+
+    workers: int
+    """Clips."""
+    memory_mb: float
+    """Of one machine, that its clips take together."""
+    address: str | None = None
+    """Of a cluster; None: the one that the environment names, or this machine alone."""
 
 
 Hear = Callable[[ClipJob, str], None]

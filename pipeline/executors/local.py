@@ -6,35 +6,27 @@ A clip whose process is killed, as by a machine that ran out of memory, is tried
 from __future__ import annotations
 
 import contextlib
-import json
 import os
-import signal
 import subprocess
-import tempfile
-import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
-from gsac.pipeline.executors.executor import ClipJob, ClipResult, Hear
+from gsac.pipeline.executors.clip_process import THREADS, run_process
+from gsac.pipeline.executors.executor import ClipJob, ClipResult, Hear, Limits
 from gsac.pipeline.executors.memory import Memory
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.tether import tethered
-
-THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-"""Shared out among the clips that run at once, where the user has not set them."""
 
 
 class LocalExecutor:
-    """Runs `gsac run` for each clip. workers: how many clips at once; hear: gets what their runs say; memory_mb: what they may
-    take together."""
+    """Runs `gsac run` for each clip. hear: gets what their runs say."""
 
-    def __init__(self, workers: int, hear: Hear, memory_mb: float):
-        self._hear, self._memory = hear, Memory(memory_mb)
+    def __init__(self, limits: Limits, hear: Hear):
+        self._hear, self._memory = hear, Memory(limits.memory_mb)
         self._leaving = False
-        self._pool = ThreadPoolExecutor(workers)  # the threads only wait for their process
+        self._pool = ThreadPoolExecutor(limits.workers)  # the threads only wait for their process
         self._futures: list[Future[ClipResult]] = []
         self._running: set[subprocess.Popen] = set()
-        share = str(max(1, (os.cpu_count() or 1) // workers))
+        share = str(max(1, (os.cpu_count() or 1) // limits.workers))
         self._environment = dict.fromkeys(THREADS, share) | os.environ
 
     def __enter__(self) -> LocalExecutor:
@@ -62,46 +54,14 @@ class LocalExecutor:
             with self._memory.take(wanted) as may_start:
                 if not may_start:
                     return result or ClipResult(job, ExitCode.INTERRUPTED, 0.0, "the batch ended before its turn")
-                result = self._try(job)
+                result = run_process(job, self._environment, lambda line: self._hear(job, line), self._while_running)
             killed, wanted = killed + result.was_killed, self._memory.limit_mb
-        result.killed = killed
-        if killed > 1:
-            result.error += " (twice, the second time with no other clip beside it: it is not tried again)"
-        return result
+        return result.set_aside(killed, "with no other clip beside it")
 
-    def _try(self, job: ClipJob) -> ClipResult:
-        began = time.monotonic()
-        with tempfile.TemporaryFile() as out:
-            said = []
-            with tethered("gsac.pipeline.cli", "run", str(job.clip), "--out", str(job.out), "--json", *job.arguments,
-                          stdout=out, stderr=subprocess.PIPE, text=True, errors="replace", env=self._environment) as process:
-                assert process.stderr is not None
-                self._running.add(process)
-                try:
-                    with process.stderr as lines:
-                        for line in lines:
-                            said.append(line.rstrip("\n"))
-                            self._hear(job, said[-1])
-                    process.wait()
-                finally:
-                    self._running.discard(process)
-            out.seek(0)
-            summary = _summary(out.read())
-        return ClipResult(job, process.returncode, time.monotonic() - began, _error(process.returncode, said), summary)
-
-
-def _summary(out: bytes) -> dict:
-    lines = out.splitlines()
-    with contextlib.suppress(IndexError, ValueError):
-        return json.loads(lines[-1])
-    return {}
-
-
-def _error(code: int, words: list[str]) -> str:
-    """The sentence with which a run ended."""
-    if code == ExitCode.OK:
-        return ""
-    if code < 0:
-        return f"its process was killed by {signal.Signals(-code).name}"
-    said = [line for line in words if line.startswith("gsac: ") and not line.startswith("gsac: warning: ")]
-    return said[-1].removeprefix("gsac: ") if said else next((line for line in reversed(words) if line.strip()), "no word of why")
+    @contextlib.contextmanager
+    def _while_running(self, process: subprocess.Popen) -> Iterator[None]:
+        self._running.add(process)
+        try:
+            yield
+        finally:
+            self._running.discard(process)

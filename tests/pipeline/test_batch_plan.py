@@ -40,6 +40,8 @@ def test_unchanged_clips_get_no_process_and_their_folders_are_mended(toy, clips,
     assert statuses(again) == {"one": "unchanged", "two": "done", "three": "unchanged"}
     assert "3 clips, 2 unchanged, 1 to do" in again.err
     assert (out / "one-avatar" / "join" / "out.txt").read_text() == "ALPHA ALPHA"
+    counters = (out / "batch.prom").read_text()
+    assert 'gsac_batch_clips{status="unchanged"} 2\n' in counters and 'gsac_batch_clips{status="done"} 1\n' in counters
     rows = {row["clip"]: row for row in again.json["clips"]}
     assert [stage["status"] for stage in rows[str(clips / "one.mp4")]["stages"]] == ["cached"] * 4
 

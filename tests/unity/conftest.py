@@ -34,8 +34,8 @@ def gpu(hlsl):
 def kernels(hlsl, tmp_path_factory):
     """Kernel name -> Program, and the tests' own BindParts."""
     folder = tmp_path_factory.mktemp("spirv")
-    sources = dict.fromkeys(hlsl.KERNELS, hlsl.CORE / "Gsac.compute") | {"Join": hlsl.CORE / "GsacJoin.compute",
-                                                                         "BindParts": HERE / "parts.compute"}
+    sources = dict.fromkeys(hlsl.KERNELS, hlsl.CORE / "Gsac.compute")
+    sources |= {hlsl.JOIN: hlsl.CORE / "GsacJoin.compute", "BindParts": HERE / "parts.compute"}
     return {name: hlsl.compile_hlsl(source, name, "comp", folder) for name, source in sources.items()}
 
 

@@ -12,7 +12,7 @@ from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
 from gsac.benchmarks.unity.frame import EVEN
 from gsac.benchmarks.unity.gpu import Painting, projection
-from gsac.benchmarks.unity.shaders import KERNELS
+from gsac.benchmarks.unity.shaders import JOIN, KERNELS
 
 pytestmark = pytest.mark.slow
 
@@ -51,7 +51,7 @@ def painted(gpu, kernels, passes):
             parameters |= dict(zip(VECTORS, row[9:9 + 4 * len(VECTORS)].reshape(-1, 4), strict=True))
             parameters["GsacDepthRange"] = parameters["GsacDepthRange"][:2]
             gpu.buffers |= {name: made[int(n)] for name, n in zip(BUFFERS, row[-len(BUFFERS):], strict=True) if n >= 0}
-            gpu.run([(kernels[[*KERNELS, "Join"][int(row[0])]], parameters, int(row[1]))])
+            gpu.run([(kernels[[*KERNELS, JOIN][int(row[0])]], parameters, int(row[1]))])
         places = asked["places"].reshape(-1, 3, 4).astype(float)
         given = {"GsacFog": 0, "unity_MatrixV": view_of(places[-1]).T, "glstate_matrix_projection": projection(CAMERA).T,
                  "_ScreenParams": [256, 256, 0, 0]}

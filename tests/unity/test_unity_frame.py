@@ -21,10 +21,18 @@ SIZE = 256
 
 
 @pytest.fixture(scope="module")
-def frame(play, mono, files, gpu, kernels, tmp_path_factory):
-    """What the scripts asked of the GPU for one frame of the person, done there: (their arrays, gpu)."""
-    path = tmp_path_factory.mktemp("frame") / "frame"
-    play("frame", files / "person.gsac", files / "person.txt", path)
+def draw(play, mono, files, gpu, kernels, tmp_path_factory):
+    """What the scripts ask of the GPU for one frame, done there: (their arrays, buffers). shape: what alone a clip moves."""
+    return lambda *shape: draw_frame(play, mono, files, gpu, kernels, tmp_path_factory.mktemp("frame") / "frame", *shape)
+
+
+@pytest.fixture(scope="module")
+def frame(draw):
+    return draw()
+
+
+def draw_frame(play, mono, files, gpu, kernels, path, *shape):
+    play("frame", files / "person.gsac", files / "person.txt", path, *shape)
     asked = mono.arrays(path)
     for name, array in asked.items():
         if name.startswith("Gsac"):
@@ -41,8 +49,11 @@ def frame(play, mono, files, gpu, kernels, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def truth(given):
+    return pose_as_the_trainer(*given("person"))
+
+
+def pose_as_the_trainer(avatar, pose, transl, weights):
     """(vertices turned to Unity's axes, bound gaussians, factors of their colours) of that frame in the avatar's own space."""
-    avatar, pose, transl, weights = given("person")
     rest = avatar.vertices.copy()
     for e, w in enumerate(weights):
         span = slice(avatar.expression_start[e], avatar.expression_start[e + 1])
@@ -136,3 +147,13 @@ def test_the_picture_of_a_frame_of_the_scripts_is_the_trainers_at_55_db(gpu, fra
     want = np.concatenate([want.rgb, want.alpha[..., None]], 2)
     assert (want[..., 3] > .5).mean() > .05, "the figure is in the picture"
     assert -10 * np.log10(((got - want) ** 2).mean()) > 55
+
+
+def test_a_clip_of_unitys_that_moves_a_blend_shape_moves_the_gaussians_as_the_trainers_expression_does(draw, given):
+    avatar, pose, transl, weights = given("person")
+    said = avatar.jaw_actions @ pose[22]
+    said[avatar.expression_names.index("jawOpen")] += .6
+    bound, still = (pose_as_the_trainer(avatar, pose, transl, w)[1] for w in (said, avatar.jaw_actions @ pose[22]))
+    splats = draw("jawOpen")[1]["GsacSplats"].reshape(-1, 12)
+    assert abs(splats[:, :3] - bound.means @ MIRROR).max() < 1e-4
+    assert abs(bound.means - still.means).max() > 3e-3, "the jaw moves"

@@ -25,16 +25,17 @@ def test_the_benchmark_and_the_scripts_sort_by_the_same_dispatches(play):
     assert told == wanted
 
 
-def test_the_table_times_every_pass_of_a_right_frame_and_the_picture_is_the_persons(gpu, files, tmp_path):
+def test_the_table_times_every_pass_of_a_right_frame_and_the_picture_is_the_persons(gpu, files, figure, tmp_path):
     run = [sys.executable, "-m", "gsac.benchmarks.unity", "--software", "--avatar", files / "figure.gsac", "--size", "96",
-           "--repeats", "3", "--distances", "1.5", "--picture", tmp_path / "eye.png"]
+           "--repeats", "3", "--distances", "1.5", "--people", "3", "--picture", tmp_path / "eye.png"]
     done = subprocess.run(list(map(str, run)), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert "llvmpipe" in lines[0] and lines[1].endswith(" ok"), done.stdout
     rows = {line.split("  ")[0]: line.split()[-5:] for line in lines if "covered" not in line}
-    for name in ("Skin", "Bind", "SortBlocks", "frame: all of them, once", "draw, 2 x 96x96, 1.5 m"):
+    for name in ("Skin", "Bind", "SortBlocks", "frame: all of them, once", "Join", "join and sort, once", "draw, 2 x 96x96, 1.5 m"):
         assert float(rows[name][1]) > 0 and float(rows[name][3]) >= 0, name
+    assert f"3 people together, {3 * len(figure.gaussians)} gaussians:" in lines, "sorted, too"
     shown = np.asarray(Image.open(tmp_path / "eye-1.5m.png")).astype(int)
     red = np.argwhere((shown[..., 0] > 150) & (shown[..., 1] < 90))[:, 1]
     blue = np.argwhere((shown[..., 2] > 150) & (shown[..., 0] < 90))[:, 1]

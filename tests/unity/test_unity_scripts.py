@@ -17,11 +17,13 @@ pytestmark = pytest.mark.slow
 
 MIRROR = np.diag([-1.0, 1, 1])
 ONCE = {
-    "GsacAvatar.Open": "a file is read", "GsacAvatar.Unknown": "an error", "GsacRenderer.Prepare": "a model's first frame",
+    "GsacAvatar.Open": "a file is read", "GsacAvatar.Unknown": "an error", "GsacAvatar.Complain": "an error",
+    "GsacRenderer.Prepare": "a model's first frame",
     "GsacRenderer.Complain": "an error", "GsacCameras.get_Material": "the first draw",
     "GsacRenderer.NewView": "a camera's first frame", "GsacSorted.Resize": "another file",
     "GsacCameras.Grow": "more people than ever", "GsacCameras.NewCrowd": "people meet", "GsacCrowd.Reserve": "more of them",
-    "GsacCrowd.Plan": "others of them", "GsacPoseStream.Prepare": "another file", "GsacBenchmark.Finish": "the end"}
+    "GsacCrowd.Plan": "others of them", "GsacPoseStream.Prepare": "another file", "GsacReach.Prepare": "another file",
+    "GsacBenchmark.Finish": "the end"}
 """What a frame may call and most frames do not: why."""
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
 
@@ -67,7 +69,7 @@ def test_the_compiled_code_of_a_frame_makes_no_object(play):
     lines = [line.split(" ", 1) for line in play("allocations", *ONCE).splitlines()]
     assert {name for kind, name in lines if kind == "frame"} == {
         "GsacAvatar.LateUpdate", "GsacRenderer.LateUpdate", "GsacCameras.Draw", "GsacPoseStream.LateUpdate",
-        "GsacPoseStream.Listen", "GsacBenchmark.Update", "GsacDemo.LateUpdate"}
+        "GsacPoseStream.Listen", "GsacBenchmark.Update", "GsacDemo.LateUpdate", "GsacReach.LateUpdate"}
     assert {name for kind, name in lines if kind == "once"} == ONCE.keys()
     assert [name for kind, name in lines if kind == "makes"] == []
     assert int(lines[-1][1]) > 80, "methods walked"
@@ -94,7 +96,7 @@ def test_the_benchmark_shows_three_poses_and_writes_the_percentiles(play, files,
 
 def test_the_importer_makes_a_prefab_with_a_whole_human_skeleton(play, files, figure):
     lines = play("import", files / "figure.gsac").splitlines()
-    assert lines[0] == "figure: prefab data mesh humanoid"
+    assert lines[0] == "figure: prefab data mesh humanoid clip wave clip walk"
     joints = {w[1]: (w[2], np.array(w[3:], float)) for w in map(str.split, lines) if w[0] == "joint"}
     for j, name in enumerate(figure.joint_names):
         parent, place = joints[name]
@@ -150,7 +152,7 @@ def test_the_importer_says_what_is_wrong_with_a_file(play, files, tmp_path):
 
 def test_instances_share_buffers_a_new_avatar_replaces_an_old_and_all_is_given_back(play, files):
     lines = play("life", files / "figure.gsac").splitlines()
-    assert lines[:4] == ["draws 2", "draws 4, more buffers True, transforms 56", "draws 4 looking away", "buffers 0"]
+    assert lines[:4] == ["draws 2", "draws 4, more buffers True, transforms 57", "draws 4 looking away", "buffers 0"]
 
 
 def test_wrong_calls_name_the_avatar_and_the_word(play, files):

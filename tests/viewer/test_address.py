@@ -19,6 +19,8 @@ BAD = {"yaw=abc": "degrees", "t=abc": "seconds", "t=-5": "seconds", "fov=0": "1 
        "joints=haed:0,1,0": "pelvis, left_hip", "draw=metal": "webgpu or webgl", "light=dim": "on or off",
        "turntable=fast": "on or off"}
 """Words that are no option -> what the page then says was expected."""
+EMPTY = ("yaw=abc", "t=abc", "fov=0", "fov=x", "dist=-1", "target=a,b")
+"""Those that gave an empty page."""
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +43,10 @@ def test_what_is_no_option_is_named_and_left_out_and_the_person_is_seen(page, wo
     said = page.run("document.getElementById('note').textContent")
     name, value = words.split("=")
     assert name in said and value.split(":")[0] in said and BAD[words] in said
-    page.run("document.body.classList.add('bare')")
-    picture = page.picture().astype(int)
-    assert (np.abs(picture - picture[3, 3]).max(-1) > 30).mean() > 0.02
+    if words in EMPTY:
+        page.run("document.body.classList.add('bare')")
+        picture = page.picture().astype(int)
+        assert (np.abs(picture - picture[3, 3]).max(-1) > 30).mean() > 0.02
     assert page.run("gsac.clock") >= 0 and page.errors == []
 
 

@@ -54,8 +54,9 @@ def ask(tmp_path, script):
 @pytest.mark.slow
 def test_left_and_right_of_the_face_are_swapped_and_only_the_avatars_actions_are_taken(tmp_path):
     got = ask(tmp_path, """console.log(JSON.stringify(mirrorFace([{ categoryName: "_neutral", score: 1 },
-      { categoryName: "eyeBlinkLeft", score: 0.7 }, { categoryName: "jawOpen", score: 0.2 }, { categoryName: "mouthRight", score: 0.4 },
-      { categoryName: "tongueOut", score: 1 }], ["jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthLeft", "mouthRight"])));""")
+      { categoryName: "eyeBlinkLeft", score: 0.7 }, { categoryName: "jawOpen", score: 0.2 },
+      { categoryName: "mouthRight", score: 0.4 }, { categoryName: "tongueOut", score: 1 }],
+      ["jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthLeft", "mouthRight"])));""")
     assert got == {"eyeBlinkRight": 0.7, "jawOpen": 0.2, "mouthLeft": 0.4}
 
 
@@ -79,7 +80,7 @@ def test_the_arms_point_where_the_users_do_in_the_mirror_however_the_user_stands
     points = np.zeros((33, 3))
     points[[11, 12, 23, 24]] = (.2, .5, 0), (-.2, .5, 0), (.1, 0, 0), (-.1, 0, 0)
     arms = {side: rng.normal(size=(2, 3)) for side in ("left", "right")}
-    for (side, (upper, fore)), shoulder in zip(arms.items(), (11, 12), strict=True):
+    for (upper, fore), shoulder in zip(arms.values(), (11, 12), strict=True):
         points[shoulder + 2] = points[shoulder] + .3 * upper / np.linalg.norm(upper)
         points[shoulder + 4] = points[shoulder + 2] + .25 * fore / np.linalg.norm(fore)
     points = Rotation.from_euler("y", body, degrees=True).apply(points) * (1, -1, -1)
@@ -164,9 +165,9 @@ def test_with_the_files_that_the_user_gives_the_avatar_does_what_the_user_does_a
     page.until("gsac.expression.jawOpen > 0.79 && gsac.turned.left_shoulder?.[2] > 89")
     assert page.run("asked") == [["loader", "binary", "the face's", "VIDEO"], ["loader", "binary", "the body's", "VIDEO"]]
     assert page.run("looked") == [640, 480] and page.run("document.getElementById('mirror').ariaPressed") == "true"
-    hand, head = ("[0, 1, 2].map((i) => gsac.skin.place(gsac.avatar.names.indexOf('%s'))[i])" % it for it in ("left_wrist", "head"))
     page.run("gsac.step(1)")
-    assert page.run(hand)[1] > page.run(head)[1] + 0.2, "the user's right arm is up, in the mirror the avatar's left"
+    hand, head = page.run("['left_wrist', 'head'].map((name) => gsac.skin.place(gsac.avatar.names.indexOf(name))[1])")
+    assert hand > head + 0.2, "the user's right arm is up, in the mirror the avatar's left"
     assert all(address.startswith("blob:") for address in page.requests[before:]) and page.errors == []
     page.run("document.getElementById('mirror').click()")
     page.until("gsac.playing.pose === 'A' && Object.keys(gsac.expression).length === 0")

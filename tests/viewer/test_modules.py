@@ -7,6 +7,7 @@ import subprocess
 import pytest
 
 from gsac.viewer import joint_names
+from gsac.viewer.package import NPM
 from gsac.viewer.page import HERE, MODULES, join_modules
 from support.page_modules import copy_modules
 
@@ -77,6 +78,7 @@ def test_a_module_imports_what_it_uses_of_others_and_nothing_else(module):
 
 def test_whatever_is_exported_is_imported():
     imported = {name for found in IMPORTS.values() for names in found.values() for name in names}
+    imported |= {name for path in NPM.glob("*.js") for names, _ in IMPORT.findall(path.read_text()) for name in names.split(", ")}
     assert {name for names in EXPORTS.values() for name in names} == imported
 
 

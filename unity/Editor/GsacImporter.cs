@@ -4,8 +4,8 @@ using UnityEngine;
 
 namespace Gsac
 {
-    /// <summary>A .gsac file in the project becomes a prefab: skeleton, Humanoid Avatar, mesh, components.</summary>
-    [ScriptedImporter(1, "gsac")]
+    /// <summary>A .gsac file in the project becomes a prefab: skeleton, Humanoid Avatar, mesh, clips, components.</summary>
+    [ScriptedImporter(2, "gsac")]
     public sealed class GsacImporter : ScriptedImporter
     {
         public override void OnImportAsset(AssetImportContext context)
@@ -27,12 +27,12 @@ namespace Gsac
             asset.Bytes = bytes;
 
             var root = new GameObject(Path.GetFileNameWithoutExtension(context.assetPath));
-            Transform[] joints = GsacSkeleton.Joints(data, root.transform);
-            // the skeleton's transforms are all that Unity may find when it makes the Avatar
-            Avatar humanoid = GsacHumanoid.Build(data, root, joints);
+            Transform[] joints = GsacSkeleton.Build(data, root.transform);
+            Avatar humanoid = GsacHumanoid.Build(data, root.name);
             Mesh mesh = GsacMesh.Build(data);
-            GsacMesh.Attach(mesh, root.transform, joints);
-            if (!humanoid.isValid || !humanoid.isHuman)
+            GsacMesh.Attach(mesh, new GsacExtent(data), root.transform, joints);
+            bool human = humanoid.isValid && humanoid.isHuman;
+            if (!human)
             {
                 context.LogImportWarning(context.assetPath + ": Unity takes the skeleton not as Humanoid; scripted poses work, Humanoid clips do not");
             }
@@ -45,6 +45,12 @@ namespace Gsac
             context.AddObjectToAsset("data", asset);
             context.AddObjectToAsset("mesh", mesh);
             context.AddObjectToAsset("humanoid", humanoid);
+            foreach (GsacClip clip in data.Clips.Values)
+            {
+                if (!human) break;
+                AnimationClip made = GsacHumanClip.Build(data, clip, humanoid, root.transform, joints);
+                context.AddObjectToAsset("clip " + clip.Name, made);
+            }
             context.SetMainObject(root);
         }
     }

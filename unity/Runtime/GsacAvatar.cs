@@ -1,5 +1,6 @@
 using System;
 using UnityEngine;
+using UnityEngine.Events;
 
 namespace Gsac
 {
@@ -8,7 +9,7 @@ namespace Gsac
     {
         /// <summary>The Animator, by any Humanoid clip, or whatever else turns the transforms.</summary>
         Animator,
-        /// <summary>Pose and expressions set from script, from the inspector or by a pose stream.</summary>
+        /// <summary>A pose set from script or from the inspector.</summary>
         Script,
         /// <summary>A clip of the .gsac file.</summary>
         Clip,
@@ -17,6 +18,7 @@ namespace Gsac
     /// <summary>
     /// A person: skeleton, poses, expressions. Drawn by the GsacRenderer beside it. Joint rotations in SMPL-X's numbers
     /// (axis-angle in radians, right-handed, y up, person facing +z, left = +x; zero = T-pose) or as Unity quaternions.
+    /// Expressions are the blend shapes of the child `Body`, whatever the source of the pose.
     /// </summary>
     [AddComponentMenu("Gsac/Gsac Avatar")]
     [DisallowMultipleComponent]
@@ -30,10 +32,16 @@ namespace Gsac
         [SerializeField, Tooltip("An imported .gsac file.")] GsacAsset asset = null;
         [SerializeField, Tooltip("Or a .gsac file whose name ends in .bytes.")] TextAsset bytes = null;
         [SerializeField] GsacSource source = GsacSource.Animator;
-        [SerializeField, Tooltip("Clip of the file that plays when the source is Clip; the first where this is empty.")] string clip = "";
+        [SerializeField, HideInInspector] string clip = "";
+        [SerializeField, Tooltip("Of clips of the file: 1 as they are, 0 stands, less than 0 plays backwards.")] float speed = 1;
+        [SerializeField, Tooltip("Whether clips of the file begin anew after their end.")] GsacLoop loop = GsacLoop.AsInFile;
+        [SerializeField, Tooltip("Called when a clip of the file that does not begin anew is over.")] UnityEvent clipEnded = new UnityEvent();
 
         GsacModel model;
+        GsacException fault;
         Transform[] joints;
+        SkinnedMeshRenderer body;
+        GsacShapes shapes;
         int jaw;
         Animator animator;
         Avatar built; // by this component, not a file's
@@ -42,10 +50,14 @@ namespace Gsac
         GsacPose shown;
         GsacPose before;
         GsacClip playing;
+        string found;
         float time;
+        bool ended;
         float faded = 1;
 
-        /// <summary>Throws GsacException where the file cannot be read, InvalidOperationException where none is given.</summary>
+        /// <summary>
+        /// Throws GsacException where the file cannot be read (which is tried once), InvalidOperationException where none is given.
+        /// </summary>
         public GsacModel Model
         {
             get
@@ -60,14 +72,34 @@ namespace Gsac
         /// <summary>In the order of Data.JointNames.</summary>
         public Transform[] Joints { get { return Model == null ? null : joints; } }
 
+        /// <summary>The skinned mesh under the gaussians: its blend shapes are the expressions. Null in edit mode where it was deleted.</summary>
+        public SkinnedMeshRenderer Body { get { return Model == null ? null : body; } }
+
         /// <summary>Weights by Data.Expressions that the next frame draws, the jaw's share added.</summary>
         public float[] DrawnWeights { get; private set; }
 
-        /// <summary>Weights by Data.Expressions as set.</summary>
-        public float[] Weights { get; private set; }
+        /// <summary>Weights by Data.Expressions, 0..1, as they stand on the body.</summary>
+        public GsacShapes Weights { get { return Model == null ? null : shapes; } }
 
         /// <summary>The pose that the source Script shows. Change it and it is drawn.</summary>
         public GsacPose Pose { get { return Model == null ? null : target; } }
+
+        /// <summary>Whether there is a file that can be read. Opens it.</summary>
+        public bool IsOpen
+        {
+            get
+            {
+                try
+                {
+                    if (model == null && fault == null && HasFile) Open();
+                }
+                catch (GsacException)
+                {
+                    // kept, and said by the renderer and by whoever asks for the model
+                }
+                return model != null;
+            }
+        }
 
         public bool HasFile { get { return asset != null || bytes != null || loose != null; } }
 
@@ -84,6 +116,30 @@ namespace Gsac
             }
         }
 
+        /// <summary>The clip that plays when the source is Clip; the first of the file where this is empty.</summary>
+        public string Clip
+        {
+            get { return clip; }
+            set { clip = value ?? ""; }
+        }
+
+        /// <summary>Of clips of the file: 1 as they are, 0 stands, less than 0 plays backwards.</summary>
+        public float Speed
+        {
+            get { return speed; }
+            set { speed = value; }
+        }
+
+        /// <summary>Whether clips of the file begin anew after their end.</summary>
+        public GsacLoop Loop
+        {
+            get { return loop; }
+            set { loop = value; }
+        }
+
+        /// <summary>Called when a clip of the file that does not begin anew is over.</summary>
+        public UnityEvent ClipEnded { get { return clipEnded; } }
+
         /// <summary>For the importer.</summary>
         public void Use(GsacAsset file)
         {
@@ -91,59 +147,99 @@ namespace Gsac
             asset = file;
         }
 
-        /// <summary>Another avatar from the bytes of a .gsac file, at run time. Throws GsacException.</summary>
+        /// <summary>
+        /// Another person from the bytes of a .gsac file, at run time: in the T-pose, without expression. Joints of the same names stay
+        /// the objects that they are, and so does all that is not the avatar's own. Throws GsacException and leaves the person as it is.
+        /// </summary>
         public void Use(byte[] file)
         {
+            GsacModel next = GsacModel.Acquire(file, file);
+            Transform[] old = GsacSkeleton.Find(next.Data, transform);
+            if (old != null) GsacSkeleton.Rest(next.Data, old);
+            else if (joints != null) GsacSkeleton.Remove(transform, joints);
             Close();
-            foreach (Transform child in GetComponentsInChildren<Transform>(true))
-            {
-                if (child.parent != transform) continue;
-                child.SetParent(null, false); // destroyed only at the frame's end
-                Destroy(child.gameObject);
-            }
             if (animator != null) animator.avatar = null;
             FreeBuilt();
             target = null;
             loose = file;
-            Open();
+            Take(next);
+            GsacMesh.Wear(body, next.Body, next.Extent, joints);
+            shapes = new GsacShapes(body, next.Data.Expressions);
+            shapes.Clear();
         }
 
         void Open()
         {
             if (!HasFile) throw new InvalidOperationException(name + ": the Gsac Avatar has no file; drag a .gsac asset onto its field `Asset`");
+            if (fault != null) throw fault;
             object origin = loose != null ? (object)loose : asset != null ? (object)asset : bytes;
-            model = GsacModel.Acquire(origin, loose ?? (asset != null ? asset.Bytes : bytes.bytes));
+            try
+            {
+                Take(GsacModel.Acquire(origin, loose ?? (asset != null ? asset.Bytes : bytes.bytes)));
+            }
+            catch (GsacException e)
+            {
+                fault = e;
+                throw;
+            }
+        }
+
+        void Take(GsacModel next)
+        {
+            model = next;
             GsacData data = model.Data;
             joints = GsacSkeleton.Joints(data, transform);
             jaw = data.Joint("jaw");
+            body = GsacMesh.Find(transform, joints);
+            if (Application.isPlaying)
+            {
+                if (body == null) body = GsacMesh.Attach(model.Body, model.Extent, transform, joints);
+                else if (body.sharedMesh == null) GsacMesh.Wear(body, model.Body, model.Extent, joints); // it went with the model
+            }
+            shapes = new GsacShapes(body, data.Expressions);
             if (target == null)
             {
                 target = new GsacPose(data.JointCount);
                 shown = new GsacPose(data.JointCount);
                 before = new GsacPose(data.JointCount);
-                Weights = new float[data.Expressions.Length];
                 DrawnWeights = new float[data.Expressions.Length];
                 GsacSkeleton.Read(target, data, joints); // what the scene was saved with
             }
             animator = GetComponent<Animator>();
             if (animator == null) animator = gameObject.AddComponent<Animator>();
-            if (animator.avatar == null) animator.avatar = built = GsacHumanoid.Build(data, gameObject, joints);
-            FindClip();
+            if (animator.avatar == null) animator.avatar = built = GsacHumanoid.Build(data, name);
+            found = null;
         }
 
+        /// <summary>Finds the clip that `clip` names, and begins it. One that is not there is said, and none plays.</summary>
         void FindClip()
         {
             playing = null;
-            foreach (GsacClip found in model.Data.Clips.Values)
+            foreach (GsacClip one in model.Data.Clips.Values)
             {
-                if (playing == null || found.Name == clip) playing = found;
+                if (playing == null && string.IsNullOrEmpty(clip) || one.Name == clip) playing = one;
             }
+            if (playing == null && !string.IsNullOrEmpty(clip)) Complain();
+            found = clip;
+            time = speed < 0 && playing != null ? GsacPose.Length(playing, Loops(playing)) : 0;
+            ended = false;
+        }
+
+        void Complain()
+        {
+            Debug.LogError(Unknown("clip", clip).Message + "; it has " + string.Join(", ", model.Data.Clips.Keys), this);
+        }
+
+        bool Loops(GsacClip one)
+        {
+            return loop == GsacLoop.AsInFile ? one.Loop : loop == GsacLoop.Always;
         }
 
         void Close()
         {
             if (model != null) model.Release();
             model = null;
+            fault = null;
         }
 
         void FreeBuilt()
@@ -185,23 +281,21 @@ namespace Gsac
         /// <summary>Plays a clip of the file, such as "wave" or "walk".</summary>
         public void PlayClip(string name)
         {
-            GsacClip found;
-            if (!Data.Clips.TryGetValue(name, out found)) throw Unknown("clip", name);
+            if (!Data.Clips.ContainsKey(name)) throw Unknown("clip", name);
             Source = GsacSource.Clip;
             BeginFade();
-            playing = found;
             clip = name;
-            time = 0;
+            FindClip();
         }
 
         /// <summary>One moment of a clip as a still pose.</summary>
         public void ShowMoment(string name, float seconds)
         {
-            GsacClip found;
-            if (!Data.Clips.TryGetValue(name, out found)) throw Unknown("clip", name);
+            GsacClip one;
+            if (!Data.Clips.TryGetValue(name, out one)) throw Unknown("clip", name);
             Source = GsacSource.Script;
             BeginFade();
-            target.Sample(found, seconds);
+            target.Sample(one, seconds);
         }
 
         /// <summary>Without a soft change from the pose before.</summary>
@@ -243,6 +337,17 @@ namespace Gsac
             Pose.Rotation[j + 3] = local.w;
         }
 
+        /// <summary>Brings a hand or foot from the pose shown to a place in the world, or as near as the limb is long.</summary>
+        public void Reach(GsacEnd end, Vector3 place)
+        {
+            GsacLimb limb = GsacLimb.Find(Data, joints, end);
+            if (limb == null) throw Unknown("limb", end.ToString());
+            if (source == GsacSource.Script) GsacSkeleton.Apply(target, model.Data, joints);
+            Source = GsacSource.Script;
+            limb.Reach(place);
+            GsacSkeleton.Read(target, model.Data, joints);
+        }
+
         int JointIndex(string joint)
         {
             int j = Data.Joint(joint);
@@ -260,7 +365,7 @@ namespace Gsac
 
         public void ClearExpressions()
         {
-            if (Model != null) Array.Clear(Weights, 0, Weights.Length);
+            Weights.Clear();
         }
 
         ArgumentException Unknown(string what, string word)
@@ -277,7 +382,7 @@ namespace Gsac
 
         void LateUpdate()
         {
-            if (!HasFile || !Application.isPlaying || Model == null) return;
+            if (!Application.isPlaying || !IsOpen) return;
             bool animated = source == GsacSource.Animator;
             if (animator.enabled != animated) animator.enabled = animated;
             Refresh(Time.deltaTime);
@@ -287,8 +392,7 @@ namespace Gsac
         public void Refresh(float seconds)
         {
             if (Model == null || source == GsacSource.Animator) return;
-            time += seconds;
-            if (source == GsacSource.Clip && playing != null) shown.Sample(playing, time);
+            if (source == GsacSource.Clip) Play(seconds);
             else shown.Copy(target);
             if (faded < 1)
             {
@@ -298,13 +402,41 @@ namespace Gsac
             GsacSkeleton.Apply(shown, model.Data, joints);
         }
 
+        /// <summary>Fills `shown` from the clip, `seconds` after the frame before.</summary>
+        void Play(float seconds)
+        {
+            // set by whatever sets a field: inspector, undo, script
+            if (found != clip)
+            {
+                if (found != null) BeginFade();
+                FindClip();
+            }
+            if (playing == null)
+            {
+                shown.Copy(target);
+                return;
+            }
+            bool loops = Loops(playing);
+            float length = GsacPose.Length(playing, loops);
+            time += seconds * speed;
+            bool over = speed > 0 && time >= length || speed < 0 && time <= 0;
+            if (loops && length > 0) time -= (float)Math.Floor(time / length) * length;
+            else time = Mathf.Clamp(time, 0, length);
+            shown.Sample(playing, time, loops);
+            if (!over || loops || ended) return;
+            ended = true;
+            clipEnded.Invoke();
+        }
+
         /// <summary>Fills DrawnWeights; the renderer calls it.</summary>
         public void CollectWeights()
         {
-            Array.Copy(Weights, DrawnWeights, Weights.Length);
+            shapes.Read(DrawnWeights);
             if (jaw < 0) return;
             Quaternion q = joints[jaw].localRotation;
-            GsacPose.AddJaw(model.Data, q.x, q.y, q.z, q.w, DrawnWeights);
+            GsacPose.ToAxisAngle(ref q.x, ref q.y, ref q.z, q.w);
+            GsacPose.AddJaw(model.Data, q.x, q.y, q.z, DrawnWeights);
+            shapes.ShowJaw(q.x, q.y, q.z);
         }
     }
 }

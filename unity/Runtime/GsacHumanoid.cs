@@ -6,32 +6,18 @@ namespace Gsac
     /// <summary>A Mecanim Avatar for the skeleton, so that any Humanoid clip plays.</summary>
     public static class GsacHumanoid
     {
-        /// <summary>The joints must stand in the T-pose. The Avatar says by isValid and isHuman whether Unity takes it.</summary>
-        public static Avatar Build(GsacData data, GameObject root, Transform[] joints)
+        /// <summary>
+        /// Of a skeleton of its own in the T-pose, so that it matters neither how the person stands nor what else hangs on the joints.
+        /// The Avatar says by isValid and isHuman whether Unity takes it.
+        /// </summary>
+        public static Avatar Build(GsacData data, string name)
         {
-            // Unity wants the root on top of the hierarchy, and at rest
-            Transform top = root.transform, parent = top.parent;
-            int place = top.GetSiblingIndex();
-            Vector3 position = top.localPosition, scale = top.localScale;
-            Quaternion rotation = top.localRotation;
-            if (parent != null) top.SetParent(null, false);
-            Rest(top, Vector3.zero, Quaternion.identity, new Vector3(1, 1, 1));
-            Avatar avatar = AvatarBuilder.BuildHumanAvatar(root, Describe(data, top, joints));
+            var root = new GameObject(name) { hideFlags = HideFlags.HideAndDontSave };
+            Transform[] joints = GsacSkeleton.Build(data, root.transform);
+            Avatar avatar = AvatarBuilder.BuildHumanAvatar(root, Describe(data, root.transform, joints));
             avatar.name = "Humanoid";
-            if (parent != null)
-            {
-                top.SetParent(parent, false);
-                top.SetSiblingIndex(place);
-            }
-            Rest(top, position, rotation, scale);
+            UnityEngine.Object.DestroyImmediate(root);
             return avatar;
-        }
-
-        static void Rest(Transform t, Vector3 position, Quaternion rotation, Vector3 scale)
-        {
-            t.localPosition = position;
-            t.localRotation = rotation;
-            t.localScale = scale;
         }
 
         static HumanDescription Describe(GsacData data, Transform root, Transform[] joints)

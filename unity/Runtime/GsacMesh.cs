@@ -1,11 +1,21 @@
+using System;
 using UnityEngine;
 using UnityEngine.Rendering;
 
 namespace Gsac
 {
-    /// <summary>The body under the gaussians as a skinned Unity mesh, for shadows, colliders and own tools.</summary>
+    /// <summary>
+    /// The body under the gaussians as a skinned Unity mesh: for shadows, colliders and own tools. Its blend shapes are the expressions:
+    /// their weights move the gaussians too.
+    /// </summary>
     public static class GsacMesh
     {
+        const string Name = "Body";
+        const float Whole = 100;
+
+        /// <summary>Shapes by which the mesh follows the jaw's turn where it has no skin of its own: set by the avatar, a whole one is 1 rad.</summary>
+        public static readonly string[] JawShapes = { "turned jaw x", "turned jaw y", "turned jaw z" };
+
         public static Mesh Build(GsacData data)
         {
             var vertices = new Vector3[data.VertexCount];
@@ -31,28 +41,82 @@ namespace Gsac
             }
             var binds = new Matrix4x4[data.JointCount];
             for (int j = 0; j < binds.Length; j++) binds[j] = Matrix4x4.Translate(-GsacSkeleton.Place(data, j));
-            var mesh = new Mesh { name = "Body", indexFormat = vertices.Length > 65535 ? IndexFormat.UInt32 : IndexFormat.UInt16 };
+            var mesh = new Mesh { name = Name, indexFormat = vertices.Length > 65535 ? IndexFormat.UInt32 : IndexFormat.UInt16 };
             mesh.vertices = vertices;
             mesh.triangles = triangles;
             mesh.boneWeights = weights;
             mesh.bindposes = binds;
             mesh.RecalculateNormals();
             mesh.RecalculateBounds();
+            AddShapes(mesh, data);
             return mesh;
         }
 
-        /// <summary>A renderer of the mesh on a child of `root`, switched off: give it a material and switch it on where it is wanted.</summary>
-        public static SkinnedMeshRenderer Attach(Mesh mesh, Transform root, Transform[] joints)
+        static void AddShapes(Mesh mesh, GsacData data)
         {
-            var holder = new GameObject("Body");
+            var moves = new Vector3[data.VertexCount];
+            for (int e = 0; e < data.Expressions.Length; e++)
+            {
+                Array.Clear(moves, 0, moves.Length);
+                AddMoves(moves, data, e, 1);
+                mesh.AddBlendShapeFrame(data.Expressions[e], Whole, moves, null, null);
+            }
+            for (int axis = 0; axis < JawShapes.Length; axis++)
+            {
+                Array.Clear(moves, 0, moves.Length);
+                bool any = false;
+                for (int e = 0; e < data.Expressions.Length; e++)
+                {
+                    float weight = data.ExpressionJaw[e * 3 + axis];
+                    if (weight == 0) continue;
+                    AddMoves(moves, data, e, weight);
+                    any = true;
+                }
+                if (any) mesh.AddBlendShapeFrame(JawShapes[axis], Whole, moves, null, null);
+            }
+        }
+
+        static void AddMoves(Vector3[] moves, GsacData data, int expression, float weight)
+        {
+            float[] d = data.ExpressionDelta;
+            for (int m = data.ExpressionStart[expression]; m < data.ExpressionStart[expression + 1]; m++)
+            {
+                moves[data.ExpressionVertex[m]] += new Vector3(d[m * 3], d[m * 3 + 1], d[m * 3 + 2]) * weight;
+            }
+        }
+
+        /// <summary>The renderer of the body on a child of `root`; null where there is none. What else is called so hangs on other bones.</summary>
+        public static SkinnedMeshRenderer Find(Transform root, Transform[] joints)
+        {
+            for (int i = 0; i < root.childCount; i++)
+            {
+                if (root.GetChild(i).name != Name) continue;
+                var body = root.GetChild(i).GetComponent<SkinnedMeshRenderer>();
+                if (body != null && (body.rootBone == null || body.rootBone == joints[0])) return body;
+            }
+            return null;
+        }
+
+        /// <summary>A renderer of the mesh on a child of `root`, switched off: give it a material and switch it on where it is wanted.</summary>
+        public static SkinnedMeshRenderer Attach(Mesh mesh, GsacExtent extent, Transform root, Transform[] joints)
+        {
+            var holder = new GameObject(Name);
             holder.transform.SetParent(root, false);
             var body = holder.AddComponent<SkinnedMeshRenderer>();
+            body.shadowCastingMode = ShadowCastingMode.ShadowsOnly;
+            body.enabled = false;
+            Wear(body, mesh, extent, joints);
+            return body;
+        }
+
+        /// <summary>Gives a renderer the mesh of a person.</summary>
+        public static void Wear(SkinnedMeshRenderer body, Mesh mesh, GsacExtent extent, Transform[] joints)
+        {
             body.sharedMesh = mesh;
             body.bones = joints;
             body.rootBone = joints[0];
-            body.shadowCastingMode = ShadowCastingMode.ShadowsOnly;
-            body.enabled = false;
-            return body;
+            // Unity takes them about the root bone, not about the mesh's origin
+            body.localBounds = new Bounds(Vector3.zero, new Vector3(2, 2, 2) * extent.Reach);
         }
     }
 }

@@ -34,7 +34,18 @@ namespace Gsac
         /// <summary>Keys to sort at the finest level.</summary>
         public int KeyCount { get; private set; }
 
+        /// <summary>The body's mesh, for avatars that no importer gave one.</summary>
+        public Mesh Body
+        {
+            get
+            {
+                if (body == null) body = GsacMesh.Build(Data);
+                return body;
+            }
+        }
+
         readonly object source;
+        Mesh body;
         int users;
 
         GsacModel(object source, byte[] bytes)
@@ -61,6 +72,7 @@ namespace Gsac
         {
             if (--users > 0) return;
             Shared.Remove(source);
+            GsacCameras.Free(body);
             if (Rest == null) return;
             Rest.Dispose();
             Skin.Dispose();

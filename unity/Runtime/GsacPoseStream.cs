@@ -8,10 +8,11 @@ namespace Gsac
 {
     /// <summary>
     /// Poses and expressions that come live over UDP, a JSON message or an OSC packet each datagram (GsacPoseMessage), smoothed.
+    /// They lie over whatever else moves the person: only what was named moves, from where it stands, and only of the chosen parts.
     /// Listens to this machine only, unless `Any Address` is on. Whatever is not a message is counted by its fault and left.
     /// </summary>
     [AddComponentMenu("Gsac/Gsac Pose Stream")]
-    [DefaultExecutionOrder(8000)]
+    [DefaultExecutionOrder(9300)] // after the avatar, before it is drawn
     [RequireComponent(typeof(GsacAvatar))]
     public sealed class GsacPoseStream : MonoBehaviour
     {
@@ -20,6 +21,8 @@ namespace Gsac
 
         [SerializeField] int port = 9000;
         [SerializeField, Tooltip("Listen to other machines too.")] bool anyAddress = false;
+        [SerializeField, Tooltip("What the stream moves; the rest is left to the Animator, the clip or the script.")]
+        GsacParts parts = GsacParts.All;
         [SerializeField, Tooltip("s: time constant of the smoothing; 0 for none.")] float smoothing = 0.06f;
 
         readonly object padlock = new object();
@@ -28,12 +31,12 @@ namespace Gsac
         GsacAvatar avatar;
         GsacData data;
         GsacPoseMessage message;
-        GsacPose incoming;
-        float[] incomingWeights;
+        GsacParts[] partOf;
+        GsacLivePose incoming;
+        GsacLivePose shown;
         Socket socket;
         Thread thread;
         volatile bool listening;
-        bool fresh;
 
         /// <summary>Messages taken, and datagrams that were none.</summary>
         public int Received { get; private set; }
@@ -45,6 +48,13 @@ namespace Gsac
         public int RefusedFor(GsacMessageFault fault)
         {
             return refused[(int)fault];
+        }
+
+        /// <summary>What the stream moves; the rest is left to the Animator, the clip or the script.</summary>
+        public GsacParts Parts
+        {
+            get { return parts; }
+            set { parts = value; }
         }
 
         public float Smoothing
@@ -62,7 +72,7 @@ namespace Gsac
         void OnEnable()
         {
             avatar = GetComponent<GsacAvatar>();
-            Prepare();
+            if (avatar.IsOpen) Prepare();
             socket = new Socket(AddressFamily.InterNetwork, SocketType.Dgram, ProtocolType.Udp);
             try
             {
@@ -85,9 +95,9 @@ namespace Gsac
         {
             data = avatar.Data;
             message = new GsacPoseMessage(data);
-            incoming = new GsacPose(data.JointCount);
-            incomingWeights = new float[data.Expressions.Length];
-            fresh = false;
+            partOf = GsacHumanBones.Parts(data.JointNames);
+            incoming = new GsacLivePose(data);
+            shown = new GsacLivePose(data);
         }
 
         void OnDisable()
@@ -117,10 +127,10 @@ namespace Gsac
                 }
                 lock (padlock)
                 {
-                    GsacMessageFault fault = message.Read(datagram, length, incoming, incomingWeights);
+                    if (message == null) continue;
+                    GsacMessageFault fault = message.Read(datagram, length, incoming);
                     if (fault == GsacMessageFault.None)
                     {
-                        fresh = true;
                         Received++;
                         continue;
                     }
@@ -133,16 +143,48 @@ namespace Gsac
 
         void LateUpdate()
         {
+            if (!avatar.IsOpen) return;
+            Transform[] joints = avatar.Joints;
+            GsacShapes weights = avatar.Weights;
             lock (padlock)
             {
                 if (!ReferenceEquals(data, avatar.Data)) Prepare();
-                if (!fresh) return;
-                if (avatar.Source != GsacSource.Script) avatar.Source = GsacSource.Script;
-                avatar.Pose.Approach(incoming, Time.deltaTime, smoothing);
-                float stay = smoothing > 0 ? Mathf.Exp(-Time.deltaTime / smoothing) : 0;
-                float[] weights = avatar.Weights;
-                for (int e = 0; e < weights.Length; e++) weights[e] = incomingWeights[e] + (weights[e] - incomingWeights[e]) * stay;
+                float stay = GsacPose.Stay(Time.deltaTime, smoothing);
+                bool body = (parts & GsacParts.Body) != 0, face = (parts & GsacParts.Face) != 0;
+                for (int j = 0; j < joints.Length; j++)
+                {
+                    Turn(joints[j], j, stay, incoming.HasJoint[j] && (parts & partOf[j]) != 0);
+                }
+                Shift(joints[0], stay, incoming.HasTransl && body);
+                for (int e = 0; e < weights.Count; e++) Weigh(weights, e, stay, incoming.HasWeight[e] && face);
             }
+        }
+
+        void Turn(Transform joint, int j, float stay, bool live)
+        {
+            if (live && !shown.HasJoint[j]) GsacSkeleton.ReadTurn(shown.Pose, j, joint);
+            shown.HasJoint[j] = live;
+            if (!live) return;
+            shown.Pose.Approach(incoming.Pose, j, stay);
+            GsacSkeleton.ApplyTurn(shown.Pose, j, joint);
+        }
+
+        void Shift(Transform root, float stay, bool live)
+        {
+            if (live && !shown.HasTransl) GsacSkeleton.ReadTransl(shown.Pose, data, root);
+            shown.HasTransl = live;
+            if (!live) return;
+            shown.Pose.ApproachTransl(incoming.Pose, stay);
+            GsacSkeleton.ApplyTransl(shown.Pose, data, root);
+        }
+
+        void Weigh(GsacShapes weights, int e, float stay, bool live)
+        {
+            if (live && !shown.HasWeight[e]) shown.Weights[e] = weights[e];
+            shown.HasWeight[e] = live;
+            if (!live) return;
+            shown.Weights[e] = incoming.Weights[e] + (shown.Weights[e] - incoming.Weights[e]) * stay;
+            weights[e] = shown.Weights[e];
         }
     }
 }

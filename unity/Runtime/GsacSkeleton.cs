@@ -1,4 +1,4 @@
-using System.Collections.Generic;
+using System;
 using UnityEngine;
 
 namespace Gsac
@@ -12,32 +12,68 @@ namespace Gsac
             return Find(data, root) ?? Build(data, root);
         }
 
-        /// <summary>Null where one is missing.</summary>
+        /// <summary>
+        /// Null where one is missing. A joint is the child of its parent: what else hangs below the person, another person too, may
+        /// be called as it likes.
+        /// </summary>
         public static Transform[] Find(GsacData data, Transform root)
         {
-            var byName = new Dictionary<string, Transform>();
-            foreach (Transform t in root.GetComponentsInChildren<Transform>(true))
-            {
-                if (t != root) byName[t.name] = t;
-            }
             var joints = new Transform[data.JointCount];
             for (int j = 0; j < joints.Length; j++)
             {
-                if (!byName.TryGetValue(data.JointNames[j], out joints[j])) return null;
+                Transform parent = j == 0 ? root : joints[data.Parents[j]];
+                joints[j] = Child(parent, data.JointNames[j]);
+                if (joints[j] == null) return null;
             }
             return joints;
         }
 
-        static Transform[] Build(GsacData data, Transform root)
+        /// <summary>The first child of a name; null where there is none.</summary>
+        static Transform Child(Transform parent, string name)
+        {
+            for (int i = 0; i < parent.childCount; i++)
+            {
+                if (parent.GetChild(i).name == name) return parent.GetChild(i);
+            }
+            return null;
+        }
+
+        /// <summary>Takes joints away; what else hung on them then hangs on the root, where it was in the world.</summary>
+        public static void Remove(Transform root, Transform[] joints)
+        {
+            foreach (Transform joint in joints)
+            {
+                for (int i = joint.childCount - 1; i >= 0; i--)
+                {
+                    Transform child = joint.GetChild(i);
+                    if (Array.IndexOf(joints, child) < 0) child.SetParent(root, true);
+                }
+            }
+            joints[0].SetParent(null, false); // destroyed only at the frame's end
+            UnityEngine.Object.Destroy(joints[0].gameObject);
+        }
+
+        public static Transform[] Build(GsacData data, Transform root)
         {
             var joints = new Transform[data.JointCount];
             for (int j = 0; j < joints.Length; j++)
             {
                 joints[j] = new GameObject(data.JointNames[j]).transform;
                 joints[j].SetParent(j == 0 ? root : joints[data.Parents[j]], false);
-                joints[j].localPosition = j == 0 ? RootPlace(data) : Place(data, j) - Place(data, data.Parents[j]);
             }
+            Rest(data, joints);
             return joints;
+        }
+
+        /// <summary>Puts joints into the T-pose of a file.</summary>
+        public static void Rest(GsacData data, Transform[] joints)
+        {
+            for (int j = 0; j < joints.Length; j++)
+            {
+                joints[j].localPosition = j == 0 ? RootPlace(data) : Place(data, j) - Place(data, data.Parents[j]);
+                joints[j].localRotation = Quaternion.identity;
+                joints[j].localScale = new Vector3(1, 1, 1);
+            }
         }
 
         public static Vector3 Place(GsacData data, int joint)
@@ -53,25 +89,41 @@ namespace Gsac
 
         public static void Apply(GsacPose pose, GsacData data, Transform[] joints)
         {
+            for (int j = 0; j < joints.Length; j++) ApplyTurn(pose, j, joints[j]);
+            ApplyTransl(pose, data, joints[0]);
+        }
+
+        public static void ApplyTurn(GsacPose pose, int joint, Transform transform)
+        {
             float[] r = pose.Rotation;
-            for (int j = 0; j < joints.Length; j++)
-            {
-                joints[j].localRotation = new Quaternion(r[j * 4], r[j * 4 + 1], r[j * 4 + 2], r[j * 4 + 3]);
-            }
-            joints[0].localPosition = RootPlace(data) + new Vector3(pose.Transl[0], pose.Transl[1], pose.Transl[2]);
+            int o = joint * 4;
+            transform.localRotation = new Quaternion(r[o], r[o + 1], r[o + 2], r[o + 3]);
+        }
+
+        public static void ApplyTransl(GsacPose pose, GsacData data, Transform root)
+        {
+            root.localPosition = RootPlace(data) + new Vector3(pose.Transl[0], pose.Transl[1], pose.Transl[2]);
         }
 
         public static void Read(GsacPose pose, GsacData data, Transform[] joints)
         {
-            for (int j = 0; j < joints.Length; j++)
-            {
-                Quaternion q = joints[j].localRotation;
-                pose.Rotation[j * 4] = q.x;
-                pose.Rotation[j * 4 + 1] = q.y;
-                pose.Rotation[j * 4 + 2] = q.z;
-                pose.Rotation[j * 4 + 3] = q.w;
-            }
-            Vector3 moved = joints[0].localPosition - RootPlace(data);
+            for (int j = 0; j < joints.Length; j++) ReadTurn(pose, j, joints[j]);
+            ReadTransl(pose, data, joints[0]);
+        }
+
+        public static void ReadTurn(GsacPose pose, int joint, Transform transform)
+        {
+            Quaternion q = transform.localRotation;
+            int o = joint * 4;
+            pose.Rotation[o] = q.x;
+            pose.Rotation[o + 1] = q.y;
+            pose.Rotation[o + 2] = q.z;
+            pose.Rotation[o + 3] = q.w;
+        }
+
+        public static void ReadTransl(GsacPose pose, GsacData data, Transform root)
+        {
+            Vector3 moved = root.localPosition - RootPlace(data);
             pose.Transl[0] = moved.x;
             pose.Transl[1] = moved.y;
             pose.Transl[2] = moved.z;

@@ -17,7 +17,7 @@ public static class Play
         CultureInfo.DefaultThreadCurrentCulture = CultureInfo.CurrentCulture = new CultureInfo("de-DE"); // commas for points
         switch (args[0])
         {
-            case "frame": Frame(args[1], args[2], args[3]); break;
+            case "frame": Frame(args[1], args[2], args[3], args.Length > 4 ? args[4] : null); break;
             case "sort": Sort(args); break;
             case "pose": Pose(args[1], args[2], args[3]); break;
             case "allocations": Allocations.Print(typeof(GsacAvatar).Assembly, args); break;
@@ -39,7 +39,7 @@ public static class Play
             case "crowds": Crowd.Count(args[1]); break;
             case "repeated": Drawing.Repeated(args[1]); break;
             case "freed": Drawing.Freed(args[1]); break;
-            default: return 2;
+            default: return Drive.Run(args);
         }
         return 0;
     }
@@ -69,10 +69,17 @@ public static class Play
         return avatar;
     }
 
-    /// <summary>One frame: every buffer, dispatch and draw, to be run on a GPU by the test.</summary>
-    static void Frame(string file, string numbers, string path)
+    /// <summary>One frame: every buffer, dispatch and draw, to be run on a GPU by the test. shape: what alone a clip of Unity's moves, to 0.6.</summary>
+    static void Frame(string file, string numbers, string path, string shape)
     {
         GsacAvatar avatar = Posed(file, Numbers(numbers));
+        if (shape != null)
+        {
+            avatar.ClearExpressions();
+            var clip = new AnimationClip();
+            clip.SetCurve("Body", typeof(SkinnedMeshRenderer), "blendShape." + shape, new AnimationCurve(new Keyframe(0, 0, 0, 100), new Keyframe(1, 100, 100, 0)));
+            clip.SampleAnimation(avatar.gameObject, 0.6f);
+        }
         avatar.transform.localPosition = new Vector3(0.4f, 0.1f, -0.7f);
         avatar.transform.localRotation = Quaternion.Euler(5, 40, -3);
         avatar.transform.localScale = new Vector3(1.2f, 1.2f, 1.2f);
@@ -175,8 +182,12 @@ public static class Play
         Player.AddCamera("second eye").transform.SetPositionAndRotation(new Vector3(0, 1, 9), Quaternion.Euler(0, 180, 0));
         int draws = 0;
         Player.OnDraw = (asked, indices, count) => draws++;
+        var reach = avatar.gameObject.AddComponent<GsacReach>();
+        foreach (GsacEnd end in GsacLimb.Ends) reach.SetGoal(end, camera.transform);
+        reach.Turn = true;
         Action frame = Player.Frame(new[] { avatar.gameObject });
         var message = new GsacPoseMessage(avatar.Data);
+        var heard = new GsacLivePose(avatar.Data);
         byte[] osc = Bundle(Osc("/gsac/joint/left_knee", 0.1f, 0, 0), Osc("/gsac/expression/jawOpen", 0.25f), Osc("/other", 1));
         byte[] text = Encoding.UTF8.GetBytes("{\"joints\":{\"left_elbow\":[0.1,-1.25e-1,0]},\"expression\":{\"jawOpen\":0.5},\"other\":[1,{\"a\":\"b\"}]}");
         foreach (GsacSource source in new[] { GsacSource.Animator, GsacSource.Script, GsacSource.Clip })
@@ -190,7 +201,7 @@ public static class Play
             {
                 camera.transform.SetPositionAndRotation(new Vector3(0, 1, 3 + i * 1e-4f), Quaternion.Euler(0, 180, 0));
                 byte[] sent = i % 2 == 0 ? text : osc;
-                if (message.Read(sent, sent.Length, avatar.Pose, avatar.Weights) == GsacMessageFault.None) understood++;
+                if (message.Read(sent, sent.Length, heard) == GsacMessageFault.None) understood++;
                 frame();
             }
             Console.WriteLine(source + " " + draws + " " + understood + " " + (GC.CollectionCount(0) - before));
@@ -367,8 +378,8 @@ public static class Play
         for (int i = 0; i < 40; i++)
         {
             frame();
-            float[] r = avatar.Pose.Rotation;
-            double degrees = 2 * Math.Atan2(r[elbow * 4 + 1], r[elbow * 4 + 3]) * 180 / Math.PI;
+            Quaternion q = avatar.Joints[elbow].localRotation;
+            double degrees = 2 * Math.Atan2(q.y, q.w) * 180 / Math.PI;
             Console.WriteLine(degrees.ToString(CultureInfo.InvariantCulture) + " " + avatar.Weights[jaw].ToString(CultureInfo.InvariantCulture));
         }
         // another file while the stream runs
@@ -429,13 +440,12 @@ public static class Play
         {
             foreach (string name in Directory.GetFiles(folder))
             {
-                var pose = new GsacPose(data.JointCount);
-                var weights = new float[data.Expressions.Length];
+                var heard = new GsacLivePose(data);
                 byte[] raw = File.ReadAllBytes(name);
-                Console.WriteLine(Path.GetFileName(name) + " " + message.Read(raw, raw.Length, pose, weights));
-                dump.Put(Path.GetFileName(name) + ".rotation", pose.Rotation);
-                dump.Put(Path.GetFileName(name) + ".transl", pose.Transl);
-                dump.Put(Path.GetFileName(name) + ".weights", weights);
+                Console.WriteLine(Path.GetFileName(name) + " " + message.Read(raw, raw.Length, heard));
+                dump.Put(Path.GetFileName(name) + ".rotation", heard.Pose.Rotation);
+                dump.Put(Path.GetFileName(name) + ".transl", heard.Pose.Transl);
+                dump.Put(Path.GetFileName(name) + ".weights", heard.Weights);
             }
         }
     }

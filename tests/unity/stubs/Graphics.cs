@@ -169,6 +169,14 @@ namespace UnityEngine
         public int[] triangles { get; set; }
         public BoneWeight[] boneWeights { get; set; }
         public Matrix4x4[] bindposes { get; set; }
+        internal readonly List<KeyValuePair<string, Vector3[]>> Shapes = new List<KeyValuePair<string, Vector3[]>>();
+        public int blendShapeCount { get { return Shapes.Count; } }
+        public void AddBlendShapeFrame(string shapeName, float frameWeight, Vector3[] deltaVertices, Vector3[] deltaNormals, Vector3[] deltaTangents)
+        {
+            if (frameWeight != 100 || deltaVertices.Length != vertices.Length || deltaNormals != null || deltaTangents != null) throw new ArgumentException(shapeName);
+            Shapes.Add(new KeyValuePair<string, Vector3[]>(shapeName, (Vector3[])deltaVertices.Clone()));
+        }
+        public int GetBlendShapeIndex(string blendShapeName) { return Shapes.FindIndex(shape => shape.Key == blendShapeName); }
         public void RecalculateNormals() { }
         public void RecalculateBounds() { }
     }
@@ -184,6 +192,23 @@ namespace UnityEngine
         public Mesh sharedMesh { get; set; }
         public Transform[] bones { get; set; }
         public Transform rootBone { get; set; }
+        public Bounds localBounds { get; set; }
+        internal readonly Dictionary<int, float> Weights = new Dictionary<int, float>();
+        public float GetBlendShapeWeight(int index)
+        {
+            Check(index);
+            float weight;
+            return Weights.TryGetValue(index, out weight) ? weight : 0;
+        }
+        public void SetBlendShapeWeight(int index, float value)
+        {
+            Check(index);
+            Weights[index] = value;
+        }
+        void Check(int index)
+        {
+            if (index < 0 || index >= sharedMesh.blendShapeCount) throw new ArgumentOutOfRangeException(index.ToString());
+        }
     }
 
     public static class QualitySettings

@@ -34,6 +34,7 @@ namespace UnityEngine
             return Mathf.Sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
         }
         public float magnitude { get { return Distance(this, zero); } }
+        public static float Dot(Vector3 lhs, Vector3 rhs) { return lhs.x * rhs.x + lhs.y * rhs.y + lhs.z * rhs.z; }
     }
 
     public struct Vector4
@@ -75,7 +76,17 @@ namespace UnityEngine
         public float x, y, z, w;
         public Quaternion(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
         public static Quaternion identity { get { return new Quaternion(0, 0, 0, 1); } }
-        public Vector3 eulerAngles { get { return Vector3.zero; } }
+        public Vector3 eulerAngles
+        {
+            get
+            {
+                Matrix4x4 m = Matrix4x4.TRS(Vector3.zero, this, new Vector3(1, 1, 1));
+                double x = Math.Asin(Math.Min(Math.Max(-m.m12, -1), 1)), y = Math.Atan2(m.m02, m.m22), z = Math.Atan2(m.m10, m.m11);
+                return new Vector3(Positive(x), Positive(y), Positive(z));
+            }
+        }
+        static float Positive(double radians) { return (float)(radians * 180 / Math.PI + (radians < 0 ? 360 : 0)); }
+        public static Quaternion Inverse(Quaternion rotation) { return new Quaternion(-rotation.x, -rotation.y, -rotation.z, rotation.w); }
 
         // Unity turns about z, then x, then y
         public static Quaternion Euler(float x, float y, float z)
@@ -88,6 +99,28 @@ namespace UnityEngine
             double half = degrees * Math.PI / 360;
             float s = (float)Math.Sin(half);
             return new Quaternion(x * s, y * s, z * s, (float)Math.Cos(half));
+        }
+
+        // for the stub of Transform: at length 1, as Unity keeps them
+        internal Quaternion Whole()
+        {
+            float n = 1 / Mathf.Sqrt(x * x + y * y + z * z + w * w);
+            return new Quaternion(x * n, y * n, z * n, w * n);
+        }
+
+        public static Quaternion FromToRotation(Vector3 fromDirection, Vector3 toDirection)
+        {
+            Vector3 a = fromDirection, b = toDirection;
+            double x = (double)a.y * b.z - (double)a.z * b.y, y = (double)a.z * b.x - (double)a.x * b.z, z = (double)a.x * b.y - (double)a.y * b.x;
+            double w = Vector3.Dot(a, b) + (double)a.magnitude * b.magnitude, n = Math.Sqrt(x * x + y * y + z * z + w * w);
+            if (n < 1e-12) return identity;
+            return new Quaternion((float)(x / n), (float)(y / n), (float)(z / n), (float)(w / n));
+        }
+
+        public static Quaternion Slerp(Quaternion a, Quaternion b, float t)
+        {
+            if (t != 1) throw new NotImplementedException();
+            return b;
         }
 
         public static Quaternion operator *(Quaternion a, Quaternion b)
@@ -147,6 +180,14 @@ namespace UnityEngine
                 m00 = p.x, m01 = p.y, m02 = p.z, m03 = p.w, m10 = q.x, m11 = q.y, m12 = q.z, m13 = q.w,
                 m20 = r.x, m21 = r.y, m22 = r.z, m23 = r.w, m30 = s.x, m31 = s.y, m32 = s.z, m33 = s.w,
             };
+        }
+
+        // for the stub of Transform
+        internal Quaternion Turn()
+        {
+            double w = Math.Sqrt(Math.Max(0, 1.0 + m00 + m11 + m22)) / 2, x = Math.Sqrt(Math.Max(0, 1.0 + m00 - m11 - m22)) / 2;
+            double y = Math.Sqrt(Math.Max(0, 1.0 - m00 + m11 - m22)) / 2, z = Math.Sqrt(Math.Max(0, 1.0 - m00 - m11 + m22)) / 2;
+            return new Quaternion((float)(m21 < m12 ? -x : x), (float)(m02 < m20 ? -y : y), (float)(m10 < m01 ? -z : z), (float)w);
         }
 
         static Vector4 Combined(Vector4 row, Matrix4x4 m)

@@ -13,7 +13,15 @@ namespace UnityEngine
 
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;
+        public static string Typed;
         public static int UpdatesAsked;
+        public static int FilesRead;
+        public static int HandlesSeen;
+        public static readonly Dictionary<int, Vector3> Drags = new Dictionary<int, Vector3>();
+        public static int Heads; // for the made-up human poses: their turns come with either sign
+
+        /// <summary>The objects that an inspector shows at once; null: its own target.</summary>
+        public static Object[] Chosen;
         public static readonly List<string> Labels = new List<string>();
         public static readonly Dictionary<string, float> Slides = new Dictionary<string, float>();
 
@@ -64,6 +72,42 @@ namespace UnityEngine
             for (int i = 0; i < Camera.All.Count; i++) if (Camera.All[i].enabled) Camera.All[i].Render();
         }
 
+        /// <summary>What brings back an object's saved state: a transform's place and turn, blend shapes, serialized fields.</summary>
+        public static Action Restore(Object of)
+        {
+            Action all = () => { };
+            var transform = of as Transform;
+            if (transform != null)
+            {
+                Vector3 place = transform.localPosition;
+                Quaternion turn = transform.localRotation;
+                return () =>
+                {
+                    transform.localPosition = place;
+                    transform.localRotation = turn;
+                };
+            }
+            var body = of as SkinnedMeshRenderer;
+            if (body != null)
+            {
+                var weights = new Dictionary<int, float>(body.Weights);
+                return () =>
+                {
+                    body.Weights.Clear();
+                    foreach (KeyValuePair<int, float> pair in weights) body.Weights.Add(pair.Key, pair.Value);
+                };
+            }
+            foreach (FieldInfo field in of.GetType().GetFields(BindingFlags.Instance | BindingFlags.NonPublic | BindingFlags.Public))
+            {
+                if (!field.IsPublic && !Attribute.IsDefined(field, typeof(SerializeField))) continue;
+                object value = field.GetValue(of);
+                all += () => field.SetValue(of, value);
+            }
+            return all;
+        }
+
+        public static Dictionary<string, AnimationCurve> Curves(AnimationClip clip) { return clip.Curves; }
+        public static Vector3[] Shape(Mesh mesh, int index) { return mesh.Shapes[index].Value; }
         public static string PropertyName(int id) { return Shader.NameOf(id); }
         public static string KernelName(int kernel) { return ComputeShader.Kernels[kernel]; }
         public static uint[] Words(GraphicsBuffer buffer) { return buffer.Words; }
@@ -91,6 +135,10 @@ namespace UnityEngine
         {
             on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);
         }
-        public static TextAsset Text(byte[] bytes) { return new TextAsset { bytes = bytes }; }
+        public static object Field(Component of, string field)
+        {
+            return of.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).GetValue(of);
+        }
+        public static TextAsset Text(byte[] bytes) { return new TextAsset { Bytes = bytes }; }
     }
 }

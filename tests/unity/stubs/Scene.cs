@@ -16,18 +16,28 @@ namespace UnityEngine
         public static void Destroy(Object o)
         {
             if (!Application.isPlaying) throw new InvalidOperationException("Destroy may not be called from edit mode");
-            DestroyImmediate(o);
+            End(o);
         }
         public static void DestroyImmediate(Object o)
         {
-            o.Destroyed = true;
             var holder = o as GameObject;
-            if (ReferenceEquals(holder, null)) return;
-            foreach (Component c in holder.Components)
+            if (holder != null) holder.transform.SetParent(null, false);
+            End(o);
+        }
+        static void End(Object o)
+        {
+            var holder = o as GameObject;
+            if (!ReferenceEquals(holder, null))
             {
-                Player.Call(c, "OnDisable");
-                Player.Call(c, "OnDestroy");
+                foreach (Component c in holder.Components)
+                {
+                    Player.Call(c, "OnDisable");
+                    Player.Call(c, "OnDestroy");
+                    c.Destroyed = true;
+                }
+                foreach (Transform child in holder.transform.Children) End(child.gameObject);
             }
+            o.Destroyed = true;
         }
         public static bool operator ==(Object a, Object b)
         {
@@ -108,6 +118,7 @@ namespace UnityEngine
         Quaternion turn = Quaternion.identity;
         public Transform parent { get; private set; }
         public int childCount { get { return Children.Count; } }
+        public Transform GetChild(int index) { return Children[index]; }
         public Vector3 localPosition { get { return place; } set { place = value; } }
         public Quaternion localRotation { get { return turn; } set { turn = value; } }
         public Vector3 localScale { get { return scale; } set { scale = value; } }
@@ -118,6 +129,11 @@ namespace UnityEngine
                 Matrix4x4 m = localToWorldMatrix;
                 return new Vector3(m.m03, m.m13, m.m23);
             }
+        }
+        public Quaternion rotation
+        {
+            get { return parent == null ? turn : parent.rotation * turn; }
+            set { turn = (parent == null ? value : Quaternion.Inverse(parent.rotation) * value).Whole(); }
         }
         public Vector3 forward
         {
@@ -139,16 +155,15 @@ namespace UnityEngine
         public Matrix4x4 worldToLocalMatrix { get { return localToWorldMatrix.Inverted(); } }
         public void SetParent(Transform to, bool worldPositionStays)
         {
-            if (worldPositionStays) throw new NotImplementedException();
+            Matrix4x4 there = localToWorldMatrix;
             if (parent != null) parent.Children.Remove(this);
             parent = to;
             if (to != null) to.Children.Add(this);
-        }
-        public int GetSiblingIndex() { return parent == null ? 0 : parent.Children.IndexOf(this); }
-        public void SetSiblingIndex(int index)
-        {
-            parent.Children.Remove(this);
-            parent.Children.Insert(index, this);
+            if (!worldPositionStays) return;
+            // of transforms without scale
+            if (to != null) there = to.worldToLocalMatrix * there;
+            place = new Vector3(there.m03, there.m13, there.m23);
+            turn = there.Turn();
         }
         public void SetPositionAndRotation(Vector3 position, Quaternion rotation)
         {
@@ -165,7 +180,15 @@ namespace UnityEngine
 
     public class TextAsset : Object
     {
-        public byte[] bytes { get; internal set; }
+        internal byte[] Bytes;
+        public byte[] bytes
+        {
+            get
+            {
+                Player.FilesRead++;
+                return Bytes;
+            }
+        }
     }
 
     public sealed class Avatar : Object

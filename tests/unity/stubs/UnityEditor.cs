@@ -11,6 +11,7 @@ namespace UnityEditor
     public class Editor : ScriptableObject
     {
         public UnityEngine.Object target { get; set; }
+        public UnityEngine.Object[] targets { get { return Player.Chosen ?? new[] { target }; } }
         public virtual void OnInspectorGUI() { }
         public virtual bool RequiresConstantRepaint() { return false; }
         public bool DrawDefaultInspector() { return false; }
@@ -41,7 +42,26 @@ namespace UnityEditor
             EditorGUI.Changed |= moved != value;
             return moved;
         }
-        public static void HelpBox(string message, MessageType type) { }
+        public static bool Toggle(string label, bool value, params GUILayoutOption[] options) { return value; }
+        public static void HelpBox(string message, MessageType type) { Player.Labels.Add(type + ": " + message); }
+        public static string DelayedTextField(string label, string text, params GUILayoutOption[] options)
+        {
+            if (Player.Typed == null) return text;
+            EditorGUI.Changed |= Player.Typed != text;
+            return Player.Typed;
+        }
+    }
+
+    public static class Handles
+    {
+        public static Vector3 PositionHandle(Vector3 position, Quaternion rotation)
+        {
+            Vector3 to;
+            Player.HandlesSeen++;
+            if (!Player.Drags.TryGetValue(Player.HandlesSeen, out to)) return position;
+            EditorGUI.Changed = true;
+            return to;
+        }
     }
 
     public static class EditorStyles
@@ -61,8 +81,18 @@ namespace UnityEditor
 
     public static class Undo
     {
-        public static void RecordObject(UnityEngine.Object objectToUndo, string name) { }
-        public static void RecordObjects(UnityEngine.Object[] objectsToUndo, string name) { }
+        static readonly List<Action> Kept = new List<Action>();
+        public static void RecordObject(UnityEngine.Object objectToUndo, string name) { RecordObjects(new[] { objectToUndo }, name); }
+        public static void RecordObjects(UnityEngine.Object[] objectsToUndo, string name)
+        {
+            foreach (UnityEngine.Object one in objectsToUndo) Kept.Add(Player.Restore(one));
+        }
+        // all that was recorded, where Unity takes one step
+        public static void PerformUndo()
+        {
+            for (int i = Kept.Count - 1; i >= 0; i--) Kept[i]();
+            Kept.Clear();
+        }
     }
 
     public class SceneVisibilityManager : ScriptableObject
@@ -73,6 +103,30 @@ namespace UnityEditor
     }
 
     [AttributeUsage(AttributeTargets.Class)] public sealed class CustomEditor : Attribute { public CustomEditor(Type inspectedType) { } }
+    [AttributeUsage(AttributeTargets.Class)] public sealed class CanEditMultipleObjects : Attribute { }
+
+    public sealed class AnimationClipSettings
+    {
+        public bool loopTime { get; set; }
+        public bool loopBlendOrientation { get; set; }
+        public bool loopBlendPositionY { get; set; }
+        public bool loopBlendPositionXZ { get; set; }
+        public bool keepOriginalOrientation { get; set; }
+        public bool keepOriginalPositionY { get; set; }
+        public bool keepOriginalPositionXZ { get; set; }
+    }
+
+    public static class AnimationUtility
+    {
+        static readonly Dictionary<AnimationClip, AnimationClipSettings> Settings = new Dictionary<AnimationClip, AnimationClipSettings>();
+        public static AnimationClipSettings GetAnimationClipSettings(AnimationClip clip)
+        {
+            AnimationClipSettings known;
+            return Settings.TryGetValue(clip, out known) ? known : new AnimationClipSettings();
+        }
+        public static void SetAnimationClipSettings(AnimationClip clip, AnimationClipSettings srcClipInfo) { Settings[clip] = srcClipInfo; }
+    }
+
     [AttributeUsage(AttributeTargets.Class)] public sealed class InitializeOnLoadAttribute : Attribute { }
 }
 

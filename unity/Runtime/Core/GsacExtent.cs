@@ -14,6 +14,9 @@ namespace Gsac
         public readonly float[] Radius;
         public readonly float Pad;
 
+        /// <summary>m: what lies farthest from joint 0 in any pose lies within it.</summary>
+        public readonly float Reach;
+
         /// <summary>m: height of the rest mesh.</summary>
         public readonly float Stature;
 
@@ -36,6 +39,12 @@ namespace Gsac
                 }
             }
             Stature = high - low;
+            var along = new float[data.JointCount];
+            for (int j = 0; j < along.Length; j++)
+            {
+                if (j > 0) along[j] = along[data.Parents[j]] + Distance(data.Joints, j * 3, data.Joints, data.Parents[j] * 3);
+                Reach = Math.Max(Reach, along[j] + Radius[j]);
+            }
             foreach (GsacLevel level in data.Levels)
             {
                 for (int n = 0; n < level.Count; n++)

@@ -2,14 +2,16 @@ using System.Collections.Generic;
 
 namespace Gsac
 {
-    /// <summary>Which of Unity's human bones each SMPL-X joint is.</summary>
+    /// <summary>Which of Unity's human bones each SMPL-X joint is, and of which part of the person.</summary>
     public static class GsacHumanBones
     {
         static readonly string[,] Body =
         {
             { "pelvis", "Hips" }, { "spine1", "Spine" }, { "spine2", "Chest" }, { "spine3", "UpperChest" }, { "neck", "Neck" },
-            { "head", "Head" }, { "jaw", "Jaw" }, { "left_eye_smplhf", "LeftEye" }, { "right_eye_smplhf", "RightEye" },
+            { "head", "Head" },
         };
+
+        static readonly string[,] Face = { { "jaw", "Jaw" }, { "left_eye_smplhf", "LeftEye" }, { "right_eye_smplhf", "RightEye" } };
 
         static readonly string[,] Limbs =
         {
@@ -29,6 +31,7 @@ namespace Gsac
         {
             var known = new Dictionary<string, string>();
             for (int i = 0; i < Body.GetLength(0); i++) known[Body[i, 0]] = Body[i, 1];
+            for (int i = 0; i < Face.GetLength(0); i++) known[Face[i, 0]] = Face[i, 1];
             foreach (string side in new[] { "Left", "Right" })
             {
                 string low = side.ToLowerInvariant() + "_";
@@ -41,6 +44,27 @@ namespace Gsac
             var names = new string[jointNames.Length];
             for (int j = 0; j < names.Length; j++) known.TryGetValue(jointNames[j], out names[j]);
             return names;
+        }
+
+        /// <summary>The part that each joint belongs to: jaw and eyes are the face, fingers the hands, all else the body.</summary>
+        public static GsacParts[] Parts(string[] jointNames)
+        {
+            string[] human = Names(jointNames);
+            var parts = new GsacParts[human.Length];
+            for (int j = 0; j < parts.Length; j++)
+            {
+                parts[j] = GsacParts.Body;
+                for (int i = 0; i < Face.GetLength(0); i++)
+                {
+                    if (human[j] == Face[i, 1]) parts[j] = GsacParts.Face;
+                }
+                foreach (string phalanx in Phalanges)
+                {
+                    bool finger = human[j] != null && human[j].EndsWith(" " + phalanx, System.StringComparison.Ordinal);
+                    if (finger) parts[j] = GsacParts.Hands;
+                }
+            }
+            return parts;
         }
     }
 }

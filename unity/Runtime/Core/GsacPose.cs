@@ -85,14 +85,20 @@ namespace Gsac
             Transl[2] = -(Transl[2] + pelvisZ) - pelvisZ;
         }
 
-        /// <summary>A clip at a time; joints that it does not name do not turn.</summary>
+        /// <summary>A clip at a time, as often as it says; joints that it does not name do not turn.</summary>
         public void Sample(GsacClip clip, float seconds)
+        {
+            Sample(clip, seconds, clip.Loop);
+        }
+
+        /// <summary>A clip at a time; loop: whether it begins anew after its end, else the last key stands.</summary>
+        public void Sample(GsacClip clip, float seconds, bool loop)
         {
             Reset();
             double at = (double)seconds * clip.Fps;
             double step = Math.Floor(at);
             float t = (float)(at - step);
-            int k0 = Key(clip, step), k1 = Key(clip, step + 1), width = clip.Joints.Length * 3;
+            int k0 = Key(clip, step, loop), k1 = Key(clip, step + 1, loop), width = clip.Joints.Length * 3;
             for (int n = 0; n < clip.Joints.Length; n++)
             {
                 int o = clip.Joints[n] * 4, i = k0 * width + n * 3, j = k1 * width + n * 3;
@@ -104,9 +110,15 @@ namespace Gsac
             for (int i = 0; i < 3; i++) Transl[i] = clip.Transl[k0 * 3 + i] * (1 - t) + clip.Transl[k1 * 3 + i] * t;
         }
 
-        static int Key(GsacClip clip, double step)
+        /// <summary>s: until a clip is at its last key, or where it loops until it begins anew.</summary>
+        public static float Length(GsacClip clip, bool loop)
         {
-            if (!clip.Loop) return (int)Math.Min(Math.Max(step, 0), clip.Keys - 1);
+            return (loop ? clip.Keys : clip.Keys - 1) / clip.Fps;
+        }
+
+        static int Key(GsacClip clip, double step, bool loop)
+        {
+            if (!loop) return (int)Math.Min(Math.Max(step, 0), clip.Keys - 1);
             double turns = Math.Floor(step / clip.Keys);
             return (int)Math.Min(Math.Max(step - turns * clip.Keys, 0), clip.Keys - 1);
         }
@@ -119,12 +131,23 @@ namespace Gsac
             for (int i = 0; i < 3; i++) Transl[i] = other.Transl[i] * (1 - t) + Transl[i] * t;
         }
 
-        /// <summary>A part of the way to another pose: exponential smoothing with a time constant, the same at every frame rate.</summary>
-        public void Approach(GsacPose goal, float seconds, float timeConstant)
+        /// <summary>What is left of a way after some time: exponential smoothing, the same at every frame rate.</summary>
+        public static float Stay(float seconds, float timeConstant)
         {
-            float stay = timeConstant > 0 ? (float)Math.Exp(-seconds / timeConstant) : 0;
+            return timeConstant > 0 ? (float)Math.Exp(-seconds / timeConstant) : 0;
+        }
+
+        /// <summary>A joint goes to its turn in another pose; stay: the part of the way that is left.</summary>
+        public void Approach(GsacPose goal, int joint, float stay)
+        {
             float[] r = goal.Rotation;
-            for (int o = 0; o < Rotation.Length; o += 4) Mix(Rotation, o, r[o], r[o + 1], r[o + 2], r[o + 3], stay);
+            int o = joint * 4;
+            Mix(Rotation, o, r[o], r[o + 1], r[o + 2], r[o + 3], stay);
+        }
+
+        /// <summary>As Approach, of the shift of the whole.</summary>
+        public void ApproachTransl(GsacPose goal, float stay)
+        {
             for (int i = 0; i < 3; i++) Transl[i] = goal.Transl[i] + (Transl[i] - goal.Transl[i]) * stay;
         }
 
@@ -151,19 +174,24 @@ namespace Gsac
             q[o + 3] = (float)Math.Cos(angle / 2);
         }
 
-        /// <summary>
-        /// Adds to expression weights what a rotation of the jaw stands for; jaw: x y z w, in the data's axes.
-        /// Bodies whose jaw has skin of its own have zeros there.
-        /// </summary>
-        public static void AddJaw(GsacData data, float x, float y, float z, float w, float[] weights)
+        /// <summary>rotation x y z w to axis-angle.</summary>
+        public static void ToAxisAngle(ref float x, ref float y, ref float z, float w)
         {
             double half = Math.Sqrt((double)x * x + (double)y * y + (double)z * z);
             double s = half > 1e-9 ? 2 * Math.Atan2(half, Math.Abs(w)) / half * (w < 0 ? -1 : 1) : 2;
-            for (int e = 0; e < weights.Length; e++)
-            {
-                float[] jaw = data.ExpressionJaw;
-                weights[e] += (float)(s * (jaw[e * 3] * x + jaw[e * 3 + 1] * y + jaw[e * 3 + 2] * z));
-            }
+            x = (float)(s * x);
+            y = (float)(s * y);
+            z = (float)(s * z);
+        }
+
+        /// <summary>
+        /// Adds to expression weights what a turn of the jaw stands for; x, y, z: axis-angle, in the data's axes.
+        /// Bodies whose jaw has skin of its own have zeros there.
+        /// </summary>
+        public static void AddJaw(GsacData data, float x, float y, float z, float[] weights)
+        {
+            float[] jaw = data.ExpressionJaw;
+            for (int e = 0; e < weights.Length; e++) weights[e] += jaw[e * 3] * x + jaw[e * 3 + 1] * y + jaw[e * 3 + 2] * z;
         }
     }
 }

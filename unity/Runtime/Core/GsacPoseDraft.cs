@@ -20,8 +20,8 @@ namespace Gsac
 
         readonly byte[][] joints, bones, expressions;
         readonly float pelvisY, pelvisZ;
+        readonly GsacLivePose draft;
         readonly GsacPose pose;
-        readonly float[] weights;
         bool camera, turned, moved;
 
         /// <summary>data: in Unity's axes.</summary>
@@ -32,8 +32,8 @@ namespace Gsac
             for (int j = 0; j < human.Length; j++) human[j] = human[j] == null ? "" : human[j].Replace(" ", "");
             bones = Bytes(human);
             expressions = Bytes(data.Expressions);
-            pose = new GsacPose(data.JointCount);
-            weights = new float[expressions.Length];
+            draft = new GsacLivePose(data);
+            pose = draft.Pose;
             Row = new float[Math.Max(63, expressions.Length)];
             pelvisY = data.Joints[1];
             pelvisZ = data.Joints[2];
@@ -46,18 +46,16 @@ namespace Gsac
             return all;
         }
 
-        public void Begin(GsacPose from, float[] fromWeights)
+        public void Begin(GsacLivePose from)
         {
             camera = turned = moved = false;
-            pose.Copy(from);
-            Array.Copy(fromWeights, weights, weights.Length);
+            draft.Copy(from);
         }
 
-        public void End(GsacPose into, float[] intoWeights)
+        public void End(GsacLivePose into)
         {
             if (camera) pose.UprightFromCamera(turned, moved, pelvisY, pelvisZ);
-            into.Copy(pose);
-            Array.Copy(weights, intoWeights, weights.Length);
+            into.Copy(draft);
         }
 
         /// <summary>Whether the root's numbers of this message are of a camera's frame.</summary>
@@ -84,20 +82,21 @@ namespace Gsac
 
         public void SetGroup(int group)
         {
-            for (int j = 0; j < GroupJoints[group]; j++) pose.SetSmplx(GroupFirst[group] + j, Row[j * 3], Row[j * 3 + 1], Row[j * 3 + 2]);
-            turned |= group == 0;
+            for (int j = 0; j < GroupJoints[group]; j++) SetJoint(GroupFirst[group] + j, j * 3);
         }
 
-        public void SetJoint(int joint)
+        /// <summary>SMPL-X's axis-angle from Row[first] on.</summary>
+        public void SetJoint(int joint, int first)
         {
-            pose.SetSmplx(joint, Row[0], Row[1], Row[2]);
+            pose.SetSmplx(joint, Row[first], Row[first + 1], Row[first + 2]);
+            draft.HasJoint[joint] = true;
             turned |= joint == 0;
         }
 
         public void SetTransl()
         {
             pose.SetSmplxTransl(Row[0], Row[1], Row[2]);
-            moved = true;
+            draft.HasTransl = moved = true;
         }
 
         /// <summary>A quaternion x y z w in Unity's axes from Row[first] on. False where it is zero.</summary>
@@ -108,12 +107,19 @@ namespace Gsac
             length = Math.Sqrt(length);
             if (!(length > 1e-3)) return false;
             for (int i = 0; i < 4; i++) pose.Rotation[joint * 4 + i] = (float)(Row[first + i] / length);
-            return true;
+            return draft.HasJoint[joint] = true;
         }
 
-        public void SetExpression(int expression, float weight) { weights[expression] = weight; }
+        public void SetExpression(int expression, float weight)
+        {
+            draft.Weights[expression] = weight;
+            draft.HasWeight[expression] = true;
+        }
 
-        public void SetExpressions() { Array.Copy(Row, weights, weights.Length); }
+        public void SetExpressions()
+        {
+            for (int e = 0; e < expressions.Length; e++) SetExpression(e, Row[e]);
+        }
 
         public static bool Plain(float value) { return value >= -MaxValue && value <= MaxValue; }
 

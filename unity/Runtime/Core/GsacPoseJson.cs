@@ -100,7 +100,7 @@ namespace Gsac
             int j = draft.Joint(text, first, last);
             if (j < 0) return Skip(0);
             if (!Row(3)) return false;
-            draft.SetJoint(j);
+            draft.SetJoint(j, 0);
             return true;
         }
 

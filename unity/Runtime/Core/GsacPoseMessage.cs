@@ -15,16 +15,16 @@ namespace Gsac
             osc = new GsacPoseOsc(draft);
         }
 
-        /// <summary>None where it was taken; else the pose and weights are untouched.</summary>
-        public GsacMessageFault Read(byte[] message, int length, GsacPose into, float[] intoWeights)
+        /// <summary>None where it was taken; else `into` is untouched.</summary>
+        public GsacMessageFault Read(byte[] message, int length, GsacLivePose into)
         {
             if (length == 0) return GsacMessageFault.Truncated;
-            draft.Begin(into, intoWeights);
+            draft.Begin(into);
             int first = message[0];
             GsacMessageFault fault = first == '/' || first == '#' ? osc.Read(message, length)
                 : first == '{' || first == ' ' || first == '\n' || first == '\r' || first == '\t' ? json.Read(message, length)
                 : GsacMessageFault.Kind;
-            if (fault == GsacMessageFault.None) draft.End(into, intoWeights);
+            if (fault == GsacMessageFault.None) draft.End(into);
             return fault;
         }
     }

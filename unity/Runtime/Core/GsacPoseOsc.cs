@@ -164,7 +164,7 @@ namespace Gsac
                 int joint = draft.Joint(data, first + OwnNamed[0].Length, last);
                 if (joint < 0) return GsacMessageFault.None;
                 if (!Fits(3, true)) return Misfit();
-                draft.SetJoint(joint);
+                draft.SetJoint(joint, 0);
             }
             else if (Begins(OwnNamed[1], first, last))
             {

@@ -1,0 +1,87 @@
+"""A batch on a Ray cluster of several nodes, all of them on this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.slow
+CLIPS = ("one", "two", "three", "four")
+POISONED = """
+import os, signal
+
+def run(job):
+    if (job.inputs["cut/words"] / "000000.txt").read_text() == "poison":
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+CORES = 2
+"""Of a node: room for one clip."""
+
+
+@pytest.fixture
+def cluster(toy, monkeypatch) -> Iterator[Any]:
+    """Its nodes have the toy project."""
+    pytest.importorskip("ray", reason="needs ray: pip install 'gsac[ray]'")
+    monkeypatch.setenv("RAY_raylet_start_wait_time_s", "180")
+    for name in ("PYTHONPATH", "GSAC_STAGES", "GSAC_CACHE", "TOY_RUNS"):
+        monkeypatch.setenv(name, toy.env[name])
+    from ray.cluster_utils import Cluster
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    yield cluster
+    cluster.shutdown()
+
+
+@pytest.fixture
+def clips(toy):
+    folder = toy.root / "clips"
+    folder.mkdir()
+    for name in CLIPS:
+        (folder / f"{name}.mp4").write_text(f"{name} alpha")
+    return folder
+
+
+def records(toy):
+    """Stage -> number of results in the store."""
+    return {stage.name: len(list(stage.glob("*.json"))) for stage in (toy.cache / "actions").iterdir()}
+
+
+def test_a_batch_ends_complete_when_a_node_is_lost_in_the_middle_of_it(toy, clips, cluster):
+    nodes = [cluster.add_node(num_cpus=CORES) for _ in range(2)]
+    process = toy.start("batch", clips, "--out", toy.root / "avatars", "--executor", "ray", "--address", cluster.address,
+                        "--set", "join.pause_s=3", "--json")
+    try:
+        toy.wait_for(lambda: toy.runs.count("join") >= 2, 120)
+        cluster.remove_node(nodes.pop(), allow_graceful=False)
+        out, err = process.communicate(timeout=180)
+    finally:
+        process.kill()
+        for node in nodes:
+            cluster.remove_node(node)
+    assert process.returncode == 0, err
+    for name in CLIPS:
+        assert (toy.root / "avatars" / f"{name}-avatar" / "join" / "out.txt").read_text() == f"{name} {name}".upper()
+    assert toy.runs.count("join") in (5, 6), "what the node was at runs again"
+    assert set(records(toy).values()) == {len(CLIPS)} and not list((toy.cache / "quarantine").iterdir())
+
+
+def test_a_poison_clip_is_set_aside_and_the_others_end(toy, clips, cluster):
+    node = cluster.add_node(num_cpus=CORES)
+    (clips / "one.mp4").write_text("poison")
+    toy.edit("left/stage.py", "def run(job):\n", POISONED)
+    try:
+        done = toy.gsac("batch", clips, "--out", toy.root / "avatars", "--executor", "ray", "--address", cluster.address, "--json")
+    finally:
+        cluster.remove_node(node)
+    rows = {row["clip"].rsplit("/", 1)[1]: row for row in done.json["clips"]}
+    assert done.code == 1 and [name for name, row in rows.items() if row["status"] == "failed"] == ["one.mp4"]
+    assert "2 times" in rows["one.mp4"]["error"] and "not tried again" in rows["one.mp4"]["error"]
+
+
+def test_no_cluster_at_the_address_is_said_before_anything_runs(toy, clips):
+    pytest.importorskip("ray", reason="needs ray: pip install 'gsac[ray]'")
+    done = toy.gsac("batch", clips, "--executor", "ray", "--address", "127.0.0.1:1")
+    assert done.code == 2 and "no Ray cluster answers there" in done.err and toy.runs == []
+    assert "only --executor ray has one" in toy.gsac("batch", clips, "--address", "127.0.0.1:1").err
