@@ -14,16 +14,15 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from gsac.avatar import rotation
 from gsac.avatar.joints import INDEX
 from gsac.avatar.yaw import yaw
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.smplx.jacobians import Chain
+from gsac.stages.smplx.lm.arm_paths import ArmPaths
 from gsac.stages.smplx.lm.hidden_arms import (
     ARM_JOINTS,
     BEHIND_SPREAD,
     ELBOW,
-    HIDES,
     ROUGH_DEPTH,
     SKIN,
     TRUSTED,
@@ -33,7 +32,6 @@ from gsac.stages.smplx.lm.hidden_arms import (
     bend_arm,
     bridge,
     find_around,
-    hiding_pose,
     isolate_arm,
     isolate_state,
 )
@@ -54,10 +52,8 @@ MOVED, LOST = 0.11, 0.03
 that nothing tells. Hanging arms move by 83 mm in turns of 20 frames, hands that went to the hips or the back by 138 on."""
 DEEP = 0.03
 """m inside the trunk from which on a hand would not be seen."""
-POSES = (*HIDES, ((20, 30, -40), (0, -95, 0)), ((0, -40, 40), (0, -125, 0)), ((0, -55, -62), (0, -100, 0)))
-"""Rotation vectors, degrees, of the left shoulder and elbow: hidden, on the hip, at the hair, before the chest."""
-FIRST_STEPS, MORE_STEPS, LEFT = 6, 18, 2
-"""Steps of each search, and more of those that are best by then."""
+STEPS = 8
+"""Steps from the cheapest path on."""
 CLEARLY = 20.0
 """By how much the cost must fall: by 73 on where a hand is seen on the back and fitted inside the trunk or before the belly, by 6
 at most where nothing tells where a hand is."""
@@ -136,47 +132,47 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     """The state with doubtful arms in poses that explain points and mask clearly better, where there are any; and (T, 2) bool, the
     doubtful arms that no stay has.
 
-    missing: (T, 2) bool, hands that were not detected; None: all were. An arm that is doubtful or without a hand for
-    much of the clip is left: nothing tells which of its frames are right.
+    missing: (T, 2) bool, hands that were not detected; None: all were.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     wrong = find_contradicted(arms, problem, state, missing)
     doubtful = wrong | find_untold(arms, problem, state, missing)
-    if problem.seen.seconds is None:
-        return state, doubtful
+    return move(arms, problem, state, doubtful, missing), doubtful
+
+
+def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray, missing: np.ndarray) -> State:
+    """The state with arms in poses that explain points and mask clearly better, where there are any.
+
+    doubtful: (T, 2) bool, those arms; missing: (T, 2) bool, hands that were not detected.
+    """
+    seconds = problem.seen.seconds
+    if seconds is None or not problem.seen.outlines:
+        return state
     settled = replace(state, local=state.local.copy())
-    trusted = 1 - np.maximum(doubtful.mean(0), missing.mean(0)) > TRUSTED
-    for side in np.flatnonzero(doubtful.any(0) & trusted).tolist():
+    for side in np.flatnonzero(doubtful.any(0)).tolist():
+        around = np.zeros(len(doubtful), bool)
         for first, last in bridge(doubtful[:, side]):
-            stay = Stay(side, first, last, *find_around(problem.seen.seconds, first, last))
-            shown, contradicted = ~missing[stay.around, side], wrong[first:last, side].sum() >= DOUBTS
-            settled.local[stay.around] = search(arms, problem, settled, stay, shown, contradicted)
-    return settled, doubtful
+            around[slice(*find_around(seconds, first, last))] = True
+        for start, stop in bridge(around, 0):
+            doubted = start + np.flatnonzero(doubtful[start:stop, side])
+            stay = Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop)
+            shown = ~missing[stay.around, side]
+            settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, side])
+    return settled
 
 
-def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, contradicted: bool) -> np.ndarray:
+def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, sure: np.ndarray) -> np.ndarray:
     """Joint rotations (F, J, 3, 3) of the stay's frames: as they are unless others are clearly better.
 
-    shown: (F,) bool, of the hand; contradicted: whether the pictures contradict what is there for some frames. Else others must be
-    better than what it comes to when it may move as freely.
+    shown: (F,) bool, of the hand; sure: (F,) bool, frames in which the arm is not doubtful.
     """
-    def fit(trials: list[State], steps: int) -> list[tuple[float, State]]:
-        found = []
-        for trial in trials:
-            alone = isolate_arm(problem, stay)
-            hold(arms.cut(stay), alone, trial, stay.side, shown)
-            bent = bend_arm(alone, trial, steps)
-            alone.seen.depth = problem.seen.depth[stay.around].copy()
-            hold(arms.cut(stay), alone, bent, stay.side, shown)
-            found.append((alone.cost(bent), bent))
-        return found
-
-    asis, *others = [isolate_state(state, stay, start) for start in list_starts(state, stay)]
-    likely = sorted(fit(others, FIRST_STEPS), key=lambda entry: entry[0])[:LEFT]
-    freed, *found = fit([asis, *(trial for _, trial in likely)], FIRST_STEPS + MORE_STEPS)
-    (before, _), found = (*fit([asis], 0), [freed, *found]) if contradicted else (freed, found)
-    lowest, best = min(found, key=lambda entry: entry[0])
-    return best.local if lowest < before - CLEARLY else asis.local
+    alone, asis = isolate_arm(problem, stay), isolate_state(state, stay, state.local[stay.around])
+    hold(arms.cut(stay), alone, asis, stay.side, shown)
+    paths = ArmPaths(alone, asis, stay.side, shown, sure, arms.height)
+    path = isolate_state(state, stay, paths.find([asis.local]))
+    bent = bend_arm(alone, path, STEPS)
+    best = bent if paths.cost(bent.local) < paths.cost(path.local) + CLEARLY else path
+    return best.local if paths.cost(best.local) < paths.cost(asis.local) - CLEARLY else asis.local
 
 
 def hold(arms: HiddenArms, alone: Problem, state: State, side: int, shown: np.ndarray) -> None:
@@ -195,17 +191,3 @@ def hold(arms: HiddenArms, alone: Problem, state: State, side: int, shown: np.nd
     sunk = shown & ~hidden & np.isfinite(near)
     seen.depth[sunk, wrist], spread[sunk, wrist] = (near - SKIN - hips)[sunk], BEHIND_SPREAD
     seen.depth_spread = spread
-
-
-def list_starts(state: State, stay: Stay) -> list[np.ndarray]:
-    """Joint rotations (F, J, 3, 3) to search from: as they are, as just before and after the stay, and in each of `POSES`."""
-    asis, joints = state.local[stay.around], ARM_JOINTS[stay.side, 1:3]
-    frame = np.arange(stay.start, stay.stop)
-    held = np.flatnonzero((frame >= stay.first - 1) & (frame <= stay.last))
-    ends = [state.local[t, joints] for t in (max(stay.first - 2, 0), min(stay.last + 1, len(state.local) - 1))]
-    out = [asis]
-    for goal in [*ends, *(rotation.exp(hiding_pose(stay.side, pose)) for pose in POSES)]:
-        start = asis.copy()
-        start[np.ix_(held, joints)] = goal
-        out.append(start)
-    return out

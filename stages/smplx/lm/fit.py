@@ -21,9 +21,9 @@ from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
-from gsac.stages.smplx.lm.doubtful_arms import settle_doubtful
+from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, move, settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
-from gsac.stages.smplx.lm.hidden_arms import HiddenArms, describe_arms, widen_arm
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, describe_arms, widen_arm
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
@@ -55,6 +55,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     detector = Detector.load(sightings.detector, body)
     sightings, problem, state, steps, said = fit_either_side(body, sightings, outlines, detector, config)
     hidden = HiddenArms.of(body, sightings.person_height)
+    state, moved = move_contradicted(hidden, problem, state, sightings.missing)
     hidden.find(problem, state, sightings.missing)
     state = hidden.search(problem, state)
     iou = np.full(len(sightings.xy), np.nan)
@@ -72,6 +73,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         steps += more
     cost = problem.cost(state)
     state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing)
+    doubtful |= moved & ~hidden.mark(len(moved))
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
     sigma = estimate_joint_sigma(problem, state)
@@ -134,6 +136,23 @@ def fit_points(problem: Problem, state: State, sightings: Sightings, detector: D
     subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
     state, more = problem.minimise(state, iterations)
     return state, first + more
+
+
+def move_contradicted(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None) -> tuple[State, np.ndarray]:
+    """The state with arms that the pictures contradict where they clearly are, before they drag the trunk along; and (T, 2) bool,
+    those that moved, as quickly as a gesture from then on.
+
+    missing: (T, 2) bool, hands that were not detected; None: all were.
+    """
+    missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
+    moved = find_contradicted(arms, problem, state, missing)
+    settled = move(arms, problem, state, moved, missing)
+    moved &= (settled.local != state.local)[:, ARM_JOINTS].any((2, 3, 4))
+    for side in (0, 1):
+        arm = np.ix_(moved[:, side], np.isin(problem.active, ARM_JOINTS[side]))
+        problem.loose[arm] = QUICK
+        problem.spread[arm] *= FREE
+    return settled, moved
 
 
 def stand_on_ground(problem: Problem, state: State, sightings: Sightings, weight: float) -> None:

@@ -110,7 +110,7 @@ def hand_on_back(body, tmp_path_factory):
     pose = truth.body_pose.reshape(FRAMES, 21, 3).copy()
     turn = Rotation.from_euler("x", np.pi) * Rotation.from_euler("y", np.pi + np.linspace(-0.4, 0.4, FRAMES)[:, None])
     truth.global_orient = turn.as_rotvec().reshape(FRAMES, 3).astype(np.float32)
-    for joint, bent in ((15, (0.8, 0.3, -1.4)), (17, (0.5, -1.25, 0.0))):
+    for joint, bent in ((15, (0.8, 0.3, -1.4)), (17, (0.5, -1.05, 0.0))):
         pose[ON_BACK, joint] = bent
     truth.body_pose = pose.reshape(FRAMES, 63)
     seen = sightings_of(body, truth)

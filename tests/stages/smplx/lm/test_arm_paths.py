@@ -1,0 +1,155 @@
+"""Paths of an arm through the poses that people can take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gsac.avatar import rotation
+from gsac.avatar.joints import INDEX
+from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.detector_errors import Detector
+from gsac.stages.smplx.lm.arm_paths import ArmPaths, list_poses
+from gsac.stages.smplx.lm.fit import move_contradicted, set_up
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, HAND, HIDES, WRIST, HiddenArms, Stay, hiding_pose, isolate_arm
+from gsac.stages.smplx.lm.problem import Problem
+from gsac.stages.smplx.prior import BODY_JOINTS
+from support.turning_person import height_of, outlines_of, sightings_of, turning_person
+
+FRAMES, BENT = 10, range(3, 8)
+ALL = np.ones(FRAMES, bool)
+SHOULDER, ELBOW_JOINT = ARM_JOINTS[0, 1:3]
+HAIR, ASIDE = ((0, -40, 40), (0, -125, 0)), ((0, 0, 0), (0, -30, 0))
+"""Rotation vectors, degrees, of the left shoulder and elbow."""
+
+
+def person_with(body, folder, pose, turn):
+    """Arms, problem and true state of a person whose left arm is bent so for the middle frames. turn: (FRAMES,) rad."""
+    truth = turning_person(body, FRAMES)
+    truth.global_orient = (Rotation.from_euler("x", np.pi) * Rotation.from_euler("y", turn[:, None])).as_rotvec().astype(np.float32)
+    own = truth.body_pose.reshape(FRAMES, 21, 3).copy()
+    own[np.ix_(BENT, [SHOULDER - 1, ELBOW_JOINT - 1])] = np.radians(np.array(pose, float))
+    truth.body_pose = own.reshape(FRAMES, 63)
+    seen = sightings_of(body, truth)
+    problem, state, _ = set_up(body, seen, outlines_of(body, truth, folder), Detector.load(seen.detector, body),
+                               SmplxConfig(height_m=height_of(body, truth)))
+    local = rotation.exp(truth.pose.reshape(FRAMES, 55, 3).astype(float))
+    return HiddenArms.of(body, seen.person_height), problem, replace(state, local=local, transl=truth.transl.astype(float),
+                                                                     betas=truth.betas.astype(float))
+
+
+def paths_of(arms, problem, state, shown):
+    stay = Stay(0, BENT[0], BENT[-1] + 1, 0, FRAMES)
+    return ArmPaths(isolate_arm(problem, stay), state, 0, shown, ~ALL, arms.height)
+
+
+def hang(state):
+    """The state with the left arm as in the first frame."""
+    arm = ARM_JOINTS[0, 1:]
+    out = replace(state, local=state.local.copy())
+    out.local[:, arm] = state.local[0, arm]
+    return out
+
+
+def blind(problem):
+    """The problem without points of the left arm."""
+    spread = problem.seen.spread.copy()
+    spread[:, [ELBOW[0], WRIST[0], *HAND[0]]] = np.inf
+    depth = problem.seen.depth.copy()
+    depth[:, [ELBOW[0], WRIST[0]]] = np.nan
+    seen = replace(problem.seen, spread=spread, depth=depth)
+    return Problem(problem.body, problem.pairs, problem.hips, seen, BODY_JOINTS, problem.smoothness, problem.person_offsets)
+
+
+def distances(problem, truth, state, local, joint):
+    """(FRAMES,) m from the true joint."""
+    place = [problem.skeleton.pose(of, truth.shape).place[:, INDEX[joint]] for of in (truth.local, local)]
+    return np.linalg.norm(place[0] - place[1], axis=1)
+
+
+@pytest.fixture(scope="module")
+def hand_in_hair(body, tmp_path_factory):
+    return person_with(body, tmp_path_factory.mktemp("hair"), HAIR, np.linspace(-0.8, 0.8, FRAMES))
+
+
+@pytest.fixture(scope="module")
+def arm_aside(body, tmp_path_factory):
+    return person_with(body, tmp_path_factory.mktemp("aside"), ASIDE, np.linspace(-0.5, 0.5, FRAMES))
+
+
+@pytest.fixture(scope="module")
+def hand_on_belly(body, tmp_path_factory):
+    return person_with(body, tmp_path_factory.mktemp("belly"), HIDES[1], np.pi + np.linspace(-0.4, 0.4, FRAMES))
+
+
+def test_an_arm_that_hangs_in_the_fit_finds_its_way_to_the_hair(hand_in_hair):
+    arms, problem, truth = hand_in_hair
+    start = hang(truth)
+    path = paths_of(arms, problem, start, ALL).find([start.local])
+    for joint, most in (("left_elbow", 0.05), ("left_wrist", 0.07)):
+        before, after = (distances(problem, truth, start, local, joint)[BENT] for local in (start.local, path))
+        assert before.min() > 0.25 and np.median(after) < most
+    others = np.delete(np.arange(55), ARM_JOINTS[0, 1:])
+    assert np.array_equal(path[:, others], start.local[:, others])
+
+
+def test_an_elbow_whose_points_are_missing_lies_where_the_mask_shows_a_limb(arm_aside):
+    arms, problem, truth = arm_aside
+    start = hang(truth)
+    path = paths_of(arms, blind(problem), start, ALL).find([start.local])
+    place = [problem.skeleton.pose(local, truth.shape).place[:, ELBOW_JOINT] + truth.transl
+             for local in (truth.local, start.local, path)]
+    true, before, after = (problem.project(truth, x)[BENT] for x in place)
+    assert np.linalg.norm(before - true, axis=1).min() > 0.08 * arms.height
+    assert np.linalg.norm(after - true, axis=1).max() < 0.03 * arms.height
+
+
+def test_a_hand_that_is_not_seen_is_hidden_by_the_body_and_touches_it(hand_on_belly):
+    arms, problem, truth = hand_on_belly
+    start, shown = hang(truth), ALL.copy()
+    shown[BENT] = False
+    paths = paths_of(arms, blind(problem), start, shown)
+    path = paths.find([start.local])
+    for t in BENT:
+        x = paths.place(t, path[t, ARM_JOINTS[0, 1:]][None])[0]
+        assert paths.around[t].hides(problem.project(truth, x[3])[None], x[[3], 2]).all()
+        assert -0.01 < paths.around[t].measure_clearance(x[3]) < 0.1
+
+
+def test_a_hand_inside_the_trunk_costs_more_than_one_on_it(hand_on_belly):
+    arms, problem, truth = hand_on_belly
+    paths = paths_of(arms, blind(problem), truth, ~ALL)
+    for t in BENT:
+        deepest = min(list_poses(0), key=lambda pose: paths.around[t].measure_clearance(paths.place(t, pose[None])[0, 3]))
+        on, within = paths.weigh(t, np.stack([truth.local[t, ARM_JOINTS[0, 1:]], deepest]))
+        assert within > on + 20
+
+
+def test_an_arm_at_rest_costs_nothing_and_a_gesture_no_more_however_quick(hand_in_hair):
+    arms, problem, truth = hand_in_hair
+    paths = paths_of(arms, problem, truth, ALL)
+    still = np.tile(np.eye(3), (3, 1, 1))
+    bend = lambda angle: np.concatenate([rotation.exp(np.full((2, 3), angle) * (0, 1, 0)), still[:1]])  # noqa: E731
+    rest, slow, quick, quicker = (float(paths.measure_motion(1, still, bend(angle))) for angle in (0.0, 0.05, 1.0, 2.0))
+    assert rest == 0 < slow < quick and quicker < 1.1 * quick
+
+
+def test_poses_of_the_right_arm_mirror_those_of_the_left():
+    left, right = (rotation.log(list_poses(side)) for side in (0, 1))
+    assert len(left) > 3000 and np.allclose(right, left * (1, -1, -1), atol=1e-9)
+    assert (np.abs(left[:, 0] - hiding_pose(0, HAIR)[0]).max(1) < 0.5).any()
+
+
+def test_only_arms_that_move_before_the_rounds_are_free_from_then_on(hand_in_hair):
+    arms, problem, truth = hand_in_hair
+    loose, spread = problem.loose.copy(), problem.spread.copy()
+    state, moved = move_contradicted(arms, problem, truth, None)
+    assert not moved.any() and np.array_equal(state.local, truth.local) and np.array_equal(problem.loose, loose)
+    state, moved = move_contradicted(arms, problem, hang(truth), None)
+    assert moved[BENT, 0].all() and not moved[:, 1].any()
+    free = problem.loose > loose
+    assert np.array_equal(free.any(1), moved[:, 0]) and set(BODY_JOINTS[free.any(0)]) == {*ARM_JOINTS[0]}
+    problem.loose[:], problem.spread[:] = loose, spread
