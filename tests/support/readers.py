@@ -138,8 +138,10 @@ def bvh():
 def glb():
     from gsac.stages.export.glb import glb_bytes
     from gsac.stages.export.stage import pose_gaussians
+    from gsac.stages.export.texture import paint_surface
 
-    return glb_bytes(figure(), *pose_gaussians(figure(), figure().pose("T")))
+    rest = pose_gaussians(figure(), figure().pose("T"))
+    return glb_bytes(figure(), paint_surface(figure(), *rest), *rest)
 
 
 def gltf():
@@ -158,8 +160,9 @@ def gltf():
 def fbx():
     from gsac.stages.export.fbx import avatar_fbx
     from gsac.stages.export.stage import pose_gaussians
+    from gsac.stages.export.texture import paint_surface
 
-    return avatar_fbx(figure(), pose_gaussians(figure(), figure().pose("T"))[0])
+    return avatar_fbx(figure(), paint_surface(figure(), *pose_gaussians(figure(), figure().pose("T"))))
 
 
 def read_motion(path):

@@ -12,6 +12,7 @@ from gsac.avatar.motion.fbx import read_fbx
 from gsac.stages.export.fbx import SECOND, avatar_fbx
 from gsac.stages.export.fbx_file import MAGIC, Long, Node, _property, fbx_bytes
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 from support.page_modules import copy_modules
 
 pytest.importorskip("ufbx")
@@ -161,7 +162,7 @@ def arm(order=0):
 @pytest.fixture(scope="module")
 def own(figure, tmp_path_factory):
     path = tmp_path_factory.mktemp("fbx") / "own.fbx"
-    path.write_bytes(avatar_fbx(figure, pose_gaussians(figure, figure.pose("T"))[0]))
+    path.write_bytes(avatar_fbx(figure, paint_surface(figure, *pose_gaussians(figure, figure.pose("T")))))
     return path
 
 

@@ -20,6 +20,7 @@ from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.fbx_file import MAGIC, Long, Node, fbx_bytes
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 from support import dances, hostile
 from support.page_modules import copy_modules
 
@@ -70,10 +71,11 @@ def whole(figure, tmp_path_factory):
     figure = replace(figure, clips={name: replace(clip, rotation=clip.rotation[:4], transl=clip.transl[:4])
                                     for name, clip in figure.clips.items()})
     gaussians = pose_gaussians(figure, figure.pose("T"))
+    surface = paint_surface(figure, *gaussians)
     rng, skeleton = np.random.default_rng(0), dances.Skeleton(figure.joint_names, figure.parents, figure.joints)
     dance = Motion(24.0, (rng.normal(size=(5, 55, 3)) * .3).astype(np.float32), np.zeros((5, 3), np.float32))
     contents = {"gsac": avatar_bytes(figure), "bvh": dances.bvh_text(skeleton, dance).encode(),
-                "gltf": glb_bytes(figure, *gaussians), "fbx": avatar_fbx(figure, gaussians[0])}
+                "gltf": glb_bytes(figure, surface, *gaussians), "fbx": avatar_fbx(figure, surface)}
     for kind, content in contents.items():
         (folder / f"whole.{kind}").write_bytes(content)
     return {kind: folder / f"whole.{kind}" for kind in contents}

@@ -8,6 +8,7 @@ from gsac.avatar.motion.files import read_motion
 from gsac.avatar.motion.source import MotionError
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 
 pytest.importorskip("ufbx")
 
@@ -15,7 +16,7 @@ pytest.importorskip("ufbx")
 @pytest.fixture(scope="module")
 def file(figure, tmp_path_factory):
     path = tmp_path_factory.mktemp("fbx") / "own.fbx"
-    path.write_bytes(avatar_fbx(figure, pose_gaussians(figure, figure.pose("T"))[0]))
+    path.write_bytes(avatar_fbx(figure, paint_surface(figure, *pose_gaussians(figure, figure.pose("T")))))
     return path
 
 

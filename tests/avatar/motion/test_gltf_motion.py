@@ -12,11 +12,13 @@ from gsac.avatar.motion.files import read_motion
 from gsac.avatar.motion.source import MotionError
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 
 
 @pytest.fixture(scope="module")
 def whole(figure):
-    return glb_bytes(figure, *pose_gaussians(figure, figure.pose("T")))
+    rest = pose_gaussians(figure, figure.pose("T"))
+    return glb_bytes(figure, paint_surface(figure, *rest), *rest)
 
 
 def read(figure, path):
