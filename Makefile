@@ -5,7 +5,7 @@ TORCH ?= torch==2.13.0
 BIN := .venv/bin
 READY := .venv/.gsac-ready
 
-.PHONY: setup demo test test-fast attack params docs shaders lint debian
+.PHONY: setup demo test test-fast attack params docs shaders metas lint debian
 
 setup: $(READY)
 
@@ -51,6 +51,10 @@ docs: setup
 # Writes the viewer page's shaders from the Unity package's HLSL; needs glslang-tools and npm.
 shaders: setup
 	$(BIN)/python -m gsac.viewer.wgsl
+
+# Writes the .meta files of the Unity package's files.
+metas: setup
+	$(BIN)/python -m gsac.unity.package
 
 lint: setup
 	$(BIN)/ruff check

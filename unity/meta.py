@@ -7,6 +7,8 @@ from pathlib import PurePosixPath
 
 PACKAGE = "com.gsac.avatar"
 _TAIL = "  externalObjects: {}\n  userData: \n  assetBundleName: \n  assetBundleVariant: \n"
+_TEXT = "TextScriptImporter:\n" + _TAIL
+_ANY = "DefaultImporter:\n" + _TAIL
 _IMPORTERS = {
     ".cs": "MonoImporter:\n  externalObjects: {}\n  serializedVersion: 2\n  defaultReferences: []\n  executionOrder: 0\n"
            "  icon: {instanceID: 0}\n  userData: \n  assetBundleName: \n  assetBundleVariant: \n",
@@ -15,11 +17,16 @@ _IMPORTERS = {
                "  assetBundleName: \n  assetBundleVariant: \n",
     ".hlsl": "ShaderIncludeImporter:\n" + _TAIL,
     ".asmdef": "AssemblyDefinitionImporter:\n" + _TAIL,
-    ".md": "TextScriptImporter:\n" + _TAIL,
-    ".bytes": "TextScriptImporter:\n" + _TAIL,
-    ".unity": "DefaultImporter:\n" + _TAIL,
+    ".md": _TEXT,
+    ".json": _TEXT,
+    ".py": _ANY,
+    ".unity": _ANY,
 }
 _PACKAGE_JSON = "PackageManifestImporter:\n" + _TAIL
+_PERSON = ("ScriptedImporter:\n  internalIDToNameTable: []\n  externalObjects: {{}}\n  serializedVersion: 2\n  userData: \n"
+           "  assetBundleName: \n  assetBundleVariant: \n  script: {{fileID: 11500000, guid: {importer}, type: 3}}\n")
+IMPORTER = "Editor/GsacImporter.cs"
+"""The script by which Unity reads .gsac files."""
 
 
 def guid(path: str) -> str:
@@ -27,12 +34,27 @@ def guid(path: str) -> str:
     return hashlib.sha256(f"{PACKAGE}/{path}".encode()).hexdigest()[:32]
 
 
+def person_guid(container: bytes) -> str:
+    """The GUID of a person, 32 hex digits: of the content alone. container: the bytes of avatar.gsac."""
+    return guid(f"person/{hashlib.sha256(container).hexdigest()}")
+
+
 def file_meta(path: str) -> str:
     """The `.meta` text of a file; path: inside the package."""
-    importer = _PACKAGE_JSON if path == "package.json" else _IMPORTERS[PurePosixPath(path).suffix]
+    suffix = PurePosixPath(path).suffix
+    importer = _PACKAGE_JSON if path == "package.json" else _person_importer() if suffix == ".gsac" else _IMPORTERS[suffix]
     return f"fileFormatVersion: 2\nguid: {guid(path)}\n{importer}"
+
+
+def person_meta(container: bytes) -> str:
+    """The `.meta` text of a person's .gsac file, whatever its name."""
+    return f"fileFormatVersion: 2\nguid: {person_guid(container)}\n{_person_importer()}"
+
+
+def _person_importer() -> str:
+    return _PERSON.format(importer=guid(IMPORTER))
 
 
 def folder_meta(path: str) -> str:
     """The `.meta` text of a folder; path: inside the package."""
-    return f"fileFormatVersion: 2\nguid: {guid(path)}\nfolderAsset: yes\nDefaultImporter:\n{_TAIL}"
+    return f"fileFormatVersion: 2\nguid: {guid(path)}\nfolderAsset: yes\n{_ANY}"

@@ -1,6 +1,7 @@
-"""Packs `unity/`, the Unity package with an avatar in it: a folder and a tarball for the Package Manager, and a `.unitypackage`.
+"""Packs `unity/`, the Unity package: a folder and a tarball for the Package Manager, and with a person a `.unitypackage`.
 
-The same input gives the same bytes. Scenes refer to files of the package by `{guid:PATH}`, which is replaced by the GUID here.
+The folder itself is a package too, which Unity takes from a git address (`?path=/unity`): its `.meta` files are committed.
+`python -m gsac.unity.package` writes them. The same input gives the same bytes.
 """
 
 from __future__ import annotations
@@ -8,28 +9,34 @@ from __future__ import annotations
 import gzip
 import io
 import json
-import re
 import tarfile
+from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
-from gsac.unity.meta import PACKAGE, file_meta, folder_meta, guid
+from gsac.unity.meta import PACKAGE, file_meta, folder_meta, guid, person_guid, person_meta
 
 HERE = Path(__file__).parent
 SOURCES = (
-    "README.md",
-    "Demo/Benchmark.unity",
-    "Demo/Demo.unity",
+    "CHANGELOG.md",
+    "Documentation~/gsac-avatar.md",
     "Editor/Gsac.Editor.asmdef",
     "Editor/GsacAvatarEditor.cs",
+    "Editor/GsacCastFiller.cs",
     "Editor/GsacHumanClip.cs",
     "Editor/GsacImporter.cs",
     "Editor/GsacPoseStreamEditor.cs",
+    "Editor/GsacSceneBounds.cs",
     "Editor/GsacSceneViews.cs",
+    "Editor/GsacSelfCheckMenu.cs",
+    "Editor/GsacThumbnail.cs",
+    "LICENSE.md",
+    "README.md",
     "Runtime/Core/GsacContainer.cs",
     "Runtime/Core/GsacCorrectives.cs",
     "Runtime/Core/GsacData.cs",
     "Runtime/Core/GsacException.cs",
     "Runtime/Core/GsacExtent.cs",
+    "Runtime/Core/GsacHarmonics.cs",
     "Runtime/Core/GsacHumanBones.cs",
     "Runtime/Core/GsacJson.cs",
     "Runtime/Core/GsacLivePose.cs",
@@ -50,78 +57,139 @@ SOURCES = (
     "Runtime/GsacAvatar.cs",
     "Runtime/GsacBenchmark.cs",
     "Runtime/GsacCameras.cs",
+    "Runtime/GsacCast.cs",
     "Runtime/GsacCrowd.cs",
     "Runtime/GsacDemo.cs",
     "Runtime/GsacDepths.cs",
     "Runtime/GsacFinish.cs",
+    "Runtime/GsacHead.cs",
     "Runtime/GsacHumanoid.cs",
     "Runtime/GsacLimb.cs",
     "Runtime/GsacLoader.cs",
     "Runtime/GsacMesh.cs",
     "Runtime/GsacModel.cs",
+    "Runtime/GsacPicture.cs",
     "Runtime/GsacPoseStream.cs",
     "Runtime/GsacReach.cs",
     "Runtime/GsacRenderer.cs",
+    "Runtime/GsacReport.cs",
+    "Runtime/GsacSceneLight.cs",
     "Runtime/GsacShapes.cs",
     "Runtime/GsacSkeleton.cs",
     "Runtime/GsacSorted.cs",
     "Runtime/GsacView.cs",
     "Runtime/Resources/Gsac/Gsac.compute",
+    "Runtime/Resources/Gsac/GsacBody.hlsl",
+    "Runtime/Resources/Gsac/GsacBody.shader",
+    "Runtime/Resources/Gsac/GsacBodyDepth.shader",
     "Runtime/Resources/Gsac/GsacCore.hlsl",
     "Runtime/Resources/Gsac/GsacDraw.hlsl",
+    "Runtime/Resources/Gsac/GsacFinish.hlsl",
+    "Runtime/Resources/Gsac/GsacFogBuiltIn.hlsl",
     "Runtime/Resources/Gsac/GsacJoin.compute",
+    "Runtime/Resources/Gsac/GsacLatest.hlsl",
+    "Runtime/Resources/Gsac/GsacOwn.hlsl",
+    "Runtime/Resources/Gsac/GsacOwn.shader",
     "Runtime/Resources/Gsac/GsacPass.hlsl",
     "Runtime/Resources/Gsac/GsacSplats.shader",
+    "Runtime/Resources/Gsac/GsacTrained.hlsl",
+    "Runtime/Resources/Gsac/GsacTrained.shader",
+    "Samples~/Crowd/Crowd.unity",
+    "Samples~/Crowd/Gsac.Samples.Crowd.asmdef",
+    "Samples~/Crowd/GsacCrowdOfTwenty.cs",
+    "Samples~/Demo/Benchmark.unity",
+    "Samples~/Demo/Demo.unity",
+    "Samples~/FaceCapture/ARKit/Gsac.Samples.ARKit.asmdef",
+    "Samples~/FaceCapture/ARKit/GsacARKitFace.cs",
+    "Samples~/FaceCapture/FaceCapture.unity",
+    "Samples~/FaceCapture/Gsac.Samples.FaceCapture.asmdef",
+    "Samples~/FaceCapture/GsacFaceCapture.cs",
+    "Samples~/FaceCapture/IGsacFace.cs",
+    "Samples~/Mecanim/Gsac.Samples.Mecanim.asmdef",
+    "Samples~/Mecanim/GsacMecanim.cs",
+    "Samples~/Mecanim/Mecanim.unity",
+    "Samples~/MixedReality/ARFoundation/Gsac.Samples.ARFoundation.asmdef",
+    "Samples~/MixedReality/ARFoundation/GsacARRoom.cs",
+    "Samples~/MixedReality/Gsac.Samples.MixedReality.asmdef",
+    "Samples~/MixedReality/GsacControllers.cs",
+    "Samples~/MixedReality/GsacFloorPlacement.cs",
+    "Samples~/MixedReality/GsacMixedReality.cs",
+    "Samples~/MixedReality/GsacPosePanel.cs",
+    "Samples~/MixedReality/GsacRoomDepth.shader",
+    "Samples~/MixedReality/GsacTouch.cs",
+    "Samples~/MixedReality/IGsacHands.cs",
+    "Samples~/MixedReality/IGsacRoom.cs",
+    "Samples~/MixedReality/Meta/Gsac.Samples.Meta.asmdef",
+    "Samples~/MixedReality/Meta/GsacMetaRoom.cs",
+    "Samples~/MixedReality/MixedReality.unity",
+    "Samples~/MixedReality/XRHands/Gsac.Samples.XRHands.asmdef",
+    "Samples~/MixedReality/XRHands/GsacXRHands.cs",
+    "Samples~/SelfCheckScene/SelfCheck.unity",
+    "Samples~/Timeline/Gsac.Samples.Timeline.asmdef",
+    "Samples~/Timeline/GsacFaceClip.cs",
+    "Samples~/Timeline/GsacFaceTrack.cs",
+    "Samples~/VR/VR.unity",
+    "SelfCheck/Gsac.SelfCheck.asmdef",
+    "SelfCheck/GsacCheckedView.cs",
+    "SelfCheck/GsacPainter.cs",
+    "SelfCheck/GsacSelfCheck.cs",
+    "Tests/Editor/Gsac.Editor.Tests.asmdef",
+    "Tests/Editor/GsacImportTests.cs",
+    "Tests/Runtime/Gsac.Tests.asmdef",
+    "Tests/Runtime/GsacPictureTests.cs",
+    "Tests/Runtime/GsacReadingTests.cs",
+    "package.json",
 )
-"""Files of every package. Whole names, so that the cache sees these files."""
+"""Files of the package. Whole names, so that the cache sees these files."""
 
-AVATAR = "Demo/Avatar.bytes"
+PACKING = ("__init__.py", "meta.py", "package.py")
+"""What lies in the folder and is not the package's: Unity wants a `.meta` of these too."""
 SAMPLES = "Samples~"
 """Unity's name for a folder that the Package Manager copies into a project when the user asks for it."""
 INSTALLED = "Assets/Gsac"
 """The folder of a project into which the .unitypackage is unpacked."""
+PEOPLE = "People"
+"""The folder in it that holds the people."""
+LEFT_OUT = ("Documentation~/", "Tests/", "package.json")
+"""What only the Package Manager can use; the samples but the demo as well."""
 
 
 def write_unity(folder: Path, container: bytes, version: str) -> None:
-    """Writes the three forms and the README into an empty folder.
+    """Writes the three forms and the README into an empty folder; only the .unitypackage holds the person.
 
     container: the bytes of avatar.gsac; version: of the package, e.g. `0.1.0`.
     """
-    files = collect_files(container)
-    upm = {_in_upm(path): content for path, content in files.items()}
-    upm["package.json"] = _manifest(version)
-    upm |= {f"{path}.meta": file_meta(_guid_path(path)).encode() for path in list(upm)}
-    upm |= {f"{path}.meta": folder_meta(_guid_path(path)).encode() for path in _folders(upm) if path != SAMPLES}
+    files = {path: (HERE / path).read_bytes() for path in SOURCES}
+    files["package.json"] = _manifest(files["package.json"], version)
+    upm = files | _metas(files)
     for path, content in upm.items():
         place = folder / PACKAGE / path
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_bytes(content)
     (folder / f"{PACKAGE}-{version}.tgz").write_bytes(_tar({f"package/{path}": content for path, content in upm.items()}))
-    (folder / "gsac-avatar.unitypackage").write_bytes(_tar(_unitypackage(files)))
+    (folder / "gsac-avatar.unitypackage").write_bytes(_tar(_unitypackage(files, container)))
     (folder / "README.md").write_bytes(files["README.md"])
 
 
-def collect_files(container: bytes) -> dict[str, bytes]:
-    """Path in the package -> content, with GUIDs filled in. container: the bytes of avatar.gsac."""
-    files = {AVATAR: container}
-    for path in SOURCES:
-        content = (HERE / path).read_bytes()
-        if path.endswith(".unity"):
-            content = re.sub(r"\{guid:([^}]+)\}", lambda found: guid(found[1]), content.decode()).encode()
-        files[path] = content
-    return dict(sorted(files.items()))
+def write_metas(folder: Path) -> None:
+    """Writes the `.meta` files of the package's sources into a folder of them."""
+    for path, content in _metas((*SOURCES, *PACKING)).items():
+        (folder / path).write_bytes(content)
 
 
-def _in_upm(path: str) -> str:
-    return f"{SAMPLES}/{path}" if path.startswith("Demo/") else path
+def _metas(paths: Iterable[str]) -> dict[str, bytes]:
+    """Path of each `.meta` -> content; of what Unity hides (`Documentation~`) and of the folder of samples there is none."""
+    seen = [path for path in paths if not path.startswith("Documentation~/")]
+    metas = {f"{path}.meta": file_meta(_guid_path(path)).encode() for path in seen}
+    return metas | {f"{path}.meta": folder_meta(_guid_path(path)).encode() for path in _folders(seen) if path != SAMPLES}
 
 
 def _guid_path(path: str) -> str:
-    """The path from which a GUID is made: the demo's files keep theirs among the samples."""
+    """The path from which a GUID is made: a sample's files keep theirs where they are copied to."""
     return path.removeprefix(f"{SAMPLES}/")
 
 
-def _folders(paths: dict[str, bytes]) -> list[str]:
+def _folders(paths: Iterable[str]) -> list[str]:
     return sorted({str(parent) for path in paths for parent in PurePosixPath(path).parents} - {"."})
 
 
@@ -130,23 +198,31 @@ def _manifest(version: str) -> bytes:
         "name": PACKAGE, "version": version, "displayName": "GSAC Avatar", "unity": "2021.3",
         "description": "Animatable Gaussian avatars: import a .gsac file, animate it as a Humanoid, in any render pipeline.",
         "keywords": ["gaussian splatting", "avatar", "humanoid"],
-        "dependencies": {"com.unity.modules.animation": "1.0.0", "com.unity.modules.imgui": "1.0.0"},
+        "dependencies": {"com.unity.modules.animation": "1.0.0", "com.unity.modules.imgui": "1.0.0",
+                         "com.unity.modules.physics": "1.0.0"},
         "samples": [{"displayName": "Demo", "path": f"{SAMPLES}/Demo",
                      "description": "This person with buttons for poses, clips and expressions; and the benchmark scene."}],
     }, indent=2).encode() + b"\n"
+def _manifest(content: bytes, version: str) -> bytes:
+    return json.dumps(json.loads(content) | {"version": version}, indent=2).encode() + b"\n"
 
 
-def _unitypackage(files: dict[str, bytes]) -> dict[str, bytes]:
+def _unitypackage(files: dict[str, bytes], container: bytes) -> dict[str, bytes]:
     """Entries of Unity's own archive for each path: GUID/asset, GUID/asset.meta, GUID/pathname."""
+    inside = {_guid_path(path): content for path, content in files.items()
+              if not path.startswith(LEFT_OUT) and (not path.startswith(SAMPLES) or path.startswith(f"{SAMPLES}/Demo/"))}
     entries = {}
-    for path in ["", *_folders(files)]:
-        entries[f"{guid(path)}/asset.meta"] = folder_meta(path).encode()
-        entries[f"{guid(path)}/pathname"] = f"{INSTALLED}/{path}".rstrip("/").encode()
-    for path, content in files.items():
-        entries[f"{guid(path)}/asset"] = content
-        entries[f"{guid(path)}/asset.meta"] = file_meta(path).encode()
-        entries[f"{guid(path)}/pathname"] = f"{INSTALLED}/{path}".encode()
+    for path in ["", PEOPLE, *_folders(inside)]:
+        entries |= _entry(guid(path), path, folder_meta(path))
+    for path, content in inside.items():
+        entries |= _entry(guid(path), path, file_meta(path)) | {f"{guid(path)}/asset": content}
+    person = person_guid(container)
+    entries |= _entry(person, f"{PEOPLE}/avatar-{person[:8]}.gsac", person_meta(container)) | {f"{person}/asset": container}
     return entries
+
+
+def _entry(name: str, path: str, meta: str) -> dict[str, bytes]:
+    return {f"{name}/asset.meta": meta.encode(), f"{name}/pathname": f"{INSTALLED}/{path}".rstrip("/").encode()}
 
 
 def _tar(files: dict[str, bytes]) -> bytes:
@@ -158,3 +234,7 @@ def _tar(files: dict[str, bytes]) -> bytes:
             entry.size, entry.mode = len(content), 0o644
             tar.addfile(entry, io.BytesIO(content))
     return gzip.compress(raw.getvalue(), 6, mtime=0)
+
+
+if __name__ == "__main__":
+    write_metas(HERE)

@@ -4,7 +4,7 @@
 // Options that pick what is seen: with one of them nothing turns by itself.
 const PICKED = ["clip", "pose", "t", "yaw", "pitch", "dist", "target", "still"];
 // All of them.
-export const OPTIONS = [...PICKED, "fov", "bg", "expression", "joints", "light", "turntable", "draw"];
+export const OPTIONS = [...PICKED, "fov", "bg", "expression", "joints", "light", "lamp", "turntable", "draw"];
 const RENDERER_NAMES = ["webgpu", "webgl", "software"];
 // Names that a sentence lists at most.
 const MOST_NAMES = 12;
@@ -65,6 +65,8 @@ export function readOptions(given) {
     turned: readTurns(given.get("joints") ?? "", refuse),
     // light=off: even light instead of the clip's. Default: the clip's.
     lit: oneOf("light", ["", "on", "off"]) !== "off",
+    // lamp=AROUND,ABOVE: a lamp in place of the clip's light, degrees from the person's front to her left and above. Default: none.
+    lamp: readLamp(given.get("lamp") ?? "", refuse),
     // turntable, or turntable=off: whether the avatar turns. Default: where nothing else is picked, and until something is.
     turntable: turntable === null ? null : turntable !== "off",
     picked: PICKED.some((name) => given.has(name)),
@@ -105,6 +107,13 @@ function readExpression(words, refuse) {
     const [name, weight] = part.split(":"), value = readNumber(weight ?? "1");
     return value >= -2 && value <= 2 ? [name, value] : refuse("expression", "a weight, as jawOpen:0.5", part);
   }).filter(Boolean));
+}
+
+/** @returns {number[] | null} two angles, degrees */
+function readLamp(words, refuse) {
+  if (!words) return null;
+  const angles = words.split(",").map(readNumber);
+  return angles.length === 2 && angles.every(Number.isFinite) ? angles : refuse("lamp", "two angles, degrees, as 40,30", words);
 }
 
 /** @returns {Object<string, number[]>} joint -> x, y, z, degrees */

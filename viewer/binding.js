@@ -36,12 +36,18 @@ export class Binding {
     }
   }
 
-  // Fills this.data; vertices: (V, 3) posed; lit: whether in the light of the clip, where the file has it.
-  update(vertices, lit) {
+  /**
+   * Fills this.data.
+   * @param {Float32Array} vertices (V, 3) posed
+   * @param {boolean} lit whether in the light of the clip, where the file has it
+   * @param {import("./scene_light.js").SceneLight | null} scene a lamp in its place, as far as its share says
+   */
+  update(vertices, lit, scene = null) {
     const { avatar: { faces }, level: { face, mu }, axes: M, data: D } = this, light = (lit && this.avatar.light) || EVEN_LIGHT;
     const shade = (c, x, y, z) => {
       const factor = light[c] + x * light[3 + c] + y * light[6 + c] + Math.abs(z) * light[9 + c];
-      return Math.min(BRIGHTEST, Math.max(DARKEST, factor));
+      const clip = Math.min(BRIGHTEST, Math.max(DARKEST, factor));
+      return scene?.share ? clip + scene.share * (Math.min(BRIGHTEST, scene.factor(c, x, y, z)) - clip) : clip;
     };
     for (let i = 0; i < this.count; i++) {
       const f = face[i] * 3, i0 = faces[f] * 3, i1 = faces[f + 1] * 3, i2 = faces[f + 2] * 3;

@@ -4,6 +4,7 @@ import { GsacError } from "./container.js";
 import { beginFilm, takePicture } from "./film.js";
 import { openKit } from "./kit.js";
 import { keyActions, listenForKeys } from "./keys.js";
+import { addLightDial } from "./light_dial.js";
 import { MotionError } from "./motion.js";
 import { addMotions, findAvatar, listenForDrops, readFile } from "./motion_files.js";
 import { saveFile, shareLink } from "./share.js";
@@ -44,6 +45,7 @@ export class Controls {
     viewer.cover = () => this.measureCover();
     this.onClick("turntable", () => { viewer.turntable = !viewer.turntable; });
     this.onClick("light", () => { viewer.levels.lit = !viewer.levels.lit; });
+    this.showLamp = addLightDial(() => viewer.levels.scene, find("lamp"), find("lamp-share"), () => this.show());
     this.onClick("pause", () => person.toggle());
     this.onClick("reset", () => person.reset());
     this.onClick("fullscreen", () => person.fullscreen());
@@ -281,6 +283,7 @@ export class Controls {
     find("film").setAttribute("aria-pressed", String(this.film !== null));
     find("turntable").setAttribute("aria-pressed", String(viewer.turntable));
     find("light").setAttribute("aria-pressed", String(viewer.levels.lit));
+    this.showLamp();
     find("timeline").hidden = find("pause").disabled = find("time").disabled = !viewer.length;
     if (!viewer.length) find("clock").textContent = "";
     find("fullscreen").setAttribute("aria-pressed", String(document.fullscreenElement !== null));

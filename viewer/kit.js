@@ -13,6 +13,8 @@ const POSE_FILE = /pose_?landmarker.*\.task$/i;
 const TAR_FILE = /\.(tgz|tar\.gz)$/i;
 // Of a tar archive.
 const TAR_BLOCK = 512;
+// An archive that unpacks to more is refused, bytes.
+const MOST_UNPACKED = 256 * 2 ** 20;
 
 /**
  * Throws MotionError, which says what is missing.
@@ -65,16 +67,25 @@ function importModule(address) {
 
 // Files of a .tar.gz archive: name and bytes.
 async function readArchive(file) {
-  const unpacked = new Response(file.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-  const bytes = new Uint8Array(await unpacked.catch(() => { throw new MotionError(`${file.name}: it is no .tgz archive`); }));
+  let size = 0;
+  const bound = new TransformStream({ transform: (part, next) => {
+    size += part.length;
+    if (size > MOST_UNPACKED) next.error(new Error("too large"));
+    else next.enqueue(part);
+  } });
+  const unpacked = new Response(file.stream().pipeThrough(new DecompressionStream("gzip")).pipeThrough(bound)).arrayBuffer();
+  const bytes = new Uint8Array(await unpacked.catch(() => {
+    const why = size > MOST_UNPACKED ? `it unpacks to more than ${MOST_UNPACKED} bytes` : "it is no .tgz archive";
+    throw new MotionError(`${file.name}: ${why}`);
+  }));
   const text = (from, most) => new TextDecoder().decode(bytes.subarray(from, from + most)).split("\0")[0];
   /** @type {[string, Blob][]} */
   const found = [];
   for (let at = 0; at + TAR_BLOCK <= bytes.length && bytes[at];) {
-    const size = Number.parseInt(text(at + 124, 12), 8);
-    if (!(size >= 0)) throw new MotionError(`${file.name}: it is no .tgz archive`);
-    found.push([text(at, 100), new Blob([bytes.subarray(at + TAR_BLOCK, at + TAR_BLOCK + size)])]);
-    at += TAR_BLOCK * (1 + Math.ceil(size / TAR_BLOCK));
+    const length = Number.parseInt(text(at + 124, 12), 8);
+    if (!(length >= 0)) throw new MotionError(`${file.name}: it is no .tgz archive`);
+    found.push([text(at, 100), new Blob([bytes.subarray(at + TAR_BLOCK, at + TAR_BLOCK + length)])]);
+    at += TAR_BLOCK * (1 + Math.ceil(length / TAR_BLOCK));
   }
   return found;
 }

@@ -2,6 +2,7 @@
 
 import { Binding } from "./binding.js";
 import { transformPoint } from "./projection.js";
+import { SceneLight } from "./scene_light.js";
 import { DepthSort } from "./sort.js";
 
 // A coarser level begins where the person is smaller than its greatest height by this factor: at the border nothing flickers.
@@ -24,6 +25,8 @@ export class Levels {
     this.drawn = 0;
     // Whether the light of the clip shines on the colours, where the file has it.
     this.lit = true;
+    // A lamp in its place.
+    this.scene = new SceneLight();
   }
 
   get binding() {
@@ -36,7 +39,7 @@ export class Levels {
 
   // Moves the gaussians that are drawn; vertices: (V, 3) posed.
   update(vertices) {
-    this.binding.update(vertices, this.lit);
+    this.binding.update(vertices, this.lit, this.scene);
   }
 
   // Takes the level for a person of this height, px. Returns whether it is another one than before.

@@ -17,13 +17,13 @@ from gsac.avatar.gsac_file.container import DTYPES, HEADER, GsacError, unpack
 HERE = Path(__file__).parent
 PAGE, STYLE = "page.html", "style.css"
 MODULES = ("json.js", "base64.js", "container.js", "reader.js",
-           "flat_quat.js", "projection.js", "skin.js", "binding.js", "sort.js",
+           "flat_quat.js", "projection.js", "skin.js", "binding.js", "sort.js", "scene_light.js",
            "levels.js", "pack.js", "webgl.js", "software.js", "shaders.js", "device.js", "webgpu.js", "renderer.js",
            "quat.js", "motion.js", "places.js", "joint_names.js", "match_names.js", "bvh.js", "gltf.js",
            "fbx_file.js", "fbx_curve.js", "fbx.js", "retarget.js", "motion_files.js",
            "address.js", "camera.js", "rate.js", "viewer.js", "limb.js", "share.js", "film.js", "keys.js",
            "mirror_pose.js", "mirror.js", "markup.js", "element.js", "kit.js", "name.js", "planes.js", "xr.js", "sliders.js",
-           "controls.js", "main.js")
+           "light_dial.js", "controls.js", "main.js")
 """Each after those that it imports; main.js runs the page. Whole names, so that the cache sees these files."""
 _IMPORT = re.compile(r'^import \{ [\w, ]+ \} from "\./\w+\.js";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(async )?function |class |const )", re.MULTILINE)

@@ -1,8 +1,8 @@
 // Written by `python -m gsac.viewer.wgsl` from the HLSL of the Unity package and page.hlsl. Do not edit.
-// glslang 11, naga-wasm@30.1.0, HLSL 7dc0adbd2d58788897b835d4684ed784f0ffc673616fd89e7535a325041cabba
+// glslang 11, naga-wasm@30.1.0, HLSL e4be239382e9952cc7bd2eabf98e6e2f831e144235f6a3c167a55c7020a163cd
 
 export const SHADERS = {
-  Skin: { bindings: {"parameters": 0, "GsacSkin": 2, "GsacRest": 1, "GsacMoves": 3, "GsacWeights": 4, "GsacBones": 5, "GsacPosed": 6}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
+  Skin: { bindings: {"parameters": 0, "GsacSkin": 2, "GsacRest": 1, "GsacMoves": 3, "GsacWeights": 4, "GsacBones": 5, "GsacPosed": 6}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80, "GsacSceneRed": 96, "GsacSceneGreen": 112, "GsacSceneBlue": 128, "GsacSceneRed2": 144, "GsacSceneGreen2": 160, "GsacSceneBlue2": 176, "GsacSceneLast": 192}, code: `
 struct GsacParams {
 GsacVertexCount: u32,
 GsacSplatCount: u32,
@@ -15,6 +15,13 @@ GsacDepthRow: vec4<f32>,
 GsacLightRed: vec4<f32>,
 GsacLightGreen: vec4<f32>,
 GsacLightBlue: vec4<f32>,
+GsacSceneRed: vec4<f32>,
+GsacSceneGreen: vec4<f32>,
+GsacSceneBlue: vec4<f32>,
+GsacSceneRed2_: vec4<f32>,
+GsacSceneGreen2_: vec4<f32>,
+GsacSceneBlue2_: vec4<f32>,
+GsacSceneLast: vec4<f32>,
 }
 
 struct GsacSkin {
@@ -133,7 +140,7 @@ id_1 = id;
 Skin_1();
 }
 ` },
-  Bind: { bindings: {"parameters": 0, "GsacCorners": 2, "GsacPosed": 1, "GsacLocal": 3, "GsacSplats": 4}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
+  Bind: { bindings: {"parameters": 0, "GsacCorners": 2, "GsacPosed": 1, "GsacLocal": 3, "GsacSplats": 4}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80, "GsacSceneRed": 96, "GsacSceneGreen": 112, "GsacSceneBlue": 128, "GsacSceneRed2": 144, "GsacSceneGreen2": 160, "GsacSceneBlue2": 176, "GsacSceneLast": 192}, code: `
 struct GsacParams {
 GsacVertexCount: u32,
 GsacSplatCount: u32,
@@ -146,6 +153,13 @@ GsacDepthRow: vec4<f32>,
 GsacLightRed: vec4<f32>,
 GsacLightGreen: vec4<f32>,
 GsacLightBlue: vec4<f32>,
+GsacSceneRed: vec4<f32>,
+GsacSceneGreen: vec4<f32>,
+GsacSceneBlue: vec4<f32>,
+GsacSceneRed2_: vec4<f32>,
+GsacSceneGreen2_: vec4<f32>,
+GsacSceneBlue2_: vec4<f32>,
+GsacSceneLast: vec4<f32>,
 }
 
 struct GsacCorners {
@@ -173,63 +187,79 @@ var<storage, read_write> GsacSplats: GsacPosed;
 var<private> id_1: vec3<u32>;
 
 fn Bind_1() {
-var phi_1317_: vec3<f32>;
-var phi_1316_: vec3<f32>;
-var phi_1315_: vec3<f32>;
-var phi_1314_: f32;
+var phi_1602_: vec3<f32>;
+var phi_1601_: vec3<f32>;
+var phi_1600_: vec3<f32>;
+var phi_1599_: f32;
+var phi_1603_: vec3<f32>;
 
-let _e31 = id_1;
+let _e41 = id_1;
 switch bitcast<i32>(0u) {
 default: {
-let _e35 = unnamed.GsacSplatCount;
-if (_e31.x >= _e35) {
+let _e45 = unnamed.GsacSplatCount;
+if (_e41.x >= _e45) {
 break;
 }
-let _e39 = GsacCorners_1.data[_e31.x];
-let _e45 = GsacPosed_1.data[_e39.x];
-let _e49 = GsacPosed_1.data[_e39.y];
-let _e50 = _e49.xyz;
-let _e53 = GsacPosed_1.data[_e39.z];
-let _e55 = (_e53.xyz - _e50);
-let _e56 = (_e45.xyz - _e50);
-let _e57 = cross(_e55, _e56);
-let _e58 = length(_e57);
-phi_1317_ = vec3<f32>(1f, 0f, 0f);
-phi_1316_ = vec3<f32>(0f, 1f, 0f);
-phi_1315_ = vec3<f32>(0f, 0f, 1f);
-phi_1314_ = 0f;
-if ((_e58 > (0.000001f * (dot(_e55, _e55) + dot(_e56, _e56)))) && (_e58 > 0.000000000000001f)) {
-let _e70 = length((_e56 - _e55));
-let _e73 = (_e55 / vec3(length(_e55)));
-let _e75 = (_e57 / vec3(_e58));
-phi_1317_ = _e73;
-phi_1316_ = _e75;
-phi_1315_ = cross(_e73, _e75);
-phi_1314_ = (10f * ((_e58 / _e70) + _e70));
+let _e49 = GsacCorners_1.data[_e41.x];
+let _e55 = GsacPosed_1.data[_e49.x];
+let _e59 = GsacPosed_1.data[_e49.y];
+let _e60 = _e59.xyz;
+let _e63 = GsacPosed_1.data[_e49.z];
+let _e65 = (_e63.xyz - _e60);
+let _e66 = (_e55.xyz - _e60);
+let _e67 = cross(_e65, _e66);
+let _e68 = length(_e67);
+phi_1602_ = vec3<f32>(1f, 0f, 0f);
+phi_1601_ = vec3<f32>(0f, 1f, 0f);
+phi_1600_ = vec3<f32>(0f, 0f, 1f);
+phi_1599_ = 0f;
+if ((_e68 > (0.000001f * (dot(_e65, _e65) + dot(_e66, _e66)))) && (_e68 > 0.000000000000001f)) {
+let _e80 = length((_e66 - _e65));
+let _e83 = (_e65 / vec3(length(_e65)));
+let _e85 = (_e67 / vec3(_e68));
+phi_1602_ = _e83;
+phi_1601_ = _e85;
+phi_1600_ = cross(_e83, _e85);
+phi_1599_ = (10f * ((_e68 / _e80) + _e80));
 }
-let _e81 = phi_1317_;
-let _e83 = phi_1316_;
-let _e85 = phi_1315_;
-let _e87 = phi_1314_;
-let _e95 = GsacLocal_1.data[(_e31.x * 3u)];
-let _e98 = GsacLocal_1.data[((_e31.x * 3u) + 1u)];
-let _e101 = GsacLocal_1.data[((_e31.x * 3u) + 2u)];
-let _e173 = ((_e50 + ((_e55 + _e56) * 0.33333334f)) + ((((_e81 * _e95.x) + (_e83 * _e95.y)) + (_e85 * _e95.z)) * _e87));
-let _e189 = (_e101.xyz * _e87);
-let _e191 = ((((_e81 * fma(-2f, fma(_e98.y, _e98.y, (_e98.z * _e98.z)), 1f)) + (_e83 * (2f * fma(_e98.x, _e98.y, (_e98.w * _e98.z))))) + (_e85 * (2f * fma(_e98.x, _e98.z, -((_e98.w * _e98.y)))))) * _e189.x);
-let _e193 = ((((_e81 * (2f * fma(_e98.x, _e98.y, -((_e98.w * _e98.z))))) + (_e83 * fma(-2f, fma(_e98.x, _e98.x, (_e98.z * _e98.z)), 1f))) + (_e85 * (2f * fma(_e98.y, _e98.z, (_e98.w * _e98.x))))) * _e189.y);
-let _e195 = ((((_e81 * (2f * fma(_e98.x, _e98.z, (_e98.w * _e98.y)))) + (_e83 * (2f * fma(_e98.y, _e98.z, -((_e98.w * _e98.x)))))) + (_e85 * fma(-2f, fma(_e98.x, _e98.x, (_e98.y * _e98.y)), 1f))) * _e189.z);
-let _e198 = fma(_e195, _e195, fma(_e191, _e191, (_e193 * _e193)));
-let _e207 = fma(_e195.xxy, _e195.yzz, fma(_e191.xxy, _e191.yzz, (_e193.xxy * _e193.yzz)));
-GsacSplats.data[(_e31.x * 3u)] = vec4<f32>(_e173.x, _e173.y, _e173.z, _e198.x);
-GsacSplats.data[((_e31.x * 3u) + 1u)] = vec4<f32>(_e198.y, _e198.z, _e207.x, _e207.y);
-let _e229 = unnamed.GsacLightRed;
-let _e231 = unnamed.GsacLightGreen;
-let _e233 = unnamed.GsacLightBlue;
-let _e241 = select(vec3<f32>(0f, 0f, 0f), vec3<f32>(_e83.x, _e83.y, abs(_e83.z)), vec3((_e87 > 0f)));
-let _e245 = vec4<f32>(_e241.x, _e241.y, _e241.z, 1f);
-let _e250 = clamp(vec3<f32>(dot(_e229, _e245), dot(_e231, _e245), dot(_e233, _e245)), vec3<f32>(0.25f, 0.25f, 0.25f), vec3<f32>(2.5f, 2.5f, 2.5f));
-GsacSplats.data[((_e31.x * 3u) + 2u)] = vec4<f32>(_e207.z, _e250.x, _e250.y, _e250.z);
+let _e91 = phi_1602_;
+let _e93 = phi_1601_;
+let _e95 = phi_1600_;
+let _e97 = phi_1599_;
+let _e105 = GsacLocal_1.data[(_e41.x * 3u)];
+let _e108 = GsacLocal_1.data[((_e41.x * 3u) + 1u)];
+let _e111 = GsacLocal_1.data[((_e41.x * 3u) + 2u)];
+let _e183 = ((_e60 + ((_e65 + _e66) * 0.33333334f)) + ((((_e91 * _e105.x) + (_e93 * _e105.y)) + (_e95 * _e105.z)) * _e97));
+let _e199 = (_e111.xyz * _e97);
+let _e201 = ((((_e91 * fma(-2f, fma(_e108.y, _e108.y, (_e108.z * _e108.z)), 1f)) + (_e93 * (2f * fma(_e108.x, _e108.y, (_e108.w * _e108.z))))) + (_e95 * (2f * fma(_e108.x, _e108.z, -((_e108.w * _e108.y)))))) * _e199.x);
+let _e203 = ((((_e91 * (2f * fma(_e108.x, _e108.y, -((_e108.w * _e108.z))))) + (_e93 * fma(-2f, fma(_e108.x, _e108.x, (_e108.z * _e108.z)), 1f))) + (_e95 * (2f * fma(_e108.y, _e108.z, (_e108.w * _e108.x))))) * _e199.y);
+let _e205 = ((((_e91 * (2f * fma(_e108.x, _e108.z, (_e108.w * _e108.y)))) + (_e93 * (2f * fma(_e108.y, _e108.z, -((_e108.w * _e108.x)))))) + (_e95 * fma(-2f, fma(_e108.x, _e108.x, (_e108.y * _e108.y)), 1f))) * _e199.z);
+let _e208 = fma(_e205, _e205, fma(_e201, _e201, (_e203 * _e203)));
+let _e217 = fma(_e205.xxy, _e205.yzz, fma(_e201.xxy, _e201.yzz, (_e203.xxy * _e203.yzz)));
+GsacSplats.data[(_e41.x * 3u)] = vec4<f32>(_e183.x, _e183.y, _e183.z, _e208.x);
+GsacSplats.data[((_e41.x * 3u) + 1u)] = vec4<f32>(_e208.y, _e208.z, _e217.x, _e217.y);
+let _e236 = unnamed.GsacSceneRed;
+let _e238 = unnamed.GsacSceneGreen;
+let _e240 = unnamed.GsacSceneBlue;
+let _e242 = unnamed.GsacSceneRed2_;
+let _e244 = unnamed.GsacSceneGreen2_;
+let _e246 = unnamed.GsacSceneBlue2_;
+let _e248 = unnamed.GsacSceneLast;
+let _e250 = unnamed.GsacLightRed;
+let _e252 = unnamed.GsacLightGreen;
+let _e254 = unnamed.GsacLightBlue;
+let _e262 = select(vec3<f32>(0f, 0f, 0f), vec3<f32>(_e93.x, _e93.y, abs(_e93.z)), vec3((_e97 > 0f)));
+let _e266 = vec4<f32>(_e262.x, _e262.y, _e262.z, 1f);
+let _e271 = clamp(vec3<f32>(dot(_e250, _e266), dot(_e252, _e266), dot(_e254, _e266)), vec3<f32>(0.25f, 0.25f, 0.25f), vec3<f32>(2.5f, 2.5f, 2.5f));
+phi_1603_ = _e271;
+if (_e248.w > 0f) {
+let _e276 = select(vec3<f32>(0f, 0f, 0f), _e93, vec3((_e97 > 0f)));
+let _e280 = vec4<f32>(_e276.x, _e276.y, _e276.z, 1f);
+let _e283 = (_e276.xyzz * _e276.yzzx);
+phi_1603_ = mix(_e271, min(pow(max(((vec3<f32>(dot(_e236, _e280), dot(_e238, _e280), dot(_e240, _e280)) + vec3<f32>(dot(_e242, _e283), dot(_e244, _e283), dot(_e246, _e283))) + (_e248.xyz * fma(_e276.x, _e276.x, -((_e276.y * _e276.y))))), vec3<f32>(0.000001f, 0.000001f, 0.000001f)), vec3<f32>(0.45454547f, 0.45454547f, 0.45454547f)), vec3<f32>(2.5f, 2.5f, 2.5f)), vec3(_e248.w));
+}
+let _e310 = phi_1603_;
+GsacSplats.data[((_e41.x * 3u) + 2u)] = vec4<f32>(_e217.z, _e310.x, _e310.y, _e310.z);
 break;
 }
 }
@@ -242,7 +272,7 @@ id_1 = id;
 Bind_1();
 }
 ` },
-  SortBlocks: { bindings: {"parameters": 0, "GsacSplats": 1, "GsacKeys": 2}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
+  SortBlocks: { bindings: {"parameters": 0, "GsacSplats": 1, "GsacKeys": 2}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80, "GsacSceneRed": 96, "GsacSceneGreen": 112, "GsacSceneBlue": 128, "GsacSceneRed2": 144, "GsacSceneGreen2": 160, "GsacSceneBlue2": 176, "GsacSceneLast": 192}, code: `
 struct GsacParams {
 GsacVertexCount: u32,
 GsacSplatCount: u32,
@@ -255,6 +285,13 @@ GsacDepthRow: vec4<f32>,
 GsacLightRed: vec4<f32>,
 GsacLightGreen: vec4<f32>,
 GsacLightBlue: vec4<f32>,
+GsacSceneRed: vec4<f32>,
+GsacSceneGreen: vec4<f32>,
+GsacSceneBlue: vec4<f32>,
+GsacSceneRed2_: vec4<f32>,
+GsacSceneGreen2_: vec4<f32>,
+GsacSceneBlue2_: vec4<f32>,
+GsacSceneLast: vec4<f32>,
 }
 
 struct GsacSplats {
@@ -702,7 +739,7 @@ id_1 = id;
 SortBlocks_1();
 }
 ` },
-  SortAcross: { bindings: {"GsacKeys": 1, "parameters": 0}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
+  SortAcross: { bindings: {"GsacKeys": 1, "parameters": 0}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80, "GsacSceneRed": 96, "GsacSceneGreen": 112, "GsacSceneBlue": 128, "GsacSceneRed2": 144, "GsacSceneGreen2": 160, "GsacSceneBlue2": 176, "GsacSceneLast": 192}, code: `
 struct GsacKeys {
 data: array<u32>,
 }
@@ -719,6 +756,13 @@ GsacDepthRow: vec4<f32>,
 GsacLightRed: vec4<f32>,
 GsacLightGreen: vec4<f32>,
 GsacLightBlue: vec4<f32>,
+GsacSceneRed: vec4<f32>,
+GsacSceneGreen: vec4<f32>,
+GsacSceneBlue: vec4<f32>,
+GsacSceneRed2_: vec4<f32>,
+GsacSceneGreen2_: vec4<f32>,
+GsacSceneBlue2_: vec4<f32>,
+GsacSceneLast: vec4<f32>,
 }
 
 @group(0) @binding(1)
@@ -880,7 +924,7 @@ id_1 = id;
 SortAcross_1();
 }
 ` },
-  SortMerge: { bindings: {"GsacKeys": 1, "parameters": 0}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
+  SortMerge: { bindings: {"GsacKeys": 1, "parameters": 0}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80, "GsacSceneRed": 96, "GsacSceneGreen": 112, "GsacSceneBlue": 128, "GsacSceneRed2": 144, "GsacSceneGreen2": 160, "GsacSceneBlue2": 176, "GsacSceneLast": 192}, code: `
 struct GsacKeys {
 data: array<u32>,
 }
@@ -897,6 +941,13 @@ GsacDepthRow: vec4<f32>,
 GsacLightRed: vec4<f32>,
 GsacLightGreen: vec4<f32>,
 GsacLightBlue: vec4<f32>,
+GsacSceneRed: vec4<f32>,
+GsacSceneGreen: vec4<f32>,
+GsacSceneBlue: vec4<f32>,
+GsacSceneRed2_: vec4<f32>,
+GsacSceneGreen2_: vec4<f32>,
+GsacSceneBlue2_: vec4<f32>,
+GsacSceneLast: vec4<f32>,
 }
 
 var<workgroup> shared_keys: array<u32, 4096>;
@@ -1138,7 +1189,7 @@ id_1 = id;
 SortMerge_1();
 }
 ` },
-  Correct: { bindings: {"parameters": 0, "GsacRest": 1, "GsacFirst": 3, "GsacPairs": 2, "GsacTurns": 4, "GsacBent": 5}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80}, code: `
+  Correct: { bindings: {"parameters": 0, "GsacRest": 1, "GsacFirst": 3, "GsacPairs": 2, "GsacTurns": 4, "GsacBent": 5}, parameters: {"GsacVertexCount": 0, "GsacSplatCount": 4, "GsacIndexBits": 8, "GsacSortStage": 12, "GsacSortShift": 16, "GsacSortStrides": 20, "GsacDepthRange": 24, "GsacDepthRow": 32, "GsacLightRed": 48, "GsacLightGreen": 64, "GsacLightBlue": 80, "GsacSceneRed": 96, "GsacSceneGreen": 112, "GsacSceneBlue": 128, "GsacSceneRed2": 144, "GsacSceneGreen2": 160, "GsacSceneBlue2": 176, "GsacSceneLast": 192}, code: `
 struct GsacParams {
 GsacVertexCount: u32,
 GsacSplatCount: u32,
@@ -1151,6 +1202,13 @@ GsacDepthRow: vec4<f32>,
 GsacLightRed: vec4<f32>,
 GsacLightGreen: vec4<f32>,
 GsacLightBlue: vec4<f32>,
+GsacSceneRed: vec4<f32>,
+GsacSceneGreen: vec4<f32>,
+GsacSceneBlue: vec4<f32>,
+GsacSceneRed2_: vec4<f32>,
+GsacSceneGreen2_: vec4<f32>,
+GsacSceneBlue2_: vec4<f32>,
+GsacSceneLast: vec4<f32>,
 }
 
 struct GsacRest {

@@ -19,6 +19,7 @@ export function describeView(viewer) {
   if (face.length) words.push(`expression=${face.join(",")}`);
   if (turned.length) words.push(`joints=${turned.join(";")}`);
   if (!levels.lit) words.push("light=off");
+  if (levels.scene.share) words.push(`lamp=${round(levels.scene.around)},${round(levels.scene.above)}`);
   return words.join("&");
 }
 

@@ -224,7 +224,7 @@ export class Viewer {
     const { pose, camera, stage, levels, renderer, background, expression } = this, { bottom, right } = this.cover();
     const view = Array.from(camera.view, (x) => x.toFixed(5));
     const place = [stage.clientWidth, stage.clientHeight, window.devicePixelRatio, bottom, right];
-    const look = [levels.lit, renderer?.kind, background, JSON.stringify(expression)];
+    const look = [levels.lit, levels.scene.rows, renderer?.kind, background, JSON.stringify(expression)];
     return [pose.quats, pose.transl, view, camera.fov, place, look].join(" ");
   }
 
@@ -344,6 +344,8 @@ export class Viewer {
     this.opening = options.turntable === null && !options.picked && !this.calm;
     this.turntable = !this.calm && (options.turntable ?? this.opening);
     this.levels.lit = options.lit;
+    if (options.lamp) this.levels.scene.place(...options.lamp);
+    else this.levels.scene.turnOff();
     this.levels.drawn = 0;
     this.expression = options.expression;
     this.turned = Object.fromEntries(Object.entries(options.turned).filter(([joint]) => avatar.names.includes(joint)));

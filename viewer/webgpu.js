@@ -149,12 +149,15 @@ export class WebgpuRenderer {
   prepare(view) {
     const { avatar, levels, device } = this, [near, far] = this.depths(view), plan = this.plans[levels.drawn];
     const light = (levels.lit && avatar.light) || EVEN_LIGHT;
+    const { rows } = levels.scene, row = (n) => rows.subarray(4 * n, 4 * n + 4);
     const along = (c) => [light[3 + c], light[6 + c], light[9 + c], light[c]];
     plan.dispatches.forEach(({ entry, stage = 0, shift = 0, strides = 0 }, i) => {
       setParameters(this.dispatchParameters, i * PARAMETER_BYTES, SHADERS[entry].parameters, {
         GsacVertexCount: avatar.vertices.length / 3, GsacSplatCount: plan.count, GsacIndexBits: plan.indexBits,
         GsacSortStage: stage, GsacSortShift: shift, GsacSortStrides: strides, GsacDepthRange: [near, 1 / (far - near)],
-        GsacDepthRow: view.subarray(8, 12), GsacLightRed: along(0), GsacLightGreen: along(1), GsacLightBlue: along(2) });
+        GsacDepthRow: view.subarray(8, 12), GsacLightRed: along(0), GsacLightGreen: along(1), GsacLightBlue: along(2),
+        GsacSceneRed: row(0), GsacSceneGreen: row(1), GsacSceneBlue: row(2), GsacSceneRed2: row(3), GsacSceneGreen2: row(4),
+        GsacSceneBlue2: row(5), GsacSceneLast: row(6) });
     });
     device.queue.writeBuffer(this.dispatchBuffer, 0, this.dispatchParameters);
     this.encoder = device.createCommandEncoder();

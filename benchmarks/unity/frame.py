@@ -18,8 +18,10 @@ from gsac.benchmarks.unity.spirv import Program
 
 BLOCK_BITS, HAND, ACROSS_THREADS, THREADS = 12, 16, 64, 64
 """As in Gsac.compute: keys a block (bits), keys a thread, threads a group of SortAcross, threads a group of Skin and Bind."""
-EVEN = {f"GsacLight{name}": np.float32([0, 0, 0, 1]) for name in ("Red", "Green", "Blue")}
-"""Light without direction."""
+SCENE = tuple(f"GsacScene{name}" for name in ("Red", "Green", "Blue", "Red2", "Green2", "Blue2", "Last"))
+"""Parameters of the scene's light."""
+EVEN = {f"GsacLight{name}": np.float32([0, 0, 0, 1]) for name in ("Red", "Green", "Blue")} | dict.fromkeys(SCENE, np.zeros(4))
+"""Light without direction, and none of the scene."""
 LENS_DEGREES, EYES_APART = 100.0, 0.064
 """Field of view of a headset's eye; m between the eyes."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from gsac.avatar.camera import Camera
 from gsac.benchmarks.unity.spirv import Program
 
 if TYPE_CHECKING:
-    from wgpu import GPUBindGroup, GPUBindGroupLayout, GPUCommandEncoder
+    from wgpu import GPUBindGroup, GPUBindGroupLayout, GPUCommandEncoder, GPUTexture
 
 Parameters = dict[str, Any]
 """Shader parameter -> int (a uint there), floats, or a matrix by columns."""
@@ -41,6 +41,9 @@ class Gpu:
         self.timed = "timestamp-query" in fitting[0].features
         self.device = fitting[0].request_device_sync(required_features=["timestamp-query"] if self.timed else [])
         self.summary, self.buffers, self.pipelines = fitting[0].summary, {}, {}
+        self.textures: dict[str, GPUTexture] = {}
+        """Textures that shaders sample, by name."""
+        self.sampler = self.device.create_sampler(mag_filter="linear", min_filter="linear")
 
     def put(self, name: str, array: np.ndarray) -> None:
         """Uploads array (...,) as the buffer of that name."""
@@ -58,15 +61,26 @@ class Gpu:
         entries = {}
         for visibility, program in programs.items():
             for number, (kind, _) in program.bindings.items():
-                entry = entries.setdefault(number, {"binding": number, "visibility": 0, "buffer": {"type": kind}})
+                what = {kind: {}} if kind in ("texture", "sampler") else {"buffer": {"type": kind}}
+                entry = entries.setdefault(number, {"binding": number, "visibility": 0, **what})
                 entry["visibility"] |= visibility
         return self.device.create_bind_group_layout(entries=list(entries.values()))
 
-    def group(self, layout: GPUBindGroupLayout, program: Program, uniform: bytes) -> GPUBindGroup:
-        """Binds the program's buffers by name, and a new parameter block `uniform`."""
+    def texture(self, width: int, height: int, form: str) -> GPUTexture:
+        """A texture to draw into, to sample and to read. form: as WebGPU names it."""
+        usage = self.wgpu.TextureUsage
+        return self.device.create_texture(size=(width, height, 1), format=form, usage=usage.RENDER_ATTACHMENT | usage.COPY_SRC
+                                          | usage.COPY_DST | usage.TEXTURE_BINDING)
+
+    def group(self, layout: GPUBindGroupLayout, programs: Sequence[Program], uniform: bytes) -> GPUBindGroup:
+        """Binds the buffers and textures of a layout's programs by name, and a new parameter block `uniform`."""
         usage = self.wgpu.BufferUsage
         entries = []
-        for number, (kind, name) in program.bindings.items():
+        for number, (kind, name) in {n: b for program in programs for n, b in program.bindings.items()}.items():
+            if kind in ("texture", "sampler"):
+                entries.append({"binding": number,
+                                "resource": self.textures[str(name)].create_view() if kind == "texture" else self.sampler})
+                continue
             buffer = self.buffers[name] if kind != "uniform" else self.device.create_buffer_with_data(
                 data=uniform, usage=usage.UNIFORM)
             entries.append({"binding": number, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}})
@@ -80,7 +94,7 @@ class Gpu:
                 layout=self.device.create_pipeline_layout(bind_group_layouts=[layout]),
                 compute={"module": self.device.create_shader_module(code=program.code), "entry_point": program.entry})
         layout, pipeline = self.pipelines[program.code]
-        return pipeline, self.group(layout, program, program.uniform(parameters)), groups
+        return pipeline, self.group(layout, [program], program.uniform(parameters)), groups
 
     def dispatch(self, encoder: GPUCommandEncoder, jobs: Iterable[Job], timestamps: dict | None = None) -> None:
         """Encodes the jobs as one pass, in order; each sees what the one before wrote."""
@@ -99,51 +113,63 @@ class Gpu:
 
 
 class Painting:
-    """A render target and the pipeline that draws `count` splats into it."""
+    """Render targets and the pipeline that draws `count` splats into them; form: of each of the targets."""
 
-    def __init__(self, gpu: Gpu, vertex: Program, fragment: Program, width: int, height: int, count: int) -> None:
+    def __init__(self, gpu: Gpu, vertex: Program, fragment: Program, width: int, height: int, count: int,
+                 forms: Sequence[str] = ("rgba16float",), depth: bool = False) -> None:
+        """depth: with a depth buffer, which the draw is tested against and which is cleared to `far` of `encode`."""
         wgpu = gpu.wgpu
-        self.gpu, self.vertex, self.width, self.height, self.count = gpu, vertex, width, height, count
+        self.gpu, self.vertex, self.fragment, self.width, self.height, self.count = gpu, vertex, fragment, width, height, count
         stages = wgpu.ShaderStage
         self.layout = gpu.layout({stages.VERTEX: vertex, stages.FRAGMENT: fragment})
         blend = {"src_factor": "one", "dst_factor": "one-minus-src-alpha", "operation": "add"}
+        test = {"format": "depth32float", "depth_write_enabled": False, "depth_compare": "less-equal"}
         self.pipeline = gpu.device.create_render_pipeline(
             layout=gpu.device.create_pipeline_layout(bind_group_layouts=[self.layout]),
             vertex={"module": gpu.device.create_shader_module(code=vertex.code), "entry_point": vertex.entry, "buffers": []},
             fragment={"module": gpu.device.create_shader_module(code=fragment.code), "entry_point": fragment.entry,
-                      "targets": [{"format": "rgba16float", "blend": {"color": blend, "alpha": blend}}]},
-            primitive={"topology": "triangle-list"})
-        self.target = gpu.device.create_texture(
-            size=(width, height, 1), format="rgba16float",
-            usage=wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.COPY_SRC)
+                      "targets": [{"format": form, "blend": {"color": blend, "alpha": blend}} for form in forms]},
+            primitive={"topology": "triangle-list"}, depth_stencil=test if depth else None)
+        self.targets = [gpu.texture(width, height, form) for form in forms]
+        self.depth = gpu.texture(width, height, "depth32float") if depth else None
+        self.kept = None
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(count, dtype=np.uint32)[:, None]
         self.index = gpu.device.create_buffer_with_data(data=np.ascontiguousarray(corners), usage=wgpu.BufferUsage.INDEX)
 
     def group(self, parameters: Parameters) -> GPUBindGroup:
         """The bind group of a draw."""
-        return self.gpu.group(self.layout, self.vertex, self.vertex.uniform(parameters))
+        return self.gpu.group(self.layout, [self.vertex, self.fragment], self.vertex.uniform(parameters))
 
-    def encode(self, encoder: GPUCommandEncoder, group: GPUBindGroup, timestamps: dict | None = None, instance: int = 0) -> None:
-        """Encodes a draw on a cleared target. instance: 0 for the left eye, 1 for the right."""
-        attachment = {"view": self.target.create_view(), "clear_value": (0, 0, 0, 0), "load_op": "clear", "store_op": "store"}
-        work = encoder.begin_render_pass(color_attachments=[attachment], timestamp_writes=timestamps)
+    def encode(self, encoder: GPUCommandEncoder, group: GPUBindGroup, timestamps: dict | None = None, instance: int = 0,
+               behind: tuple[float, float, float, float] = (0, 0, 0, 0), far: float = 1) -> None:
+        """Encodes a draw on cleared targets. instance: 0 for the left eye, 1 for the right; behind, far: colour and depth there."""
+        attachments = [{"view": target.create_view(), "clear_value": behind, "load_op": "clear", "store_op": "store"}
+                       for target in self.targets]
+        depth = self.depth and {"view": (self.kept or self.depth).create_view(), "depth_clear_value": far,
+                                "depth_load_op": "load" if self.kept else "clear", "depth_store_op": "store"}
+        work = encoder.begin_render_pass(color_attachments=attachments, depth_stencil_attachment=depth, timestamp_writes=timestamps)
         work.set_pipeline(self.pipeline)
         work.set_bind_group(0, group)
         work.set_index_buffer(self.index, "uint32")
         work.draw_indexed(self.count * 6, 1, 0, 0, instance)
         work.end()
 
+    def keep_depth(self, depth: GPUTexture | None) -> None:
+        """From here on draws against a depth that lies there; None: against the same far one everywhere."""
+        self.kept = depth
+
     def read(self) -> np.ndarray:
-        """The picture (H, W, 4) float32, premultiplied RGBA."""
+        """The first target's picture (H, W, 4) float32, premultiplied RGBA."""
         raw = self.gpu.device.queue.read_texture(
-            {"texture": self.target}, {"bytes_per_row": self.width * 8, "rows_per_image": self.height},
+            {"texture": self.targets[0]}, {"bytes_per_row": self.width * 8, "rows_per_image": self.height},
             (self.width, self.height, 1))
         return np.frombuffer(raw, np.float16).reshape(self.height, self.width, 4).astype(np.float32)
 
-    def draw(self, parameters: Parameters, instance: int = 0) -> np.ndarray:
-        """Draws and returns the picture (H, W, 4) float32, premultiplied RGBA."""
+    def draw(self, parameters: Parameters, instance: int = 0, behind: tuple[float, float, float, float] = (0, 0, 0, 0),
+             far: float = 1) -> np.ndarray:
+        """Draws and returns the picture (H, W, 4) float32, premultiplied RGBA. Arguments as `encode`'s."""
         encoder = self.gpu.device.create_command_encoder()
-        self.encode(encoder, self.group(parameters), instance=instance)
+        self.encode(encoder, self.group(parameters), instance=instance, behind=behind, far=far)
         self.gpu.device.queue.submit([encoder.finish()])
         return self.read()
 

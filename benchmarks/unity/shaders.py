@@ -18,6 +18,8 @@ KERNELS = ("Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct")
 JOIN = "Join"
 """The kernel of GsacJoin.compute."""
 EYES = ("Vertex", "Fragment")
+TEXTURES = ("--shift-texture-binding", "20", "--shift-sampler-binding", "30")
+"""Options of glslangValidator: a fragment program's textures keep clear of its vertex program's buffers."""
 
 
 def missing_packages() -> list[str]:
@@ -30,7 +32,7 @@ def compile_hlsl(source: Path, entry: str, stage: str, folder: Path, include: Se
 
     Raises ShaderError or AssertionError with the tools' words.
     """
-    out = compile_spirv(Path(source), entry, stage, Path(folder) / f"{entry}.spv", *(f"-I{i}" for i in include))
+    out = compile_spirv(Path(source), entry, stage, Path(folder) / f"{entry}.spv", *TEXTURES, *(f"-I{i}" for i in include))
     done = subprocess.run(["spirv-val", "--target-env", "vulkan1.0", str(out)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return Program(out.read_bytes())
@@ -45,12 +47,12 @@ def shader_passes(path: Path = CORE / "GsacSplats.shader") -> dict[str, str]:
     return passes
 
 
-def compile_pass(text: str, folder: Path, stand_in: Path) -> tuple[Program, Program]:
+def compile_pass(text: str, folder: Path, stand_in: Path, entries: tuple[str, str] = EYES) -> tuple[Program, Program]:
     """Compiles a pass to its vertex and fragment program. stand_in: folder of stand-ins for the render pipeline's files."""
     source = Path(folder) / "pass.hlsl"
     source.write_text(text)
     vertex, fragment = (compile_hlsl(source, entry, stage, folder, (CORE, stand_in))
-                        for entry, stage in zip(EYES, ("vert", "frag"), strict=True))
+                        for entry, stage in zip(entries, ("vert", "frag"), strict=True))
     return vertex, fragment
 
 

@@ -8,6 +8,8 @@ import numpy as np
 
 MAGIC = 0x07230203
 ENTRY_POINT, NAME, MEMBER_NAME, TYPE_POINTER, VARIABLE, DECORATE, MEMBER_DECORATE = 15, 5, 6, 32, 59, 71, 72
+TYPES = {25: "texture", 26: "sampler"}
+"""Instruction that makes a type -> kind of a binding of that type."""
 BLOCK, NON_WRITABLE, BINDING, OFFSET = 2, 24, 33, 35
 BLOCK_SIZE = 512
 """Bytes of a parameter block, more than the package's need."""
@@ -25,7 +27,7 @@ class Program:
         words = struct.unpack(f"<{len(code) // 4}I", code)
         assert words[0] == MAGIC, "not SPIR-V"
         names, members, pointer, kind, binding, offset = {}, {}, {}, {}, {}, {}
-        blocks, readonly = set(), set()
+        blocks, readonly, opaque = set(), set(), {}
         at = 5
         while at < len(words):
             op, length = words[at] & 0xffff, words[at] >> 16
@@ -38,6 +40,8 @@ class Program:
                 members.setdefault(w[0], {})[w[1]] = _text(w[2:])
             elif op == TYPE_POINTER:
                 pointer[w[0]] = w[2]
+            elif op in TYPES:
+                opaque[w[0]] = TYPES[op]
             elif op == VARIABLE:
                 kind[w[1]] = pointer[w[0]]
             elif op == DECORATE and w[1] == BINDING:
@@ -51,7 +55,7 @@ class Program:
             at += length
         self.code = code
         self.bindings: dict[int, tuple[str, str | None]] = {}
-        """Binding -> (kind of buffer, its name; None for the parameters)."""
+        """Binding -> (kind of buffer, `texture` or `sampler`, its name; None for the parameters)."""
         self.parameters: dict[str, int] = {}
         """Parameter -> offset in the parameter block, bytes."""
         for variable, number in binding.items():
@@ -59,6 +63,8 @@ class Program:
             if struct_type in blocks:
                 self.bindings[number] = ("uniform", None)
                 self.parameters |= {name: offset[struct_type][i] for i, name in members[struct_type].items()}
+            elif struct_type in opaque:
+                self.bindings[number] = (opaque[struct_type], names[variable])
             else:
                 self.bindings[number] = ("read-only-storage" if struct_type in readonly else "storage", names[variable])
 

@@ -49,8 +49,7 @@ class RayExecutor:
         os.environ.setdefault("RAY_raylet_start_wait_time_s", "180")  # a busy machine takes its time
         refuse_deaf(limits.address)
         try:
-            ray.init(address=limits.address, logging_level="error", log_to_driver=False, include_dashboard=False,
-                     **({} if limits.address else {"ignore_reinit_error": True}))
+            ray.init(address=limits.address, logging_level="error", log_to_driver=False, include_dashboard=False)
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise BadInput(f"--address {limits.address}: no Ray cluster answers there ({error}); start one with "
                            "`ray start --head`, or leave --address out") from error

@@ -7,7 +7,7 @@ gives  avatar.gsac: everything in one container (docs/gsac-format.md)
        avatar.glb: skinned, textured, animated mesh; not shown beside it the gaussians, with KHR_gaussian_splatting
        avatar.fbx: skinned, textured, animated mesh with expressions, without gaussians
        viewer.html: a page that opens from disk
-       unity: the Unity package with this person, as a folder, a tarball and a .unitypackage
+       unity: the Unity package, as a folder and a tarball, and with this person as a .unitypackage
 """
 
 from gsac.avatar.artifacts import check_file, check_folder

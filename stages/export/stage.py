@@ -55,13 +55,12 @@ def run(job: Job) -> None:
     pose = avatar.pose(job.config.ply_pose.upper())
     splats = (*pose_gaussians(avatar, pose), avatar.gaussians.rgb, avatar.gaussians.opacity)
     rest = pose_gaussians(avatar, avatar.pose("T"))
-    surface = paint_surface(avatar, *rest)
     files = {
         "avatar.gsac": lambda: container,
         "avatar.ply": lambda: ply_bytes(*splats, job.config.ply_pad_sh),
         "avatar.spz": lambda: spz_bytes(*splats),
-        "avatar.glb": lambda: glb_bytes(avatar, surface, *rest),
-        "avatar.fbx": lambda: avatar_fbx(avatar, surface),
+        "avatar.glb": lambda: glb_bytes(avatar, surface.result(), *rest),
+        "avatar.fbx": lambda: avatar_fbx(avatar, surface.result()),
         "viewer.html": lambda: page_bytes(container),
     }
 
@@ -73,6 +72,7 @@ def run(job: Job) -> None:
         write_unity(job.out / "unity", container, version("gsac"))
 
     with ThreadPoolExecutor() as pool:  # zlib takes longest, and releases the interpreter's lock
+        surface = pool.submit(paint_surface, avatar, *rest)
         tasks = [pool.submit(write_package), *(pool.submit(write, name) for name in files)]
         for done, task in enumerate(tasks):
             job.progress(done, len(tasks), "files")

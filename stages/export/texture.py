@@ -66,9 +66,12 @@ def paint_surface(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray, sc
     face, bary, _ = rasterise(np.column_stack([flat.uv, np.ones(len(flat.uv))]), flat.faces, screen)
     _reach_small_faces(face, bary, flat.uv[flat.faces].mean(1))
     turn = Rotation.from_quat(to_xyzw(quats)).as_matrix()
+    corners, places = flat.uv[flat.faces] * SIZE, vertices[avatar.faces].astype(np.float64)
+    normal = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
     picture = _draw(
-        face, bary, vertices.astype(np.float64), avatar.faces.astype(np.int64), colours, near.astype(np.int64),
-        avatar.gaussians.face.astype(np.int64), means.astype(np.float64),
+        face, bary, np.stack([corners.min(1), corners.max(1)], axis=1).astype(np.int64), vertices.astype(np.float64),
+        avatar.faces.astype(np.int64), normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20), colours,
+        near.astype(np.int64), avatar.gaussians.face.astype(np.int64), means.astype(np.float64),
         (turn * scales[:, None] ** 2) @ turn.transpose(0, 2, 1), np.clip(avatar.gaussians.rgb, 0, 1).astype(np.float32),
         avatar.gaussians.opacity.astype(np.float64))
     pixels = fill_gaps(picture, face >= 0)
@@ -105,41 +108,42 @@ def _reach_small_faces(face: np.ndarray, bary: np.ndarray, middle: np.ndarray) -
 def fill_gaps(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Gives each texel between charts a mean of those around, so that small copies of the picture show no seams (push and pull).
 
-    The nearest get the colour of their own chart. picture: (S, S, 3) float32 in 0..1, S a power of two; known: (S, S) bool.
-    Returns (S, S, 3) uint8.
+    The nearest get the colour of their own chart. picture: (S, S, 3) float32 in 0..1, 0 where nothing is known, used
+    up; S: a power of two; known: (S, S) bool. Returns (S, S, 3) uint8.
     """
-    for _ in range(GUTTER):
-        picture, known = _grow(picture, known)
-    levels = [(picture, known)]
+    levels = [(picture, _grow(picture, known))]
     while len(levels[-1][1]) > 1 and not levels[-1][1].all():
         levels.append(_halve(*levels[-1]))
     coarse = levels[-1][0]
     for fine, there in levels[-2::-1]:
         _take_over(fine, there, coarse)
         coarse = fine
-    return np.rint(np.multiply(coarse, 255, out=coarse), out=coarse).astype(np.uint8)
+    coarse *= 255
+    coarse += 0.5
+    return coarse.astype(np.uint8)
 
 
 @own_kernel(nogil=True)
 def _grow(picture, known):  # noqa: ANN001, ANN202
-    """The picture and what is known of it, with each texel beside known ones as their mean."""
-    out, there = picture.copy(), known.copy()
-    for row in range(len(known)):
-        for column in range(len(known)):
-            if known[row, column]:
-                continue
-            count = 0
-            for y in range(max(row - 1, 0), min(row + 2, len(known))):
-                for x in range(max(column - 1, 0), min(column + 2, len(known))):
-                    if known[y, x]:
+    """Gives texels beside known ones, GUTTER deep, their neighbours' mean, in place. Returns what is known then."""
+    S = len(known)
+    ring = known.astype(np.uint8)
+    for depth in range(2, 2 + GUTTER):
+        for row in range(S):
+            for column in range(S):
+                if ring[row, column]:
+                    continue
+                count = 0
+                for y, x in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
+                    if 0 <= y < S and 0 <= x < S and 0 < ring[y, x] < depth:
                         count += 1
                         for c in range(3):
-                            out[row, column, c] += picture[y, x, c]
-            if count:
-                there[row, column] = True
-                for c in range(3):
-                    out[row, column, c] /= count
-    return out, there
+                            picture[row, column, c] += picture[y, x, c]
+                if count:
+                    ring[row, column] = depth
+                    for c in range(3):
+                        picture[row, column, c] /= count
+    return ring > 0
 
 
 @own_kernel(nogil=True)
@@ -173,98 +177,100 @@ def _take_over(fine, known, coarse):  # noqa: ANN001, ANN202
 
 
 @own_kernel(nogil=True)
-def _draw(face, bary, vertices, faces, colours, near, bound_to, means, covariance, rgb, opacity):  # noqa: ANN001, ANN202
+def _draw(face, bary, boxes, vertices, faces, normal, colours, near, bound_to, means, covariance, rgb,  # noqa: ANN001, ANN202
+          opacity):
     """Draws the gaussians over the mesh's own colours, each face flat. Returns (S, S, 3) float32, 0 where no face.
 
-    face: (S, S), bary: (S, S, 3) of the texels; vertices: (V, 3); faces: (F, 3); colours: (V, 3); near: (V, K) gaussians to look
-    at; bound_to: (N,) face of each; means: (N, 3); covariance: (N, 3, 3); rgb: (N, 3); opacity: (N,).
+    face: (S, S), bary: (S, S, 3) of the texels; boxes: (F, 2, 2) first and last texel of each face; vertices: (V, 3);
+    faces: (F, 3); normal: (F, 3) unit; colours: (V, 3); near: (V, K) gaussians to look at; bound_to: (N,) face of each;
+    means: (N, 3); covariance: (N, 3, 3); rgb: (N, 3); opacity: (N,).
     """
     F, K = len(faces), 3 * near.shape[1]
-    normal = np.empty((F, 3))
-    for f in range(F):
-        a, b = vertices[faces[f, 1]] - vertices[faces[f, 0]], vertices[faces[f, 2]] - vertices[faces[f, 0]]
-        x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-        length = max(np.sqrt(x * x + y * y + z * z), 1e-20)
-        normal[f, 0], normal[f, 1], normal[f, 2] = x / length, y / length, z / length
-    count = np.full(F, -1)
-    which = np.empty((F, K), np.int32)
-    conic = np.empty((F, K, 5))
-    flat = np.empty((F, 3, 2))
-    depth = np.empty(K)
+    which, conic, flat, depth = np.empty(K, np.int64), np.empty((K, 5)), np.empty((3, 2)), np.empty(K)
     out = np.zeros((len(face), len(face), 3), np.float32)
-    for row in range(len(face)):
-        for column in range(len(face)):
-            f = face[row, column]
-            if f < 0:
-                continue
-            if count[f] < 0:
-                _look_at(f, vertices, faces, near, normal, bound_to, means, covariance, which, conic, flat, depth, count)
-            x = y = 0.0
-            left, red, green, blue = 1.0, 0.0, 0.0, 0.0
-            for c in range(3):
-                x += bary[row, column, c] * flat[f, c, 0]
-                y += bary[row, column, c] * flat[f, c, 1]
-            for m in range(count[f]):
-                dx, dy = x - conic[f, m, 3], y - conic[f, m, 4]
-                far = conic[f, m, 0] * dx * dx + 2 * conic[f, m, 1] * dx * dy + conic[f, m, 2] * dy * dy
-                if far > SPREAD:
+    for f in range(F):
+        count = -1
+        for row in range(boxes[f, 0, 1], boxes[f, 1, 1] + 1):
+            for column in range(boxes[f, 0, 0], boxes[f, 1, 0] + 1):
+                if face[row, column] != f:
                     continue
-                g = which[f, m]
-                alpha = min(opacity[g] * np.exp(-0.5 * far), MOST_ALPHA)
-                red += left * alpha * rgb[g, 0]
-                green += left * alpha * rgb[g, 1]
-                blue += left * alpha * rgb[g, 2]
-                left *= 1 - alpha
-                if left < LEFT:
-                    break
-            for c in range(3):
-                weight, corner = left * bary[row, column, c], faces[f, c]
-                red += weight * colours[corner, 0]
-                green += weight * colours[corner, 1]
-                blue += weight * colours[corner, 2]
-            out[row, column, 0], out[row, column, 1], out[row, column, 2] = red, green, blue
+                if count < 0:
+                    count = _look_at(f, vertices, faces, near, normal, bound_to, means, covariance, which, conic, flat, depth)
+                x = y = 0.0
+                left, red, green, blue = 1.0, 0.0, 0.0, 0.0
+                for c in range(3):
+                    x += bary[row, column, c] * flat[c, 0]
+                    y += bary[row, column, c] * flat[c, 1]
+                for m in range(count):
+                    dx, dy = x - conic[m, 3], y - conic[m, 4]
+                    far = conic[m, 0] * dx * dx + 2 * conic[m, 1] * dx * dy + conic[m, 2] * dy * dy
+                    if far > SPREAD:
+                        continue
+                    g = which[m]
+                    alpha = min(opacity[g] * np.exp(-0.5 * far), MOST_ALPHA)
+                    red += left * alpha * rgb[g, 0]
+                    green += left * alpha * rgb[g, 1]
+                    blue += left * alpha * rgb[g, 2]
+                    left *= 1 - alpha
+                    if left < LEFT:
+                        break
+                for c in range(3):
+                    weight, corner = left * bary[row, column, c], faces[f, c]
+                    red += weight * colours[corner, 0]
+                    green += weight * colours[corner, 1]
+                    blue += weight * colours[corner, 2]
+                out[row, column, 0], out[row, column, 1], out[row, column, 2] = red, green, blue
     return out
 
 
 @own_kernel(nogil=True)
-def _look_at(f, vertices, faces, near, normal, bound_to, means, covariance, which, conic, flat,  # noqa: ANN001, ANN202
-             depth, count):
-    """Fills the row of one face: the gaussians before it, the outermost first, and their shapes in the face's plane."""
-    n, kept = normal[f], 0
+def _look_at(f, vertices, faces, near, normal, bound_to, means, covariance, which, conic, flat, depth):  # noqa: ANN001, ANN202
+    """Fills in the gaussians before one face, the outermost first, and their shapes in its plane. Returns their number."""
+    n, kept = (normal[f, 0], normal[f, 1], normal[f, 2]), 0
     s = 1.0 if n[2] >= 0 else -1.0  # a basis of the face's plane without a branch (Duff et al. 2017)
     p = -1.0 / (s + n[2])
     q = n[0] * n[1] * p
     u = (1.0 + s * n[0] * n[0] * p, s * q, -s * n[0])
     v = (q, s + n[1] * n[1] * p, -n[1])
     for corner in range(3):
-        at = vertices[faces[f, corner]]
-        flat[f, corner, 0] = at[0] * u[0] + at[1] * u[1] + at[2] * u[2]
-        flat[f, corner, 1] = at[0] * v[0] + at[1] * v[1] + at[2] * v[2]
-        for g in near[faces[f, corner]]:
-            other, known = normal[bound_to[g]], False
+        at = faces[f, corner]
+        flat[corner, 0] = vertices[at, 0] * u[0] + vertices[at, 1] * u[1] + vertices[at, 2] * u[2]
+        flat[corner, 1] = vertices[at, 0] * v[0] + vertices[at, 1] * v[1] + vertices[at, 2] * v[2]
+        for k in range(near.shape[1]):
+            g = near[at, k]
+            b, known = bound_to[g], False
             for m in range(kept):
-                known = known or which[f, m] == g
-            if known or other[0] * n[0] + other[1] * n[1] + other[2] * n[2] <= 0:
+                known = known or which[m] == g
+            if known or normal[b, 0] * n[0] + normal[b, 1] * n[1] + normal[b, 2] * n[2] <= 0:
                 continue  # or of the next finger, or of the other side
             away = means[g, 0] * n[0] + means[g, 1] * n[1] + means[g, 2] * n[2]
             place = kept
             while place > 0 and depth[place - 1] < away:
-                depth[place], which[f, place] = depth[place - 1], which[f, place - 1]
+                depth[place], which[place] = depth[place - 1], which[place - 1]
                 place -= 1
-            depth[place], which[f, place] = away, g
+            depth[place], which[place] = away, g
             kept += 1
-    count[f] = kept
+    x0, y0 = flat[:, 0].mean(), flat[:, 1].mean()
+    reach = np.sqrt(((flat[:, 0] - x0) ** 2 + (flat[:, 1] - y0) ** 2).max())
+    used = 0
     for m in range(kept):
-        g = which[f, m]
+        g = which[m]
         uu = vv = LOW_PASS_M ** 2
         uv = x = y = 0.0
         for a in range(3):
             x += means[g, a] * u[a]
             y += means[g, a] * v[a]
-            for b in range(3):
-                uu += u[a] * covariance[g, a, b] * u[b]
-                uv += u[a] * covariance[g, a, b] * v[b]
-                vv += v[a] * covariance[g, a, b] * v[b]
+            across = covariance[g, a, 0] * u[0] + covariance[g, a, 1] * u[1] + covariance[g, a, 2] * u[2]
+            along = covariance[g, a, 0] * v[0] + covariance[g, a, 1] * v[1] + covariance[g, a, 2] * v[2]
+            uu += u[a] * across
+            uv += v[a] * across
+            vv += v[a] * along
         area = uu * vv - uv * uv
-        conic[f, m, 0], conic[f, m, 1], conic[f, m, 2] = vv / area, -uv / area, uu / area
-        conic[f, m, 3], conic[f, m, 4] = x, y
+        a, b, c, dx, dy = vv / area, -uv / area, uu / area, x0 - x, y0 - y
+        # How far from the gaussian the face's middle is, less how far its corners can be nearer.
+        if np.sqrt(a * dx * dx + 2 * b * dx * dy + c * dy * dy) - reach * np.sqrt(a + c) > np.sqrt(SPREAD):
+            continue
+        which[used] = g
+        conic[used, 0], conic[used, 1], conic[used, 2], conic[used, 3], conic[used, 4] = a, b, c, x, y
+        used += 1
+    return used

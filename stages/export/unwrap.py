@@ -16,8 +16,10 @@ from gsac.avatar.artifacts import ArtifactError
 AXES = np.array([(1.0, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
 FLAT = np.array([(2, 1), (2, 1), (0, 2), (0, 2), (0, 1), (0, 1)])
 """The coordinates that remain when a chart is flattened along each of `AXES`."""
-ROUNDS, COMPANY = 6, 0.3
+ROUNDS, COMPANY = 3, 0.3
 """How often a face looks at its neighbours' axes, and how much each counts beside its own normal's cosine."""
+HALVINGS = 11
+"""Of the interval in which the texels a metre lie."""
 GUTTER = 2
 """Texels that are free around each chart."""
 ALIKE = 6
@@ -114,7 +116,7 @@ def _pack(spans: np.ndarray, part: np.ndarray, size: int) -> tuple[float, np.nda
     """
     order = np.lexsort((part, -np.rint(ALIKE * np.log(np.maximum(spans[:, 1], 1e-9)))))
     low, high, best = 0.0, float(size) / max(spans.max(), 1e-9), None
-    for _ in range(16):
+    for _ in range(HALVINGS):
         scale = (low + high) / 2
         corner = _rows(np.ceil(spans[order] * scale).astype(int) + 1 + 2 * GUTTER, size)
         if corner is None:

@@ -1,5 +1,6 @@
 """Compiles the package's C# with Mono's `mcs`, warnings as errors, and runs programs of the tests with it."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -33,16 +34,34 @@ def run(program, *args, heap="256m", collector=""):
 
 
 def compile_package(package, out):
-    """The package over the stubs of Unity, Runtime without the editor's, as Unity does. Returns the tests' program."""
-    stubs, editor = sorted((HERE / "stubs").glob("*.cs")), HERE / "stubs" / "UnityEditor.cs"
-    compile_csharp([s for s in stubs if s != editor], out / "UnityEngine.dll")
+    """The package with its samples over the stubs of Unity; players' assemblies without the editor's. The tests' program."""
+    stubs, editor = (set((HERE / "stubs").glob(f"{kind}*.cs")) for kind in ("", "UnityEditor"))
+    compile_csharp(sorted(stubs - editor), out / "UnityEngine.dll")
     options = [f"-r:{out / 'UnityEngine.dll'}"]
-    compile_csharp(sorted((package / "Runtime").rglob("*.cs")), out / "Gsac.dll", *options)
-    compile_csharp([editor], out / "UnityEditor.dll", *options)
-    options += [f"-r:{out / 'UnityEditor.dll'}", f"-r:{out / 'Gsac.dll'}"]
-    compile_csharp(sorted((package / "Editor").rglob("*.cs")), out / "Gsac.Editor.dll", *options)
-    options.append(f"-r:{out / 'Gsac.Editor.dll'}")
+    compile_csharp(sorted((HERE / "stubs" / "packages").glob("*.cs")), out / "Packages.dll", *options)
+    options.append(f"-r:{out / 'Packages.dll'}")
+    for name, sources in in_order(package):
+        if name == "Gsac.Editor":
+            compile_csharp(sorted(editor), out / "UnityEditor.dll", *options)
+            options.append(f"-r:{out / 'UnityEditor.dll'}")
+        compile_csharp(sources, out / f"{name}.dll", *options)
+        options.append(f"-r:{out / name}.dll")
     return compile_csharp(sorted((HERE / "programs").glob("[ADP]*.cs")), out / "Play.exe", *options)
+
+
+def in_order(package):
+    """(name, sources) of each assembly of the package, after those that it names; the editor's last."""
+    folders = {path.parent: json.loads(path.read_text()) for path in Path(package).rglob("*.asmdef")}
+    sources = {assembly["name"]: [] for assembly in folders.values()}
+    for path in sorted(Path(package).rglob("*.cs")):
+        sources[next(folders[folder] for folder in path.parents if folder in folders)["name"]].append(path)
+    waiting = sorted(folders.values(), key=lambda assembly: (assembly["includePlatforms"] == ["Editor"], assembly["name"]))
+    done = []
+    while waiting:
+        ready = next(one for one in waiting if not set(one["references"]) & {other["name"] for other in waiting})
+        waiting.remove(ready)
+        done.append((ready["name"], sources[ready["name"]]))
+    return done
 
 
 def arrays(path):

@@ -57,7 +57,7 @@ def test_prefab_stages_of_others_and_hidden_people_are_left_alone(told):
 
 def test_what_was_made_at_run_time_is_destroyed_with_the_last_person(play, files):
     """Materials, and Avatars that no file brought, in play and in edit mode."""
-    run = ["two: 1 2", "another file: 2", "off: 1 2", "off: 0 1", "gone: 0 0"]
+    run = ["two: 3 2", "another file: 2", "off: 3 2", "off: 0 1", "gone: 0 0"]
     assert play("freed", files / "figure.gsac").splitlines() == run * 2
 
 

@@ -145,7 +145,7 @@ def test_pose_and_expression_of_edit_mode_are_saved_with_the_scene(play, files):
 def test_a_loaded_person_has_the_body_with_the_expressions_as_blend_shapes(play, mono, files, figure, tmp_path):
     lines = play("body", files / "figure.gsac", files / "figure.txt", tmp_path / "body").splitlines()
     got = mono.arrays(tmp_path / "body")
-    assert lines == ["person Body enabled False root bone pelvis", "shared True", "on again True True 0.5"]
+    assert lines == ["person Body enabled True root bone pelvis", "shared True", "on again True True 0.5"]
     np.testing.assert_allclose(got["vertices"].reshape(-1, 3), figure.vertices * (-1, 1, 1), atol=1e-6)
     figure = RiggedAvatar.read(files / "figure.gsac")
     for e, name in enumerate(figure.expression_names):

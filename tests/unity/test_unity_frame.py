@@ -10,6 +10,7 @@ from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render
 from gsac.avatar.skinning import joint_transforms, skin
+from gsac.benchmarks.unity.frame import EVEN
 from gsac.benchmarks.unity.gpu import Painting, projection
 from gsac.benchmarks.unity.packing import pack_avatar
 from gsac.benchmarks.unity.shaders import KERNELS
@@ -40,7 +41,8 @@ def draw_frame(play, mono, files, gpu, kernels, path, *shape):
     jobs = []
     for row in asked["steps"].reshape(-1, 26):
         names = ("GsacVertexCount", "GsacSplatCount", "GsacIndexBits", "GsacSortStage", "GsacSortShift", "GsacSortStrides")
-        parameters = dict(zip(names, map(int, row[2:8]), strict=True)) | {"GsacDepthRange": row[8:10], "GsacDepthRow": row[10:14]}
+        parameters = EVEN | dict(zip(names, map(int, row[2:8]), strict=True))
+        parameters |= {"GsacDepthRange": row[8:10], "GsacDepthRow": row[10:14]}
         parameters |= {f"GsacLight{name}": row[14 + 4 * c:18 + 4 * c] for c, name in enumerate(("Red", "Green", "Blue"))}
         jobs.append((kernels[KERNELS[int(row[0])]], parameters, int(row[1])))
     gpu.run(jobs)

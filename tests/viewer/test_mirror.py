@@ -1,6 +1,7 @@
 """Mirror me: what a face and a body network see of the user, the avatar does as in a mirror, and nothing leaves the page."""
 
 import base64
+import gzip
 import io
 import json
 import subprocess
@@ -153,6 +154,8 @@ def test_the_page_says_which_file_is_missing(page):
     assert "vision_wasm_internal.wasm, face_landmarker.task are missing" in note and "vision_bundle" not in note
     give(page, {"broken.tgz": b"no archive"})
     page.until("document.getElementById('note').textContent.includes('broken.tgz')")
+    give(page, {"bomb.tgz": gzip.compress(bytes(300 << 20), 1)})
+    page.until("document.getElementById('note').textContent.includes('unpacks to more than 268435456 bytes')")
     assert page.errors == [] and not page.run("document.getElementById('mirror').ariaPressed === 'true'")
 
 

@@ -18,6 +18,7 @@ from gsac.benchmarks.viewer import browser as chromium
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.glb import glb_bytes
 from gsac.stages.export.stage import pose_gaussians
+from gsac.stages.export.texture import paint_surface
 from gsac.viewer.page import page_bytes
 from support import dances
 from support.page_modules import expose
@@ -138,7 +139,8 @@ def test_the_camera_goes_along_with_a_motion_that_walks_away(page, figure, skele
 
 
 def test_our_own_glb_dropped_gives_its_clips_back(page, figure, tmp_path):
-    (tmp_path / "own.glb").write_bytes(glb_bytes(figure, *pose_gaussians(figure, figure.pose("T"))))
+    rest = pose_gaussians(figure, figure.pose("T"))
+    (tmp_path / "own.glb").write_bytes(glb_bytes(figure, paint_surface(figure, *rest), *rest))
     assert drop(page, tmp_path / "own.glb") == "wave 2, walk 2: put on this avatar"
     for name in ("wave", "walk"):
         got, clip = clip_of(page, f"{name} 2"), figure.clips[name]
@@ -155,7 +157,7 @@ def test_our_own_glb_dropped_gives_its_clips_back(page, figure, tmp_path):
 def test_a_dropped_fbx_plays_as_render_plays_it(page, figure, tmp_path):
     pytest.importorskip("ufbx")
     path = tmp_path / "own.fbx"
-    path.write_bytes(avatar_fbx(figure, pose_gaussians(figure, figure.pose("T"))[0]))
+    path.write_bytes(avatar_fbx(figure, paint_surface(figure, *pose_gaussians(figure, figure.pose("T")))))
     names = drop(page, path).removesuffix(": put on this avatar").split(", ")
     assert [name.split()[0] for name in names] == ["wave", "walk"] and page.run("gsac.playing.clip") == names[0]
     assert_same(clip_of(page, names[0]), read_motion(path, figure.joint_names, figure.parents, figure.joints), degrees=0.1)

@@ -20,6 +20,17 @@ namespace Gsac
         Vector3 degrees;
         bool handles = true;
 
+        /// <summary>Unity asks by name whether the key F knows what to frame, and what.</summary>
+        public bool HasFrameBounds()
+        {
+            return ((GsacAvatar)target).CanOpen;
+        }
+
+        public Bounds OnGetFrameBounds()
+        {
+            return GsacSceneBounds.Of((GsacAvatar)target);
+        }
+
         public override void OnInspectorGUI()
         {
             DrawDefaultInspector();

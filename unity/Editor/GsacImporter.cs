@@ -5,7 +5,7 @@ using UnityEngine;
 namespace Gsac
 {
     /// <summary>A .gsac file in the project becomes a prefab: skeleton, Humanoid Avatar, mesh, clips, components.</summary>
-    [ScriptedImporter(2, "gsac")]
+    [ScriptedImporter(3, "gsac")]
     public sealed class GsacImporter : ScriptedImporter
     {
         public override void OnImportAsset(AssetImportContext context)
@@ -41,7 +41,7 @@ namespace Gsac
             // GsacAvatar brings its GsacRenderer
             root.AddComponent<GsacAvatar>().Use(asset);
 
-            context.AddObjectToAsset("prefab", root);
+            context.AddObjectToAsset("prefab", root, GsacThumbnail.Paint(data));
             context.AddObjectToAsset("data", asset);
             context.AddObjectToAsset("mesh", mesh);
             context.AddObjectToAsset("humanoid", humanoid);

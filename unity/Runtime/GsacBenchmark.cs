@@ -1,7 +1,5 @@
 using System;
 using System.Globalization;
-using System.IO;
-using System.Text;
 using UnityEngine;
 
 namespace Gsac
@@ -16,6 +14,7 @@ namespace Gsac
         const int MostSeconds = 24 * 3600;
 
         [SerializeField] GsacAvatar avatar = null;
+        [SerializeField, Tooltip("Where no avatar is named: the first of these.")] GsacCast cast = null;
         [SerializeField, Tooltip("s")] float duration = 600;
         [SerializeField, Tooltip("s between two poses")] float every = 0.5f;
         [SerializeField, Tooltip("s before counting begins")] float warmUp = 3;
@@ -38,6 +37,11 @@ namespace Gsac
             Application.runInBackground = true;
             perSecond = new int[Math.Min(MostSeconds, (int)duration + 2)];
             secondEnds = warmUp + 1;
+        }
+
+        void Start()
+        {
+            if (avatar == null && cast != null) avatar = cast.First;
         }
 
         void Update()
@@ -77,44 +81,19 @@ namespace Gsac
 
         void Finish()
         {
-            string stamp = DateTime.Now.ToString("yyyyMMdd-HHmmss", CultureInfo.InvariantCulture);
-            ResultFile = Path.Combine(Application.persistentDataPath, "gsac-benchmark-" + stamp + ".json");
-            File.WriteAllText(ResultFile, Report());
-            Debug.Log("Gsac benchmark: written to " + ResultFile);
-        }
-
-        string Report()
-        {
-            var text = new StringBuilder("{\n");
-            Line(text, "device", SystemInfo.deviceModel);
-            Line(text, "gpu", SystemInfo.graphicsDeviceName);
-            Line(text, "api", SystemInfo.graphicsDeviceType.ToString());
-            Line(text, "processor", SystemInfo.processorType);
-            Line(text, "system", SystemInfo.operatingSystem);
-            Line(text, "unity", Application.unityVersion);
-            Line(text, "editor", Application.isEditor);
-            Line(text, "width", Screen.width);
-            Line(text, "height", Screen.height);
-            Line(text, "gaussians", avatar.Data.Levels[0].Count);
-            Line(text, "pose_every_s", every);
-            Line(text, "seconds", times.Sum);
-            Line(text, "frames", times.Count);
-            Line(text, "mean_fps", times.Count / Math.Max(times.Sum, 1e-9));
-            Line(text, "median_ms", 1000 * times.Quantile(0.5));
-            Line(text, "p95_ms", 1000 * times.Quantile(0.95));
-            Line(text, "p99_ms", 1000 * times.Quantile(0.99));
-            text.Append("  \"fps_each_second\": [");
-            for (int i = 0; i < seconds; i++) text.Append(i == 0 ? "" : ", ").Append(perSecond[i]);
-            return text.Append("]\n}\n").ToString();
-        }
-
-        static void Line(StringBuilder text, string name, object value)
-        {
-            text.Append("  \"").Append(name).Append("\": ");
-            if (value is string) text.Append('"').Append(((string)value).Replace("\\", "\\\\").Replace("\"", "\\\"")).Append('"');
-            else if (value is bool) text.Append((bool)value ? "true" : "false");
-            else text.Append(Convert.ToString(value, CultureInfo.InvariantCulture));
-            text.Append(",\n");
+            GsacReport report = GsacReport.OfDevice("benchmark");
+            report.Add("width", Screen.width);
+            report.Add("height", Screen.height);
+            report.Add("gaussians", avatar.Data.Levels[0].Count);
+            report.Add("pose_every_s", every);
+            report.Add("seconds", times.Sum);
+            report.Add("frames", times.Count);
+            report.Add("mean_fps", times.Count / Math.Max(times.Sum, 1e-9));
+            report.Add("median_ms", 1000 * times.Quantile(0.5));
+            report.Add("p95_ms", 1000 * times.Quantile(0.95));
+            report.Add("p99_ms", 1000 * times.Quantile(0.99));
+            report.Add("fps_each_second", perSecond, seconds);
+            ResultFile = report.Write("gsac-benchmark");
         }
 
         void OnGUI()

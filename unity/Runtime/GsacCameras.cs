@@ -15,7 +15,8 @@ namespace Gsac
         static readonly List<GsacView> Seen = new List<GsacView>();
         static readonly List<GsacCrowd> Crowds = new List<GsacCrowd>();
         static int[] group = new int[16], counts = new int[16]; // of each of Seen: the first whom it is drawn with; gaussians of a group
-        static Material material;
+        static Material material, own, trained;
+        static readonly Material[] body = new Material[2];
 
         /// <summary>
         /// Gaussians that a headset's camera draws at most, of all people together; 0: as many as there are. The farthest person gets
@@ -29,11 +30,40 @@ namespace Gsac
         /// <summary>The splats' material, shared by all avatars that have none of their own.</summary>
         public static Material Material
         {
+            get { return Made(ref material, "Gsac/GsacSplats"); }
+        }
+
+        /// <summary>What draws an avatar's own picture, and what lays it over the scene.</summary>
+        internal static Material OwnMaterial
+        {
+            get { return Made(ref own, "Gsac/GsacOwn"); }
+        }
+
+        internal static Material TrainedMaterial
+        {
+            get { return Made(ref trained, "Gsac/GsacTrained"); }
+        }
+
+        /// <summary>What the body's mesh wears: shadow, depth texture and motion; depth.</summary>
+        internal static Material[] BodyMaterials
+        {
             get
             {
-                if (material == null) material = new Material(Resources.Load<Shader>("Gsac/GsacSplats")) { hideFlags = HideFlags.HideAndDontSave };
-                return material;
+                Made(ref body[0], "Gsac/GsacBody");
+                Made(ref body[1], "Gsac/GsacBodyDepth");
+                return body;
             }
+        }
+
+        static Material Made(ref Material material, string shader)
+        {
+            if (material == null) Make(ref material, shader);
+            return material;
+        }
+
+        static void Make(ref Material material, string shader)
+        {
+            material = new Material(Resources.Load<Shader>(shader)) { hideFlags = HideFlags.HideAndDontSave };
         }
 
         internal static void Add(GsacRenderer renderer)
@@ -55,7 +85,11 @@ namespace Gsac
             Crowds.Clear();
             Seen.Clear();
             Free(material);
-            material = null;
+            Free(own);
+            Free(trained);
+            Free(body[0]);
+            Free(body[1]);
+            material = own = trained = body[0] = body[1] = null;
         }
 
         /// <summary>Destroys what was made at run time, or in the editor while nothing plays.</summary>

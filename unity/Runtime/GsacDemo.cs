@@ -7,6 +7,7 @@ namespace Gsac
     public sealed class GsacDemo : MonoBehaviour
     {
         [SerializeField] GsacAvatar avatar = null;
+        [SerializeField, Tooltip("Where no avatar is named: the first of these.")] GsacCast cast = null;
         [SerializeField] Camera eye = null;
 
         float yaw = 180;
@@ -17,6 +18,7 @@ namespace Gsac
 
         void Start()
         {
+            if (avatar == null && cast != null) avatar = cast.First;
             if (avatar != null && avatar.Data.Clips.Count > 0) avatar.Source = GsacSource.Clip;
         }
 

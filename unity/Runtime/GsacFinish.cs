@@ -11,6 +11,9 @@ namespace Gsac
         /// <summary>x y z: factor of the colours, in the project's colour space; w: share of the person that is there.</summary>
         public Vector4 Tint;
 
+        /// <summary>Whether a project with linear colours shows the trained picture.</summary>
+        public bool Trained;
+
         /// <summary>Whether the scene's fog lies over the person.</summary>
         public bool Fog;
 
@@ -19,7 +22,7 @@ namespace Gsac
 
         public bool IsLike(GsacFinish other)
         {
-            return Material == other.Material && Fog == other.Fog && Layer == other.Layer && Tint.x == other.Tint.x && Tint.y == other.Tint.y
+            return Material == other.Material && Trained == other.Trained && Fog == other.Fog && Layer == other.Layer && Tint.x == other.Tint.x && Tint.y == other.Tint.y
                 && Tint.z == other.Tint.z && Tint.w == other.Tint.w;
         }
     }

@@ -12,6 +12,7 @@ namespace Gsac
     {
         const string Name = "Body";
         const float Whole = 100;
+        static readonly Material[] Bare = new Material[0];
 
         /// <summary>Shapes by which the mesh follows the jaw's turn where it has no skin of its own: set by the avatar, a whole one is 1 rad.</summary>
         public static readonly string[] JawShapes = { "turned jaw x", "turned jaw y", "turned jaw z" };
@@ -97,16 +98,23 @@ namespace Gsac
             return null;
         }
 
-        /// <summary>A renderer of the mesh on a child of `root`, switched off: give it a material and switch it on where it is wanted.</summary>
+        /// <summary>A renderer of the mesh on a child of `root`; it shows nothing before somebody gives it materials, as GsacRenderer does.</summary>
         public static SkinnedMeshRenderer Attach(Mesh mesh, GsacExtent extent, Transform root, Transform[] joints)
         {
             var holder = new GameObject(Name);
             holder.transform.SetParent(root, false);
             var body = holder.AddComponent<SkinnedMeshRenderer>();
-            body.shadowCastingMode = ShadowCastingMode.ShadowsOnly;
-            body.enabled = false;
+            body.shadowCastingMode = ShadowCastingMode.On;
             Wear(body, mesh, extent, joints);
             return body;
+        }
+
+        /// <summary>Has the body cast shadows and write depth and motion, or takes that from it; materials that others gave it stay.</summary>
+        internal static void Dress(SkinnedMeshRenderer body, bool on)
+        {
+            Material worn = body.sharedMaterial;
+            if (on && worn == null) body.sharedMaterials = GsacCameras.BodyMaterials;
+            else if (!on && worn != null && ReferenceEquals(worn, GsacCameras.BodyMaterials[0])) body.sharedMaterials = Bare;
         }
 
         /// <summary>Gives a renderer the mesh of a person.</summary>

@@ -45,6 +45,9 @@ namespace Gsac
         }
 
         readonly object source;
+        readonly List<GraphicsBuffer> buffers = new List<GraphicsBuffer>();
+        IEnumerator<GraphicsBuffer> parts;
+        bool uploaded;
         Mesh body;
         int users;
 
@@ -55,15 +58,24 @@ namespace Gsac
             Extent = new GsacExtent(Data);
         }
 
+        /// <summary>Reads what nobody uses yet, on any thread. source: what the bytes come from. Throws GsacException.</summary>
+        public static GsacModel Read(object source, byte[] bytes)
+        {
+            return new GsacModel(source, bytes);
+        }
+
         /// <summary>source: what the bytes come from; instances with the same one share. Throws GsacException.</summary>
         public static GsacModel Acquire(object source, byte[] bytes)
         {
             GsacModel model;
-            if (!Shared.TryGetValue(source, out model))
-            {
-                model = new GsacModel(source, bytes);
-                Shared[source] = model;
-            }
+            return Acquire(Shared.TryGetValue(source, out model) ? model : Read(source, bytes));
+        }
+
+        /// <summary>The one to be used for what was read: the one of before where there is one.</summary>
+        public static GsacModel Acquire(GsacModel read)
+        {
+            GsacModel model;
+            if (!Shared.TryGetValue(read.source, out model)) Shared[read.source] = model = read;
             model.users++;
             return model;
         }
@@ -73,54 +85,54 @@ namespace Gsac
             if (--users > 0) return;
             Shared.Remove(source);
             GsacCameras.Free(body);
-            if (Rest == null) return;
-            Rest.Dispose();
-            Skin.Dispose();
-            Moves.Dispose();
-            Quads.Dispose();
-            if (Pairs != null)
-            {
-                Pairs.Dispose();
-                First.Dispose();
-                Pairs = First = null;
-            }
-            foreach (Level level in Levels)
-            {
-                level.Corners.Dispose();
-                level.Local.Dispose();
-                level.Colours.Dispose();
-            }
-            Rest = null;
+            foreach (GraphicsBuffer buffer in buffers) buffer.Dispose();
+            buffers.Clear();
         }
 
         /// <summary>Puts the buffers on the GPU, once.</summary>
         public void Upload()
         {
-            if (Rest != null) return;
+            while (UploadPart())
+            {
+            }
+        }
+
+        /// <summary>Puts one buffer more on the GPU; false where all are there.</summary>
+        public bool UploadPart()
+        {
+            if (uploaded) return false;
+            if (parts == null) parts = Parts();
+            uploaded = !parts.MoveNext();
+            if (!uploaded) buffers.Add(parts.Current);
+            return !uploaded;
+        }
+
+        IEnumerator<GraphicsBuffer> Parts()
+        {
             int[] first;
             float[] moves = GsacPacking.Moves(Data, out first);
-            Rest = Structured(GsacPacking.Rest(Data), 4);
-            Moves = Structured(moves, 4);
-            Skin = Structured(GsacPacking.Skin(Data, first), 4);
+            yield return Rest = Structured(GsacPacking.Rest(Data), 4);
+            yield return Moves = Structured(moves, 4);
+            yield return Skin = Structured(GsacPacking.Skin(Data, first), 4);
             if (Data.Correctives != null)
             {
-                Pairs = Structured(GsacPacking.Pairs(Data.Correctives), 4);
-                First = Structured(Data.Correctives.Start, 1);
+                yield return Pairs = Structured(GsacPacking.Pairs(Data.Correctives), 4);
+                yield return First = Structured(Data.Correctives.Start, 1);
             }
-            Levels = new Level[Data.Levels.Length];
+            var levels = new Level[Data.Levels.Length];
             int most = 0;
-            for (int i = 0; i < Levels.Length; i++)
+            for (int i = 0; i < levels.Length; i++)
             {
                 GsacLevel level = Data.Levels[i];
                 most = Math.Max(most, level.Count);
-                Levels[i] = new Level
-                {
-                    Count = level.Count, Sort = new GsacSort(level.Count), Corners = Structured(GsacPacking.Corners(Data, level), 4),
-                    Local = Structured(GsacPacking.Local(level), 4), Colours = Structured(GsacPacking.Colours(level), 4),
-                };
+                levels[i] = new Level { Count = level.Count, Sort = new GsacSort(level.Count) };
+                yield return levels[i].Corners = Structured(GsacPacking.Corners(Data, level), 4);
+                yield return levels[i].Local = Structured(GsacPacking.Local(level), 4);
+                yield return levels[i].Colours = Structured(GsacPacking.Colours(level), 4);
+                KeyCount = Math.Max(KeyCount, levels[i].Sort.KeyCount);
             }
-            foreach (Level level in Levels) KeyCount = Math.Max(KeyCount, level.Sort.KeyCount);
-            Quads = Indices(Math.Max(most, 1));
+            Levels = levels;
+            yield return Quads = Indices(Math.Max(most, 1));
         }
 
         /// <summary>Two triangles a splat, for `count` of them.</summary>

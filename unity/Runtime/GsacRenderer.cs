@@ -34,6 +34,9 @@ namespace Gsac
         static readonly int[] LightIds =
         {
             Shader.PropertyToID("GsacLightRed"), Shader.PropertyToID("GsacLightGreen"), Shader.PropertyToID("GsacLightBlue"),
+            Shader.PropertyToID("GsacSceneRed"), Shader.PropertyToID("GsacSceneGreen"), Shader.PropertyToID("GsacSceneBlue"),
+            Shader.PropertyToID("GsacSceneRed2"), Shader.PropertyToID("GsacSceneGreen2"), Shader.PropertyToID("GsacSceneBlue2"),
+            Shader.PropertyToID("GsacSceneLast"),
         };
 
         [SerializeField, Tooltip("m: where coarser levels of detail begin for a lens of 60 degrees, if the file does not say at which height; each doubling takes the next.")]
@@ -54,6 +57,15 @@ namespace Gsac
         [SerializeField, Tooltip("Whether the scene's fog lies over the person; not in HDRP.")]
         bool fog = true;
 
+        [SerializeField, Tooltip("Whether the person casts shadows and writes depth and motion, by the mesh under the gaussians.")]
+        bool bodyPass = true;
+
+        [SerializeField, Tooltip("The scene's light, instead of the clip's.")]
+        GsacSceneLight sceneLight = new GsacSceneLight();
+
+        [SerializeField, Tooltip("In projects with linear colours: draws the avatar's edges and layers as it was trained, by a picture of its own for each camera but a headset's.")]
+        bool trainedColours = true;
+
         readonly List<GsacView> views = new List<GsacView>();
         GsacAvatar avatar;
         GsacModel model;
@@ -64,10 +76,10 @@ namespace Gsac
         GraphicsBuffer turns, bent; // null where the body has no pose correctives
         float[] turnRows;
         Vector4[] boneRows;
-        readonly Vector4[] light = new Vector4[3];
+        readonly Vector4[] light = new Vector4[10]; // of each of LightIds
         Vector4[] shownBones; // what `shape` stands for
         float[] shownWeights;
-        readonly Vector4[] shownLight = new Vector4[3];
+        readonly Vector4[] shownLight = new Vector4[10];
         int shape; // counts the poses, weights and lights that were drawn
         int skinned;
         int[] bound; // the shape that each level was bound to
@@ -116,6 +128,32 @@ namespace Gsac
             set { fog = value; }
         }
 
+        /// <summary>
+        /// Whether the person casts shadows and writes depth and motion, by the mesh under the gaussians. A material that the child
+        /// `Body` has of its own stays.
+        /// </summary>
+        public bool BodyPass
+        {
+            get { return bodyPass; }
+            set { bodyPass = value; }
+        }
+
+        /// <summary>How far the avatar stands in the scene's light, and which that is.</summary>
+        public GsacSceneLight SceneLight
+        {
+            get { return sceneLight; }
+        }
+
+        /// <summary>
+        /// Whether a project with linear colours shows the trained picture, at the cost of a picture of the avatar's size for each camera.
+        /// Off, in a headset and with a material of its own the splats are blended among the scene's linear colours: paler edges, no more to pay.
+        /// </summary>
+        public bool TrainedColours
+        {
+            get { return trainedColours; }
+            set { trainedColours = value; }
+        }
+
         void OnEnable()
         {
             trouble = null;
@@ -124,6 +162,7 @@ namespace Gsac
 
         void OnDisable()
         {
+            Dress(false);
             GsacCameras.Remove(this);
             Drop();
         }
@@ -149,6 +188,13 @@ namespace Gsac
         void LateUpdate()
         {
             Refresh();
+            Dress(bodyPass && opacity > 0);
+        }
+
+        void Dress(bool on)
+        {
+            if (avatar == null) avatar = GetComponent<GsacAvatar>();
+            if (avatar != null && avatar.IsOpen && avatar.Body != null) GsacMesh.Dress(avatar.Body, on);
         }
 
         /// <summary>
@@ -187,7 +233,7 @@ namespace Gsac
             return new GsacFinish
             {
                 Material = material != null ? material : GsacCameras.Material, Tint = new Vector4(shown.r, shown.g, shown.b, Mathf.Clamp(opacity, 0, 1)),
-                Fog = fog, Layer = gameObject.layer,
+                Trained = trainedColours && material == null, Fog = fog, Layer = gameObject.layer,
             };
         }
 
@@ -201,6 +247,7 @@ namespace Gsac
             avatar.CollectWeights();
             float lit = model.Data.Light == null ? 0 : Mathf.Clamp(clipLight, 0, 1);
             for (int c = 0; c < 3; c++) light[c] = Light(c, lit);
+            sceneLight.Fill(transform, avatar.Joints[0].position, light, 3);
             bool same = Keep(boneRows, shownBones) & Keep(avatar.DrawnWeights, shownWeights) & Keep(light, shownLight);
             if (!same) shape++;
         }
@@ -306,7 +353,7 @@ namespace Gsac
         void Bind(GsacModel.Level level, GraphicsBuffer splats)
         {
             kernels.SetInt(SplatCountId, level.Count);
-            for (int c = 0; c < 3; c++) kernels.SetVector(LightIds[c], light[c]);
+            for (int i = 0; i < LightIds.Length; i++) kernels.SetVector(LightIds[i], light[i]);
             kernels.SetBuffer(bindKernel, CornersId, level.Corners);
             kernels.SetBuffer(bindKernel, LocalId, level.Local);
             kernels.SetBuffer(bindKernel, PosedId, posed);

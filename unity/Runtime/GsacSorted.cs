@@ -31,6 +31,7 @@ namespace Gsac
 
         readonly MaterialPropertyBlock properties = new MaterialPropertyBlock();
         readonly int[] sortKernels = new int[3];
+        readonly GsacPicture picture = new GsacPicture();
         bool found;
         readonly int[] number = new int[1]; // of the frame's draws
         int frame = -1;
@@ -40,6 +41,7 @@ namespace Gsac
 
         public void Dispose()
         {
+            picture.Dispose();
             if (keys == null) return;
             keys.Dispose();
             latest.Dispose();
@@ -114,7 +116,8 @@ namespace Gsac
             properties.SetBuffer(LatestId, latest);
             for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], space.GetRow(r));
             bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
-            properties.SetVector(BlendId, new Vector4(rule.LowPass, rule.AlphaMax, rule.AlphaMin, linear ? 1 : 0));
+            bool own = linear && finish.Trained && !camera.stereoEnabled && GsacPicture.IsPossible;
+            properties.SetVector(BlendId, new Vector4(rule.LowPass, rule.AlphaMax, rule.AlphaMin, linear && !own ? 1 : 0));
             properties.SetInteger(KeepsEnergyId, rule.KeepsEnergy ? 1 : 0);
             properties.SetVector(TintId, finish.Tint);
             properties.SetInteger(FogId, finish.Fog ? 1 : 0);
@@ -122,12 +125,14 @@ namespace Gsac
             properties.SetBuffer(SplatsId, splats);
             properties.SetBuffer(ColoursId, colours);
             properties.SetBuffer(KeysId, keys);
-            var draw = new RenderParams(finish.Material)
+            var draw = new RenderParams(own ? GsacCameras.TrainedMaterial : finish.Material)
             {
                 camera = camera, worldBounds = bounds, matProps = properties, layer = finish.Layer,
                 shadowCastingMode = ShadowCastingMode.Off, receiveShadows = false,
             };
-            Graphics.RenderPrimitivesIndexed(draw, MeshTopology.Triangles, indices, count * 6);
+            if (own) picture.Draw(camera, bounds, properties, indices, count * 6);
+            // the picture is two triangles
+            Graphics.RenderPrimitivesIndexed(draw, MeshTopology.Triangles, indices, own ? 6 : count * 6);
         }
     }
 }

@@ -32,8 +32,18 @@ public static class Play
             case "inspector": Inspector(args[1]); break;
             case "demo": Demo(args[1]); break;
             case "life": Life(args[1]); break;
+            case "cast": Adopt.Cast(args[1]); break;
+            case "load": Adopt.LoadAsync(args[1], args[2]); break;
+            case "paint": Adopt.Paint(args[1], args[2], args[3]); break;
+            case "look": Adopt.Look(args[1], args[2]); break;
+            case "samples": AdoptSamples.Run(args[1], args[2]); break;
+            case "self-check": Adopt.SelfCheck(args[1], args[2]); break;
+            case "eye-check": Adopt.EyeCheck(args[1], args[2]); break;
             case "cameras": Drawing.Cameras(args[1]); break;
             case "zoom": Drawing.Zoom(args[1]); break;
+            case "scene": PlayLight.Scene(args[1], args[2]); break;
+            case "dressed": DrawOwn.Dressed(args[1]); break;
+            case "picture": DrawOwn.Picture(args[1], args[2]); break;
             case "finish": Drawing.Finish(args[1]); break;
             case "crowd": Crowd.Print(args); break;
             case "crowds": Crowd.Count(args[1]); break;

@@ -14,7 +14,8 @@ public static class Crowd
     };
     static readonly string[] Vectors =
     {
-        "GsacDepthRange", "GsacDepthRow", "GsacLightRed", "GsacLightGreen", "GsacLightBlue", "GsacJoinModel0", "GsacJoinModel1", "GsacJoinModel2",
+        "GsacDepthRange", "GsacDepthRow", "GsacLightRed", "GsacLightGreen", "GsacLightBlue",
+        "GsacSceneRed", "GsacSceneGreen", "GsacSceneBlue", "GsacSceneRed2", "GsacSceneGreen2", "GsacSceneBlue2", "GsacSceneLast", "GsacJoinModel0", "GsacJoinModel1", "GsacJoinModel2",
     };
     static readonly string[] Bound =
     {

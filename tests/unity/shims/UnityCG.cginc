@@ -15,3 +15,10 @@ float4 unity_FogColor;
 #define UNITY_Z_0_FAR_FROM_CLIPSPACE(z) max(z, 0)
 #define UNITY_CALC_FOG_FACTOR_RAW(z) float unityFogFactor = unity_FogParams.x * (z); unityFogFactor = exp2(-unityFogFactor * unityFogFactor)
 #endif
+#ifdef MESH
+#define UNITY_MATRIX_VP mul(glstate_matrix_projection, unity_MatrixV)
+#define UNITY_UV_STARTS_AT_TOP 1
+float4x4 unity_ObjectToWorld;
+float4 UnityClipSpaceShadowCasterPos(float4 place, float3 normal) { return mul(UNITY_MATRIX_VP, mul(unity_ObjectToWorld, float4(place.xyz, 1))); }
+float4 UnityApplyLinearShadowBias(float4 clip) { return clip; }
+#endif

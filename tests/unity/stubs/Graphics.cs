@@ -8,7 +8,7 @@ namespace UnityEngine
     public enum MeshTopology { Triangles }
     public enum ColorSpace { Gamma, Linear }
 
-    public sealed class Shader : Object
+    public sealed partial class Shader : Object
     {
         static readonly List<string> Names = new List<string>();
         public static int PropertyToID(string name)
@@ -21,7 +21,7 @@ namespace UnityEngine
         internal static string NameOf(int id) { return Names[id]; }
     }
 
-    public sealed class Material : Object
+    public sealed partial class Material : Object
     {
         public Material(Shader shader) { Made.Add(this); }
     }
@@ -41,6 +41,7 @@ namespace UnityEngine
         }
         public void SetData(Array data)
         {
+            if (Player.OnUpload != null) Player.OnUpload();
             if (data is Vector4[])
             {
                 var rows = (Vector4[])data;
@@ -67,6 +68,37 @@ namespace UnityEngine
         public void Dispose() { Alive--; }
     }
 
+    public enum RenderTextureFormat { ARGBHalf = 2, RHalf = 15 }
+    public enum RenderTextureReadWrite { Linear = 1 }
+
+    public sealed class RenderTexture : Texture
+    {
+        public int width { get; private set; }
+        public int height { get; private set; }
+        public RenderTexture(int width, int height, int depth, RenderTextureFormat format, RenderTextureReadWrite readWrite)
+        {
+            if (width <= 0 || height <= 0) throw new ArgumentException("a picture of " + width + " x " + height);
+            this.width = width;
+            this.height = height;
+            Made.Add(this);
+        }
+    }
+
+    public class Texture : Object { }
+
+    public static class GL
+    {
+        public static Matrix4x4 GetGPUProjectionMatrix(Matrix4x4 proj, bool renderIntoTexture)
+        {
+            if (!renderIntoTexture) throw new NotImplementedException();
+            proj.m10 = -proj.m10;
+            proj.m11 = -proj.m11;
+            proj.m12 = -proj.m12;
+            proj.m13 = -proj.m13;
+            return proj;
+        }
+    }
+
     public sealed class ComputeShader : Object
     {
         internal static readonly string[] Kernels = { "Skin", "Bind", "SortBlocks", "SortAcross", "SortMerge", "Correct", "Join" };
@@ -89,7 +121,11 @@ namespace UnityEngine
     {
         internal readonly Vector4[] Values = new Vector4[96];
         internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[96];
+        internal readonly Matrix4x4[] Matrices = new Matrix4x4[96];
+        internal readonly Texture[] Textures = new Texture[96];
         public void SetVector(int nameID, Vector4 value) { Values[nameID] = value; }
+        public void SetMatrix(int nameID, Matrix4x4 value) { Matrices[nameID] = value; }
+        public void SetTexture(int nameID, Texture value) { Textures[nameID] = value; }
         public void SetInteger(int nameID, int value) { Values[nameID] = new Vector4(value, 0, 0, 0); }
         public void SetBuffer(int nameID, GraphicsBuffer value) { Buffers[nameID] = value; }
     }
@@ -106,18 +142,22 @@ namespace UnityEngine
         public bool receiveShadows { get; set; }
     }
 
-    public static class Graphics
+    public static partial class Graphics
     {
         public static void RenderPrimitivesIndexed(in RenderParams rparams, MeshTopology topology, GraphicsBuffer indexBuffer, int indexCount,
                                                    int startIndex = 0, int instanceCount = 1)
         {
             if (Player.OnDraw != null) Player.OnDraw(rparams, indexBuffer, indexCount);
         }
+        public static void ExecuteCommandBuffer(CommandBuffer buffer)
+        {
+            if (Player.OnOwnDraw != null) Player.OnOwnDraw(buffer.Properties, buffer.Count);
+        }
     }
 
     public enum CameraType { Game = 1, SceneView = 2, Preview = 4, VR = 8, Reflection = 16 }
 
-    public sealed class Camera : Behaviour
+    public sealed partial class Camera : Behaviour
     {
         internal static readonly List<Camera> All = new List<Camera>();
         public delegate void CameraCallback(Camera cam);
@@ -127,6 +167,10 @@ namespace UnityEngine
         internal float[] EyeFocal;
         public int cullingMask { get; set; } = -1;
         public int pixelHeight { get; internal set; } = 1080;
+        public int pixelWidth { get { return 1920; } }
+        public float nearClipPlane { get { return 0.01f; } }
+        public float farClipPlane { get { return 1000; } }
+        public Rect rect { get; internal set; } = new Rect(0, 0, 1, 1);
         public bool stereoEnabled { get { return EyeFocal != null; } }
         public Matrix4x4 projectionMatrix { get; set; } = Lens(1, 1.7320508f);
         public Matrix4x4 worldToCameraMatrix { get { return ViewAt(0); } }
@@ -137,6 +181,7 @@ namespace UnityEngine
         {
             if (Player.HasPipeline) Rendering.RenderPipelineManager.Begin(this);
             else if (onPreCull != null) onPreCull(this);
+            if (Player.OnRender != null) Player.OnRender(this);
         }
         Matrix4x4 ViewAt(float side)
         {
@@ -162,7 +207,7 @@ namespace UnityEngine
         public float weight3 { get; set; }
     }
 
-    public sealed class Mesh : Object
+    public sealed partial class Mesh : Object
     {
         public IndexFormat indexFormat { get; set; }
         public Vector3[] vertices { get; set; }
@@ -183,8 +228,11 @@ namespace UnityEngine
 
     public class Renderer : Component
     {
-        public bool enabled { get; set; }
+        public bool enabled { get; set; } = true;
         public ShadowCastingMode shadowCastingMode { get; set; }
+        Material[] materials = { null };
+        public Material sharedMaterial { get { return materials.Length == 0 ? null : materials[0]; } set { materials = new[] { value }; } }
+        public Material[] sharedMaterials { get { return (Material[])materials.Clone(); } set { materials = (Material[])value.Clone(); } }
     }
 
     public sealed class SkinnedMeshRenderer : Renderer
@@ -211,7 +259,7 @@ namespace UnityEngine
         }
     }
 
-    public static class QualitySettings
+    public static partial class QualitySettings
     {
         public static int vSyncCount { get; set; }
         public static ColorSpace activeColorSpace { get { return ColorSpace.Linear; } }
@@ -226,6 +274,8 @@ namespace UnityEngine
     public static class SystemInfo
     {
         public static bool supportsComputeShaders { get; internal set; } = true;
+        public static int supportedRenderTargetCount { get { return 8; } }
+        public static bool SupportsRenderTextureFormat(RenderTextureFormat format) { return Player.HasHalfTargets; }
         public static int maxComputeBufferInputsVertex { get { return 8; } }
         public static GraphicsDeviceType graphicsDeviceType { get { return GraphicsDeviceType.Vulkan; } }
         public static string graphicsDeviceName { get { return "stub \"GPU\""; } }
@@ -245,7 +295,29 @@ namespace UnityEngine.Rendering
         internal static void Begin(Camera camera) { if (beginCameraRendering != null) beginCameraRendering(new ScriptableRenderContext(), camera); }
     }
 
+    public struct RenderTargetIdentifier
+    {
+        public RenderTargetIdentifier(Texture tex) { }
+    }
+
+    public sealed class CommandBuffer
+    {
+        internal MaterialPropertyBlock Properties;
+        internal int Count;
+        public string name { get; set; }
+        public void Clear() { Properties = null; }
+        public void Release() { }
+        public void SetRenderTarget(RenderTargetIdentifier[] colors, RenderTargetIdentifier depth) { }
+        public void ClearRenderTarget(bool clearDepth, bool clearColor, Color backgroundColor) { }
+        public void DrawProcedural(GraphicsBuffer indexBuffer, Matrix4x4 matrix, Material material, int shaderPass, MeshTopology topology,
+                                   int indexCount, int instanceCount, MaterialPropertyBlock properties)
+        {
+            Properties = properties;
+            Count = indexCount;
+        }
+    }
+
     public enum GraphicsDeviceType { Vulkan }
     public enum IndexFormat { UInt16, UInt32 }
-    public enum ShadowCastingMode { Off, ShadowsOnly = 3 }
+    public enum ShadowCastingMode { Off, On }
 }

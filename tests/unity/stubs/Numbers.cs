@@ -6,6 +6,8 @@ namespace UnityEngine
     public static class Mathf
     {
         public static float Sqrt(float x) { return (float)Math.Sqrt(x); }
+        public const float Rad2Deg = (float)(180 / Math.PI);
+        public static float Atan2(float y, float x) { return (float)Math.Atan2(y, x); }
         public static float Exp(float x) { return (float)Math.Exp(x); }
         public static float Clamp(float x, float low, float high) { return Math.Min(Math.Max(x, low), high); }
         public static float DeltaAngle(float from, float to) { return (float)(to - from - 360 * Math.Floor((to - from + 180) / 360)); }
@@ -49,6 +51,7 @@ namespace UnityEngine
     {
         public float r, g, b, a;
         public Color(float r, float g, float b, float a) { this.r = r; this.g = g; this.b = b; this.a = a; }
+        public static Color clear { get { return new Color(); } }
         public static Color white { get { return new Color(1, 1, 1, 1); } }
         public Color linear { get { return new Color(Linear(r), Linear(g), Linear(b), a); } }
         static float Linear(float x) { return x <= 0.04045f ? x / 12.92f : (float)Math.Pow((x + 0.055) / 1.055, 2.4); }
@@ -56,7 +59,13 @@ namespace UnityEngine
 
     public struct Rect
     {
-        public Rect(float x, float y, float width, float height) { }
+        public float width { get; set; }
+        public float height { get; set; }
+        public Rect(float x, float y, float width, float height)
+        {
+            this.width = width;
+            this.height = height;
+        }
     }
 
     public struct Bounds
@@ -164,6 +173,12 @@ namespace UnityEngine
         {
             return r == 0 ? new Vector4(m00, m01, m02, m03) : r == 1 ? new Vector4(m10, m11, m12, m13)
                 : r == 2 ? new Vector4(m20, m21, m22, m23) : new Vector4(m30, m31, m32, m33);
+        }
+
+        public Vector4 GetColumn(int c)
+        {
+            return c == 0 ? new Vector4(m00, m10, m20, m30) : c == 1 ? new Vector4(m01, m11, m21, m31)
+                : c == 2 ? new Vector4(m02, m12, m22, m32) : new Vector4(m03, m13, m23, m33);
         }
 
         public Vector3 MultiplyPoint3x4(Vector3 p)

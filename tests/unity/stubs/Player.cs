@@ -10,6 +10,17 @@ namespace UnityEngine
         /// <summary>What is called at each dispatch (shader, kernel, groups) and draw (parameters, indices, how many).</summary>
         public static Action<ComputeShader, int, int> OnDispatch;
         public static Action<RenderParams, GraphicsBuffer, int> OnDraw;
+        public static Action OnUpload;
+        public static Action<Camera> OnRender;
+        public static Func<Texture2D> OnCapture;
+
+        /// <summary>What is called where splats are drawn into an avatar's own picture (properties, indices); whether a device can.</summary>
+        public static Action<MaterialPropertyBlock, int> OnOwnDraw;
+        public static bool HasHalfTargets;
+
+        /// <summary>The light around, and whether something stands between the person and the sun.</summary>
+        public static Rendering.SphericalHarmonicsL2 Probe;
+        public static bool IsShaded;
 
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;
@@ -115,6 +126,8 @@ namespace UnityEngine
         public static GraphicsBuffer Buffer(ComputeShader shader, int kernel, int id) { return shader.Buffers[kernel, id]; }
         public static Vector4 Value(MaterialPropertyBlock block, int id) { return block.Values[id]; }
         public static GraphicsBuffer Buffer(MaterialPropertyBlock block, int id) { return block.Buffers[id]; }
+        public static Matrix4x4 Matrix(MaterialPropertyBlock block, int id) { return block.Matrices[id]; }
+        public static Texture Texture(MaterialPropertyBlock block, int id) { return block.Textures[id]; }
         public static int BuffersAlive { get { return GraphicsBuffer.Alive; } }
         public static int Alive<T>() { return UnityEngine.Object.Made.FindAll(o => o is T && o != null).Count; }
         public static List<string> Errors { get { return Debug.Errors; } }
@@ -129,12 +142,18 @@ namespace UnityEngine
             Camera.All.Add(camera);
             return camera;
         }
+        public static void SetRect(Camera camera, float width, float height) { camera.rect = new Rect(0, 0, width, height); }
         public static void SetPixelHeight(Camera camera, int height) { camera.pixelHeight = height; }
         public static void SetEyes(Camera camera, float[] focal) { camera.EyeFocal = focal; }
         public static void SetField(Component on, string field, object value)
         {
             on.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).SetValue(on, value);
         }
+        public static T Last<T>() where T : Component
+        {
+            return (T)GameObject.Made.FindLast(c => c is T);
+        }
+        public static void BeforeRender() { Application.BeforeRender(); }
         public static object Field(Component of, string field)
         {
             return of.GetType().GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).GetValue(of);

@@ -4,7 +4,7 @@ using System.Collections.Generic;
 
 namespace UnityEngine
 {
-    [Flags] public enum HideFlags { HideAndDontSave = 61 }
+    [Flags] public enum HideFlags { DontSave = 52, HideAndDontSave = 61 }
 
     public class Object
     {
@@ -39,6 +39,7 @@ namespace UnityEngine
             }
             o.Destroyed = true;
         }
+        public static T Instantiate<T>(T original) where T : Component { return Cloner.Clone(original); }
         public static bool operator ==(Object a, Object b)
         {
             bool noA = ReferenceEquals(a, null) || a.Destroyed, noB = ReferenceEquals(b, null) || b.Destroyed;
@@ -79,6 +80,7 @@ namespace UnityEngine
 
     public sealed class GameObject : Object
     {
+        internal static new readonly List<Component> Made = new List<Component>();
         internal readonly List<Component> Components = new List<Component>();
         public Transform transform { get; private set; }
         public int layer { get; set; }
@@ -101,6 +103,7 @@ namespace UnityEngine
             made.gameObject = this;
             made.name = name;
             Components.Add(made);
+            if (made is MonoBehaviour) Made.Add(made);
             Player.Call(made, "OnEnable");
             return made;
         }
@@ -109,6 +112,7 @@ namespace UnityEngine
             foreach (Component c in Components) if (c is T) return (T)(object)c;
             return default(T);
         }
+        public T[] GetComponentsInChildren<T>(bool includeInactive) { return transform.GetComponentsInChildren<T>(includeInactive); }
     }
 
     public sealed class Transform : Component
@@ -121,6 +125,8 @@ namespace UnityEngine
         public Transform GetChild(int index) { return Children[index]; }
         public Vector3 localPosition { get { return place; } set { place = value; } }
         public Quaternion localRotation { get { return turn; } set { turn = value; } }
+        public Vector3 lossyScale { get { return parent == null ? scale : Times(parent.lossyScale, scale); } }
+        static Vector3 Times(Vector3 a, Vector3 b) { return new Vector3(a.x * b.x, a.y * b.y, a.z * b.z); }
         public Vector3 localScale { get { return scale; } set { scale = value; } }
         public Vector3 position
         {
@@ -167,8 +173,9 @@ namespace UnityEngine
         }
         public void SetPositionAndRotation(Vector3 position, Quaternion rotation)
         {
-            if (parent != null) throw new NotImplementedException();
-            place = position;
+            Matrix4x4 above = parent == null ? Matrix4x4.identity : parent.localToWorldMatrix;
+            if (above.m00 != 1 || above.m11 != 1 || above.m22 != 1) throw new NotImplementedException();
+            place = position - new Vector3(above.m03, above.m13, above.m23);
             turn = rotation;
         }
     }
@@ -251,6 +258,8 @@ namespace UnityEngine
     {
         public static bool isPlaying { get; internal set; } = true;
         public static bool isEditor { get { return false; } }
+        public static event Action onBeforeRender;
+        internal static void BeforeRender() { if (onBeforeRender != null) onBeforeRender(); }
         public static bool runInBackground { get; set; }
         public static int targetFrameRate { get; set; }
         public static string unityVersion { get { return "stub"; } }
@@ -268,6 +277,7 @@ namespace UnityEngine
     {
         internal static readonly List<string> Errors = new List<string>();
         public static void Log(object message) { }
+        public static void LogWarning(object message, Object context) { Errors.Add(message.ToString()); }
         public static void LogError(object message, Object context) { Errors.Add(message.ToString()); }
     }
 

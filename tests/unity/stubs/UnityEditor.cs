@@ -72,10 +72,18 @@ namespace UnityEditor
     public static class EditorUtility
     {
         public static bool IsPersistent(UnityEngine.Object target) { return false; }
+        public static bool DisplayDialog(string title, string message, string ok)
+        {
+            Player.Labels.Add(message);
+            return true;
+        }
+        public static void RevealInFinder(string path) { }
     }
 
     public static class EditorApplication
     {
+        public delegate void CallbackFunction();
+        public static CallbackFunction update;
         public static void QueuePlayerLoopUpdate() { Player.UpdatesAsked++; }
     }
 
@@ -166,6 +174,12 @@ namespace UnityEditor.AssetImporters
         public string assetPath { get; set; }
         public UnityEngine.Object mainObject { get; private set; }
         public void AddObjectToAsset(string identifier, UnityEngine.Object obj) { Added.Add(identifier, obj); }
+        public void AddObjectToAsset(string identifier, UnityEngine.Object obj, Texture2D thumbnail)
+        {
+            Thumbnail = thumbnail;
+            Added.Add(identifier, obj);
+        }
+        public Texture2D Thumbnail;
         public void SetMainObject(UnityEngine.Object obj) { mainObject = obj; }
         public void LogImportError(string msg) { Words.Add("error: " + msg); }
         public void LogImportWarning(string msg) { Words.Add("warning: " + msg); }

@@ -26,6 +26,13 @@ namespace Gsac
             Fault = fault;
         }
 
+        /// <summary>The same, of a file that has a name.</summary>
+        public GsacException(string file, GsacException found)
+            : base(file + ": " + found.Message, found)
+        {
+            Fault = found.Fault;
+        }
+
         /// <summary>The name in docs/gsac-format.md.</summary>
         public static string Word(GsacFault fault)
         {

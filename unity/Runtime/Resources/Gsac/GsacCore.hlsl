@@ -7,6 +7,11 @@
 #define GSAC_WIDE 1.3
 #define GSAC_DARKEST 0.25
 #define GSAC_BRIGHTEST 2.5
+#define GSAC_GAMMA 2.2 // a factor of linear light is this root of it in display colours
+// Display values of what lies behind for which an edge is exact where nobody knows what lies there, and for which its light is.
+#define GSAC_DARK_BEHIND 0.05
+#define GSAC_BRIGHT_BEHIND 0.85
+#define GSAC_USUAL_BEHIND 0.1
 
 // The frame of a face: orthonormal a, n, b, its centre, its size k (0 where it has no area).
 struct GsacFrame
@@ -78,6 +83,30 @@ float3 GsacLightOn(GsacFrame f, float4 red, float4 green, float4 blue)
 {
     float4 n = float4(f.k > 0 ? float3(f.n.xy, abs(f.n.z)) : float3(0, 0, 0), 1);
     return clamp(float3(dot(red, n), dot(green, n), dot(blue, n)), GSAC_DARKEST, GSAC_BRIGHTEST);
+}
+
+// Light that a scene throws on a surface, of its normal: linear, as a factor of the surface's colour, in the second order that a
+// diffuse surface needs (Ramamoorthi and Hanrahan 2001). red, green, blue: of x, y, z and 1.
+struct GsacSceneLight
+{
+    float4 red;
+    float4 green;
+    float4 blue;
+    float4 red2; // of xy, yz, zz, zx
+    float4 green2;
+    float4 blue2;
+    float4 last; // of xx - yy; how far it stands in for the clip's light, 0..1
+};
+
+// What the scene's light multiplies display colours with.
+float3 GsacSceneOn(GsacFrame f, GsacSceneLight s)
+{
+    float3 n = f.k > 0 ? f.n : float3(0, 0, 0);
+    float4 one = float4(n, 1);
+    float4 two = n.xyzz * n.yzzx;
+    float3 light = float3(dot(s.red, one), dot(s.green, one), dot(s.blue, one))
+        + float3(dot(s.red2, two), dot(s.green2, two), dot(s.blue2, two)) + s.last.rgb * (n.x * n.x - n.y * n.y);
+    return min(pow(max(light, 1e-6), 1 / GSAC_GAMMA), GSAC_BRIGHTEST);
 }
 
 // Covariance: diagonal xx yy zz, rest xy xz yz.
@@ -164,6 +193,33 @@ float3 GsacLinear(float3 c)
     float3 high = pow(max((c + 0.055) / 1.055, 0), 2.4);
     return float3(c.x > 0.04045 ? high.x : c.x / 12.92, c.y > 0.04045 ? high.y : c.y / 12.92,
                   c.z > 0.04045 ? high.z : c.z / 12.92);
+}
+
+float3 GsacDisplay(float3 c)
+{
+    float3 high = 1.055 * pow(max(c, 0), 1 / 2.4) - 0.055;
+    return float3(c.x > 0.0031308 ? high.x : c.x * 12.92, c.y > 0.0031308 ? high.y : c.y * 12.92,
+                  c.z > 0.0031308 ? high.z : c.z * 12.92);
+}
+
+// A picture that was composited in display colours, made ready to be laid over linear ones: emitted light and alpha, premultiplied.
+// trained: display colour, premultiplied, and alpha; behind: linear light of what lies there, where that is known.
+// Of a person over any background the display colour is trained.rgb + (1 - a) background; in linear light that is no "over", so the
+// alpha is that of two backgrounds; the emitted light makes it exact for the background that is there.
+float4 GsacOver(float4 trained, float3 behind, bool known)
+{
+    float left = 1 - trained.a;
+    float3 low = GsacLinear(trained.rgb + left * GSAC_DARK_BEHIND);
+    float3 high = GsacLinear(trained.rgb + left * GSAC_BRIGHT_BEHIND);
+    float span = GsacLinear(GSAC_BRIGHT_BEHIND).x - GsacLinear(GSAC_DARK_BEHIND).x;
+    // green has most of what an eye sees
+    float through = (high.g - low.g) / span;
+    float3 there = max(known ? behind : GsacLinear(GSAC_USUAL_BEHIND), 1e-6);
+    float3 wanted = GsacLinear(trained.rgb + left * GsacDisplay(there));
+    // emitted light is never negative
+    float3 most = wanted / there;
+    through = min(through, min(most.r, min(most.g, most.b)));
+    return float4(max(wanted - through * there, 0), 1 - through);
 }
 
 #endif

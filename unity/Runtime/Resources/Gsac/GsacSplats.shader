@@ -109,14 +109,7 @@ Shader "Gsac/Splats"
             #pragma multi_compile_instancing
             #pragma multi_compile_fog
             #include "UnityCG.cginc"
-            #if defined(FOG_LINEAR) || defined(FOG_EXP) || defined(FOG_EXP2)
-            float3 Fogged(float3 colour, float z)
-            {
-                UNITY_CALC_FOG_FACTOR_RAW(UNITY_Z_0_FAR_FROM_CLIPSPACE(z));
-                return lerp(unity_FogColor.rgb, colour, saturate(unityFogFactor));
-            }
-            #define GSAC_FOGGED(colour, z) Fogged(colour, z)
-            #endif
+            #include "GsacFogBuiltIn.hlsl"
             #define GSAC_SCREEN _ScreenParams.xy
             #define GSAC_ORIGIN float3(0, 0, 0)
             #include "GsacPass.hlsl"

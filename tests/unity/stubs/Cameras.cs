@@ -1,0 +1,73 @@
+// Stands for cameras that are rendered by hand, what they render to, and the choice of the render pipeline. API.md: pages and versions.
+using System;
+
+namespace UnityEngine
+{
+    using UnityEngine.Rendering;
+
+    public enum CameraClearFlags { Skybox = 1, SolidColor = 2 }
+
+    public sealed partial class Camera
+    {
+        public CameraClearFlags clearFlags { get; set; }
+        public Color backgroundColor { get; set; }
+        public bool allowHDR { get; set; }
+        public bool allowMSAA { get; set; }
+        public float nearClipPlane { get; set; }
+        public float farClipPlane { get; set; }
+        public float fieldOfView { get; set; }
+        public bool orthographic { get; set; }
+        public float orthographicSize { get; set; }
+        public RenderTexture targetTexture { get; set; }
+    }
+
+    public sealed class RenderTexture : Texture
+    {
+        /// <summary>Not Unity's: lowest row first.</summary>
+        public Color32[] Pixels;
+        public readonly int Width;
+        public static RenderTexture active { get; set; }
+        public RenderTexture(int width, int height, int depth)
+        {
+            Width = width;
+            Pixels = new Color32[width * height];
+        }
+    }
+
+    public static class ScreenCapture
+    {
+        public enum StereoScreenCaptureMode { BothEyes = 3 }
+        public static Texture2D CaptureScreenshotAsTexture(StereoScreenCaptureMode stereoCaptureMode) { return Player.OnCapture(); }
+    }
+
+    public static partial class QualitySettings
+    {
+        public static RenderPipelineAsset renderPipeline { get; set; }
+    }
+
+    public sealed class WaitForEndOfFrame
+    {
+    }
+}
+
+namespace UnityEngine.Rendering
+{
+    public class RenderPipelineAsset : ScriptableObject
+    {
+    }
+
+    public static class GraphicsSettings
+    {
+        public static RenderPipelineAsset defaultRenderPipeline { get; set; }
+        public static RenderPipelineAsset currentRenderPipeline { get { return QualitySettings.renderPipeline ?? defaultRenderPipeline; } }
+    }
+}
+
+namespace UnityEngine.XR
+{
+    public static class XRSettings
+    {
+        public enum StereoRenderingMode { MultiPass, SinglePass, SinglePassInstanced, SinglePassMultiview }
+        public static StereoRenderingMode stereoRenderingMode { get { return StereoRenderingMode.SinglePassInstanced; } }
+    }
+}

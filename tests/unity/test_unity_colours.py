@@ -1,0 +1,120 @@
+"""A project with linear colours shows the trained picture, which was composited in display colours: scripts, and a software GPU."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.benchmarks.unity import colours
+
+pytestmark = pytest.mark.slow
+
+SIZE = 192
+BACKGROUND = .5
+
+
+@pytest.fixture(scope="module")
+def avatar(exported):
+    return RiggedAvatar.read(exported / "avatar.gsac")
+
+
+@pytest.fixture(scope="module")
+def shot(avatar):
+    return colours.make_shots(avatar, SIZE, 1, seed=3)[0]
+
+
+@pytest.fixture(scope="module", params=sorted(colours.BEHIND))
+def stage(request, gpu, avatar, shot):
+    programs = colours.compile_programs(request.param, Path(__file__).parent / "shims")
+    stage = colours.Stage(gpu, programs, avatar, SIZE)
+    stage.put(shot, avatar.gaussians)
+    stage.draw_own(shot)
+    return stage
+
+
+def test_a_linear_project_shows_the_trained_picture_at_40_db_whatever_lies_behind(stage, shot, avatar):
+    rgb, alpha = colours.trained_picture(shot, avatar.faces, avatar.gaussians)
+    person = alpha > colours.EDGE
+    assert person.mean() > .05, "the figure is in the picture"
+    unknown, direct = [], []
+    for background in colours.BACKGROUNDS:
+        want = rgb + (1 - alpha[..., None]) * background
+        unknown.append(colours.decibels(stage.lay(shot, background, known=False), want, alpha >= 0))
+        direct.append(colours.decibels(stage.draw_direct(shot, background), want, alpha >= 0))
+        if stage.programs.behind:
+            assert colours.decibels(stage.lay(shot, background, known=True), want, person) > 45
+    print(f"not knowing what lies behind: {min(unknown):.1f} dB; as one draw: {min(direct):.1f} dB")
+    assert min(unknown) > 40 and min(unknown) > min(direct) + 3
+
+
+def test_what_stands_before_the_person_hides_her_and_what_stands_behind_does_not(stage, shot):
+    seen = stage.lay(shot, BACKGROUND, known=False)
+    near, away = .01, shot.vertices[:, 2]
+    depth = lambda metres: 1 - 2 * near / metres  # noqa: E731, of the tests' projection
+    hidden = stage.lay(shot, BACKGROUND, known=False, far=depth(away.min() - .2))
+    shown = stage.lay(shot, BACKGROUND, known=False, far=depth(away.max() + .2))
+    assert abs(seen - BACKGROUND).max() > .2
+    np.testing.assert_allclose(hidden, BACKGROUND, atol=1e-3)
+    np.testing.assert_array_equal(shown, seen)
+
+
+@pytest.fixture(scope="module")
+def told(play, mono, files, tmp_path_factory):
+    """(situation -> splats drawn to a picture, quads to the scene, pictures, linear colours; what the pictures are drawn with)."""
+    path = tmp_path_factory.mktemp("picture") / "asked"
+    lines = dict(line.split(": ") for line in play("picture", files / "figure.gsac", path).splitlines())
+    return {what: tuple(map(int, words.split())) for what, words in lines.items()}, mono.arrays(path)
+
+
+def test_a_picture_of_the_avatar_alone_is_drawn_for_a_camera_and_two_triangles_lay_it_over_the_scene(told, figure):
+    count = len(figure.gaussians)
+    for lens in ("wide", "flat", "again"):
+        assert told[0][lens] in [(n, 1, 2, 0) for n in (count, *map(len, figure.coarser))]
+    assert told[0]["part of a screen"][:2] == (told[0]["again"][0], 1) and told[0]["copy"] == (0,)
+
+
+def test_a_headset_and_who_wants_it_so_get_the_splats_themselves(told):
+    drawn = told[0]["again"][0]
+    assert told[0]["switched off"][:2] == told[0]["headset"][:2] == (0, drawn)
+    assert told[0]["switched off"][3] == 1
+
+
+def test_pictures_are_kept_while_the_person_comes_nearer_and_freed_with_the_renderer(told):
+    assert told[0]["new pictures in a walk of a metre"][0] < 8
+    assert told[0]["gone"] == (0, 0)
+
+
+@pytest.mark.parametrize("lens", ["wide", "tele", "flat"])
+def test_the_picture_holds_the_avatar_pixel_for_pixel_of_the_screen(told, lens):
+    asked = {name.removeprefix(f"{lens}."): array for name, array in told[1].items() if name.startswith(lens)}
+    P, view, crop = (asked[name].reshape(4, 4).astype(float) for name in ("lens", "GsacEyeView", "GsacEyeProjection"))
+    (left, low, right, top), (sx, sy, mx, my) = asked["GsacEyeRect"], asked["GsacEyeLens"]
+    eye = np.c_[told[1]["joints"].reshape(-1, 3), np.ones(55)] @ view.T
+    clip = eye @ P.T
+    place = clip[:, :2] / clip[:, 3:]
+    got = eye @ crop.T
+    wanted = (place - [left, low]) / [right - left, top - low] * 2 - 1
+    np.testing.assert_allclose(got[:, :2] / got[:, 3:], wanted * [1, -1], atol=2e-4)
+    inside = (abs(place) < 1).all(1)
+    assert inside.any() and (abs(wanted[inside]) < 1).all()
+    pixels = (np.array([left, low, right, top]) + 1) / 2 * [1920, 1080, 1920, 1080]
+    np.testing.assert_allclose(pixels, np.round(pixels), atol=1e-2)
+    np.testing.assert_allclose([pixels[2] - pixels[0], pixels[3] - pixels[1]], asked["size"], atol=1e-2)
+    # the shader's corner goes through the camera to where it is on the screen
+    away = asked["GsacEyeScreen"][2]
+    corner = np.array([(left + mx) / sx, (top + my) / sy, -1, 1]) * ([1, 1, away, 1] if lens == "flat" else [away, away, away, 1])
+    back = P @ corner
+    np.testing.assert_allclose(back[:2] / back[3], [left, top], atol=1e-5)
+
+
+def test_a_tinted_and_a_fading_person_look_as_without_a_picture_of_their_own(stage, shot, monkeypatch):
+    usual = stage.parameters
+    monkeypatch.setattr(stage, "parameters", lambda *of: usual(*of) | {"GsacTint": [.3, 1, .6, .5]})
+    stage.draw_own(shot)
+    got, want = stage.lay(shot, BACKGROUND, known=False), stage.draw_direct(shot, BACKGROUND)
+    monkeypatch.undo()
+    stage.draw_own(shot)
+    shown = abs(got - BACKGROUND).max(2) > .02
+    assert .4 < shown.sum() / (abs(stage.lay(shot, BACKGROUND, known=False) - BACKGROUND).max(2) > .02).sum() < .6
+    assert colours.decibels(got, want, shown) > 28

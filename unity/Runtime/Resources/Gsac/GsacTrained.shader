@@ -1,0 +1,117 @@
+// For projects with linear colours: lays the avatar's own picture, which GsacOwn.shader drew in display colours, over the scene among
+// the transparent things; one SubShader a render pipeline. What lies behind is taken from a copy where the pipeline has one.
+Shader "Gsac/Trained"
+{
+    SubShader
+    {
+        PackageRequirements { "com.unity.render-pipelines.high-definition": "12.0.0" }
+        Tags { "RenderPipeline" = "HDRenderPipeline" "RenderType" = "Transparent" "Queue" = "Transparent" }
+        Pass
+        {
+            Name "Gsac"
+            Tags { "LightMode" = "ForwardOnly" }
+            ZWrite Off
+            ZTest LEqual
+            Cull Off
+            Blend One OneMinusSrcAlpha
+
+            HLSLPROGRAM
+            #pragma target 4.5
+            #pragma vertex Vertex
+            #pragma fragment Fragment
+            #include "Packages/com.unity.render-pipelines.core/ShaderLibrary/Common.hlsl"
+            #include "Packages/com.unity.render-pipelines.high-definition/Runtime/ShaderLibrary/ShaderVariables.hlsl"
+            #include "GsacTrained.hlsl"
+
+            GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
+            {
+                return GsacLaid(vertex, UNITY_MATRIX_P);
+            }
+
+            GsacLaidPixel Fragment(GsacLaidVaryings input)
+            {
+                return GsacLay(input, UNITY_MATRIX_P, float3(0, 0, 0), float2(0, 0));
+            }
+            ENDHLSL
+        }
+    }
+
+    SubShader
+    {
+        PackageRequirements { "com.unity.render-pipelines.universal": "12.0.0" }
+        Tags { "RenderPipeline" = "UniversalPipeline" "RenderType" = "Transparent" "Queue" = "Transparent" }
+        Pass
+        {
+            Name "Gsac"
+            Tags { "LightMode" = "UniversalForward" }
+            ZWrite Off
+            ZTest LEqual
+            Cull Off
+            Blend One OneMinusSrcAlpha
+
+            HLSLPROGRAM
+            #pragma target 4.5
+            #pragma vertex Vertex
+            #pragma fragment Fragment
+            #pragma multi_compile_fog
+            #include "Packages/com.unity.render-pipelines.universal/ShaderLibrary/Core.hlsl"
+            #define GSAC_FOGGED(colour, z) MixFog(colour, ComputeFogFactor(z))
+            #include "GsacTrained.hlsl"
+
+            GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
+            {
+                return GsacLaid(vertex, UNITY_MATRIX_P);
+            }
+
+            Texture2D<float4> _CameraOpaqueTexture;
+
+            GsacLaidPixel Fragment(GsacLaidVaryings input)
+            {
+                float2 size;
+                _CameraOpaqueTexture.GetDimensions(size.x, size.y);
+                float3 behind = _CameraOpaqueTexture.Sample(GsacLinearClampSampler, input.clip.xy / _ScaledScreenParams.xy).rgb;
+                return GsacLay(input, UNITY_MATRIX_P, behind, size);
+            }
+            ENDHLSL
+        }
+    }
+
+    SubShader
+    {
+        Tags { "RenderType" = "Transparent" "Queue" = "Transparent" }
+        GrabPass { "GsacBehind" }
+        Pass
+        {
+            Name "Gsac"
+            ZWrite Off
+            ZTest LEqual
+            Cull Off
+            Blend One OneMinusSrcAlpha
+
+            HLSLPROGRAM
+            #pragma target 4.5
+            #pragma vertex Vertex
+            #pragma fragment Fragment
+            #pragma multi_compile_fog
+            #include "UnityCG.cginc"
+            #include "GsacFogBuiltIn.hlsl"
+            #include "GsacTrained.hlsl"
+
+            GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
+            {
+                return GsacLaid(vertex, UNITY_MATRIX_P);
+            }
+
+            Texture2D<float4> GsacBehind;
+
+            GsacLaidPixel Fragment(GsacLaidVaryings input)
+            {
+                float2 size;
+                GsacBehind.GetDimensions(size.x, size.y);
+                float3 behind = GsacBehind.Sample(GsacLinearClampSampler, input.clip.xy / _ScreenParams.xy).rgb;
+                return GsacLay(input, UNITY_MATRIX_P, behind, size);
+            }
+            ENDHLSL
+        }
+    }
+}
