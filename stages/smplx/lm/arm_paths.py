@@ -140,7 +140,9 @@ class ArmPaths:
     def measure_motion(self, t: int, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Cost (...) of the motion from frame t - 1 to t. before, after: (..., 3, 3, 3) rotations."""
         angle = measure_turns(before[..., :2, :, :], after[..., :2, :, :])
-        gap = self.alone.seen.seconds[t] - self.alone.seen.seconds[t - 1]
+        seconds = self.alone.seen.seconds
+        assert seconds is not None  # without times no arm moves
+        gap = seconds[t] - seconds[t - 1]
         return robust(angle / gap / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1)
 
     def place(self, t: int, poses: np.ndarray) -> np.ndarray:
@@ -210,7 +212,7 @@ def list_poses(side: int) -> np.ndarray:
 
 
 def measure_turns(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Angles (...) rad between rotations (..., 3, 3)."""
+    """Angles (...) rad between rotations before (..., 3, 3) and after (..., 3, 3)."""
     return np.arccos(np.clip((np.einsum("...ab,...ab->...", before, after) - 1) / 2, -1, 1))
 
 
@@ -224,6 +226,7 @@ def measure_gap(start: np.ndarray, end: np.ndarray, places: np.ndarray) -> np.nd
 def look_around(alone: Problem, state: State, side: int, height: float) -> list[Around]:
     """What each frame shows around an arm. height: px, of the person."""
     body, offsets, out = alone.body, alone.person_offsets, []
+    assert offsets is not None  # only an arm's or a hand's own problem may lack them
     arm = np.asarray(body.weights)[:, [*ARM_JOINTS[side, 1:], *np.arange(J)[HANDS[side]]]].sum(1) > 0.5
     faces = body.faces[~arm[body.faces].any(1)]
     surface = np.unique(faces)[::6]

@@ -2,8 +2,8 @@
 
 An arm is doubtful where its points lie elsewhere for some frames, or in one in which the mask shows a limb that the body does not
 cover, where its hand is seen although it lies inside the trunk, where its hand has moved while nothing told where it was, or where
-its hand is out of sight for more of a turn than a trunk covers. It is then searched again from the poses that people take; one that
-explains points and mask much better takes its place.
+its hand is out of sight for more of a turn than a trunk covers. Its path is then searched among all that arms can do; one that
+explains the pictures much better takes its place.
 T frames; sides are 0 left, 1 right.
 """
 
@@ -55,8 +55,8 @@ DEEP = 0.03
 STEPS = 8
 """Steps from the cheapest path on."""
 CLEARLY = 20.0
-"""By how much the cost must fall: by 73 on where a hand is seen on the back and fitted inside the trunk or before the belly, by 6
-at most where nothing tells where a hand is."""
+"""By how much the cost must fall before an arm takes another path; and by how much a finer fit to the points may cost more than its
+path, which knows them only roughly."""
 
 
 def find_contradicted(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray) -> np.ndarray:
