@@ -17,15 +17,16 @@ def write_metrics(folder: Path, entries: Iterable[Entry]) -> None:
     """Writes the file whole or not at all."""
     entries = list(entries)
     count = Counter(entry.status for entry in entries)
-    seconds = Counter({entry.status: 0.0 for entry in entries})
-    for entry in entries:
-        seconds[entry.status] += entry.seconds
     lines = ["# HELP gsac_batch_clips Clips of the batch by what became of them.", "# TYPE gsac_batch_clips gauge"]
     lines += [f'gsac_batch_clips{{status="{status.value}"}} {count[status]}' for status in Status]
     lines += ["# HELP gsac_batch_seconds Time by the clock that runs of clips took.", "# TYPE gsac_batch_seconds gauge"]
-    lines += [f'gsac_batch_seconds{{status="{status.value}"}} {seconds[status]:.3f}' for status in Status]
+    lines += [f'gsac_batch_seconds{{status="{status.value}"}} {_seconds(entries, status):.3f}' for status in Status]
     lines += ["# HELP gsac_batch_killed Runs of clips that a signal ended.", "# TYPE gsac_batch_killed gauge",
               f"gsac_batch_killed {sum(entry.killed for entry in entries)}"]
     lines += ["# HELP gsac_batch_written_seconds When this was written, in Unix time.", "# TYPE gsac_batch_written_seconds gauge",
               f"gsac_batch_written_seconds {time.time():.0f}"]
     write_text(folder / FILE, "\n".join(lines) + "\n")
+
+
+def _seconds(entries: list[Entry], status: Status) -> float:
+    return sum(entry.seconds for entry in entries if entry.status is status)

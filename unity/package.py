@@ -193,16 +193,6 @@ def _folders(paths: Iterable[str]) -> list[str]:
     return sorted({str(parent) for path in paths for parent in PurePosixPath(path).parents} - {"."})
 
 
-def _manifest(version: str) -> bytes:
-    return json.dumps({
-        "name": PACKAGE, "version": version, "displayName": "GSAC Avatar", "unity": "2021.3",
-        "description": "Animatable Gaussian avatars: import a .gsac file, animate it as a Humanoid, in any render pipeline.",
-        "keywords": ["gaussian splatting", "avatar", "humanoid"],
-        "dependencies": {"com.unity.modules.animation": "1.0.0", "com.unity.modules.imgui": "1.0.0",
-                         "com.unity.modules.physics": "1.0.0"},
-        "samples": [{"displayName": "Demo", "path": f"{SAMPLES}/Demo",
-                     "description": "This person with buttons for poses, clips and expressions; and the benchmark scene."}],
-    }, indent=2).encode() + b"\n"
 def _manifest(content: bytes, version: str) -> bytes:
     return json.dumps(json.loads(content) | {"version": version}, indent=2).encode() + b"\n"
 

@@ -8,6 +8,7 @@ the cache. A clip that kills its process is tried once more; then it is set asid
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import socket
 import time
@@ -49,7 +50,7 @@ class RayExecutor:
         os.environ.setdefault("RAY_raylet_start_wait_time_s", "180")  # a busy machine takes its time
         refuse_deaf(limits.address)
         try:
-            ray.init(address=limits.address, logging_level="error", log_to_driver=False, include_dashboard=False)
+            ray.init(address=limits.address, logging_level=logging.ERROR, log_to_driver=False, include_dashboard=False)
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise BadInput(f"--address {limits.address}: no Ray cluster answers there ({error}); start one with "
                            "`ray start --head`, or leave --address out") from error
