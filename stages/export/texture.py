@@ -111,7 +111,7 @@ def fill_gaps(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
     The nearest get the colour of their own chart. picture: (S, S, 3) float32 in 0..1, 0 where nothing is known, used
     up; S: a power of two; known: (S, S) bool. Returns (S, S, 3) uint8.
     """
-    levels = [(picture, _grow(picture, known))]
+    levels = [(picture, _grow(picture, known, GUTTER))]
     while len(levels[-1][1]) > 1 and not levels[-1][1].all():
         levels.append(_halve(*levels[-1]))
     coarse = levels[-1][0]
@@ -124,11 +124,11 @@ def fill_gaps(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 @own_kernel(nogil=True)
-def _grow(picture, known):  # noqa: ANN001, ANN202
-    """Gives texels beside known ones, GUTTER deep, their neighbours' mean, in place. Returns what is known then."""
+def _grow(picture, known, deep):  # noqa: ANN001, ANN202
+    """Gives texels beside known ones, so many deep, their neighbours' mean, in place. Returns what is known then."""
     S = len(known)
     ring = known.astype(np.uint8)
-    for depth in range(2, 2 + GUTTER):
+    for depth in range(2, 2 + deep):
         for row in range(S):
             for column in range(S):
                 if ring[row, column]:
