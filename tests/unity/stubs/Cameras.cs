@@ -13,8 +13,8 @@ namespace UnityEngine
         public Color backgroundColor { get; set; }
         public bool allowHDR { get; set; }
         public bool allowMSAA { get; set; }
-        public float nearClipPlane { get; set; }
-        public float farClipPlane { get; set; }
+        public float nearClipPlane { get; set; } = 0.01f;
+        public float farClipPlane { get; set; } = 1000;
         public float fieldOfView { get; set; }
         public bool orthographic { get; set; }
         public float orthographicSize { get; set; }
@@ -25,12 +25,21 @@ namespace UnityEngine
     {
         /// <summary>Not Unity's: lowest row first.</summary>
         public Color32[] Pixels;
-        public readonly int Width;
+        public int width { get; private set; }
+        public int height { get; private set; }
         public static RenderTexture active { get; set; }
         public RenderTexture(int width, int height, int depth)
         {
-            Width = width;
+            this.width = width;
+            this.height = height;
             Pixels = new Color32[width * height];
+        }
+        public RenderTexture(int width, int height, int depth, RenderTextureFormat format, RenderTextureReadWrite readWrite)
+        {
+            if (width <= 0 || height <= 0) throw new ArgumentException("a picture of " + width + " x " + height);
+            this.width = width;
+            this.height = height;
+            Made.Add(this);
         }
     }
 

@@ -71,21 +71,6 @@ namespace UnityEngine
     public enum RenderTextureFormat { ARGBHalf = 2, RHalf = 15 }
     public enum RenderTextureReadWrite { Linear = 1 }
 
-    public sealed class RenderTexture : Texture
-    {
-        public int width { get; private set; }
-        public int height { get; private set; }
-        public RenderTexture(int width, int height, int depth, RenderTextureFormat format, RenderTextureReadWrite readWrite)
-        {
-            if (width <= 0 || height <= 0) throw new ArgumentException("a picture of " + width + " x " + height);
-            this.width = width;
-            this.height = height;
-            Made.Add(this);
-        }
-    }
-
-    public class Texture : Object { }
-
     public static class GL
     {
         public static Matrix4x4 GetGPUProjectionMatrix(Matrix4x4 proj, bool renderIntoTexture)
@@ -168,8 +153,6 @@ namespace UnityEngine
         public int cullingMask { get; set; } = -1;
         public int pixelHeight { get; internal set; } = 1080;
         public int pixelWidth { get { return 1920; } }
-        public float nearClipPlane { get { return 0.01f; } }
-        public float farClipPlane { get { return 1000; } }
         public Rect rect { get; internal set; } = new Rect(0, 0, 1, 1);
         public bool stereoEnabled { get { return EyeFocal != null; } }
         public Matrix4x4 projectionMatrix { get; set; } = Lens(1, 1.7320508f);

@@ -29,13 +29,13 @@ namespace UnityEngine
             var holder = o as GameObject;
             if (!ReferenceEquals(holder, null))
             {
-                foreach (Component c in holder.Components)
+                foreach (Component c in new List<Component>(holder.Components))
                 {
                     Player.Call(c, "OnDisable");
                     Player.Call(c, "OnDestroy");
                     c.Destroyed = true;
                 }
-                foreach (Transform child in holder.transform.Children) End(child.gameObject);
+                foreach (Transform child in new List<Transform>(holder.transform.Children)) End(child.gameObject);
             }
             o.Destroyed = true;
         }
