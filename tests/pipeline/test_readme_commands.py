@@ -89,8 +89,8 @@ def test_readmes_commands_in_their_order_work_and_change_no_file_that_was_there_
         assert code == 0, (words, said)
         assert mine.items() <= contents(home).items(), words
     made = contents(home)
-    assert made.keys() - mine.keys() == {"clip-avatar-dance.mp4", "clip-avatar.zip"}
+    assert made.keys() - mine.keys() == {"clip-avatar-dance.mp4", "clip-avatar.vrm", "clip-avatar.zip"}
     for words in commands():
         code, said = run(toy, home, words)
-        assert (code, "--force" in said) == ((2, True) if words[0] in ("render", "pack") else (0, False)), (words, said)
+        assert (code, "--force" in said) == ((2, True) if words[0] in ("render", "convert", "pack") else (0, False)), (words, said)
     assert contents(home) == made
