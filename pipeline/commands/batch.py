@@ -106,7 +106,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     page = BatchPage(arguments.out, jobs)
     for job, earlier in kept.items():
         record.keep(job, earlier, earlier.status if arguments.resume else Status.KEPT)
-        page.keep(job)
+        page.keep(job, earlier.error)
     record.plan(plans)
     work = ClipWork(project, configs, store, options, reporter, arguments.replace)
     unchanged = run_unchanged(work, [plan.job for plan in plans if plan.unchanged], planner.keys)

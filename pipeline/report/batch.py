@@ -104,9 +104,9 @@ class BatchPage:
         card = end_card(result)
         self._cards[result.job] = replace(card, changes=tuple(list_changes(card.figures, read_figures(before or {}))))
 
-    def keep(self, job: ClipJob) -> None:
-        """Takes in a clip that is left as it lies in its folder."""
-        self._cards[job] = make_card(job.out)
+    def keep(self, job: ClipJob, error: str) -> None:
+        """Takes in a clip that is left as the batch before has left it. error: why it failed there; empty where it did not."""
+        self._cards[job] = failed_card(job, error) if error and Results(job.out).failed is None else make_card(job.out)
 
     @property
     def is_due(self) -> bool:
@@ -152,8 +152,13 @@ def end_card(result: ClipResult) -> Card:
     recorded = Results(result.job.out).failed
     if result.code == ExitCode.OK or (recorded is not None and recorded[0] in failed):
         return make_card(result.job.out)
-    why = result.error.replace(str(result.job.clip), result.job.clip.name).replace(f"{result.job.out.parent}{os.sep}", "")
-    return Card(result.job.clip.name, result.job.out.name, Outcome.FAILED, why)
+    return failed_card(result.job, result.error)
+
+
+def failed_card(job: ClipJob, error: str) -> Card:
+    """Of a clip whose failure no folder records. error: its sentence; the page leaves out where files lie."""
+    why = error.replace(str(job.clip), job.clip.name).replace(f"{job.out.parent}{os.sep}", "")
+    return Card(job.clip.name, job.out.name, Outcome.FAILED, why)
 
 
 def make_card(folder: Path) -> Card:

@@ -107,6 +107,18 @@ def test_a_clip_that_was_refused_does_not_show_the_other_avatar_in_its_folder(ou
     assert "✕ Failed ada-avatar holds the avatar of /home/ada.mp4" in text and "<img" not in html and "href" not in html
 
 
+def test_clips_that_a_resumed_batch_leaves_keep_their_verdict_or_their_failure(out, tmp_path):
+    write_avatar(tmp_path / "ada-avatar", "ada.mp4", 0.97)
+    jobs = [ClipJob(Path(f"/elsewhere/{name}.mp4"), tmp_path / f"{name}-avatar") for name in ("ada", "cut")]
+    page = BatchPage(tmp_path, jobs)
+    for job, error in zip(jobs, ("", "stage split failed: /elsewhere/cut.mp4: not a video"), strict=True):
+        page.keep(job, error)
+    page.write()
+    cards = read_cards(tmp_path / "batch.html")
+    assert "✓ Good" in cards["ada.mp4"][0] and "✕ Failed stage split failed: cut.mp4: not a video" in cards["cut.mp4"][0]
+    assert "1 of 2 clips are done, 1 failed." in (tmp_path / "batch.html").read_text()
+
+
 def test_an_unreadable_report_costs_its_own_verdict_only(tmp_path):
     write_avatar(tmp_path / "ada-avatar", "ada.mp4", 0.97)
     write_run(tmp_path / "old-avatar", "old.mp4", {"name": "train", "status": "ran"})
