@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from gsac.pipeline.batch_entry import Entry, Status, status_of
-from gsac.pipeline.batch_metrics import write_metrics
+from gsac.pipeline.batch_metrics import refuse_foreign, write_metrics
 from gsac.pipeline.batch_plan import ClipPlan
 from gsac.pipeline.executors.executor import ClipJob, ClipResult
 from gsac.pipeline.rows import read_json
-from gsac.pipeline.run_folder import write_text
+from gsac.pipeline.run_folder import RUN, write_text
 from gsac.stages.contract import BadInput
 
 FILE = "batch.json"
@@ -26,24 +26,39 @@ class BatchRecord:
     """The file batch.json in the folder of a batch."""
 
     def __init__(self, folder: Path, request: dict[str, Any]):
-        """request: the words of the command that `--resume` needs. Raises BadInput where another's file has that name."""
+        """request: the words of the command that `--resume` needs. Raises BadInput where another's file has its name, or
+        that of its counters."""
         self.path = folder.absolute() / FILE
         self.request = request
         self.entries: dict[ClipJob, Entry] = {}
         self._written = 0.0
-        self._before = {entry.out: entry for entry in read_entries(self.path)}
+        self._before = {(entry.clip, entry.out): entry for entry in read_entries(self.path)}
+        self._reached = read_request(self.path).get("until") if self._before else None
+        refuse_foreign(self.path.parent)
 
     def plan(self, plans: list[ClipPlan]) -> None:
         """Notes the clips before any of them runs."""
         for plan in plans:
-            before = self._before.get(str(plan.job.out))
+            before = self.earlier(plan.job)
             self.entries[plan.job] = Entry(str(plan.job.clip), str(plan.job.out), digest=plan.digest,
                                            before=before.metrics if before is not None and before.digest == plan.digest else {})
         self.write(now=True)
 
     def earlier(self, job: ClipJob) -> Entry | None:
-        """What the batch before has said of a clip."""
-        return self._before.get(str(job.out))
+        """What the batch before has said of a clip in this folder."""
+        return self._before.get((str(job.clip), str(job.out)))
+
+    def ended(self, job: ClipJob) -> Entry | None:
+        """What the batch before has made of a clip; None where it has not ended, or where its results are gone."""
+        entry = self.earlier(job)
+        there = entry is not None and entry.status.is_end and (entry.status is Status.FAILED or (job.out / RUN).is_file())
+        return entry if there else None
+
+    def unchanged(self, plan: ClipPlan) -> Entry | None:
+        """The same where the clip was done as far as it is asked for now, and its file is as it was."""
+        entry = self.ended(plan.job)
+        same = entry is not None and entry.status is not Status.FAILED and self._reached == self.request["until"]
+        return entry if same and entry is not None and entry.digest == plan.digest else None
 
     def end(self, result: ClipResult) -> None:
         """Notes the end of a clip."""

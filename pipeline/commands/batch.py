@@ -81,6 +81,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     check_executor(arguments.executor)
     if arguments.address is not None and arguments.executor != "ray":
         raise BadInput(f"--address {arguments.address}: only --executor ray has one")
+    if arguments.jobs is not None and arguments.executor == "ray":
+        raise BadInput(f"--jobs {arguments.jobs}: on a cluster as many clips run at once as it has room for; leave it out")
     project = Project.at_hand()
     configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
     options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
@@ -89,17 +91,15 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     planner.keys.check(planner.steps)  # one error now, not one a clip
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
     record = BatchRecord(arguments.out, request)
-    kept = {job: earlier for job in jobs if (earlier := record.earlier(job)) is not None
-            and arguments.resume and earlier.status.is_end}
+    kept = {job: earlier for job in jobs if arguments.resume and (earlier := record.ended(job)) is not None}
     plans = planner.plan_all(job for job in jobs if job not in kept)
     if arguments.changed_only:
-        kept |= {plan.job: earlier for plan in plans if (earlier := record.earlier(plan.job)) is not None
-                 and earlier.status in (Status.DONE, Status.UNCHANGED, Status.KEPT) and earlier.digest == plan.digest}
+        kept |= {plan.job: earlier for plan in plans if (earlier := record.unchanged(plan)) is not None}
         plans = [plan for plan in plans if plan.job not in kept]
     workers = arguments.jobs or count_workers(planner.keys)
     limits = Limits(workers, arguments.memory * 1024 if arguments.memory else SHARE * machine_mb(), arguments.address)
     due = [plan for plan in plans if not plan.unchanged]
-    reporter.note(foretell(plans, len(kept), workers))
+    reporter.note(foretell(plans, len(kept), None if arguments.executor == "ray" else workers))
     if arguments.dry_run:
         return dry_run(plans, reporter, arguments.json)
     planner.keys.pull_models({stage for plan in due for stage in plan.due}, reporter.note)
@@ -156,17 +156,21 @@ def count_workers(keys: Keys) -> int:
     return 1 if keys.device == "cuda" else max(1, (os.cpu_count() or 1) // 2)
 
 
-def foretell(plans: list[ClipPlan], kept: int, workers: int) -> str:
-    """The line before the start: how many clips need what, and how long it may take."""
+def foretell(plans: list[ClipPlan], kept: int, workers: int | None) -> str:
+    """The line before the start: how many clips need what, and how long it may take. workers: None where a cluster decides."""
     due = [plan for plan in plans if plan.due]
     unchanged = sum(plan.unchanged for plan in plans)
     parts = [f"{len(plans) + kept} clips"]
     parts += [f"{unchanged} unchanged"] if unchanged else []
     parts += [f"{kept} left as they are"] if kept else []
     parts += [f"{broken} cannot be read"] if (broken := sum(bool(plan.error) for plan in plans)) else []
-    seconds = sum(plan.seconds for plan in due) / max(1, min(workers, len(due)))
-    work = f"{len(due)} to do, {min(workers, len(due))} at once" + (f", about {duration(seconds)}" if seconds else "")
-    return ", ".join([*parts, work if due else "nothing to do"])
+    if not due:
+        return ", ".join([*parts, "nothing to do"])
+    at_once = min(workers or 1, len(due))
+    seconds = sum(plan.seconds for plan in due) / at_once
+    where = f"{at_once} at once" if workers is not None else "on the cluster"
+    time = f"about {duration(seconds)}{'' if workers is not None else ' one after another'}" if seconds else ""
+    return ", ".join([*parts, f"{len(due)} to do", where, *filter(None, [time])])
 
 
 def dry_run(plans: list[ClipPlan], reporter: PlainReporter, json: bool) -> ExitCode:

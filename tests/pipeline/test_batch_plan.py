@@ -1,6 +1,7 @@
 """gsac batch plans in one process: what is unchanged costs none, what was stopped goes on, what failed is known."""
 
 import json
+import shutil
 import signal
 
 import pytest
@@ -86,6 +87,14 @@ def test_changed_only_leaves_clips_whose_file_is_the_same_though_parameters_are_
     assert statuses(whole) == {"one": "done", "two": "unchanged", "three": "done"}
 
 
+def test_changed_only_does_not_leave_a_clip_that_ended_earlier_than_asked_for_or_whose_results_are_gone(toy, clips, out):
+    toy.gsac("batch", clips, "--out", out, "--until", "left")
+    assert set(statuses(toy.gsac("batch", clips, "--out", out, "--changed-only", "--json")).values()) == {"done"}
+    shutil.rmtree(out / "one-avatar")
+    again = statuses(toy.gsac("batch", clips, "--out", out, "--changed-only", "--json"))
+    assert again == {"one": "unchanged", "two": "kept", "three": "kept"} and (out / "one-avatar" / "join" / "out.txt").exists()
+
+
 def test_force_and_from_reach_every_clip(toy, clips, out):
     toy.gsac("batch", clips, "--out", out)
     ran = toy.runs.count("left")
@@ -109,8 +118,13 @@ def test_clips_together_take_no_more_memory_than_may_be_filled(toy, clips, out, 
     assert toy.runs == everything * 3, "clips that together would take more run one after another"
 
 
-def test_a_batch_json_of_another_program_is_never_written_over(toy, clips, out):
+def test_files_of_others_by_the_names_of_its_own_are_never_written_over(toy, clips, out):
     out.mkdir()
     (out / "batch.json").write_text('{"mine": 1}')
     done = toy.gsac("batch", clips, "--out", out)
     assert done.code == 2 and "was not written by this version" in done.err and (out / "batch.json").read_text() == '{"mine": 1}'
+    (out / "batch.json").unlink()
+    (out / "batch.prom").write_text("mine")
+    done = toy.gsac("batch", clips, "--out", out)
+    assert done.code == 2 and "batch.prom was not written by" in done.err and (out / "batch.prom").read_text() == "mine"
+    assert toy.runs == []

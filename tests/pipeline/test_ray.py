@@ -84,4 +84,5 @@ def test_no_cluster_at_the_address_is_said_before_anything_runs(toy, clips):
     pytest.importorskip("ray", reason="needs ray: pip install 'gsac[ray]'")
     done = toy.gsac("batch", clips, "--executor", "ray", "--address", "127.0.0.1:1")
     assert done.code == 2 and "no Ray cluster answers there" in done.err and toy.runs == []
+    assert "as many clips run at once as it has room for" in toy.gsac("batch", clips, "--executor", "ray", "-j", "2").err
     assert "only --executor ray has one" in toy.gsac("batch", clips, "--address", "127.0.0.1:1").err
