@@ -37,11 +37,25 @@ def find_modules(text: str) -> list[str]:
 
 
 def write_package(folder: Path) -> None:
-    """Writes the package's files into a folder, which is made."""
+    """Writes the package's files into a folder, which is made. FileExistsError where it holds a file that is none of them."""
+    files = package_files()
+    foreign = sorted(path.name for path in folder.iterdir() if path.name not in files) if folder.is_dir() else []
+    if foreign or (folder.is_dir() and any(folder.iterdir()) and not (folder / WHOLE).is_file()):
+        raise FileExistsError(f"{folder} holds files of another ({', '.join(foreign[:3]) or 'package.json'}); give a folder that is "
+                              "new or empty, or one of an earlier package")
     folder.mkdir(parents=True, exist_ok=True)
-    for name, content in package_files().items():
+    for name, content in files.items():
         (folder / name).write_bytes(content)
 
 
+def main() -> None:
+    if len(sys.argv) != 2:
+        sys.exit("usage: python -m gsac.viewer.package FOLDER")
+    try:
+        write_package(Path(sys.argv[1]))
+    except OSError as error:
+        sys.exit(str(error))
+
+
 if __name__ == "__main__":
-    write_package(Path(sys.argv[1]))
+    main()

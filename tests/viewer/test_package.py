@@ -242,3 +242,15 @@ def test_threes_scene_shows_what_the_element_shows_and_what_is_nearer_hides_it(f
     assert (core & person).sum() > 0.8 * person.sum()
     assert np.abs(seen["wall before"][person] - (255, 0, 255)).max() <= 2
     assert page.errors == []
+
+
+def test_a_folder_with_files_of_another_is_never_written_over_and_an_earlier_package_is(tmp_path):
+    write_package(tmp_path / "mine")
+    write_package(tmp_path / "mine")
+    for name in ("package.json", "notes.txt"):
+        theirs = tmp_path / name.partition(".")[0]
+        theirs.mkdir()
+        (theirs / name).write_text("theirs")
+        with pytest.raises(FileExistsError, match="holds files of another"):
+            write_package(theirs)
+        assert [path.name for path in theirs.iterdir()] == [name] and (theirs / name).read_text() == "theirs"
