@@ -41,7 +41,7 @@ def write_package(folder: Path) -> None:
     files = package_files()
     foreign = sorted(path.name for path in folder.iterdir() if path.name not in files) if folder.is_dir() else []
     if foreign or (folder.is_dir() and any(folder.iterdir()) and not (folder / WHOLE).is_file()):
-        raise FileExistsError(f"{folder} holds files of another ({', '.join(foreign[:3]) or 'package.json'}); give a folder that is "
+        raise FileExistsError(f"{folder} holds files of others ({', '.join(foreign[:3]) or 'package.json'}); give one that is "
                               "new or empty, or one of an earlier package")
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():

@@ -251,6 +251,6 @@ def test_a_folder_with_files_of_another_is_never_written_over_and_an_earlier_pac
         theirs = tmp_path / name.partition(".")[0]
         theirs.mkdir()
         (theirs / name).write_text("theirs")
-        with pytest.raises(FileExistsError, match="holds files of another"):
+        with pytest.raises(FileExistsError, match="holds files of others"):
             write_package(theirs)
         assert [path.name for path in theirs.iterdir()] == [name] and (theirs / name).read_text() == "theirs"
