@@ -34,9 +34,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("jobs", type=int, metavar="JOBS", help="to be planned")
     options = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as folder:
+        borrow_models(Path(folder, "cache"))
         project, store = Project.at_hand(), Store(Path(folder, "cache"))
-        Path(store.root, "models").rmdir()
-        Path(store.root, "models").symlink_to(Store.open().root / "models")
         configs = resolve(project)
         clips = make_clips(Path(folder), options.clips, KeysOfOneMoment(project, configs, store), store)
         jobs = [ClipJob(clips[n % len(clips)], Path(folder, f"{n}-avatar")) for n in range(options.jobs)]
@@ -48,6 +47,12 @@ def main(argv: list[str] | None = None) -> int:
     print(f"{len(plans):,} jobs of {len(clips):,} clips, {sum(plan.unchanged for plan in plans):,} unchanged: {took:.1f} CPU s, "
           f"{1000 * took / len(plans):.2f} ms each; {peak / 1024:.0f} MB at most, {before / 1024:.0f} before")
     return 0
+
+
+def borrow_models(cache: Path) -> None:
+    """Makes a cache with the model files of the user's own, and nothing else."""
+    cache.mkdir()
+    (cache / "models").symlink_to(Store.open().root / "models")
 
 
 def make_clips(folder: Path, count: int, keys: KeysOfOneMoment, store: Store) -> list[Path]:

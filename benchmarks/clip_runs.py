@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.store import Store
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import RunFolder
 
@@ -17,7 +17,7 @@ HEIGHT = 1280
 """Height of rendered clips, px."""
 
 
-def render_clip(folder: Path, say: PlainReporter, **options: Any) -> Path:
+def render_clip(folder: Path, say: Journal, **options: Any) -> Path:
     """Renders a truth clip into the folder unless it is there. options: of the turntable. Returns the folder."""
     if not (folder / "truth.npz").is_file():
         from gsac.turntable.clip import make_clip
@@ -27,7 +27,7 @@ def render_clip(folder: Path, say: PlainReporter, **options: Any) -> Path:
     return folder
 
 
-def run_clip(folder: Path, out: Path, stages: Iterable[str], store: Store, say: PlainReporter,
+def run_clip(folder: Path, out: Path, stages: Iterable[str], store: Store, say: Journal,
              settings: tuple[str, ...] = ()) -> RunFolder:
     """Runs the folder's clip.mp4, or the folder itself where it holds photos, up to each of the stages, with results from the
     store where it has them.

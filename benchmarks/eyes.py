@@ -7,7 +7,6 @@ clip is fitted with the points of the own network, of the other, and with the tr
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from gsac.avatar.network_files import model_path
 from gsac.benchmarks.fit.clips import FitCase, prepare_case, render_seed
 from gsac.benchmarks.fit.score import joint_distances, score
 from gsac.cache.store import Store
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.journal import plain_journal
 from gsac.stages.contract import Job
 from gsac.stages.smplx.detector_errors import FILES
 
@@ -40,7 +39,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="*", default=[101, 102, 103], help="turntable clips (default: 101 102 103)")
     parser.add_argument("--clips", type=Path, nargs="*", default=[], metavar="DIR", help="truth clips at hand")
     parser.add_argument("--out", type=Path, required=True)
-    options, say, store = parser.parse_args(), PlainReporter(sys.stderr), Store.open()
+    options, say, store = parser.parse_args(), plain_journal(), Store.open()
     folders = [render_seed(options.out / "clips" / f"seed{seed}", seed, say) for seed in options.seeds] + options.clips
     print("clip", "points", *SCORES, sep=",")
     for folder in folders:

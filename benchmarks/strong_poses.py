@@ -7,12 +7,11 @@ hands on hips, once more from half the distance; every pose is moved onto its im
 from __future__ import annotations
 
 import argparse
-import sys
 
 from gsac.benchmarks import training
 from gsac.benchmarks.clip_runs import render_clip
 from gsac.benchmarks.speed_accuracy.novel_poses import judge_poses
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.journal import plain_journal
 
 DISTANCES = {"strong": 1.0, "near": 0.5}
 """Name of the pictures -> distance of their camera, as a factor."""
@@ -26,7 +25,7 @@ def main() -> None:
                                      description="Avatars in strong poses that no clip shows.")
     training.declare(parser, "strong-poses")
     parser.add_argument("--views", type=int, default=12, metavar="N", help="pictures from each distance (default: 12)")
-    options, say = parser.parse_args(), PlainReporter(sys.stderr)
+    options, say = parser.parse_args(), plain_journal()
     if options.run:
         parser.error("--run has no truth in other poses; give --seeds")
     columns = [name.format(kind) for kind in DISTANCES for name in FIGURES]

@@ -20,7 +20,7 @@ import numpy as np
 
 from gsac.benchmarks.clip_runs import render_clip, run_clip
 from gsac.cache.store import Store
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.rows import read_json, rows_of
 from gsac.pipeline.run_folder import RUN
 from gsac.pipeline.timings import add_timings
@@ -53,7 +53,7 @@ def declare(parser: argparse.ArgumentParser, name: str) -> None:
     parser.add_argument("--out", type=Path, default=Path(f"bench-{name}"), metavar="DIR", help=f"default: ./bench-{name}")
 
 
-def prepare_cases(options: argparse.Namespace, say: PlainReporter, novel: int = 0, exact: bool = False, variant: str = "",
+def prepare_cases(options: argparse.Namespace, say: Journal, novel: int = 0, exact: bool = False, variant: str = "",
                   settings: tuple[str, ...] = ()) -> list[Case]:
     """The clips of the options, rendered and fitted unless they are kept.
 
@@ -175,7 +175,7 @@ def clip_folder(out: Path, name: str) -> Path:
     return out / "clips" / name
 
 
-def fit_clip(out: Path, folder: Path, variant: str, say: PlainReporter, settings: tuple[str, ...] = ()) -> Case:
+def fit_clip(out: Path, folder: Path, variant: str, say: Journal, settings: tuple[str, ...] = ()) -> Case:
     """Runs a truth clip up to the body fit.
 
     folder: of the clip; variant: name of the settings, empty for the defaults; settings: `stage.key=value`.

@@ -17,7 +17,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from gsac.cache.digest import file_digest
+from gsac.cache.digest import content_digest
 from gsac.cache.errors import CacheError
 from gsac.cache.memo import Memo, memo_in
 from gsac.cache.module_digest import read_source
@@ -61,7 +61,7 @@ def code_parts(
         parts[name], named = _module(file, name if is_package else name.rpartition(".")[0], memo)
         for reference in named:
             if reference.endswith(FILE_SUFFIXES) and (file.parent / reference).is_file():  # `gsac.js` too is a file, not a module
-                parts[f"{name}/{reference}"] = file_digest(file.parent / reference, memo)
+                parts[f"{name}/{reference}"] = content_digest(file.parent / reference, memo)
             elif reference.startswith(FIRST_PARTY + "."):
                 waiting.append(reference)
     memo.flush()

@@ -30,7 +30,7 @@ def canonical(value: Any) -> bytes:
 def file_digest(path: Path, memo: Memo | None = None) -> str:
     """Plain sha256 of a file's content, remembered by its stat (in the default store unless a memo is given)."""
     memo = memo or memo_in(default_root())
-    digest = _file_digest(Path(path), memo)
+    digest = content_digest(Path(path), memo)
     memo.flush()
     return digest
 
@@ -41,7 +41,7 @@ def tree_digest(path: Path, memo: Memo | None = None) -> tuple[str, Manifest]:
     Links to files are followed; links to folders and special files raise CacheError. Empty folders do not count.
     """
     memo = memo or memo_in(default_root())
-    manifest = {name: [_file_digest(file, memo), file.stat().st_size] for name, file in sorted(tree_files(Path(path)).items())}
+    manifest = {name: [content_digest(file, memo), file.stat().st_size] for name, file in sorted(tree_files(Path(path)).items())}
     memo.flush()
     return manifest_digest(manifest), manifest
 
@@ -75,7 +75,8 @@ def tree_files(path: Path) -> dict[str, Path]:
     return files
 
 
-def _file_digest(path: Path, memo: Memo) -> str:
+def content_digest(path: Path, memo: Memo) -> str:
+    """As `file_digest`, for callers that flush the memo themselves once they have asked for many files."""
     before = path.stat()
     known = memo.get("file", before)
     if known is not None:

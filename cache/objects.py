@@ -18,6 +18,8 @@ from gsac.cache.record import Footprint
 
 UNKNOWN = (errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 """errno of what a file system does not know how to do."""
+SYNCED_AT_ONCE = 8
+"""Files of a tree."""
 
 
 def object_name(digest: str, output: str) -> str:
@@ -88,12 +90,14 @@ def require_plain(path: Path, output: str) -> None:
 
 
 def sync(path: Path) -> None:
-    """fsync of every file and folder of a tree."""
+    """fsync of every file and folder of a tree; several at once, so that one commit of the file system's journal serves them."""
     if not path.is_dir():
         sync_one(path)
-    for folder, _, files in os.walk(path):
-        for name in [*files, ""]:
-            sync_one(Path(folder, name))
+        return
+    from concurrent.futures import ThreadPoolExecutor  # only where a tree is published: it is slow to import
+
+    with ThreadPoolExecutor(SYNCED_AT_ONCE) as pool:
+        list(pool.map(sync_one, (Path(folder, name) for folder, _, files in os.walk(path) for name in [*files, ""])))
 
 
 def sync_one(path: Path) -> None:

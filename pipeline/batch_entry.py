@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from gsac.pipeline.executors.executor import ClipResult
 from gsac.pipeline.outcomes import ExitCode
 
 
@@ -60,8 +59,8 @@ class Entry:
         return self.__dict__ | {"seconds": round(self.seconds, 3)}
 
 
-def status_of(result: ClipResult) -> Status:
-    """Of a clip whose run has ended."""
-    if result.code != ExitCode.OK:
+def status_of(code: int, unchanged: bool) -> Status:
+    """Of a clip whose run has ended. unchanged: whether all results were in the cache."""
+    if code != ExitCode.OK:
         return Status.FAILED
-    return Status.UNCHANGED if result.unchanged else Status.DONE
+    return Status.UNCHANGED if unchanged else Status.DONE

@@ -12,9 +12,8 @@ from gsac.pipeline.cost_forecast import Forecaster
 from gsac.pipeline.executors.executor import ClipJob
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import KeysOfOneMoment
-from gsac.pipeline.plan import Reason, StagePlan, plan_waiting
+from gsac.pipeline.plan import Reason, StagePlan, plan_stages
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import RunFolder
 from gsac.pipeline.sources import source_digest
@@ -67,7 +66,7 @@ class BatchPlanner:
         self.keys, self.store = KeysOfOneMoment(project, configs, store), store
         self._graph, self._force = project.graph, options.force
         nowhere = RunFolder(store.root)  # only asked for the stages
-        self.steps = ClipRun(project, configs, store, nowhere, PlainReporter(), self.keys).select(options)
+        self.steps = ClipRun(project, configs, store, nowhere, keys=self.keys).select(options)
         self._outputs = {name: project.outputs(name) for name in self.steps}
         self._forecaster = Forecaster(self.keys, store)
         self._peak_mb = functools.cache(lambda name: _peak_mb(name, store))
@@ -82,7 +81,7 @@ class BatchPlanner:
             digest = source_digest(job.clip, self.store)
         except BadInput as error:
             return ClipPlan(job, error=str(error))
-        plans = self._plan_stages(digest)
+        plans = plan_stages(self._graph, self.steps, {CLIP: digest}, self._plan)
         due = tuple(plan.stage for plan in plans if plan.cached is None)
         if not due:
             return ClipPlan(job, digest=digest)
@@ -93,22 +92,12 @@ class BatchPlanner:
         first = next((n for n, name in enumerate(self.steps) if name in due and self.keys.project.stage(name).uses_device), 0)
         return self.steps[first - 1] if first else ""
 
-    def _plan_stages(self, digest: str) -> list[StagePlan]:
-        """Like ClipRun.plan, without looking for what has changed since earlier runs."""
-        digests, plans = {CLIP: digest}, []
-        for name in self.steps:
-            deps = self._graph.step(name).deps
-            if any(port not in digests for port in deps):
-                plans.append(plan_waiting(name, []))
-                continue
-            parts = self.keys.parts(name, {port: digests[port] for port in deps})
-            record = self.store.lookup(parts.key, self._outputs[name])
-            forced = name in self._force
-            reason = Reason.FORCED if forced else Reason.FIRST_RUN if record is None else Reason.UP_TO_DATE
-            plans.append(StagePlan(name, reason, parts, record))
-            if record is not None and not forced:
-                digests |= {f"{name}/{output}": digest for output, digest in record.outputs.items()}
-        return plans
+    def _plan(self, name: str, inputs: dict[str, str]) -> StagePlan:
+        """Like ClipRun's, without looking for what has changed since earlier runs."""
+        parts = self.keys.parts(name, inputs)
+        record = self.store.lookup(parts.key, self._outputs[name])
+        reason = Reason.FORCED if name in self._force else Reason.FIRST_RUN if record is None else Reason.UP_TO_DATE
+        return StagePlan(name, reason, parts, record)
 
 
 def _peak_mb(name: str, store: Store) -> float:

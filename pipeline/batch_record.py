@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gsac.pipeline.batch_entry import Entry, Status, status_of
-from gsac.pipeline.batch_metrics import refuse_foreign, write_metrics
+from gsac.pipeline.batch_entry import Entry, Status
+from gsac.pipeline.batch_metrics import StageCounters, refuse_foreign, write_metrics
 from gsac.pipeline.batch_plan import ClipPlan
-from gsac.pipeline.executors.executor import ClipJob, ClipResult
+from gsac.pipeline.events import ClipEnded, ClipKept, ClipPlanned, Event
+from gsac.pipeline.executors.executor import ClipJob
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run_folder import RUN, write_text
 from gsac.stages.contract import BadInput
@@ -23,26 +25,37 @@ GAP_S = 2.0
 
 
 class BatchRecord:
-    """The file batch.json in the folder of a batch."""
+    """The file batch.json in the folder of a batch, and its counters: what the batch's journal tells, as it stands."""
 
-    def __init__(self, folder: Path, request: dict[str, Any]):
-        """request: the words of the command that `--resume` needs. Raises BadInput where another's file has its name, or
-        that of its counters."""
+    def __init__(self, folder: Path, request: dict[str, Any], jobs: Iterable[ClipJob]):
+        """jobs: all clips; request: the words of the command that `--resume` needs. Raises BadInput where another's file has its
+        name, or that of its counters."""
         self.path = folder.absolute() / FILE
         self.request = request
-        self.entries: dict[ClipJob, Entry] = {}
+        self.entries: dict[str, Entry] = {}
+        """By name of the clip."""
+        self._jobs = {job.name: job for job in jobs}
+        self._stages = StageCounters()
         self._written = 0.0
         self._before = {(entry.clip, entry.out): entry for entry in read_entries(self.path)}
         self._reached = read_request(self.path).get("until") if self._before else None
         refuse_foreign(self.path.parent)
 
-    def plan(self, plans: list[ClipPlan]) -> None:
-        """Notes the clips before any of them runs."""
-        for plan in plans:
-            before = self.earlier(plan.job)
-            self.entries[plan.job] = Entry(str(plan.job.clip), str(plan.job.out), digest=plan.digest,
-                                           before=before.metrics if before is not None and before.digest == plan.digest else {})
-        self.write(now=True)
+    def take(self, event: Event) -> None:
+        """Notes what becomes of a clip."""
+        self._stages.take(event)
+        if isinstance(event, ClipPlanned):
+            job = self._jobs[event.clip]
+            before = self.earlier(job)
+            self.entries[event.clip] = Entry(str(job.clip), str(job.out), digest=event.digest,
+                                             before=before.metrics if before is not None and before.digest == event.digest else {})
+        elif isinstance(event, ClipKept) and (before := self.earlier(self._jobs[event.clip])) is not None:
+            self.entries[event.clip] = replace(before, status=Status(event.status))
+        elif isinstance(event, ClipEnded):
+            entry = self.entries[event.clip]
+            entry.status, entry.code, entry.seconds = Status(event.status), event.code, event.seconds
+            entry.error, entry.killed, entry.metrics = event.error, event.killed, event.metrics
+            self.write()
 
     def earlier(self, job: ClipJob) -> Entry | None:
         """What the batch before has said of a clip in this folder."""
@@ -60,17 +73,10 @@ class BatchRecord:
         same = entry is not None and entry.status is not Status.FAILED and self._reached == self.request["until"]
         return entry if same and entry is not None and entry.digest == plan.digest else None
 
-    def end(self, result: ClipResult) -> None:
-        """Notes the end of a clip."""
-        entry = self.entries[result.job]
-        entry.status, entry.code = status_of(result), result.code
-        entry.seconds, entry.error = result.seconds, result.error
-        entry.killed, entry.metrics = result.killed, result.summary.get("metrics") or {}
-        self.write()
-
-    def keep(self, job: ClipJob, earlier: Entry, status: Status) -> None:
-        """Notes that a clip is left as the batch before has left it."""
-        self.entries[job] = replace(earlier, status=status)
+    @property
+    def failed(self) -> list[Entry]:
+        """Clips that failed."""
+        return [entry for entry in self.entries.values() if entry.status is Status.FAILED]
 
     def write(self, now: bool = False) -> None:
         """Writes the file whole or not at all, every few seconds while clips end."""
@@ -78,7 +84,7 @@ class BatchRecord:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             content = {"version": VERSION, "request": self.request, "clips": [entry.to_json() for entry in self.entries.values()]}
             write_text(self.path, json.dumps(content, indent=1) + "\n")
-            write_metrics(self.path.parent, self.entries.values())
+            write_metrics(self.path.parent, self.entries.values(), self._stages)
             self._written = time.monotonic()
 
 

@@ -2,55 +2,67 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
+from gsac.pipeline.events import ClipEnded, Event, Note, StageLine
 from gsac.pipeline.pace import duration
-from gsac.pipeline.reporter import PLAIN_GAP_S, PlainReporter, TerminalReporter
+from gsac.pipeline.reporter import PLAIN_GAP_S, TOLD, PlainReporter, TerminalReporter, words_of, words_of_clip
+from gsac.stages.counting import counted
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 
+WARNING = "gsac: warning: "
+"""Begin of a note that also a clip without work is heard with."""
 WORTH_S = 5.0
 """s before which a batch has no rate worth telling."""
 
 
 class BatchReporter(AbstractContextManager):
-    """Passes on what the clips' runs say, some lines of each; called from several threads."""
+    """Tells what the runs of clips are at, some lines of each, and how each ended."""
 
     def __init__(self, reporter: PlainReporter, clips: Mapping[str, float]):
         """clips: name -> seconds that it may take, of those that are to be run."""
         self._reporter, self._clips = reporter, dict(clips)
         self._whole, self._began = sum(clips.values()), time.monotonic()
-        self._lock = threading.Lock()
         self._last: dict[str, float] = {}
         self._done, self._whole_done = 0, 0.0
 
     def __exit__(self, *exc) -> None:
         pass
 
-    def hear(self, clip: str, line: str) -> None:
-        """A line that the run of a clip has said."""
-        with self._lock:
-            now = time.monotonic()
-            if now - self._last.get(clip, -PLAIN_GAP_S) >= PLAIN_GAP_S:
-                self._last[clip] = now
-                self._reporter.note(f"{clip}: {line}")
+    def take(self, event: Event) -> None:
+        """Tells of a clip's run; of one that is unchanged only a warning or a failure."""
+        if not event.clip:
+            return
+        at_work = event.clip in self._clips
+        if isinstance(event, ClipEnded):
+            if at_work or event.code:
+                self._end(event)
+        elif at_work and event.kind in TOLD and not isinstance(event, StageLine):
+            self._hear(event.clip, words_of(event))
+        elif isinstance(event, Note) and event.message.startswith(WARNING):
+            self._reporter.note(event.message)
 
-    def end(self, clip: str, words: str) -> None:
-        """The end of a clip's run, in words."""
-        with self._lock:
-            self._done += 1
-            self._whole_done += self._clips.get(clip, 0.0)
-            self._reporter.note(f"{words} ({self.course()})")
+    def _hear(self, clip: str, line: str) -> None:
+        """line: what its run is at."""
+        now = time.monotonic()
+        if now - self._last.get(clip, -PLAIN_GAP_S) >= PLAIN_GAP_S:
+            self._last[clip] = now
+            self._reporter.note(f"{clip}: {line}")
+
+    def _end(self, event: ClipEnded) -> None:
+        self._done += event.clip in self._clips
+        self._whole_done += self._clips.get(event.clip, 0.0)
+        self._reporter.note(f"{event.clip}: {words_of_clip(event)} ({self.course()})")
 
     def course(self) -> str:
         """`3 of 12 clips, 1.5 a minute, about 6 min left`"""
-        words, passed = [f"{self._done} of {len(self._clips)} clips"], time.monotonic() - self._began
+        words, passed = [f"{self._done} of {counted(len(self._clips), 'clip')}"], time.monotonic() - self._began
         share = self._whole_done / self._whole if self._whole else self._done / max(1, len(self._clips))
         if self._done and passed >= WORTH_S:
             words.append(f"{60 * self._done / passed:.2g} a minute")
@@ -72,14 +84,12 @@ class BatchTable(BatchReporter):
     def __exit__(self, *exc) -> None:
         self._live.stop()
 
-    def hear(self, clip: str, line: str) -> None:
-        with self._lock:
-            self._rows[clip] = line
+    def _hear(self, clip: str, line: str) -> None:
+        self._rows[clip] = line
 
-    def end(self, clip: str, words: str) -> None:
-        with self._lock:
-            self._rows.pop(clip, None)
-        super().end(clip, words)
+    def _end(self, event: ClipEnded) -> None:
+        self._rows.pop(event.clip, None)
+        super()._end(event)
 
     def draw(self) -> Table:
         """The table as it stands."""

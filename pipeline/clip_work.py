@@ -7,14 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from gsac.cache.store import Store
+from gsac.pipeline.clip_end import told_clip
 from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
+from gsac.pipeline.event_file import kept_events
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.other_clip import find_other_clip, forget_results
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.own_store import writable_store
 from gsac.pipeline.project import Project
 from gsac.pipeline.report.refresh import EarlySections, refresh_report
-from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
@@ -31,7 +33,7 @@ class ClipWork:
     configs: dict[str, Any]
     store: Store
     options: Options
-    reporter: PlainReporter
+    journal: Journal
     replace: bool = False
     """Whether another clip's avatar in the folder gives way."""
 
@@ -41,7 +43,7 @@ class ClipWork:
         clip: absolute path. keys: of this project, these configs and this store, where they are known already. Raises BadInput
         where the folder is another's, and what ClipRun.run raises, with the summary of what was done attached.
         """
-        folder.say = self.reporter.note
+        folder.say, self.journal.clip = self.journal.note, self.journal.clip or clip.name
         folder.refuse_foreign(clip, self.project)
         with folder.hold():
             other = find_other_clip(folder, clip, self.store)
@@ -51,9 +53,10 @@ class ClipWork:
             folder.prepare(clip, self.project, self.configs)
             if other is not None:
                 forget_results(folder)
-            store = writable_store(self.store, folder.root / OWN_STORE, self.reporter)
-            clip_run = ClipRun(self.project, self.configs, store, folder, self.reporter, keys if store is self.store else None)
-            self._carry_out(clip_run, clip)
+            store = writable_store(self.store, folder.root / OWN_STORE, self.journal)
+            clip_run = ClipRun(self.project, self.configs, store, folder, self.journal, keys if store is self.store else None)
+            with kept_events(folder, self.journal), told_clip(self.journal, clip_run.summary):
+                self._carry_out(clip_run, clip)
         return clip_run
 
     def _carry_out(self, clip_run: ClipRun, clip: Path) -> None:
@@ -73,4 +76,4 @@ class ClipWork:
     def _write_report(self, clip_run: ClipRun, early: EarlySections | None = None) -> None:
         """Writes report.html if it is due; a failure is only a warning."""
         if (warning := refresh_report(clip_run.folder, early)) is not None:
-            self.reporter.note(f"gsac: warning: {warning}")
+            self.journal.note(f"gsac: warning: {warning}")

@@ -17,6 +17,7 @@ from gsac.pipeline.keys import Keys
 from gsac.pipeline.pace import duration
 from gsac.pipeline.plan import StagePlan
 from gsac.stages.contract import BadInput, make_config
+from gsac.stages.counting import counted
 
 EARLIER_RUNS = 5
 """Runs of a stage, the newest, that tell how fast it is here."""
@@ -94,7 +95,7 @@ class Forecast:
         where = "on this machine" if self.known_here else "on a machine like the one that was measured"
         parts = [f"{name} {duration(time.seconds)}" for name, time in self.stages.items() if time.seconds >= BRIEF_S]
         missing = f", without {' and '.join(self.unknown)}, of which no time is known" if self.unknown else ""
-        cores = f"{self.cores} core{'s' if self.cores > 1 else ''}"
+        cores = counted(self.cores, "core")
         busy = ", longer while others keep it as busy as now" if self.load > self.cores else ""
         return f"{lead} {duration(self.whole.seconds)} {where} ({cores}){busy}: {', '.join(parts)}{missing}; quality {quality}"
 

@@ -73,6 +73,16 @@ def _is_of_the_program(path: Any) -> bool:
     return any(Path(path).resolve().is_relative_to(home) for home in homes)
 
 
+def ending(error: BaseException) -> tuple[ExitCode, str]:
+    """Exit code and sentence of what ended a clip's run; a bug of ours names itself."""
+    if isinstance(error, KeyboardInterrupt):
+        return ExitCode.INTERRUPTED, "interrupted"
+    code = exit_code(error)
+    if code is None or not isinstance(error, Exception):
+        return ExitCode.FAILED, f"{type(error).__name__}: {error}"
+    return code, sentence(error)
+
+
 def sentence(error: Exception) -> str:
     """The line that the user reads."""
     if isinstance(error, OSError):

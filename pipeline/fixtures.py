@@ -22,6 +22,7 @@ from gsac.pipeline.rows import read_rows, result_row
 from gsac.pipeline.run_folder import PARAMS, RunFolder
 from gsac.pipeline.versions import package_version
 from gsac.stages.contract import BadInput
+from gsac.stages.counting import counted
 
 MANIFEST = "manifest.json"
 REPLAYS = "replay"
@@ -39,7 +40,7 @@ def cut_fixtures(run: RunFolder, project: Project, folder: Path, frames: int | N
     ports = dict.fromkeys(port for step in steps for port in step.deps)
     held = [count for port in ports if port != CLIP and (count := count_frames(run.path(port))) is not None]
     if frames is not None and held and frames > held[0]:
-        raise BadInput(f"--frames {frames}: the run has {held[0]} frames; leave --frames out to keep all")
+        raise BadInput(f"--frames {frames}: the run has {counted(held[0], 'frame')}; leave --frames out to keep all")
     digests = {}
     for port in ports:
         copy_frames(run.require(port), folder / port, None if port == CLIP else frames)

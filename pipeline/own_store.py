@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from gsac.cache.store import Store
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.reporter import Speaker
 
 
-def writable_store(store: Store, instead: Path, reporter: PlainReporter) -> Store:
+def writable_store(store: Store, instead: Path, say: Speaker) -> Store:
     """The store; where it may only be read one at `instead`, which gets the results of this run and still uses what it holds.
 
     To be called when nothing of the user's can be at fault any more, since it makes a folder.
     """
     if store.writable:
         return store
-    reporter.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")
-    return Store(instead, say=reporter.note, below=store)
+    say.note(f"gsac: warning: the cache {store.root} cannot be written; this run keeps its results in {instead}")
+    return Store(instead, say=say.note, below=store)

@@ -30,23 +30,28 @@ class Pace:
 
     def words(self, total: int) -> str:
         """`30/60 frames, 4.1 frames/s, 7 s left`"""
-        done = self._heard[-1][1]
-        rate = self._rate()
-        words = f"{done}/{total} {self._unit}" if total else f"{done} {self._unit}"
-        if rate is not None:
-            words += f", {rate:.3g} {self._unit}/s" if " " not in self._unit else ""
-            if total > done:
-                words += f", {duration((total - done) / rate)} left"
-        return words
+        return progress_words(self._heard[-1][1], total, self._unit, self.rate)
 
     def seconds_left(self, total: int) -> float:
         """s, of this phase; 0 where it is not known."""
-        rate = self._rate()
+        rate = self.rate
         return (total - self._heard[-1][1]) / rate if rate is not None and total else 0.0
 
-    def _rate(self) -> float | None:
+    @property
+    def rate(self) -> float | None:
+        """Units/s; None until it has settled."""
         (began, before), (now, done) = self._heard[0], self._heard[-1]
         return (done - before) / (now - began) if now - began >= SETTLED_S and done > before else None
+
+
+def progress_words(done: int, total: int, unit: str, rate: float | None) -> str:
+    """`30/60 frames, 4.1 frames/s, 7 s left`; total: 0 where nobody knows. rate: units/s."""
+    words = f"{done}/{total} {unit}" if total else f"{done} {unit}"
+    if rate is not None:
+        words += f", {rate:.3g} {unit}/s" if " " not in unit else ""
+        if total > done:
+            words += f", {duration((total - done) / rate)} left"
+    return words
 
 
 class Course:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from enum import Enum
 
 from gsac.cache.key import Change, ChangeKind, KeyParts
 from gsac.cache.record import Record
 from gsac.cache.store import Store
+from gsac.pipeline.graph import Graph
 
 
 class Reason(Enum):
@@ -111,6 +112,31 @@ def plan_stage(
         return StagePlan(parts.stage, Reason.FIRST_RUN, parts)
     reasons = {_BY_CHANGE[change.kind] for change in changes if change.kind in _BY_CHANGE}
     return StagePlan(parts.stage, next(r for r in LEADING if r in reasons), parts, changes=changes)
+
+
+def plan_stages(graph: Graph, steps: list[str], digests: dict[str, str],
+                plan: Callable[[str, dict[str, str]], StagePlan]) -> list[StagePlan]:
+    """Plans of stages in running order, as far as their inputs are known.
+
+    digests: of the ports that are known; those of cached stages join them. plan: of a stage, and the digests of its inputs.
+    """
+    plans = []
+    for name in steps:
+        inputs = graph.step(name).deps
+        unknown = [port for port in inputs if port not in digests]
+        if unknown:
+            makers = {graph.producer[port] for port in unknown}
+            plans.append(plan_waiting(name, [maker for maker in graph.steps if maker in makers]))
+            continue
+        plans.append(plan(name, {port: digests[port] for port in inputs}))
+        if plans[-1].cached is not None:
+            digests |= port_digests(plans[-1].cached)
+    return plans
+
+
+def port_digests(record: Record) -> dict[str, str]:
+    """Port -> tree digest, of a stage's outputs."""
+    return {f"{record.parts.stage}/{output}": digest for output, digest in record.outputs.items()}
 
 
 def plan_waiting(stage: str, above: list[str]) -> StagePlan:

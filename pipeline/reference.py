@@ -1,9 +1,10 @@
-"""Writes the reference pages from the code: docs/cli.md of all commands, docs/quality.md of the presets, docs/stages/<name>.md of
-each stage."""
+"""Writes the reference pages from the code: docs/cli.md of all commands, docs/quality.md of the presets, docs/events.md of what
+runs tell, docs/stages/<name>.md of each stage."""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import importlib
 import inspect
 import types
@@ -14,6 +15,8 @@ from typing import Any
 from gsac.pipeline import commands
 from gsac.pipeline.cli import make_parser
 from gsac.pipeline.cost_model import stage_cost
+from gsac.pipeline.event_file import LIMIT
+from gsac.pipeline.events import KINDS, Event, StageEvent
 from gsac.pipeline.footage import Footage, keep
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.outcomes import ExitCode, Outcome
@@ -22,9 +25,25 @@ from gsac.pipeline.params import Values, config_values, meanings, resolve
 from gsac.pipeline.plan import Reason
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import QUALITIES, dial_names
+from gsac.pipeline.run_folder import EVENTS, OLDER_EVENTS
 from gsac.stages.contract import BadInput, Stage
 
 WRITTEN = "<!-- Written by `make docs` from the code; edit the docstrings there. -->\n"
+
+
+EVENTS_LEAD = f"""\
+Whatever a run or a batch tells is an event: the terminal, `batch.json`, `batch.prom` and traces are drawn from the same stream.
+
+- `{EVENTS}` in the folder of a run or a batch holds them, a JSON object a line; later runs append. From {LIMIT >> 20} MB on it goes
+  on in a new file, and the one before is `{OLDER_EVENTS}`. A batch's file leaves progress and lines of logs to those of its clips.
+- `gsac events [DIR] [--follow]` prints them as a person reads them.
+- `gsac run --events` and `gsac batch --events` print them on stdout as they happen, before the result.
+- With `pip install 'gsac[otel]'` and `OTEL_EXPORTER_OTLP_ENDPOINT=http://HOST:4318` they become a trace, sent over HTTP: a span
+  for the batch, in it one a clip, in it one a stage, with key, outcome, device and figures. `OTEL_*` is all its configuration.
+  Names of clips and errors stay out unless `OTEL_RESOURCE_ATTRIBUTES` has `gsac.names=true`.
+
+A field that holds what it holds without being told (empty, 0, null, the first attempt) is left out. Readers pass over kinds and
+fields that they do not know, and over a line that is no JSON: a kill cuts the last one off."""
 
 
 EXAMPLE, EXAMPLE_CORES = Footage(60, 720, 1280), 2
@@ -33,7 +52,7 @@ EXAMPLE, EXAMPLE_CORES = Footage(60, 720, 1280), 2
 
 def pages(project: Project) -> dict[str, str]:
     """Path below docs/ -> text, of every page."""
-    return {"cli.md": cli_page(), "quality.md": quality_page(project),
+    return {"cli.md": cli_page(), "quality.md": quality_page(project), "events.md": events_page(),
             **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
 
 
@@ -54,6 +73,27 @@ def cli_page() -> str:
                "## Words of `--json`", "`status` of a stage:", _words(Outcome),
                "`reason`, why a stage has to run or need not:", _words(Reason)]
     return "\n\n".join(blocks) + "\n"
+
+
+def events_page() -> str:
+    """Every kind of event with its fields."""
+    blocks = ["# Events", WRITTEN.strip(), EVENTS_LEAD, "## Every event", _fields(Event, ()),
+              "## Events of a stage, besides", _fields(StageEvent, _own_fields(Event))]
+    for kind in KINDS.values():
+        base = StageEvent if issubclass(kind, StageEvent) else Event
+        blocks += [f"## {kind.kind}", inspect.getdoc(kind) or "", _fields(kind, _own_fields(base))]
+    return "\n\n".join(filter(None, blocks)) + "\n"
+
+
+def _own_fields(kind: type[Event]) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(kind))
+
+
+def _fields(kind: type[Event], without: tuple[str, ...]) -> str:
+    """A table of a kind's fields; empty where it has none of its own."""
+    hints, said = typing.get_type_hints(kind), meanings(kind)
+    rows = [(f"`{name}`", _kind(hints[name]), said.get(name, "")) for name in _own_fields(kind) if name not in without]
+    return _table(("field", "type", ""), rows) if rows else ""
 
 
 def quality_page(project: Project) -> str:

@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 import sys
-import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from enum import Enum
-from typing import TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 from gsac.pipeline.outcomes import Outcome
-from gsac.pipeline.pace import Course, Pace, duration
+from gsac.pipeline.pace import duration, progress_words
 from gsac.pipeline.wrapping import fit
+from gsac.stages.counting import counted
+
+if TYPE_CHECKING:
+    from gsac.pipeline.events import (
+        ClipEnded,
+        Event,
+        Note,
+        StageEvent,
+        StageFailed,
+        StageFinished,
+        StageHit,
+        StageLine,
+        StageNote,
+        StageProgress,
+        StageStarted,
+        StageWarning,
+    )
 
 PLAIN_GAP_S = 10.0
 """At least this long between two plain progress lines."""
@@ -41,15 +58,21 @@ _SENTENCES = {
 }
 
 
+class Speaker(Protocol):
+    """Says lines to people: a reporter, or a journal to which one listens."""
+
+    def note(self, message: str) -> None: ...
+
+
 class PlainReporter(AbstractContextManager):
     """One line an event."""
 
     def __init__(self, stream: TextIO | None = None, verbose: bool = False):
         self.verbose = verbose
+        """Whether lines that stages print are told, too."""
         self._stream = stream or sys.stderr
-        self._last = self._began = 0.0
-        self._pace = Pace()
-        self._course: Course | None = None
+        self._last = 0.0
+        """Unix time of the last line on progress, or of the stage's begin."""
 
     def __exit__(self, *exc) -> None:
         pass
@@ -63,62 +86,44 @@ class PlainReporter(AbstractContextManager):
 
     def foresees(self, stage: str, outcome: Outcome, seconds: float, detail: str) -> None:
         """A dry run's line on one stage."""
-        self.ends(stage, outcome, seconds, detail)
+        self._end(stage, outcome, seconds, detail)
 
-    def follows(self, course: Course) -> None:
-        """From here on each stage is told with its place in the run and the time that the run still takes."""
-        self._course = course
+    def take(self, event: Event) -> None:
+        """Tells an event of which a person wants to know at once; of a batch's clips its own reporter tells."""
+        if event.kind in TOLD and not (event.batch and event.clip):
+            getattr(self, f"_{event.kind}", self._tell)(event)
 
-    def starts(self, stage: str, why: str) -> None:
-        self._begin(stage)
-        self._last = self._began
-        self.note(f"{self._titled(stage)}: starts ({why})")
+    def _tell(self, event: Event) -> None:
+        self.note(words_of(event))
 
-    def progress(self, stage: str, done: int, total: int, unit: str) -> None:
-        now = time.monotonic()
-        words = self._words(stage, done, total, unit, now)
-        if now - self._last >= PLAIN_GAP_S:
-            self._last = now
-            self.note(f"{self._titled(stage)}: {words}")
+    def _note(self, event: Note) -> None:
+        (self.result if event.result else self.note)(event.message)
 
-    def _begin(self, stage: str) -> None:
-        self._began, self._pace = time.monotonic(), Pace()
-        if self._course is not None:
-            self._course.begin(stage)
+    def _stage_started(self, event: StageStarted) -> None:
+        self._last = event.time
+        self._tell(event)
 
-    def _end(self, stage: str, outcome: Outcome, seconds: float) -> None:
-        if self._course is not None and outcome is Outcome.RAN:
-            self._course.end(stage, seconds)
+    def _stage_progress(self, event: StageProgress) -> None:
+        if event.time - self._last >= PLAIN_GAP_S:
+            self._last = event.time
+            self._tell(event)
 
-    def _titled(self, stage: str) -> str:
-        """`7/8 train`"""
-        return f"{self._course.place(stage)} {stage}" if self._course is not None and self._course.has(stage) else stage
+    def _stage_line(self, event: StageLine) -> None:
+        if self.verbose:
+            self._tell(event)
 
-    def _words(self, stage: str, done: int, total: int, unit: str, now: float) -> str:
-        """The stage's progress, and what is left of the run where earlier runs tell."""
-        self._pace.hear(done, unit, now)
-        words = self._pace.words(total)
-        if self._course is None or not self._course.has(stage):
-            return words
-        left = self._course.seconds_left(stage, now - self._began, self._pace.seconds_left(total))
-        return words if left is None else f"{words}; whole run: about {duration(left)} left"
+    def _stage_hit(self, event: StageHit) -> None:
+        self._end(titled(event), Outcome.CACHED, event.seconds)
 
-    def warning(self, stage: str, message: str) -> None:
-        self.note(f"{stage}: warning: {message}")
+    def _stage_finished(self, event: StageFinished) -> None:
+        self._end(titled(event), Outcome.RAN, event.seconds)
 
-    def remark(self, stage: str, message: str) -> None:
-        """A stage's note."""
-        self.note(f"{stage}: note: {message}")
+    def _stage_failed(self, event: StageFailed) -> None:
+        self._end(titled(event), Outcome.FAILED, 0.0)
 
-    def log(self, stage: str, line: str) -> None:
-        """A line that the stage printed; only asked for where `verbose`."""
-        self.note(f"{stage}: | {line}")
-
-    def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
-        self._end(stage, outcome, seconds)
-        time_words = f" in {seconds:.1f} s" if outcome is Outcome.RAN else ""
-        time_words = f" (took {seconds:.1f} s when it ran)" if outcome is Outcome.CACHED else time_words
-        self.note(f"{self._titled(stage)}: {outcome.value}{time_words}{': ' + detail if detail else ''}")
+    def _end(self, title: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
+        """seconds: of the run that computed the result."""
+        self.note(words_of_end(title, outcome, seconds, detail))
 
 
 class QuietReporter(PlainReporter):
@@ -158,12 +163,11 @@ class TerminalReporter(PlainReporter):
         text.stylize(style, begin)
         self.console.print(text, soft_wrap=True)
 
-    def starts(self, stage: str, why: str) -> None:
+    def _stage_started(self, event: StageStarted) -> None:
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
         from rich.table import Column
 
         self._close()
-        self._begin(stage)
         cut = Column(no_wrap=True, overflow="ellipsis", ratio=1)
         self._bar = Progress(
             SpinnerColumn(), TextColumn("{task.fields[stage]:<14}", markup=False),
@@ -171,34 +175,85 @@ class TerminalReporter(PlainReporter):
             TextColumn("{task.fields[words]}", markup=False, table_column=cut), console=self.console, transient=True,
             expand=True,
         )
-        self._bar.add_task("", total=None, stage=self._titled(stage), words=f"reading and loading ({why})")
+        self._bar.add_task("", total=None, stage=titled(event), words=f"reading and loading ({event.reason})")
         self._bar.start()
 
-    def progress(self, stage: str, done: int, total: int, unit: str) -> None:
+    def _stage_progress(self, event: StageProgress) -> None:
         if self._bar is None:
             return
-        words, task = self._words(stage, done, total, unit, time.monotonic()), self._bar.tasks[0]
-        going_on = done < total
-        task.total, task.completed = (total, done) if going_on else (None, 0)  # a bar without a total pulses
-        task.fields["words"] = words if going_on or not total else f"{done} {unit} {COUNTED}"
+        task, going_on = self._bar.tasks[0], event.done < event.total
+        task.total, task.completed = (event.total, event.done) if going_on else (None, 0)  # a bar without a total pulses
+        task.fields["words"] = words_of_progress(event) if going_on or not event.total else f"{event.done} {event.unit} {COUNTED}"
 
-    def warning(self, stage: str, message: str) -> None:
-        self._print(f"{stage}: warning: {message}", "yellow")
+    def _stage_warning(self, event: StageWarning) -> None:
+        self._print(f"{event.stage}: warning: {event.message}", "yellow")
 
-    def remark(self, stage: str, message: str) -> None:
-        self._print(f"{stage}: note: {message}", "dim")
+    def _stage_note(self, event: StageNote) -> None:
+        self._print(f"{event.stage}: note: {event.message}", "dim")
 
-    def ends(self, stage: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
+    def _end(self, title: str, outcome: Outcome, seconds: float, detail: str = "") -> None:
         self._close()
-        self._end(stage, outcome, seconds)
         took = f"{seconds:8.1f} s" if outcome is not Outcome.FAILED else " " * 10
-        title = f"{self._titled(stage):<14} {took}  "
-        self._print(f"{title}{outcome.value}{': ' + detail if detail else ''}", outcome.style, len(title))
+        before = f"{title:<14} {took}  "
+        self._print(f"{before}{outcome.value}{': ' + detail if detail else ''}", outcome.style, len(before))
 
     def _close(self) -> None:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
+
+
+def titled(event: StageEvent) -> str:
+    """`7/8 train`"""
+    return f"{event.place} {event.stage}".strip()
+
+
+def words_of_end(title: str, outcome: Outcome, seconds: float, detail: str = "") -> str:
+    """`7/8 train: ran in 12.0 s`; seconds: of the run that computed the result."""
+    time_words = f" in {seconds:.1f} s" if outcome is Outcome.RAN else ""
+    time_words = f" (took {seconds:.1f} s when it ran)" if outcome is Outcome.CACHED else time_words
+    return f"{title}: {outcome.value}{time_words}{': ' + detail if detail else ''}"
+
+
+def words_of_progress(event: StageProgress) -> str:
+    """The stage's progress, and what is left of the run where earlier runs tell."""
+    words = progress_words(event.done, event.total, event.unit, event.rate)
+    return words if event.run_left is None else f"{words}; whole run: about {duration(event.run_left)} left"
+
+
+def words_of_clip(event: ClipEnded) -> str:
+    """How a clip's run ended, what of it was computed, and how long it took."""
+    end = "failed" if event.code else f"done, {event.ran} of {counted(event.stages, 'stage')} ran"
+    return f"{end}, {counted(event.warnings, 'warning')}, {duration(event.seconds)}"
+
+
+WORDS: dict[str, Callable[[Any], str]] = {
+    "batch_started": lambda it: f"batch of {it.clips} clips starts, {it.due} to do",
+    "batch_ended": lambda it: f"batch ends after {duration(it.seconds)}, {it.failed} failed",
+    "clip_planned": lambda it: f"planned, {', '.join(it.due) or 'nothing'} to do",
+    "clip_kept": lambda it: f"left as it is ({it.status})",
+    "clip_started": lambda it: "starts",
+    "clip_ended": lambda it: words_of_clip(it) + (f": {it.error}" if it.error else ""),
+    "stage_planned": lambda it: f"{titled(it)}: to do ({it.reason}){f', about {duration(it.seconds)}' if it.seconds else ''}",
+    "stage_hit": lambda it: words_of_end(titled(it), Outcome.CACHED, it.seconds),
+    "stage_started": lambda it: f"{titled(it)}: starts ({it.reason})",
+    "stage_progress": lambda it: f"{titled(it)}: {words_of_progress(it)}",
+    "stage_warning": lambda it: f"{it.stage}: warning: {it.message}",
+    "stage_note": lambda it: f"{it.stage}: note: {it.message}",
+    "stage_line": lambda it: f"{it.stage}: | {it.line}",
+    "stage_finished": lambda it: words_of_end(titled(it), Outcome.RAN, it.seconds),
+    "stage_failed": lambda it: words_of_end(titled(it), Outcome.FAILED, 0.0, it.error),
+    "note": lambda it: it.message,
+}
+"""Kind of event -> a line on it."""
+TOLD = {"note", "stage_hit", "stage_started", "stage_progress", "stage_warning", "stage_note", "stage_line", "stage_finished",
+        "stage_failed"}
+"""Kinds that a person is told while a run goes."""
+
+
+def words_of(event: Event) -> str:
+    """A line on an event for people, without its time and clip."""
+    return WORDS[event.kind](event)
 
 
 def open_reporter(verbosity: Verbosity = Verbosity.NORMAL, plain: bool = False) -> PlainReporter:

@@ -23,10 +23,9 @@ from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.pace import Course
 from gsac.pipeline.params import config_values
-from gsac.pipeline.plan import StagePlan, plan_stage, plan_waiting
+from gsac.pipeline.plan import StagePlan, plan_stage, plan_stages, port_digests
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import STANDARD, describe_quality, quality_entry
-from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import Row, read_rows, result_row, write_rows
 from gsac.pipeline.run_folder import LOGS, RunFolder
 from gsac.pipeline.sources import Source, source_digest
@@ -37,6 +36,7 @@ from gsac.stages.severity import Severity
 
 if TYPE_CHECKING:
     from gsac.pipeline.cost_forecast import Forecast
+    from gsac.pipeline.journal import Journal
 
 AHEAD = 2
 """Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
@@ -82,7 +82,7 @@ class StageResult:
         info = record.info
         return cls(plan.stage, outcome, plan.sentence, record.key, info.seconds, info.cpu_seconds,
                    info.peak_rss_mb, info.warnings, info.findings, info.notes, config_values(config),
-                   add_timings(info.metrics, info.timings), info.timings, record.parts.inputs, _ports(record))
+                   add_timings(info.metrics, info.timings), info.timings, record.parts.inputs, port_digests(record))
 
     def to_json(self) -> dict[str, Any]:
         """As run.json and --json hold it."""
@@ -115,13 +115,14 @@ class Options:
 class ClipRun:
     """The stages of one clip, their results shown in one folder and kept in one store."""
 
-    def __init__(self, project: Project, configs: dict[str, Any], store: Store, folder: RunFolder, reporter: PlainReporter,
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, folder: RunFolder, journal: Journal | None = None,
                  keys: Keys | None = None):
+        """journal: told what happens; None: nobody listens."""
         self.graph = project.graph
         self.configs = configs
         self.store = store
         self.folder = folder
-        self.reporter = reporter
+        self._journal = journal
         self.keys = keys or Keys(project, configs, store)
         self.results: list[StageResult] = []
         self.metrics: dict[str, Any] = {}
@@ -133,6 +134,15 @@ class ClipRun:
         """Key -> outcome, of the stages that this run has judged."""
         self._damaged: set[str] = set()
         """Ports whose files this run has found damaged."""
+
+    @cached_property
+    def journal(self) -> Journal:
+        """Told what happens. Where nothing runs none is asked for, and its modules are not loaded."""
+        if self._journal is None:
+            from gsac.pipeline.journal import Journal
+
+            return Journal()
+        return self._journal
 
     def select(self, options: Options) -> list[str]:
         """Stages in running order. BadInput names a stage that is unknown or left out."""
@@ -152,26 +162,14 @@ class ClipRun:
         return self._plan_all(self.select(options), {CLIP: source_digest(clip, self.store)}, options)
 
     def _plan_all(self, steps: list[str], digests: dict[str, str], options: Options) -> list[StagePlan]:
-        """Plans of stages in running order. digests: of the ports that are known; those of cached stages join them."""
-        plans = []
-        for name in steps:
-            unknown = [p for p in self.graph.step(name).deps if p not in digests]
-            if unknown:
-                makers = {self.graph.producer[p] for p in unknown}
-                plans.append(plan_waiting(name, [maker for maker in self.graph.steps if maker in makers]))
-                continue
-            parts = self.keys.parts(name, {port: digests[port] for port in self.graph.step(name).deps})
-            plan = self._plan(parts, options)
-            plans.append(plan)
-            if plan.cached is not None:
-                digests |= _ports(plan.cached)
-        return plans
+        return plan_stages(self.graph, steps, digests,
+                           lambda name, inputs: self._plan(self.keys.parts(name, inputs), options))
 
     def pull_models(self, clip: Path, options: Options) -> None:
         """Pulls the networks that are not here and that stages to be run need. BadInput where they cannot be had."""
         if self.keys.missing_models(self.select(options)):
             due = [plan.stage for plan in self.plan(clip, options) if plan.cached is None]
-            self.keys.pull_models(due, self.reporter.note)
+            self.keys.pull_models(due, self.journal.note)
 
     def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
         """Runs the stages that are not up to date; fills `results`, `metrics` and the folder. at_last: called with the
@@ -185,8 +183,8 @@ class ClipRun:
         source = Source(clip, self.store)
         digests = {CLIP: source.digest}
         paths = {CLIP: clip}
-        runner = StageRunner(self.keys, self.store, self.reporter, self.folder.root / LOGS)
-        self.reporter.follows(Course(steps, self.graph.above, self._expected_seconds))
+        runner = StageRunner(self.keys, self.store, self.journal, self.folder.root / LOGS)
+        self.journal.follows(Course(steps, self.graph.above, self._expected_seconds))
         with in_use(self.store) as lease, self._writing_results(clip, source.digest, options), runner:
             at, plans = 0, {}
             while at < len(steps):
@@ -212,7 +210,7 @@ class ClipRun:
                         continue
                     if self.forecast is None:
                         later = self._plan_all(steps[at + 1:], dict(digests), options)
-                        self.foretell(clip, [*plans.values(), *later], options)
+                        self._tell_plans(self.foretell(clip, [*plans.values(), *later], options), [plan, *later])
                     with self._recording_failure(plan, parts.key, runner):
                         outcome, record = runner.run(
                             parts, plan.reason, {port: paths[port] for port in inputs}, forced=name in options.force,
@@ -220,12 +218,11 @@ class ClipRun:
                 if outcome is Outcome.CACHED and parts.key in self._told:
                     outcome = self._told[parts.key]
                 elif outcome is Outcome.CACHED:
-                    self.reporter.ends(name, outcome, record.info.seconds)
-                    for message in record.info.warnings:
-                        self.reporter.warning(name, first_sentence(message))
+                    self.journal.found(record)
+                    self._recall_warnings(record)
                 self._told[parts.key] = outcome
                 self._record(plan, outcome, record)
-                digests |= _ports(record)
+                digests |= port_digests(record)
                 paths |= {f"{name}/{output}": self.store.path(record, output) for output in record.outputs}
                 at += 1
                 if at < len(steps) and not options.anyway:
@@ -237,8 +234,23 @@ class ClipRun:
 
         self.forecast = Forecaster(self.keys, self.store).foretell(plans, clip)
         if self.forecast.worth_saying:
-            self.reporter.note(self.forecast.sentence(describe_quality(quality_entry(options.quality, self.configs))))
+            self.journal.note(self.forecast.sentence(describe_quality(quality_entry(options.quality, self.configs))))
         return self.forecast
+
+    def _tell_plans(self, forecast: Forecast, plans: list[StagePlan]) -> None:
+        """Tells which stages have to be computed, or may have to."""
+        for plan in plans:
+            if plan.cached is None:
+                expected = forecast.stages.get(plan.stage)
+                self.journal.planned(plan.stage, plan.parts.key if plan.parts else "", plan.reason.value,
+                                     expected.seconds if expected is not None else 0.0)
+
+    def _recall_warnings(self, record: Record) -> None:
+        """Tells the warnings of the run that computed a result, in short."""
+        info = record.info
+        findings = info.findings or [{}] * len(info.warnings)  # old records have none
+        for message, finding in zip(info.warnings, findings, strict=False):
+            self.journal.warning(record.parts.stage, first_sentence(message), finding.get("code", ""), finding.get("severity", ""))
 
     def _judged_forecast(self) -> Row:
         """Entry `forecast` of run.json, with what its stages took; {} where nothing had to run."""
@@ -265,7 +277,7 @@ class ClipRun:
             raise IntegrityError(f"{port} was damaged in the cache {self.store.root} as soon as it was made again; check the disk")
         self._damaged.add(port)
         maker = self.graph.producer[port]
-        self.reporter.note(f"{name}: its input {port} was damaged in the cache; {maker} runs again first")
+        self.journal.note(f"{name}: its input {port} was damaged in the cache; {maker} runs again first")
         return maker
 
     @cached_property
@@ -288,7 +300,7 @@ class ClipRun:
         try:
             yield
         except (StageError, CacheError) as error:
-            self.reporter.ends(plan.stage, Outcome.FAILED, 0.0)
+            self.journal.failed(plan.stage, key, error)
             self.results.append(StageResult(plan.stage, Outcome.FAILED, plan.sentence, key,
                                             params=config_values(self.configs[plan.stage]), error=str(error),
                                             killed=getattr(error, "killed", "")))
@@ -331,7 +343,3 @@ def refuse_hopeless(record: Record) -> None:
 def first_sentence(message: str) -> str:
     """A warning that was told in full when its stage ran, cut to its first sentence."""
     return textwrap.shorten(re.split(r"(?<=\.)\s", message, maxsplit=1)[0], RECALLED, placeholder=" …")
-
-
-def _ports(record: Record) -> dict[str, str]:
-    return {f"{record.parts.stage}/{output}": digest for output, digest in record.outputs.items()}

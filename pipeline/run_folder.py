@@ -6,6 +6,7 @@
     .placed.json            real files as they were placed: what differs from it was edited
     logs/<stage>.log        what the stage printed
     run.json  metrics.json  report.html
+    events.jsonl            what the runs here have told
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from gsac.stages.contract import BadInput
 
 DAG, LOCK, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "dvc.lock", "params.yaml", "run.json", "metrics.json", "report.html"
 LOGS = "logs"
+EVENTS, OLDER_EVENTS = "events.jsonl", "events.1.jsonl"
 PLACED = ".placed.json"
 """Port or file -> digests of the real files that were placed here: the last, and the one before while that may still lie there."""
 
@@ -151,7 +153,7 @@ class RunFolder:
 
     def discard(self) -> None:
         """Removes the folder, where `prepare` has made it and it holds nothing but what a run writes, and those made above it."""
-        ours = {CLIP, DAG, LOCK, PARAMS, RUN, METRICS, REPORT, LOGS, PLACED, OWN_STORE}
+        ours = {CLIP, DAG, LOCK, PARAMS, RUN, METRICS, REPORT, LOGS, PLACED, OWN_STORE, EVENTS}
         for folder in self._made:
             with contextlib.suppress(OSError):
                 if folder == self.root and {entry.name for entry in folder.iterdir()} <= ours:
@@ -214,11 +216,12 @@ class RunFolder:
             raise BadInput(f"--out {self.root} is where gsac itself lies; choose another folder")
         if (self.root / DAG).exists():
             try:
-                Graph.load(self.root / DAG)
+                if not is_same_file(self.root / DAG, project.dag):  # as it is nearly always; reading YAML takes long
+                    Graph.load(self.root / DAG)
             except BadInput as e:
                 raise BadInput(f"--out {self.root} holds another project's {DAG} ({e}); choose another folder") from e
             return
-        for name in (*project.graph.steps, PARAMS, RUN, METRICS, REPORT, LOGS):
+        for name in (*project.graph.steps, PARAMS, RUN, METRICS, REPORT, LOGS, EVENTS, OLDER_EVENTS):
             if os.path.lexists(self.root / name):
                 raise BadInput(f"--out {self.root} is not the folder of a run and holds {name}, which would be written "
                                "over; choose another folder, or move it away")
@@ -272,6 +275,14 @@ def avatar_name(clip: Path, number: int = 1) -> str:
 def text_digest(text: str | bytes) -> str:
     """Digest of a file of the folder's own by its content."""
     return typed_digest("text", text.encode() if isinstance(text, str) else text)
+
+
+def is_same_file(one: Path, other: Path) -> bool:
+    """Whether two files can be read and hold the same bytes."""
+    try:
+        return one.read_bytes() == other.read_bytes()
+    except OSError:
+        return False
 
 
 def write_text(path: Path, text: str) -> None:

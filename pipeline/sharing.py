@@ -18,7 +18,7 @@ from gsac.cache.lease import single_flight
 from gsac.cache.record import Record
 from gsac.cache.root import named_remote
 from gsac.cache.store import Store
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.reporter import Speaker
 
 if TYPE_CHECKING:
     from gsac.cache.remote.claim import Claim
@@ -45,13 +45,13 @@ def shared_results() -> Results | None:
 
 
 @contextlib.contextmanager
-def sharing(store: Store, reporter: PlainReporter) -> Iterator[Sharing | None]:
+def sharing(store: Store, say: Speaker) -> Iterator[Sharing | None]:
     """None where nothing is shared. At the end the last uploads are waited for, unless the run was interrupted."""
     results = shared_results()
     if results is None:
         yield None
         return
-    shares = Sharing(results, store, reporter)
+    shares = Sharing(results, store, say)
     try:
         yield shares
     except KeyboardInterrupt:
@@ -64,10 +64,10 @@ def sharing(store: Store, reporter: PlainReporter) -> Iterator[Sharing | None]:
 
 
 class Sharing:
-    """One run's dealings with the shared results. The reporter is spoken to by the run's own thread alone."""
+    """One run's dealings with the shared results. `say` is spoken to by the run's own thread alone."""
 
-    def __init__(self, results: Results, store: Store, reporter: PlainReporter) -> None:
-        self.results, self.store, self.reporter = results, store, reporter
+    def __init__(self, results: Results, store: Store, say: Speaker) -> None:
+        self.results, self.store, self.say = results, store, say
         self._due: queue.SimpleQueue[tuple[Record, Claim | None] | None] = queue.SimpleQueue()
         self._claims: dict[str, Claim] = {}
         """Key -> claim, of what this run computes now."""
@@ -89,7 +89,7 @@ class Sharing:
         from gsac.cache.remote.claim import claim_or_fetch
 
         def waiting() -> None:
-            self.reporter.note(f"{parts.stage}: another machine computes the same result; waiting for it")
+            self.say.note(f"{parts.stage}: another machine computes the same result; waiting for it")
 
         found = self._try(lambda: claim_or_fetch(self.results.bucket, parts.key, lambda: self._fetch(parts, outputs), waiting))
         if found is None or isinstance(found, Record):
@@ -116,11 +116,11 @@ class Sharing:
             self._due.put(None)
             self._uploader.join(PATIENCE_S)
             if self._uploader.is_alive():
-                self.reporter.note(f"uploading results to {self.results.bucket.url}")
+                self.say.note(f"uploading results to {self.results.bucket.url}")
                 self._uploader.join()
         if self._missed:
             why = f" ({self._error})" if self._error else ""
-            self.reporter.note(f"gsac: warning: not uploaded: {', '.join(self._missed)}{why}; `gsac cache push` does it later")
+            self.say.note(f"gsac: warning: not uploaded: {', '.join(self._missed)}{why}; `gsac cache push` does it later")
 
     def abandon(self) -> None:
         """Leaves off; what was not uploaded stays here."""
@@ -129,7 +129,7 @@ class Sharing:
     def _fetch(self, parts: KeyParts, outputs: Collection[str]) -> Record | None:
         record = self.results.fetch(self.store, parts.stage, parts.key, outputs)
         if record is not None:
-            self.reporter.note(f"{parts.stage}: fetched from {self.results.bucket.url}")
+            self.say.note(f"{parts.stage}: fetched from {self.results.bucket.url}")
         return record
 
     def _try(self, ask: Callable[[], Answer]) -> Answer | None:
@@ -145,7 +145,7 @@ class Sharing:
             bucket.fails(error)
             if not bucket.said_failing:
                 bucket.said_failing = True
-                self.reporter.note(f"gsac: warning: {error}; the run goes on without it")
+                self.say.note(f"gsac: warning: {error}; the run goes on without it")
             return None
 
     def _work(self) -> None:

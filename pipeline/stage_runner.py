@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gsac.cache import objects
 from gsac.cache.errors import CacheError, no_room
@@ -25,10 +25,12 @@ from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.params import config_values
 from gsac.pipeline.plan import Reason
-from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.sharing import Sharing, sharing
 from gsac.pipeline.sources import Source
 from gsac.stages.contract import BadInput, StageError
+
+if TYPE_CHECKING:
+    from gsac.pipeline.journal import Journal
 
 METRICS_OUTPUT = "metrics.json"
 """An output of this name is also kept in the action record."""
@@ -53,7 +55,7 @@ class StageRunner:
 
     keys: Keys
     store: Store
-    reporter: PlainReporter
+    journal: Journal
     logs: Path
     """Folder for `<stage>.log`."""
     on_start: Callable[[], None] = lambda: None
@@ -69,7 +71,7 @@ class StageRunner:
     """Folder for the logs of prepared processes."""
 
     def __enter__(self) -> StageRunner:
-        self._shares = self._kept.enter_context(sharing(self.store, self.reporter))
+        self._shares = self._kept.enter_context(sharing(self.store, self.journal))
         return self
 
     def __exit__(self, *exc) -> None:
@@ -140,16 +142,16 @@ class StageRunner:
                 record = self._compute_whole(parts, reason, inputs, forced, sources)
                 if self._shares is not None:
                     self._shares.upload(record)
-        self.reporter.ends(name, Outcome.RAN, record.info.seconds)
+        self.journal.computed(record)
         return Outcome.RAN, record
 
     def _compute_whole(self, parts: KeyParts, reason: Reason, inputs: dict[str, Path], forced: bool,
                        sources: Iterable[Source]) -> Record:
         """Computes and publishes, of sources that stayed as they were."""
         name = parts.stage
-        models = self.keys.models.need(parts.models, self.reporter.note)
+        models = self.keys.models.need(parts.models, self.journal.note)
         watched = [*sources, *(Source(path, self.store) for path in models.values())]
-        self.reporter.starts(name, reason.value)
+        self.journal.starts(name, reason.value, parts.key, parts.device or self.keys.device)
         scratch = self.store.partial(parts.key)
         if forced:
             objects.remove(scratch)
@@ -192,7 +194,7 @@ class StageRunner:
             objects.remove(scratch)
         for source in touched:
             source.look_again()
-            self.reporter.note(f"{name}: {source.path} was written or replaced while it was read; it is read again")
+            self.journal.note(f"{name}: {source.path} was written or replaced while it was read; it is read again")
         return not touched
 
     def _check_code(self, parts: KeyParts, because: StageError | None = None) -> None:
@@ -214,19 +216,20 @@ class StageRunner:
         def hear(event: dict[str, Any]) -> None:
             self._show_log(name, log)
             if event["event"] == "progress":
-                self.reporter.progress(name, event["done"], event["total"], event["unit"])
+                self.journal.progress(name, event["done"], event["total"], event["unit"])
             elif event["event"] == "resumed":
-                self.reporter.note(f"{name}: goes on from {event['unit'].removesuffix('s')} {event['done']} of {event['total']}")
+                self.journal.note(f"{name}: goes on from {event['unit'].removesuffix('s')} {event['done']} of {event['total']}")
             elif event["event"] == "timing":
                 info.timings[event["name"]] = event["value"]
             else:
-                message = event["message"].removeprefix(f"{name}: ")  # the reporter names the stage
-                kept, tell = {"warning": (info.warnings, self.reporter.warning), "note": (info.notes, self.reporter.remark)}[
-                    event["event"]]
-                kept.append(message)
+                message = event["message"].removeprefix(f"{name}: ")  # the event names the stage
                 if event["event"] == "warning":
+                    info.warnings.append(message)
                     info.findings.append(event["finding"])
-                tell(name, message)
+                    self.journal.warning(name, message, event["finding"]["code"], event["finding"]["severity"])
+                else:
+                    info.notes.append(message)
+                    self.journal.remark(name, message)
 
         order = {
             "inputs": {port: str(path) for port, path in inputs.items()}, "out": str(folder),
@@ -259,9 +262,8 @@ class StageRunner:
         return info
 
     def _show_log(self, name: str, log: LogReader, ended: bool = False) -> None:
-        if self.reporter.verbose:
-            for line in log.new_lines(ended):
-                self.reporter.log(name, line)
+        for line in log.new_lines(ended):
+            self.journal.log(name, line)
 
     def _waiting(self, name: str) -> None:
-        self.reporter.note(f"{name}: another run computes the same result; waiting for it")
+        self.journal.note(f"{name}: another run computes the same result; waiting for it")

@@ -54,7 +54,7 @@ class Code(Enum):
     HAND_NEVER_DETECTED = Wording("The {side} hand was never seen; its fingers stay at rest.", "Show both hands, fingers apart.")
     FACE_NEVER_DETECTED = Wording("The face was never seen from the front; it stays without expression.",
                                   "Look into the camera for a second.")
-    HAND_NEVER_SEEN = Wording("The {side} hand is never seen in {figure} frames; its pose will be a guess.",
+    HAND_NEVER_SEEN = Wording("The {side} hand is never seen; its pose will be a guess.",
                               "Show both hands, fingers apart.")
     HAND_MISPLACED = Wording("The {side} hand was detected in a wrong place in {frames}; those detections are not used.")
     HAND_NOT_FILLED = Wording("The {side} hand is missing in {frames}, too long to fill.", "Keep the hands in sight.")
@@ -73,10 +73,10 @@ class Code(Enum):
                                  "shows it, is used.", "Leave it out.", Severity.NEWS)
     PAPER_START = Wording("smplx.method paper starts from trunk and hanging arms; the publication starts from Hand4Whole's "
                           "regression", severity=Severity.NEWS)
-    START_INTERPOLATED = Wording("The poses that you brought lack {figure} frames, {frames}; they start from their neighbours'.",
+    START_INTERPOLATED = Wording("The poses that you brought lack {frames}; they start from their neighbours'.",
                                  severity=Severity.NEWS)
-    START_DOUBTED = Wording("The poses that you brought put the trunk in a wrong place in {figure} frames, {frames}; the fit "
-                            "starts there from trunk and hanging arms.",
+    START_DOUBTED = Wording("The poses that you brought put the trunk in a wrong place in {frames}; the fit starts "
+                            "there from trunk and hanging arms.",
                             "If these are many, check the poses' axes: x right, y down, z away.", Severity.NEWS)
     PAPER_NO_HEAD = Wording("face.npz holds no head mesh, for no face was seen; the paper's face terms (vertex, Laplacian, edge) "
                             "are off", severity=Severity.NEWS)
@@ -94,7 +94,7 @@ class Code(Enum):
                            "Let the arms hang a little away from the body, hands in sight.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
-    NOT_MEASURED = Wording("No frame is held out ({figure} usable frames, train.holdout is {holdout}): the quality of this avatar "
+    NOT_MEASURED = Wording("No frame is held out (usable frames: {figure}, train.holdout is {holdout}): the quality of this avatar "
                            "is not measured.", severity=Severity.NEWS)
     PART_OF_TURN = Wording("The frames show the person from {figure:.0f} of 360 degrees; the rest of the avatar is made up from "
                            "that.", "Record a full turn.")
@@ -111,6 +111,8 @@ class Code(Enum):
     REPEATED = Wording("Pictures repeat in {frames}; these frames are not used.",
                        "Send the file as the phone recorded it, not a copy with another frame rate.", Severity.NEWS)
     SCENE_CUT = Wording("Another scene begins in {frames}.", "Give one shot, from one stand.", Severity.WRONG)
+    SCENES_LEFT_OUT = Wording("The clip is cut together of {figure} scenes; only {first:.1f} to {last:.1f} s are used, the longest "
+                              "one that shows a person.", "Give one shot, from one stand.", Severity.WRONG)
     EXPOSURE_STEPS = Wording("Exposure or white balance is off by up to {figure:.0%} in {frames}.",
                              "Lock exposure and focus before the turn: hold a finger on the person in the picture.")
     BLURRED = Wording("The picture is blurred in {frames}.",

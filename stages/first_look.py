@@ -8,6 +8,7 @@ import numpy as np
 
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.avatar.yaw import degrees_covered, yaw_of
+from gsac.stages.counting import count_of
 
 LEFT, RIGHT = ([INDEX[f"{side}_{part}"] for part in ("shoulder", "hip")] for side in ("left", "right"))
 SEEN = 0.3
@@ -49,7 +50,7 @@ class FirstLook:
     @property
     def sentence(self) -> str:
         """One line."""
-        frames = f"all {self.frames} frames" if self.seen == self.frames else f"{self.seen} of {self.frames} frames"
+        frames = count_of(self.seen, self.frames, "frame")
         parts = ", ".join(f"{name} {size:.0f} px" if size else f"no {name}"
                           for name, size in (("face", self.face_px), ("hands", self.hand_px)))
         return f"A person in {frames}, {self.height_px:.0f} px tall, seen from {self.turn:.0f} of 360 degrees; {parts}."

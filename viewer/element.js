@@ -254,8 +254,8 @@ export class GsacAvatar extends Element {
 
   /** @param {Object<string, number[]>} turns joint -> axis-angle, degrees, on top of what plays; what is not named is not turned */
   turn(turns) {
-    const strange = Object.keys(turns).find((name) => !this.joints.includes(name) || turns[name].length !== 3
-      || !turns[name].every(Number.isFinite));
+    const strange = Object.keys(turns).find((name) => !this.joints.includes(name) || !Array.isArray(turns[name])
+      || turns[name].length !== 3 || !turns[name].every(Number.isFinite));
     if (strange !== undefined) throw new Error(`${strange}: expected one of the joints, with three numbers`);
     this.viewer.turned = { ...turns };
     this.changed();

@@ -1,18 +1,19 @@
 // Runs the page: unpacks the avatar inside it, shows it in the element <gsac-avatar>, and follows the address.
 
 import { readAddress } from "./address.js";
-import { decodeBase64 } from "./base64.js";
+import { unpackArrays } from "./arrays.js";
 import { Controls } from "./controls.js";
 import { GsacAvatar } from "./element.js";
+import { decodeLetters } from "./letters.js";
+import { listenForMessages, readOrigins } from "./messages.js";
 import { readName } from "./name.js";
-import { unpackPlanes } from "./planes.js";
 import { offerHeadset } from "./xr.js";
 
-// The bytes of avatar.gsac, which page.html holds in planes, compressed and in base64.
+// The bytes of avatar.gsac, which page.html holds packed, compressed and as letters.
 async function unpackAvatar() {
   const { textContent, dataset } = document.getElementById("avatar");
-  const packed = new Blob([decodeBase64(textContent.trim())]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return unpackPlanes(new Uint8Array(await new Response(packed).arrayBuffer()), JSON.parse(dataset.planes));
+  const packed = new Blob([decodeLetters(textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return unpackArrays(new Uint8Array(await new Response(packed).arrayBuffer()), JSON.parse(dataset.arrays));
 }
 
 async function main() {
@@ -24,6 +25,7 @@ async function main() {
   Object.assign(window, { gsac: person.viewer });
   const controls = new Controls(person, readName(location.pathname)), first = options();
   controls.follow(first);
+  listenForMessages(person, readOrigins(person));
   await person.open((await unpackAvatar()).buffer, first);
   window.addEventListener("hashchange", () => {
     const next = options();

@@ -1,6 +1,7 @@
 // Draws the gaussians with the processor: from the nearest to the farthest, each ellipse row by row, until a pixel is full.
 // The picture is that of webgl.js; where WebGL itself runs on the processor, this is several times faster.
 
+import { exponential } from "./exponential.js";
 import { NEAR, WIDE } from "./projection.js";
 
 // A pixel is full when less than this share of its light comes from farther away.
@@ -98,20 +99,20 @@ export class SoftwareRenderer {
     const { width, height, transmittance, colour, binding: { data, level: { rgb } } } = this;
     const { alphaMax, alphaMin } = this.avatar.blend;
     const r = rgb[i * 3] * data[i * 12 + 9], g = rgb[i * 3 + 1] * data[i * 12 + 10], b = rgb[i * 3 + 2] * data[i * 12 + 11];
-    const A = down / det, B = -slant / det, reach2 = 2 * Math.log(opacity / alphaMin);
+    const A = down / det, perA = det / down, perDown = 1 / down, shear = slant / down, reach2 = 2 * Math.log(opacity / alphaMin);
     const tall = Math.sqrt(reach2 * down), first = Math.max(0, Math.ceil(cy - tall - 0.5));
-    const last = Math.min(height - 1, Math.floor(cy + tall - 0.5)), bend = Math.exp(-A);
+    const last = Math.min(height - 1, Math.floor(cy + tall - 0.5)), bend = exponential(-A);
     for (let row = first; row <= last; row++) {
       // Along a row the exponent is a parabola: at dx = middle it is smallest, and each pixel's weight follows from the last.
-      const dy = row + 0.5 - cy, middle = -B * dy / A, least = dy * dy / down, half2 = (reach2 - least) / A;
+      const dy = row + 0.5 - cy, middle = shear * dy, least = dy * dy * perDown, half2 = (reach2 - least) * perA;
       if (half2 <= 0) continue;
       const half = Math.sqrt(half2), from = Math.max(0, Math.ceil(cx + middle - half - 0.5));
       const to = Math.min(width - 1, Math.floor(cx + middle + half - 0.5)), e = from + 0.5 - cx - middle;
-      let weight = opacity * Math.exp(-0.5 * (least + A * e * e)), step = Math.exp(-A * (e + 0.5));
+      let weight = opacity * exponential(-0.5 * (least + A * e * e)), step = exponential(-A * (e + 0.5));
       for (let at = row * width + from, end = row * width + to; at <= end; at++) {
         const open = transmittance[at];
         if (open > FULL) {
-          const alpha = weight < alphaMax ? weight : alphaMax, share = alpha * open, o = at * 3;
+          const share = (weight < alphaMax ? weight : alphaMax) * open, o = at * 3;
           colour[o] += share * r;
           colour[o + 1] += share * g;
           colour[o + 2] += share * b;

@@ -338,14 +338,12 @@ export class Viewer {
 
   /** @param {ReturnType<typeof import("./address.js").readAddress>} options */
   follow(options) {
-    const { avatar, camera } = this, { clip, pose, pitch, distance, target } = options;
+    const { avatar, camera } = this, { clip, pose } = options;
     this.still = options.still;
     this.background = options.background ?? this.background;
     this.opening = options.turntable === null && !options.picked && !this.calm;
     this.turntable = !this.calm && (options.turntable ?? this.opening);
-    this.levels.lit = options.lit;
-    if (options.lamp) this.levels.scene.place(...options.lamp);
-    else this.levels.scene.turnOff();
+    this.shine(options);
     this.levels.drawn = 0;
     this.expression = options.expression;
     this.turned = Object.fromEntries(Object.entries(options.turned).filter(([joint]) => avatar.names.includes(joint)));
@@ -356,14 +354,27 @@ export class Viewer {
     this.paused = this.calm && this.length > 0;
     camera.walked.fill(0);
     this.step(0);
-    camera.fov = options.fov;
+    this.aim(options);
+    this.draw();
+  }
+
+  /** @param {import("./address.js").Options} options what the camera sees; what is not given frames the whole figure from the front */
+  aim({ fov, yaw, pitch, distance, target }) {
+    const { camera } = this;
+    camera.fov = fov;
     this.frame();
     camera.moved = pitch !== null || distance !== null || target !== null;
-    camera.yaw = options.yaw;
+    camera.yaw = yaw;
     camera.pitch = pitch ?? camera.pitch;
     camera.distance = distance ?? camera.distance;
     camera.target = target ?? camera.target;
-    this.draw();
+  }
+
+  /** @param {import("./address.js").Options} options by whose lamp, or the clip's light, the person is seen */
+  shine({ lit, lamp }) {
+    this.levels.lit = lit;
+    if (lamp) this.levels.scene.place(...lamp);
+    else this.levels.scene.turnOff();
   }
 
   /**

@@ -9,7 +9,6 @@ own detections, filled, and then fitted.
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 SEEDS = (31, 32)
@@ -41,9 +40,9 @@ def main(argv: list[str] | None = None) -> int:
     from gsac.benchmarks.handgap import table as gap_table
     from gsac.benchmarks.handgap.clips import make_turning_body
     from gsac.cache.store import Store
-    from gsac.pipeline.reporter import PlainReporter
+    from gsac.pipeline.journal import plain_journal
 
-    say = PlainReporter(sys.stderr)
+    say = plain_journal()
     store = Store.open(say=say.note)
     options.out.mkdir(parents=True, exist_ok=True)
     kept = options.clips or options.out / "clips"

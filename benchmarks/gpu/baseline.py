@@ -29,6 +29,7 @@ from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gpu import body_arrays
 from gsac.stages.train.poses.poses import HAND_SHARE
 from gsac.stages.train.task import Fit, Task
+from gsac.stages.train.views import View, of_each
 
 RATES = {"mu": "mu_rate", "quat": "quat_rate", "log_scale": "scale_rate", "rgb": "rgb_rate", "opacity": "opacity_rate",
          "pose": "pose_rate"}
@@ -61,7 +62,8 @@ def seconds_per_step(figure: Figure, gaussians: Gaussians, recipe: Recipe, compi
 def fit(task: Task) -> Fit:
     """Recipe fast for the stage, eager, with the frames, sizes, backgrounds and rates of the CUDA trainer."""
     prealign.adjust(task, Cuda())
-    fine, coarse = crop_views(task)
+    fine = crop_views(task)
+    coarse = of_each(View.halved, fine)
     gaussians = init_gaussians(task, coarse, budget(task, "cuda"))
     recipe = make_recipe(task.config, len(gaussians))
     levels = [on_device([Shot(views[int(t)].pixels, views[int(t)].camera) for t in task.trained]) for views in (coarse, fine)]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
 
 import numpy as np
 
@@ -30,14 +29,14 @@ def main() -> None:
     if why := why_not():
         raise SystemExit(f"benchmarks.gpu.people: {why}")
     from gsac.benchmarks.speed_accuracy.novel_poses import judge_poses
-    from gsac.pipeline.reporter import PlainReporter
+    from gsac.pipeline.journal import plain_journal
 
     def one(case: training.Case, recipe: str, cores: list[int] | None) -> dict:
         folder = options.out / "trainings" / f"{case.name}_{recipe}"
         metrics = training.train(case, folder, cores, recipe=recipe, device="cuda", height=options.height, flip=True)
         return metrics | (judge_poses(folder, case.novel, folder / "novel") if case.novel else {})
 
-    cases = training.prepare_cases(options, PlainReporter(sys.stderr), options.novel)
+    cases = training.prepare_cases(options, plain_journal(), options.novel)
     calls = [(case, recipe) for case in cases for recipe in RECIPES]
     ends = training.side_by_side(one, calls, options.jobs)
     pairs = {case.name: tuple(ends[2 * k: 2 * k + 2]) for k, case in enumerate(cases)}

@@ -10,7 +10,6 @@ its own. LPIPS is a dash without its weights (`gsac models add`).
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from gsac.benchmarks import training
@@ -41,9 +40,9 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.paper_table import table
-    from gsac.pipeline.reporter import PlainReporter
+    from gsac.pipeline.journal import plain_journal
 
-    say = PlainReporter(sys.stderr)
+    say = plain_journal()
     options.out.mkdir(parents=True, exist_ok=True)
     rows: dict[tuple[str, str], list[dict]] = {}
     for at, seed in enumerate(options.seeds):

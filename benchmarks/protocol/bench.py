@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from gsac.benchmarks import training
@@ -41,9 +40,9 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.protocol import table
-    from gsac.pipeline.reporter import PlainReporter
+    from gsac.pipeline.journal import plain_journal
 
-    say, protocol = PlainReporter(sys.stderr), PROTOCOLS[options.name]
+    say, protocol = plain_journal(), PROTOCOLS[options.name]
     if options.repeats < 1:
         raise BadInput(f"--repeats {options.repeats}: expected 1 or more")
     names = [folder.resolve().name for folder in options.clips]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
 from pathlib import Path
 
 from gsac.benchmarks import training
@@ -26,9 +25,9 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.size import chart
-    from gsac.pipeline.reporter import PlainReporter
+    from gsac.pipeline.journal import plain_journal
 
-    say = PlainReporter(sys.stderr)
+    say = plain_journal()
     options.out.mkdir(parents=True, exist_ok=True)
     curves: dict[str, list[dict]] = {}
     scratch: dict[str, list[tuple[int, float]]] = {}

@@ -8,13 +8,12 @@ seconds of when it ran.
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from gsac.benchmarks import training
 from gsac.benchmarks.speed_accuracy.trial import PAPER, Trial
+from gsac.pipeline.journal import Journal, plain_journal
 from gsac.pipeline.quality import QUALITIES, STANDARD
-from gsac.pipeline.reporter import PlainReporter
 
 CURVE = 6
 """Judged checkpoints of a training with the first seed."""
@@ -41,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.speed_accuracy import chart, table
 
-    say = PlainReporter(sys.stderr)
+    say = plain_journal()
     options.out.mkdir(parents=True, exist_ok=True)
     beside = [trial for path in options.beside for trial in table.read_csv(path)]
     trials = measure(options, say)
@@ -53,7 +52,7 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def measure(options: argparse.Namespace, say: PlainReporter) -> list[Trial]:
+def measure(options: argparse.Namespace, say: Journal) -> list[Trial]:
     """Runs all trainings of the clips. What is finished is in speed_accuracy.csv, should the rest be stopped."""
     from gsac.benchmarks.speed_accuracy import novel_poses, table
     from gsac.benchmarks.speed_accuracy.trial import make_trial

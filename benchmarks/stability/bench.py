@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from gsac.benchmarks.stability.trial import Task
-    from gsac.pipeline.reporter import PlainReporter
+    from gsac.pipeline.journal import Journal
 
 TINY = {"frames": 8, "height": 320}
 """Of the clip of --quick."""
@@ -38,6 +37,9 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--clip", type=Path, action="append", default=[], metavar="DIR",
                      help="a truth clip: a folder with clip.mp4, mask/ and truth.npz; may be repeated (default: seeds 31 to 33)")
     out.add_argument("--frames", type=int, default=30, help="kept of each clip, evenly (default: 30)")
+    out.add_argument("--kept", type=int, default=None, metavar="N",
+                     help="that the run keeps of those frames, and `gsac check` then its own number, as of clips that people film "
+                          "(default: all, and check looks at the same)")
     out.add_argument("--height", type=int, default=640, help="px (default: 640)")
     out.add_argument("--jobs", type=int, default=1, metavar="N", help="trials side by side (default: 1)")
     out.add_argument("--limit", type=float, default=600, metavar="S", help="seconds after which a trial hangs (default: 600)")
@@ -53,9 +55,9 @@ def main(argv: list[str] | None = None) -> int:
     from gsac.benchmarks.stability import chart, table
     from gsac.benchmarks.stability.outcome import draw_curves, find_outcomes
     from gsac.benchmarks.stability.trial import hash_results
-    from gsac.pipeline.reporter import PlainReporter
+    from gsac.pipeline.journal import plain_journal
 
-    say = PlainReporter(sys.stderr)
+    say = plain_journal()
     options.out.mkdir(parents=True, exist_ok=True)
     keep_settings(options)
     lines = options.out / "trials.jsonl"
@@ -82,13 +84,14 @@ def keep_settings(options: argparse.Namespace) -> None:
     """Notes in OUT/settings.json what its trials share. Raises BadInput where OUT holds trials of other settings."""
     from gsac.stages.contract import BadInput
 
-    path, own = options.out / "settings.json", {name: getattr(options, name) for name in ("frames", "height", "until", "quick")}
-    if path.is_file() and (kept := json.loads(path.read_text())) != own:
+    path = options.out / "settings.json"
+    own = {name: getattr(options, name) for name in ("frames", "kept", "height", "until", "quick")}
+    if path.is_file() and (kept := {"kept": None} | json.loads(path.read_text())) != own:
         raise BadInput(f"{options.out} holds trials of other settings ({kept}, not {own}); give another --out")
     path.write_text(json.dumps(own) + "\n")
 
 
-def list_open(options: argparse.Namespace, lines: Path, say: PlainReporter) -> list[Task]:
+def list_open(options: argparse.Namespace, lines: Path, say: Journal) -> list[Task]:
     """Tasks that the file of lines has no trial of by today's code."""
     from gsac.benchmarks.stability import table
     from gsac.benchmarks.stability.trial import hash_results
@@ -106,7 +109,7 @@ def forecast(tasks: list[Task], jobs: int) -> str:
     return f"{len(tasks)} trials, about {minutes:.0f} CPU minutes, {minutes / max(1, jobs):.0f} with {jobs} side by side"
 
 
-def measure(options: argparse.Namespace, tasks: list[Task], lines: Path, say: PlainReporter) -> None:
+def measure(options: argparse.Namespace, tasks: list[Task], lines: Path, say: Journal) -> None:
     """Runs the tasks and appends each to the file of lines as it ends."""
     from gsac.benchmarks.stability import table, workers
     from gsac.benchmarks.stability.trial import Trial
@@ -123,7 +126,7 @@ def measure(options: argparse.Namespace, tasks: list[Task], lines: Path, say: Pl
     workers.run_all(tasks, options.jobs, options.limit, tell, options.until_s)
 
 
-def list_tasks(options: argparse.Namespace, say: PlainReporter) -> list[Task]:
+def list_tasks(options: argparse.Namespace, say: Journal) -> list[Task]:
     """Tasks in the order in which they should be done: methods, clean clips before faults, severities 3, 5, 1, 4, 2, then seeds.
 
     So a sweep that ends early has all persons at the severities that it came to.
@@ -154,7 +157,7 @@ def list_tasks(options: argparse.Namespace, say: PlainReporter) -> list[Task]:
 
     def task(fault: str, severity: int, seed: int, method: str) -> Task:
         return Task(clips[seed % len(clips)].resolve(), fault, severity, seed, method, options.out.resolve(), **sizes,
-                    until=options.until)
+                    until=options.until, kept=options.kept)
 
     return [each for method in options.methods or ([DEFAULT] if quick else METHODS)
             for each in ([task(CLEAN, 0, seed, method) for seed in seeds[:len(clips)]]

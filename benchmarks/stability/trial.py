@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 import time
 import traceback
 from dataclasses import asdict, dataclass, field, replace
@@ -25,8 +24,8 @@ from gsac.benchmarks.stability.faults import FAULTS
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
 from gsac.benchmarks.stability.take import Take, read_take
-from gsac.pipeline.clip_check import LAST, PARAMS, check_clip
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.clip_check import FRAMES, LAST, PARAMS, check_clip
+from gsac.pipeline.journal import plain_journal
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.severity import Severity
 from gsac.turntable.options import TurntableOptions
@@ -75,6 +74,8 @@ class Task:
     frames: int
     height: int
     until: str = "smplx"
+    kept: int | None = None
+    """Of the clip's frames, those that the run keeps, spread evenly, and `gsac check` then keeps its own; None: both keep all."""
 
     @property
     def code(self) -> str:
@@ -188,7 +189,7 @@ def render_person(task: Task, fault: Fault) -> Path:
     options |= {"frames": task.frames, "height": task.height, "fps": rate, "crf": CRF,
                 "noise": TurntableOptions.noise * task.height / HEIGHT}
     folder = task.out / "clips" / hash_code("gsac.turntable.clip")
-    return render_clip(folder / f"{task.clip.name}_{fault.name}_{task.severity}", PlainReporter(sys.stderr), **options)
+    return render_clip(folder / f"{task.clip.name}_{fault.name}_{task.severity}", plain_journal(), **options)
 
 
 def _seed_of(clip: Path) -> int:
@@ -209,10 +210,13 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
     if fault and fault.origin is Origin.FILM:
         film, touched = fault.inject(film, task.severity, task.seed)
         trial.touched = take.number[touched].tolist()
-    ports, said, take = _split(film, folder)
+    ports, said, take = _split(film, folder, task.kept)
     trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in said]
-    if trial.checked is not None:
-        trial.checked = _check(dict(ports), said, folder)
+    if trial.checked is not None and task.kept is None:
+        trial.checked = _check(dict(ports), said, folder / "check", folder)
+    elif trial.checked is not None:
+        own, heard, _ = _split(film, folder / "check", FRAMES)
+        trial.checked = _check(own, heard, folder / "check")
     for name in stages_until(task.until):
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
         found = run_stage(name, values, ports, folder / name if name in BEFORE else folder / task.method / name)
@@ -226,14 +230,14 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
     return ports, take
 
 
-def _split(film: Film, folder: Path) -> tuple[dict[str, Path], list[Finding], Take]:
-    """Runs `split` on the film and gives its pictures their own times.
+def _split(film: Film, folder: Path, count: int | None) -> tuple[dict[str, Path], list[Finding], Take]:
+    """Runs `split` on the film and gives its pictures their own times. count: most frames kept; None: all.
 
     Returns its ports, what it said, and the take that it kept.
     """
     ports = {"clip": folder / f"clip-{os.getpid()}.mp4"}
     film.write(ports["clip"])
-    said = run_stage("split", {"count": len(film.take.frames)}, ports, folder / "split")
+    said = run_stage("split", {"count": count or len(film.take.frames)}, ports, folder / "split")
     ports["clip"].unlink()
     clip = Clip.read(ports["split/clip.json"])
     take = film.take.at(film.number(np.array(clip.timestamps_s)))
@@ -243,13 +247,16 @@ def _split(film: Film, folder: Path) -> tuple[dict[str, Path], list[Finding], Ta
     return ports, said, take
 
 
-def _check(ports: dict[str, Path], said: list[Finding], folder: Path) -> list[str]:
-    """Codes of `gsac check`, mere news left out, by all of the trial's frames; said: by split."""
+def _check(ports: dict[str, Path], said: list[Finding], folder: Path, shared: Path | None = None) -> list[str]:
+    """Codes of `gsac check`, mere news left out, by the frames at these ports.
+
+    said: by split; folder: for its results; shared: the run's, where both look at the same frames.
+    """
     found = list(said)
     try:
         for name in stages_until(LAST):
-            shared = name in BEFORE and name not in PARAMS
-            found += run_stage(name, PARAMS.get(name, {}), ports, folder / name if shared else folder / "check" / name)
+            kept = shared if shared is not None and name in BEFORE and name not in PARAMS else folder
+            found += run_stage(name, PARAMS.get(name, {}), ports, kept / name)
             if any(finding["severity"] == Severity.HOPELESS for finding in found):
                 break
     except (StageError, ArtifactError):

@@ -33,10 +33,12 @@ from gsac.benchmarks.unity.spirv import Program
 
 BACKGROUNDS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Display values of a grey background."""
+SKY = 4.0
+"""Linear light of a bright sky, 1 being white after exposure."""
 WAYS = ("direct", "refitted", "own", "behind")
 EDGE = 0.02
 """Least alpha of a pixel of the person."""
-BEHIND = {"": "GsacBehind", "UniversalPipeline": "_CameraOpaqueTexture", "HDRenderPipeline": None}
+BEHIND = {"": "GsacBehind", "UniversalPipeline": "_CameraOpaqueTexture", "HDRenderPipeline": "_ColorPyramidTexture"}
 """Render pipeline -> the shader's name of the copy of what lies behind."""
 
 
@@ -64,7 +66,7 @@ class Programs(NamedTuple):
     direct: tuple[Program, Program]
     own: tuple[Program, Program]
     laid: tuple[Program, Program]
-    behind: str | None
+    behind: str
 
 
 def compile_programs(pipeline: str, stand_in: Path) -> Programs:
@@ -105,6 +107,7 @@ class Stage:
         P, screen = projection(camera), [self.size, self.size, 0, 0]
         return {"unity_MatrixV": view, "glstate_matrix_projection": P.T, "_ScreenParams": screen, "_ScaledScreenParams": screen,
                 "_ScreenSize": screen, "_WorldSpaceCameraPos": [0, 0, 0, 0], "GsacEyeView": view,
+                "TestFog": [0, 0, 0, 0], "_InvViewProjMatrix": np.eye(4),
                 "GsacEyeProjection": projection(camera, flipped=True).T, "GsacEyeScreen": [self.size, self.size, 2, 1],
                 "GsacEyeRect": [-1, -1, 1, 1], "GsacEyeLens": [P[0, 0], P[1, 1], P[0, 2], P[1, 2]],
                 "GsacIndexBits": index_bits(len(g)), **draw_rule(g.low_pass, linear),
@@ -122,13 +125,13 @@ class Stage:
     def lay(self, shot: Shot, background: float, known: bool, far: float = 1) -> np.ndarray:
         """Display values (size, size, 3) of the own picture laid over a background. far: depth of what stands in the scene."""
         grey = float(to_linear(np.asarray(background)))
-        if self.programs.behind:
-            side = self.size if known else 4
-            copy = self.gpu.texture(side, side, "rgba16float")
-            self.gpu.device.queue.write_texture({"texture": copy}, np.full((side, side, 4), grey, np.float16), {
-                "bytes_per_row": side * 8, "rows_per_image": side}, (side, side, 1))
-            self.gpu.textures[self.programs.behind] = copy
-        return to_display(self.laid.draw(self.parameters(shot, 0), behind=(grey, grey, grey, 1), far=far)[..., :3])
+        side = self.size if known else 4
+        copy = self.gpu.texture(side, side, "rgba16float")
+        self.gpu.device.queue.write_texture({"texture": copy}, np.full((side, side, 4), grey, np.float16), {
+            "bytes_per_row": side * 8, "rows_per_image": side}, (side, side, 1))
+        self.gpu.textures[self.programs.behind] = copy
+        parameters = self.parameters(shot, 0) | {"GsacBehindIsCopied": int(known)}
+        return to_display(self.laid.draw(parameters, behind=(grey, grey, grey, 1), far=far)[..., :3])
 
 
 def bind_shot(shot: Shot, faces: np.ndarray, g: Gaussians) -> tuple[Bound, np.ndarray]:

@@ -22,6 +22,7 @@ COMMANDS = {
     "stage": "run one stage, on a run's folder or on fixture artifacts",
     "fixtures": "cut what every stage of a run read, as plain files that replay it elsewhere",
     "batch": "run many clips over one cache",
+    "events": "what the runs or the batch in a folder have told: stages, progress, warnings, ends",
     "cache": "list, check, clean and share the cache",
     "models": "list, pull, add and remove model files",
     "data": "import a data set that you downloaded: frames, masks, cameras, poses and the published split",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +12,26 @@ from gsac.pipeline.batch import find_clips, make_jobs, run_batch
 from gsac.pipeline.batch_entry import Status
 from gsac.pipeline.batch_plan import BatchPlanner, ClipPlan
 from gsac.pipeline.batch_record import FILE, BatchRecord, read_request
-from gsac.pipeline.batch_reporter import BatchReporter, open_batch_reporter
+from gsac.pipeline.batch_reporter import open_batch_reporter
+from gsac.pipeline.clip_end import clip_end
 from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.commands.options import (
+    add_events,
     add_json,
     add_params,
     add_person,
     add_quality,
+    open_journal,
     open_store,
     progress_reporter,
     values_of_person,
 )
+from gsac.pipeline.event_file import EventFile, others_files
+from gsac.pipeline.events import BatchEnded, BatchStarted, ClipKept, ClipPlanned, Event, StageLine, StageProgress
 from gsac.pipeline.executors import EXECUTORS, check_executor
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Limits
 from gsac.pipeline.executors.memory import SHARE, machine_mb
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import ExitCode
@@ -36,9 +43,14 @@ from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import Options
 from gsac.pipeline.unchanged import run_unchanged
 from gsac.stages.contract import BadInput
+from gsac.stages.counting import counted
 
 REQUEST = ("source", "until", "start", "force", "anyway", "replace", "quality", "height", "body", "params", "set")
 """Arguments that say which clips are run and how; `--resume` takes them from the batch that it goes on with."""
+
+
+NOT_KEPT = (StageProgress, StageLine)
+"""What the batch's file of events leaves to those in the clips' folders."""
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -68,12 +80,77 @@ def declare(command: argparse.ArgumentParser) -> None:
     add_person(command)
     add_params(command)
     add_json(command)
+    add_events(command)
     command.set_defaults(do=do)
 
 
 def do(arguments: argparse.Namespace) -> ExitCode:
-    reporter = progress_reporter(arguments)
-    request = take_request(arguments)
+    with progress_reporter(arguments) as reporter, open_journal(arguments, reporter, of_batch=True) as journal:
+        return run(arguments, reporter, journal)
+
+
+def run(arguments: argparse.Namespace, reporter: PlainReporter, journal: Journal) -> ExitCode:
+    """The whole batch; reporter: what its table is drawn by."""
+    began, request = time.monotonic(), take_request(arguments)
+    check_arguments(arguments)
+    project = Project.at_hand()
+    configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
+    options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
+    store = open_store(journal)
+    planner = BatchPlanner(project, configs, store, options)
+    planner.keys.check(planner.steps)  # one error now, not one a clip
+    jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
+    refuse_others_events(arguments.out)
+    record = BatchRecord(arguments.out, request, jobs)
+    kept = {job: earlier for job in jobs if arguments.resume and (earlier := record.ended(job)) is not None}
+    plans = planner.plan_all(job for job in jobs if job not in kept)
+    if arguments.changed_only:
+        kept |= {plan.job: earlier for plan in plans if (earlier := record.unchanged(plan)) is not None}
+        plans = [plan for plan in plans if plan.job not in kept]
+    workers = arguments.jobs or count_workers(planner.keys)
+    limits = Limits(workers, arguments.memory * 1024 if arguments.memory else SHARE * machine_mb(), arguments.address)
+    due = [plan for plan in plans if not plan.unchanged]
+    journal.note(foretell(plans, len(kept), None if arguments.executor == "ray" else workers))
+    if arguments.dry_run:
+        return dry_run(plans, reporter, arguments.json)
+    planner.keys.pull_models({stage for plan in due for stage in plan.due}, journal.note)
+    page = BatchPage(arguments.out, jobs)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with EventFile(arguments.out.absolute(), NOT_KEPT) as file, journal.heard_by(file.take), journal.heard_by(record.take):
+        for job, earlier in kept.items():
+            journal.tell(ClipKept(clip=job.name, status=earlier.status if arguments.resume else Status.KEPT))
+            page.keep(job, earlier.error)
+        for plan in plans:
+            journal.tell(ClipPlanned(clip=plan.job.name, digest=plan.digest, due=list(plan.due), seconds=round(plan.seconds, 3)))
+        record.write(now=True)
+        journal.tell(BatchStarted(clips=len(jobs), due=len(due), executor=arguments.executor))
+
+        def hear(job: ClipJob, event: Event, attempt: int = 1) -> None:
+            journal.relay(event, job.name, attempt)
+
+        def end(result: ClipResult) -> None:
+            journal.tell(clip_end(result.code, result.seconds, result.error, result.summary, result.unchanged, result.killed,
+                                  result.job.name))
+            page.add(result, record.entries[result.job.name].before)
+            if page.is_due:
+                write_page(page, journal)
+
+        work = ClipWork(project, configs, store, options, journal, arguments.replace)
+        unchanged = run_unchanged(work, [plan.job for plan in plans if plan.unchanged], planner.keys, hear)
+        times = {plan.job.name: plan.seconds for plan in due}
+        try:
+            with open_batch_reporter(reporter, times) as table, journal.heard_by(table.take):
+                executor = EXECUTORS[arguments.executor](limits, hear)
+                results = run_batch([plan.told_job for plan in due], executor, end, unchanged)
+        finally:
+            journal.tell(BatchEnded(seconds=round(time.monotonic() - began, 3), failed=len(record.failed)))
+        record.write(now=True)
+        write_page(page, journal)
+        return conclude(record, {result.job.name: result for result in results}, page, journal, arguments.json)
+
+
+def check_arguments(arguments: argparse.Namespace) -> None:
+    """BadInput names an argument that cannot be, or that does not go with another one."""
     if arguments.jobs is not None and arguments.jobs < 1:
         raise BadInput(f"--jobs {arguments.jobs}: expected at least 1")
     if arguments.memory is not None and not arguments.memory > 0:
@@ -83,44 +160,6 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--address {arguments.address}: only --executor ray has one")
     if arguments.jobs is not None and arguments.executor == "ray":
         raise BadInput(f"--jobs {arguments.jobs}: on a cluster as many clips run at once as it has room for; leave it out")
-    project = Project.at_hand()
-    configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
-    options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
-    store = open_store(reporter)
-    planner = BatchPlanner(project, configs, store, options)
-    planner.keys.check(planner.steps)  # one error now, not one a clip
-    jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
-    record = BatchRecord(arguments.out, request)
-    kept = {job: earlier for job in jobs if arguments.resume and (earlier := record.ended(job)) is not None}
-    plans = planner.plan_all(job for job in jobs if job not in kept)
-    if arguments.changed_only:
-        kept |= {plan.job: earlier for plan in plans if (earlier := record.unchanged(plan)) is not None}
-        plans = [plan for plan in plans if plan.job not in kept]
-    workers = arguments.jobs or count_workers(planner.keys)
-    limits = Limits(workers, arguments.memory * 1024 if arguments.memory else SHARE * machine_mb(), arguments.address)
-    due = [plan for plan in plans if not plan.unchanged]
-    reporter.note(foretell(plans, len(kept), None if arguments.executor == "ray" else workers))
-    if arguments.dry_run:
-        return dry_run(plans, reporter, arguments.json)
-    planner.keys.pull_models({stage for plan in due for stage in plan.due}, reporter.note)
-    page = BatchPage(arguments.out, jobs)
-    for job, earlier in kept.items():
-        record.keep(job, earlier, earlier.status if arguments.resume else Status.KEPT)
-        page.keep(job, earlier.error)
-    record.plan(plans)
-    work = ClipWork(project, configs, store, options, reporter, arguments.replace)
-    unchanged = run_unchanged(work, [plan.job for plan in plans if plan.unchanged], planner.keys)
-    with open_batch_reporter(reporter, {plan.job.name: plan.seconds for plan in due}) as table:
-        def end(result: ClipResult) -> None:
-            record.end(result)
-            page.add(result, record.entries[result.job].before)
-            show(result, table, page, reporter)
-
-        executor = EXECUTORS[arguments.executor](limits, lambda job, line: table.hear(job.name, line))
-        results = run_batch([plan.told_job for plan in due], executor, end, unchanged)
-    record.write(now=True)
-    write_page(page, reporter)
-    return conclude(record, {result.job: result for result in results}, page, reporter, arguments.json)
 
 
 def take_request(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -160,7 +199,7 @@ def foretell(plans: list[ClipPlan], kept: int, workers: int | None) -> str:
     """The line before the start: how many clips need what, and how long it may take. workers: None where a cluster decides."""
     due = [plan for plan in plans if plan.due]
     unchanged = sum(plan.unchanged for plan in plans)
-    parts = [f"{len(plans) + kept} clips"]
+    parts = [counted(len(plans) + kept, "clip")]
     parts += [f"{unchanged} unchanged"] if unchanged else []
     parts += [f"{kept} left as they are"] if kept else []
     parts += [f"{broken} cannot be read"] if (broken := sum(bool(plan.error) for plan in plans)) else []
@@ -184,44 +223,31 @@ def dry_run(plans: list[ClipPlan], reporter: PlainReporter, json: bool) -> ExitC
     return ExitCode.OK
 
 
-def conclude(record: BatchRecord, results: dict[ClipJob, ClipResult], page: BatchPage, reporter: PlainReporter,
-             json: bool) -> ExitCode:
-    """The last lines and the object of --json."""
-    failed = [entry for entry in record.entries.values() if entry.status is Status.FAILED]
-    reporter.result(f"{len(record.entries) - len(failed)} of {len(record.entries)} clips are done")
-    for entry in failed:
-        reporter.result(f"failed: {entry.clip}: {entry.error}")
+def conclude(record: BatchRecord, results: dict[str, ClipResult], page: BatchPage, journal: Journal, json: bool) -> ExitCode:
+    """The last lines and the object of --json. results: by name of the clip."""
+    journal.result(f"{len(record.entries) - len(record.failed)} of {counted(len(record.entries), 'clip')} done")
+    for entry in record.failed:
+        journal.result(f"failed: {entry.clip}: {entry.error}")
     if json:
         files = {"page": page.path, "record": record.path}
         emit({"outputs": {name: str(path) for name, path in files.items() if path.exists()}, "clips": [
-            (results[job].summary if job in results else {})
+            (results[name].summary if name in results else {})
             | {"clip": entry.clip, "out": entry.out, "status": entry.status.value, "code": entry.code,
-               "seconds": round(entry.seconds, 3), "error": entry.error or None} for job, entry in record.entries.items()]})
+               "seconds": round(entry.seconds, 3), "error": entry.error or None} for name, entry in record.entries.items()]})
     elif page.path.exists():
         print(page.path)
-    return ExitCode.FAILED if failed else ExitCode.OK
+    return ExitCode.FAILED if record.failed else ExitCode.OK
 
 
-def show(result: ClipResult, table: BatchReporter, page: BatchPage, reporter: PlainReporter) -> None:
-    """Tells of a clip's end, and writes the page where that is due."""
-    if not result.unchanged or result.code:
-        table.end(result.job.name, describe(result))
-    if page.is_due:
-        write_page(page, reporter)
-
-
-def write_page(page: BatchPage, reporter: PlainReporter) -> None:
+def write_page(page: BatchPage, journal: Journal) -> None:
     """Writes the page; where that fails the batch goes on."""
     try:
         page.write()
     except Exception as error:
-        reporter.note(f"gsac: warning: {page.path} could not be written ({type(error).__name__}: {error})")
+        journal.note(f"gsac: warning: {page.path} could not be written ({type(error).__name__}: {error})")
 
 
-def describe(result: ClipResult) -> str:
-    """One clip's line."""
-    rows = result.summary.get("stages", [])
-    ran = sum(row["status"] == "ran" for row in rows)
-    warnings = sum(len(row["warnings"]) for row in rows)
-    end = "failed" if result.code else f"done, {ran} of {len(rows)} stages ran"
-    return f"{result.job.name}: {end}, {warnings} warnings, {duration(result.seconds)}"
+def refuse_others_events(folder: Path) -> None:
+    """BadInput where the files of events would be a user's."""
+    for path in others_files(folder):
+        raise BadInput(f"{path} was not written by gsac, which would append to it; move it away, or give another --out")

@@ -20,6 +20,7 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.rows import read_rows, result_row
 from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
+from gsac.stages.counting import counted
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -61,7 +62,8 @@ def do_export(arguments: argparse.Namespace) -> ExitCode:
         lineage.clips, lineage.papers = {clip: [run.clip_name]}, sorted(papers)  # no paths of this machine
         size = write_bundle(out, store, records, clip, papers | {LINEAGE: json.dumps(lineage.to_json(), indent=1).encode()})
     along = ", ".join(name.removeprefix("papers/") for name in sorted(papers))
-    reporter.note(f"{len(records)} results of {run.clip_name}, {format_size(size)}; papers: {along or 'none (--consent FILE)'}")
+    reporter.note(f"{counted(len(records), 'result')} of {run.clip_name}, {format_size(size)}; "
+                  f"papers: {along or 'none (--consent FILE)'}")
     if arguments.json:
         emit({"stages": [], "outputs": {"bundle": str(out)},
               "metrics": {"results": len(records), "bytes": size, "papers": sorted(papers)}})
@@ -77,8 +79,8 @@ def do_import(arguments: argparse.Namespace) -> ExitCode:
         bundle = read_bundle(arguments.file, store)
     except BundleError as error:
         raise BadInput(str(error)) from error
-    reporter.note(f"{len(bundle.records)} results of the clip {bundle.clip[:12]}, {format_size(bundle.bytes)}; `gsac run` on that "
-                  "clip finds them in the cache")
+    reporter.note(f"{counted(len(bundle.records), 'result')} of the clip {bundle.clip[:12]}, {format_size(bundle.bytes)}; "
+                  "`gsac run` on that clip finds them in the cache")
     for paper in bundle.papers:
         reporter.note(f"paper: {paper}")
     if arguments.json:

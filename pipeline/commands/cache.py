@@ -21,6 +21,7 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.project import Project
 from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
+from gsac.stages.counting import counted
 
 UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 
@@ -56,7 +57,7 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
         age = f"{row.age_s / 86400:6.1f} d"
         reporter.note(f"{row.stage:<10} {row.key[:16]}  {format_size(row.bytes):>9}  {age}  {row.seconds:8.1f} s  "
                       f"{describe_places(places[row.key])}")
-    reporter.note(f"{len(rows)} results, {format_size(sum(row.bytes for row in rows))} in {store.root}")
+    reporter.note(f"{counted(len(rows), 'result')}, {format_size(sum(row.bytes for row in rows))} in {store.root}")
     if arguments.json:
         emit({"root": str(store.root), "results": [
             dataclasses.asdict(row) | {"clips": sorted({folder.clip_name for folder in places[row.key]}),
@@ -111,9 +112,9 @@ def do_gc(arguments: argparse.Namespace) -> ExitCode:
         return do_gc_remote(arguments)
     report = gc.collect(open_store(reporter), arguments.keep_days, limit, arguments.dry_run, force=arguments.force)
     verb = "would remove" if arguments.dry_run else "removed"
-    left = len(report.temps) + len(report.partial)
-    reporter.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, {left} left-overs of dead runs: "
-                f"{format_size(report.freed_bytes)}; {format_size(report.kept_bytes)} stay")
+    left = counted(len(report.temps) + len(report.partial), "left-over")
+    reporter.note(f"{verb} {counted(len(report.records), 'result')}, {counted(len(report.objects), 'object')}, {left} of "
+                  f"dead runs: {format_size(report.freed_bytes)}; {format_size(report.kept_bytes)} stay")
     for line in reasons(report):
         reporter.note(line)
     if arguments.json:
@@ -127,8 +128,8 @@ def do_gc_remote(arguments: argparse.Namespace) -> ExitCode:
     reporter, results = answer_reporter(arguments), require_results()
     report = sweep_remote(results.bucket, arguments.keep_days, arguments.dry_run)
     verb = "would remove" if arguments.dry_run else "removed"
-    reporter.note(f"{verb} {len(report.records)} results, {len(report.objects)} objects, "
-                  f"{len(report.claims) + len(report.unfinished)} left-overs from {results.bucket.url}: "
+    reporter.note(f"{verb} {counted(len(report.records), 'result')}, {counted(len(report.objects), 'object')}, "
+                  f"{counted(len(report.claims) + len(report.unfinished), 'left-over')} from {results.bucket.url}: "
                   f"{format_size(report.freed_bytes)}; {format_size(report.kept_bytes)} stay")
     if arguments.json:
         emit({"remote": results.bucket.url} | dataclasses.asdict(report))

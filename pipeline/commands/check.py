@@ -15,7 +15,6 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.own_store import writable_store
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
-from gsac.pipeline.reporter import QuietReporter
 from gsac.pipeline.run import ClipRun, HopelessClipError, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 
@@ -33,7 +32,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     with progress_reporter(arguments) as reporter, half_made(temporary_folder()) as (folder, _):
         store = writable_store(open_store(reporter), folder / OWN_STORE, reporter)
         run_folder = RunFolder(folder / clip.name)
-        clip_run = ClipRun(project, configs, store, run_folder, QuietReporter())
+        clip_run = ClipRun(project, configs, store, run_folder)
         with run_folder.hold():
             run_folder.prepare(clip, project, configs)
             clip_run.keys.pull_models(clip_run.select(options), reporter.note)

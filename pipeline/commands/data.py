@@ -9,6 +9,7 @@ from pathlib import Path
 from gsac.pipeline.commands.options import progress_reporter
 from gsac.pipeline.outcomes import ExitCode
 from gsac.stages.contract import BadInput
+from gsac.stages.counting import counted
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -38,7 +39,7 @@ def do_import(arguments: argparse.Namespace) -> ExitCode:
         made += 1
         test = f", {len(clip.test)} of them to test ({clip.split_source})" if clip.test else ""
         masks = "with masks" if clip.masked else "without masks, which stage segment will make"
-        reporter.result(f"{folder}: {len(clip.numbers)} frames {masks}{test}")
+        reporter.result(f"{folder}: {counted(len(clip.numbers), 'frame')} {masks}{test}")
         brought = ("--set", "segment.method=brought") if clip.masked else ()
         reporter.note(shlex.join(("gsac", "run", str(folder), *brought, "--set", f"split.photo_fps={clip.fps:g}", "--set",
                                   "split.count=null")))

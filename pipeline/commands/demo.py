@@ -10,13 +10,13 @@ from pathlib import Path
 from gsac.cache.half_made import half_made
 from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.closing import closing_lines
-from gsac.pipeline.commands.options import add_quality, open_store, progress_reporter
+from gsac.pipeline.commands.options import add_quality, open_journal, open_store, progress_reporter
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.keys import Keys
-from gsac.pipeline.outcomes import ExitCode, Outcome
+from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.placing import keep_aside
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import resolve_quality
-from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run import Options
 from gsac.pipeline.run_folder import RunFolder
 
@@ -31,33 +31,33 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     root = arguments.out.absolute()
-    with progress_reporter(arguments) as reporter:
-        store, project = open_store(reporter), Project.at_hand()
+    with progress_reporter(arguments) as reporter, open_journal(arguments, reporter) as journal:
+        store, project = open_store(journal), Project.at_hand()
         configs = resolve_quality(arguments.quality, project)
         if not (root / "clip" / CLIP_FILE).is_file():
-            Keys(project, configs, store).pull_models(project.graph.steps, reporter.note)
-        clip, folder = make_truth_clip(root / "clip", reporter), RunFolder(root / "avatar")
-        ClipWork(project, configs, store, Options(quality=arguments.quality), reporter).do(clip.resolve(), folder)
+            Keys(project, configs, store).pull_models(project.graph.steps, journal.note)
+        clip, folder = make_truth_clip(root / "clip", journal), RunFolder(root / "avatar")
+        ClipWork(project, configs, store, Options(quality=arguments.quality), journal).do(clip.resolve(), folder)
         for line in closing_lines(folder):
-            reporter.note(line)
+            journal.note(line)
         print(folder.root, flush=True)
     return ExitCode.OK
 
 
-def make_truth_clip(folder: Path, reporter: PlainReporter) -> Path:
+def make_truth_clip(folder: Path, journal: Journal) -> Path:
     """clip.mp4 in the folder; rendered, whole or not at all, if it is not there yet."""
     if (folder / CLIP_FILE).is_file():
         return folder / CLIP_FILE
     from gsac.turntable.clip import make_clip
 
-    reporter.starts("truth", f"a clip is made in {folder}")
+    journal.starts("truth", f"a clip is made in {folder}")
     began = time.monotonic()
     folder.parent.mkdir(parents=True, exist_ok=True)
     with half_made(folder.parent) as (temp, _):
         made = make_clip(temp / folder.name, seed=1,
-                         progress=lambda done, total, unit: reporter.progress("truth", done, total, unit))
+                         progress=lambda done, total, unit: journal.progress("truth", done, total, unit))
         if os.path.lexists(folder):
-            keep_aside(folder, reporter.note)
+            keep_aside(folder, journal.note)
         (temp / folder.name).rename(folder)
-    reporter.ends("truth", Outcome.RAN, time.monotonic() - began)
+    journal.finishes("truth", time.monotonic() - began)
     return folder / made.name

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gsac.cache.errors import CacheFolderError
 from gsac.cache.gc import sweep_store
@@ -17,10 +19,13 @@ from gsac.pipeline.params import Values, resolve
 from gsac.pipeline.plan import StagePlan
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import QUALITIES, STANDARD
-from gsac.pipeline.reporter import PlainReporter, open_reporter
+from gsac.pipeline.reporter import PlainReporter, Speaker, open_reporter
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
+
+if TYPE_CHECKING:
+    from gsac.pipeline.journal import Journal
 
 
 def add_clip(command: argparse.ArgumentParser) -> None:
@@ -81,7 +86,24 @@ def add_run_folder(command: argparse.ArgumentParser) -> None:
 
 def progress_reporter(arguments: argparse.Namespace) -> PlainReporter:
     """Of a command that does something, on stderr."""
-    return open_reporter(arguments.verbosity, plain=getattr(arguments, "json", False))
+    return open_reporter(arguments.verbosity, plain=getattr(arguments, "json", False) or getattr(arguments, "events", False))
+
+
+def add_events(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--events", action="store_true",
+                         help="each event as a JSON line on stdout, as it happens, before the result (docs/events.md)")
+
+
+@contextlib.contextmanager
+def open_journal(arguments: argparse.Namespace, reporter: PlainReporter, of_batch: bool = False) -> Iterator[Journal]:
+    """Of a command that runs clips: the reporter hears it, stdout with --events, and the place that OTEL_* names."""
+    from gsac.pipeline.journal import Journal, print_event
+    from gsac.pipeline.tracing import traced
+
+    printers = [print_event] if getattr(arguments, "events", False) else []
+    journal = Journal(reporter.take, *printers, of_batch=of_batch)
+    with traced(journal):
+        yield journal
 
 
 def answer_reporter(arguments: argparse.Namespace) -> PlainReporter:
@@ -91,10 +113,10 @@ def answer_reporter(arguments: argparse.Namespace) -> PlainReporter:
     return PlainReporter(sys.stdout)
 
 
-def open_store(reporter: PlainReporter) -> Store:
+def open_store(say: Speaker) -> Store:
     """The store of GSAC_CACHE; it reports what it finds damaged. What killed processes left in it and in the system's folder of
     temporary files is removed."""
-    store = Store.open(say=reporter.note)
+    store = Store.open(say=say.note)
     sweep_store(store)
     sweep(temporary_folder())
     return store
@@ -129,5 +151,5 @@ def plan_run(arguments: argparse.Namespace, reporter: PlainReporter, until: str 
     folder, project, configs = open_run_folder(arguments, arguments.folder)
     if until is not None:
         project.graph.step(until)
-    clip_run = ClipRun(project, configs, open_store_of(folder, reporter), folder, reporter)
+    clip_run = ClipRun(project, configs, open_store_of(folder, reporter), folder)
     return clip_run, clip_run.plan(folder.require_clip(), Options(until=until))

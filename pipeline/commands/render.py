@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from gsac.avatar.video import ENCODERS, TRANSPARENT
 from gsac.cache.half_made import half_made
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput, StageError
 
@@ -79,7 +79,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--background none: {out.suffix} holds no transparency; expected --out with {' or '.join(TRANSPARENT)}, "
                        "or a folder for PNG pictures")
     with progress_reporter(arguments) as reporter:
-        frames, (width, height), seconds = film(file, arguments, out, size, background, floor, reporter)
+        frames, (width, height), seconds = film(file, arguments, out, size, background, floor, Journal(reporter.take))
     if arguments.json:
         emit({"stages": [{"name": "render", "status": Outcome.RAN.value, "seconds": seconds, "key": None}],
               "outputs": {"video": str(out)},
@@ -91,7 +91,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int] | None, background: np.ndarray | None,
-         floor: np.ndarray | None, reporter: PlainReporter) -> tuple[int, tuple[int, int], float]:
+         floor: np.ndarray | None, journal: Journal) -> tuple[int, tuple[int, int], float]:
     """Writes the video. Returns the number of its frames, their width and height, and the seconds that it took.
 
     background, floor: (3,) RGB in 0..1.
@@ -103,7 +103,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
     from gsac.avatar.video import Pictures, Video, VideoError
 
     began = time.monotonic()
-    reporter.starts("render", f"{file.name} to {out}")
+    journal.starts("render", f"{file.name} to {out}")
     try:
         avatar = RiggedAvatar.read(file)
         motion = find_motion(arguments.motion, avatar)
@@ -115,7 +115,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
             with Video(made, *size, arguments.fps, background is None) if out.suffix else Pictures(made) as video:
                 for done, frame in enumerate(draw_frames(avatar, plan, *size, background, shadow=not arguments.no_shadow,
                                                          floor=floor)):
-                    reporter.progress("render", done, len(plan), "frames")
+                    journal.progress("render", done, len(plan), "frames")
                     video.add(frame)
             made.replace(out)
     except ArtifactError as e:
@@ -123,7 +123,7 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
     except VideoError as e:
         raise StageError(str(e).replace(str(made), str(out))) from e
     seconds = time.monotonic() - began
-    reporter.ends("render", Outcome.RAN, seconds)
+    journal.finishes("render", seconds)
     return len(plan), size, seconds
 
 

@@ -10,10 +10,12 @@ from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.closing import closing_lines
 from gsac.pipeline.commands.options import (
     add_clip,
+    add_events,
     add_json,
     add_params,
     add_person,
     add_quality,
+    open_journal,
     open_store,
     progress_reporter,
     values_of_person,
@@ -45,6 +47,7 @@ def declare(command: argparse.ArgumentParser) -> None:
     add_params(command)
     command.add_argument("--dry-run", action="store_true", help="say what would run and why, and how long it would take")
     add_json(command)
+    add_events(command)
     command.set_defaults(do=do)
 
 
@@ -58,15 +61,15 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     clip = find_clip(arguments.clip)
     run_folder = RunFolder(arguments.out or (here.root if here is not None else default_out(clip)))
     options = Options(arguments.until, arguments.start, tuple(arguments.force), quality, arguments.anyway)
-    with progress_reporter(arguments) as reporter:
-        store = open_store(reporter)
-        clip_run = ClipRun(project, configs, store, run_folder, reporter)
+    with progress_reporter(arguments) as reporter, open_journal(arguments, reporter) as journal:
+        store = open_store(journal)
+        clip_run = ClipRun(project, configs, store, run_folder, journal)
         clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
             return dry_run(clip_run, clip, options, reporter, arguments.json)
-        finished = ClipWork(project, configs, store, options, reporter, arguments.replace).do(clip, run_folder)
+        finished = ClipWork(project, configs, store, options, journal, arguments.replace).do(clip, run_folder)
         for line in closing_lines(run_folder):
-            reporter.note(line)
+            journal.note(line)
         if arguments.json:
             emit(finished.summary())
         else:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from gsac.pipeline.events import Event
 from gsac.pipeline.run_folder import avatar_name
 
 
@@ -70,8 +71,10 @@ class Limits:
     """Of a cluster; None: the one that the environment names, or this machine alone."""
 
 
-Hear = Callable[[ClipJob, str], None]
-"""Called with each line that the run of a clip says while it is at work."""
+class Hear(Protocol):
+    """Called with each event that the run of a clip tells while it is at work, from any thread. attempt: which run of the clip."""
+
+    def __call__(self, job: ClipJob, event: Event, attempt: int = 1) -> None: ...
 
 
 class Executor(AbstractContextManager, Protocol):

@@ -18,7 +18,7 @@ from gsac.pipeline.outcomes import ExitCode
 
 
 class LocalExecutor:
-    """Runs `gsac run` for each clip. hear: gets what their runs say."""
+    """Runs `gsac run` for each clip. hear: gets what their runs tell."""
 
     def __init__(self, limits: Limits, hear: Hear):
         self._hear, self._memory = hear, Memory(limits.memory_mb)
@@ -54,7 +54,8 @@ class LocalExecutor:
             with self._memory.take(wanted) as may_start:
                 if not may_start:
                     return result or ClipResult(job, ExitCode.INTERRUPTED, 0.0, "the batch ended before its turn")
-                result = run_process(job, self._environment, lambda line: self._hear(job, line), self._while_running)
+                result = run_process(job, self._environment, lambda event, attempt=killed + 1: self._hear(job, event, attempt),
+                                     self._while_running)
             killed, wanted = killed + result.was_killed, self._memory.limit_mb
         return result.set_aside(killed, "with no other clip beside it")
 

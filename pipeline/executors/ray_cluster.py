@@ -11,11 +11,11 @@ import contextlib
 import logging
 import os
 import socket
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+from gsac.pipeline.events import Event, StageLine, StageProgress, read_event
 from gsac.pipeline.executors.clip_process import THREADS, run_process
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Hear, Limits
 from gsac.pipeline.outcomes import ExitCode
@@ -29,8 +29,8 @@ CORES = 2
 """Of a machine, for each clip; its run shares them out among its threads."""
 ANSWER_S = 5.0
 """s in which a cluster's address has to answer."""
-LINES_S = 2.0
-"""s between two lines of a clip that are passed on."""
+PROGRESS_S = 2.0
+"""s between two events on a clip's progress that are passed on, and between two looks at what was."""
 PASSED_ON = ("GSAC_", "AWS_", "OMP_", "NUMBA_", "OPENBLAS_")
 """Beginnings of environment variables that the clips' runs get from the command."""
 MACHINES_OWN = ("GSAC_CACHE", "GSAC_DEVICE")
@@ -54,8 +54,10 @@ class RayExecutor:
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise BadInput(f"--address {limits.address}: no Ray cluster answers there ({error}); start one with "
                            "`ray start --head`, or leave --address out") from error
-        self._lines = ray.remote(Lines).options(num_cpus=0).remote()
+        self._events = ray.remote(Events).options(num_cpus=0).remote()
+        self._run_clip = ray.remote(run_clip)  # once: each has its code sent to every worker
         self._gpus = ray.cluster_resources().get("GPU", 0)
+        self._cores = min(CORES, self._most_cores())
         self._tasks: dict[Any, tuple[ClipJob, ClipJob]] = {}
         """Task -> the clip, and the part of its stages that the task runs."""
 
@@ -77,16 +79,16 @@ class RayExecutor:
     def _start(self, job: ClipJob, part: ClipJob, gpus: int) -> None:
         """Hands the stages of `part` to the cluster, as the next task of the job."""
         environment = {name: value for name, value in os.environ.items() if name.startswith(PASSED_ON)}
-        task = self._ray.remote(run_clip).options(
-            num_cpus=min(CORES, self._most_cores()), num_gpus=gpus, max_retries=LOST, retry_exceptions=False,
+        task = self._run_clip.options(
+            num_cpus=self._cores, num_gpus=gpus, max_retries=LOST, retry_exceptions=False,
             memory=int(min(job.peak_mb, self._limits.memory_mb) * 2**20), name=job.name)
-        self._tasks[task.remote(part, environment, self._lines)] = (job, part)
+        self._tasks[task.remote(part, environment, self._events)] = (job, part)
 
     def collect(self) -> Iterator[ClipResult]:
         took: dict[ClipJob, float] = {}
         while self._tasks:
-            done, _ = self._ray.wait(list(self._tasks), timeout=LINES_S)
-            self._pass_on_lines()
+            done, _ = self._ray.wait(list(self._tasks), timeout=PROGRESS_S)
+            self._pass_on_events()
             for task in done:
                 job, part = self._tasks.pop(task)
                 result = self._result(task, job)
@@ -105,12 +107,15 @@ class RayExecutor:
             return ClipResult(job, ExitCode.FAILED, 0.0, f"the cluster lost it {LOST + 1} times ({why}); look at the machines, "
                               "then run the batch again", killed=LOST + 1)
 
-    def _pass_on_lines(self) -> None:
+    def _pass_on_events(self) -> None:
         by_out = {str(job.out): job for job, _ in self._tasks.values()}
-        with contextlib.suppress(Exception):  # lines are only for people
-            for out, line in self._ray.get(self._lines.take.remote(), timeout=LINES_S).items():
-                if out in by_out:
-                    self._hear(by_out[out], line)
+        told = []
+        with contextlib.suppress(Exception):  # a machine that is gone takes what it told along; the clip's end comes without
+            told = self._ray.get(self._events.take.remote(), timeout=ANSWER_S)
+        for out, line, attempt in told:
+            event = read_event(line)
+            if out in by_out and event is not None:
+                self._hear(by_out[out], event, attempt)
 
     def _most_cores(self) -> float:
         """Cores of the largest machine."""
@@ -129,39 +134,45 @@ def refuse_deaf(address: str | None) -> None:
                        "`ray start --head`, or leave --address out") from error
 
 
-class Lines:
-    """The last line of each clip at work; an actor."""
+class Events:
+    """What clips at work have told; an actor."""
 
     def __init__(self):
-        self._lines: dict[str, str] = {}
+        self._told: list[tuple[str, str, int]] = []
 
-    def put(self, out: str, line: str) -> None:
-        """Notes a line of the clip whose folder is `out`."""
-        self._lines[out] = line
+    def put(self, out: str, line: str, attempt: int) -> None:
+        """Notes an event of the clip whose folder is `out`, as a line, since only the command needs its type."""
+        self._told.append((out, line, attempt))
 
-    def take(self) -> dict[str, str]:
-        """Folder -> line, of clips that have said one since the last call."""
-        lines, self._lines = self._lines, {}
-        return lines
+    def take(self) -> list[tuple[str, str, int]]:
+        """Folder, line and attempt, of all events since the last call."""
+        told, self._told = self._told, []
+        return told
 
 
-def run_clip(job: ClipJob, environment: dict[str, str], lines: Any) -> ClipResult:
+def run_clip(job: ClipJob, environment: dict[str, str], events: Any) -> ClipResult:
     """One clip on the machine where this runs."""
+    import ray
+
     cores = str(CORES)
     own = {name: os.environ[name] for name in MACHINES_OWN if name in os.environ}
     environment = dict.fromkeys(THREADS, cores) | os.environ | environment | own
-    last = 0.0
+    last, put, killed = 0.0, None, 0
 
-    def hear(line: str) -> None:
-        nonlocal last
-        if time.monotonic() - last >= LINES_S:
-            last = time.monotonic()
-            with contextlib.suppress(Exception):
-                lines.put.remote(str(job.out), line)
+    def hear(event: Event) -> None:
+        nonlocal last, put
+        seldom = isinstance(event, StageProgress)
+        if isinstance(event, StageLine) or (seldom and event.time - last < PROGRESS_S):
+            return
+        last = event.time if seldom else last
+        with contextlib.suppress(Exception):
+            put = events.put.remote(str(job.out), event.to_line(), killed + 1)
 
-    killed = 0
     while True:
         result = run_process(job, environment, hear)
         killed += result.was_killed
         if not result.was_killed or killed == TRIES:
+            if put is not None:
+                with contextlib.suppress(Exception):  # events come in order: where the last is there, all are
+                    ray.get(put, timeout=ANSWER_S)
             return result.set_aside(killed, "on the same machine")

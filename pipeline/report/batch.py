@@ -9,6 +9,7 @@ import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -21,6 +22,7 @@ from gsac.pipeline.report.origin import HEAD_BYTES, read_origin
 from gsac.pipeline.report.page import make_template
 from gsac.pipeline.report.results import Results
 from gsac.pipeline.report.verdict import Grade
+from gsac.pipeline.run import first_sentence
 from gsac.pipeline.run_folder import LOGS, REPORT, RUN, write_text
 from gsac.stages.contract import BadInput
 from gsac.stages.severity import Severity
@@ -37,6 +39,8 @@ GAP_S = 5.0
 """s between two writings of the page while clips end."""
 VIEW_HEIGHT = 264
 """px of a view on a card."""
+IN_PICTURE = ("cut_off", "part_hidden", "second_person")
+"""Codes of findings that a card tells in words: what of the person the pictures lack, and who else is in them."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,8 @@ class Card:
     """Name and address, relative to the page, of what there is to open."""
     found: tuple[str, ...] = ()
     """What contradicts itself in the clip: codes of findings, as words."""
+    in_picture: tuple[str, ...] = ()
+    """Sentences on what of the person the pictures lack, and on who else is in them."""
     figures: Mapping[str, float] = field(default_factory=dict)
     """Name in metrics.json -> value."""
     changes: tuple[str, ...] = ()
@@ -178,15 +184,26 @@ def make_card(folder: Path) -> Card:
     strip, views = cut_strip(page)
     grade = Grade.__members__.get(origin.grade)
     return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, views, links, name_findings(results),
-                read_figures(results.run.get("metrics") or {}))
+                tell_picture(results), read_figures(results.run.get("metrics") or {}))
 
 
 def name_findings(results: Results) -> tuple[str, ...]:
     """Codes of the findings that are wrong in the clip, each once, as words: `camera moves`."""
-    rows = [results.result(name) or row for name, row in results.rows.items()]
-    codes = [str(finding.get("code")) for row in rows for finding in row.get("findings") or []
-             if finding.get("severity") == Severity.WRONG]
+    codes = [str(finding.get("code")) for _, finding in list_findings(results) if finding.get("severity") == Severity.WRONG]
     return tuple(code.replace("_", " ") for code in dict.fromkeys(codes))
+
+
+def tell_picture(results: Results) -> tuple[str, ...]:
+    """The first sentences of the warnings whose codes are IN_PICTURE."""
+    return tuple(first_sentence(message) for message, finding in list_findings(results) if finding.get("code") in IN_PICTURE)
+
+
+def list_findings(results: Results) -> list[tuple[str, dict[str, Any]]]:
+    """Warnings with their findings, of the results in the folder."""
+    rows = [results.result(name) or row for name, row in results.rows.items()]
+    return [(str(message), finding) for row in rows
+            for message, finding in zip_longest(row.get("warnings") or [], row.get("findings") or [], fillvalue="")
+            if isinstance(finding, dict)]
 
 
 def cut_strip(page: Path) -> tuple[Picture | None, int]:

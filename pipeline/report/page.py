@@ -21,6 +21,7 @@ from gsac.pipeline.report.results import AbsentError, Results, number, tree_size
 from gsac.pipeline.report.tables import parameters, provenance, stage_rows, totals
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run_folder import REPORT, RUN, RunFolder
+from gsac.stages.counting import counted
 from gsac.stages.severity import Severity
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def make_template(name: str) -> Template:
 
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True,
                                      lstrip_blocks=True, undefined=jinja2.StrictUndefined, finalize=_as_utf8)
-    environment.filters |= {"seconds": seconds, "bytes": size}
+    environment.filters |= {"seconds": seconds, "bytes": size, "counted": counted}
     return environment.get_template(name)
 
 
@@ -212,7 +213,7 @@ def describe_person(results: Results, facts: dict[str, float]) -> str:
     try:
         clip = read_json(results.path("split/clip.json")) or {}
         count = sum(1 for p in results.path("split/frames").iterdir() if p.stem.isdigit())
-        words.append(f"{count} frames of {clip.get('width')} x {clip.get('height')} px")
+        words.append(f"{counted(count, 'frame')} of {clip.get('width')} x {clip.get('height')} px")
         times = clip.get("timestamps_s") or []
         words.append(f"{times[-1] - times[0]:.1f} s" if len(times) > 1 else "photos" if not times else "one moment")
     except (AbsentError, AttributeError, TypeError, OSError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gsac.pipeline.report.results import number
+from gsac.stages.counting import counted
 
 OVERFIT_DB, POSE_DB, WORST_DB = 2.0, 1.0, 3.0
 TURN, OUTLINE, ALPHA_IOU, HAND, PERSON = 270.0, 0.85, 0.95, 0.5, 0.95
@@ -66,5 +67,5 @@ def avatar_weaknesses(metrics: dict[str, Any]) -> list[str]:
     if iou is not None and iou < ALPHA_IOU:
         found.append(f"Its outline misses the person's (alpha IoU {iou:.2f} on held-out frames).")
     if rows and len(rows) < 3:
-        found.append(f"Quality was judged on {len(rows)} held-out frame{'s' if len(rows) > 1 else ''} only.")
+        found.append(f"Quality was judged on {counted(len(rows), 'held-out frame')} only.")
     return found

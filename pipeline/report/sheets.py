@@ -17,6 +17,7 @@ from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
 from gsac.pipeline.report.pictures import EXACT, QUALITIES, SEEN, Footage, Picture, make_picture, shrink_to_fit, spread_evenly
 from gsac.pipeline.report.results import AbsentError, Results, number
+from gsac.stages.counting import counted
 
 CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT, FACES = 12, 8, 8, 8, 8, 3
 """How many frames each sheet shows at most."""
@@ -312,7 +313,7 @@ def heldout_figures(results: Results) -> dict[str, str]:
                "Held out": len(metrics.get("heldout_frames") or []) or None,
                "LPIPS": "not measured (no weights)" if lpips is None else f"{lpips:.3f} ({metrics.get('lpips_net')})",
                "VGG features (HED)": None if vgg_hed is None else f"{vgg_hed:.3f} (no LPIPS)"}
-    return {name: f"{value} frames" if isinstance(value, int) else value for name, value in figures.items() if value}
+    return {name: counted(value, "frame") if isinstance(value, int) else value for name, value in figures.items() if value}
 
 
 def heldout_rows(results: Results) -> dict[str, dict]:

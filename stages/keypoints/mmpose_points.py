@@ -15,6 +15,7 @@ from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face
 from gsac.avatar.mmpose_file import read_mmpose
 from gsac.stages.contract import BadInput
+from gsac.stages.counting import counted
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import BODY133, Detector
@@ -39,7 +40,7 @@ class MmposePoints(Detector):
         source = f"keypoints.points is {self._config.points}: it"
         lacking = sorted(range(len(frames)) - self._found.keys())
         if lacking or len(self._found) > len(frames):
-            raise BadInput(f"{source} has {len(self._found)} frames, the clip {len(frames)}"
+            raise BadInput(f"{source} has {counted(len(self._found), 'frame')}, the clip {len(frames)}"
                            + (f", and none for frame {lacking[0]}" if lacking else "") + "; run mmpose on this run's split/frames")
         for t, frame in enumerate(frames):
             if frame.seen:

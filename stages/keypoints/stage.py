@@ -15,6 +15,7 @@ from gsac.avatar.region import Region
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import BadInput, Job
+from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
 from gsac.stages.first_look import FirstLook
 from gsac.stages.frame_names import name_frames
@@ -78,7 +79,7 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
     """Warns of what was not seen; that nobody was seen in any frame is an error. cuts: one for each frame."""
     seen = np.array([f.seen for f in frames])
     if not seen.any():
-        raise BadInput(f"No person was found in any of the clip's {len(frames)} frames; {ADVICE}")
+        raise BadInput(f"No person was found in any of the clip's {counted(len(frames), 'frame')}; {ADVICE}")
     if seen.mean() < FLICKER and not any(f.score[points].any() for f in frames for points in (FACE, *HANDS.values())):
         raise BadInput(f"No person was found: something like one shows in {name_frames(seen)} only, and never a face or a hand; "
                        f"{ADVICE}")

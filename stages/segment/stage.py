@@ -17,6 +17,7 @@ from gsac.avatar.onnx_network import NetworkError
 from gsac.avatar.sapiens import Sapiens
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import BadInput, Job, StageError
+from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
 from gsac.stages.segment.brought import MASKS, hand_on
 from gsac.stages.segment.components import keep_person, keep_soft_person
@@ -183,8 +184,9 @@ def describe_nobody(paths: list[Path], unfound: np.ndarray) -> str:
     if not unfound.any():
         return f"frame 0 ({paths[0].name}) and all others: no person was found, so every mask would be empty"
     first = int(np.flatnonzero(unfound)[0])
-    return (f"frame {first} ({paths[first].name}): the mask is empty although a person was found there, and no other of the "
-            f"{len(paths)} frames has one; look at the frames, and film one whole person or try segment.method=selfie")
+    return (f"frame {first} ({paths[first].name}): the mask is empty although a person was found there, and none of the "
+            f"clip's {counted(len(paths), 'frame')} has one; look at the frames, and film one whole person, or try "
+            "segment.method=selfie")
 
 
 def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,

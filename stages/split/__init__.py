@@ -7,7 +7,8 @@ gives  frames/%06d.png (8-bit RGB), frames/plate.png where there is a plate, fra
 
 The rotation tag is applied, HDR is tone-mapped to SDR BT.709, transparency is composited over black and pixels are made square;
 the aspect is kept. Footage taller than split.max_height is cut to the person where that shows them larger, if the networks that
-find people are there (split.crop). The same input gives the same bytes.
+find people are there (split.crop). Of a video that is cut together of several scenes one is used, the longest that shows a person.
+The same input gives the same bytes.
 """
 
 from gsac.avatar.artifacts import check_image_folder

@@ -24,6 +24,8 @@ MANY_REPEATED = 0.1
 """Share of the frames from which on single repeated ones are news."""
 OTHER_PICTURE, SAME_PLACE = 12.0, 0.5
 """Of another scene: the median change of a block, of 255, and the correlation of the blocks below which it is one."""
+SAME_SCENE = 0.8
+"""Least correlation of the two pictures before a cut, or of the two after it: where a camera swings, all neighbours differ."""
 MIRRORED = 0.8
 """Correlation with the mirrored picture from which on a scene is the same one."""
 ALIKE = 0.5
@@ -101,9 +103,11 @@ def find_repeats(blocks: np.ndarray) -> np.ndarray:
 
 def find_scene_cuts(blocks: np.ndarray) -> np.ndarray:
     """blocks: (T, h, w, 3), 0..255. Returns (T,) bool: the first frames of other scenes; not those of a flash, of black or mirrored
-    pictures."""
+    pictures, or of a camera that swings."""
     cuts = np.zeros(len(blocks), bool)
     for t in range(1, len(blocks) - 1):
+        if max(correlate(*blocks[t:t + 2]), correlate(*blocks[t - 2:t]) if t > 1 else 0) < SAME_SCENE:
+            continue
         cuts[t] = all(np.median(np.abs(after - before)) > OTHER_PICTURE and abs(correlate(after, before)) < SAME_PLACE
                       and correlate(after[:, ::-1], before) < MIRRORED and min(after.std(), before.std()) > OTHER_PICTURE
                       for before in blocks[max(0, t - 2):t] for after in blocks[t:t + 2])

@@ -7,7 +7,9 @@ import re
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -29,6 +31,7 @@ from gsac.stages.split.photos import write_plate_of_video
 from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
 from gsac.stages.split.picture_quality import HEIGHT, Look, judge_pictures, look_at
 from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, LIMITS, PQ, UNSPECIFIED, Video, file_url, probe
+from gsac.stages.split.scenes import Scene, choose_scene, divide
 
 TRANSFER_NAMES = {HLG: "arib-std-b67", PQ: "smpte2084"}
 SHOWN = re.compile(r"\bn:\s*\d+ pts:\s*(-?\d+)")
@@ -36,7 +39,8 @@ TIME_BASE = re.compile(r"config in time_base: (\d+)/(\d+)")
 LONGEST_S = 24 * 3600
 SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
 LOOKS, CHECKS, TRIES = 12, 30, 3
-"""Most key frames by which a crop is planned, most frames in which it is checked, and crops tried before the frames stay whole."""
+"""Most key frames by which a crop is planned, most frames in which it is checked, and crops tried before the frames stay whole; as
+often a scene is cut down to one that may show further cuts, now that its frames lie closer."""
 
 
 def split_video(path: Path, frames: Path, config: SplitConfig, people: People | None, warn: Callable[[Finding], None],
@@ -61,12 +65,9 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     if not 0 <= times[-1] <= LONGEST_S:
         raise BadInput(f"{path.name}: its frames lie {times[-1]:g} s apart from first to last; at most {LONGEST_S} s are read. "
                        "Copy the file from the phone again, or cut the clip.")
-    picks = pick_by_time(times, config.fps, config.count)
-    mask_of = match_frames(masks, len(times), picks) if masks else {}
-
     looks: list[Look] = []
 
-    def write(crop: Crop | None) -> Written:
+    def write(picks: np.ndarray, crop: Crop | None) -> Written:
         width, height = frame_size(video, config, crop)
         small = fit_size(width, height, HEIGHT)
         graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, crop, width, height))
@@ -79,7 +80,12 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"),
                     lambda pictures: looks.extend(map(look_at, _read_pictures(pictures, *small))))
 
-    crop, (shown, base, errors) = write_about_person(path, video, frames, config, people, write)
+    def write_scene(scene: Scene) -> WrittenScene:
+        picks = scene.first + pick_by_time(times[scene.first:scene.last + 1], config.fps, config.count)
+        own_keys = video.key_ticks[np.isin(video.key_ticks, video.ticks[scene.first:scene.last + 1])]
+        return picks, *write_about_person(path, replace(video, key_ticks=own_keys), frames, config, people, partial(write, picks))
+
+    picks, crop, (shown, base, errors) = write_one_scene(video.ticks, times, looks, frames, people, write_scene, warn)
 
     written = len(list(frames.glob("*.png")))
     if written == 0:
@@ -99,7 +105,8 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
             looks = [look.turned() if odd else look for look, odd in zip(looks, mirrored, strict=True)]
         warn(Finding.of(Code.MIRRORED, mirrored, figure=mirrored.sum(),
                         treated="turned back" if crop is None else "not used: they were cut to the person's place"))
-    if mask_of:
+    if masks:
+        mask_of = match_frames(masks, len(times), picks)
         write_masks(frames, [mask_of[int(at)] for at in np.searchsorted(video.ticks, shown)], (video.width, video.height), crop,
                     frame_size(video, config, crop), mirrored & (crop is None))
     repeated, findings = judge_pictures(looks, timed=True)
@@ -133,6 +140,28 @@ def frame_size(video: Video, config: SplitConfig, crop: Crop | None) -> tuple[in
 
 
 Written = tuple[list[int], Fraction, list[str]]
+WrittenScene = tuple[np.ndarray, Crop | None, Written]
+"""The frames that were picked, (K,) of the video's, how they were cut, and what became of them."""
+
+
+def write_one_scene(ticks: np.ndarray, times: np.ndarray, looks: list[Look], frames: Path, people: People | None,
+                    write_scene: Callable[[Scene], WrittenScene], warn: Callable[[Finding], None]) -> WrittenScene:
+    """Writes the frames of the whole video, and of one scene alone where it is cut together of several.
+
+    ticks, times: (N,) of the video's frames; looks: at the frames that were written last.
+    """
+    scene, scenes = Scene(0, len(times) - 1), 1
+    found = write_scene(scene)
+    for _ in range(TRIES):
+        parts = divide(scene, np.searchsorted(ticks, found[2][0]), [look.blocks for look in looks])
+        if len(parts) == 1:
+            break
+        scene, scenes = choose_scene(parts, times, frame_paths(frames), people), scenes + len(parts) - 1
+        remove_frames(frames)
+        found = write_scene(scene)
+    if scenes > 1:
+        warn(Finding.of(Code.SCENES_LEFT_OUT, figure=scenes, first=times[scene.first], last=times[scene.last]))
+    return found
 
 
 def write_about_person(path: Path, video: Video, frames: Path, config: SplitConfig, people: People | None,
@@ -153,9 +182,14 @@ def write_about_person(path: Path, video: Video, frames: Path, config: SplitConf
         if found is not None and not sides_near(found, crop, *whole[:2], LEAST_MARGIN).any():
             return crop, written
         extent = found.joined(extent).grown(sides_near(found, crop, *whole[:2], 0)) if found is not None else None
-        for frame in frame_paths(frames):
-            frame.unlink()
+        remove_frames(frames)
     return None, write(None)
+
+
+def remove_frames(folder: Path) -> None:
+    """Makes room for other ones."""
+    for frame in frame_paths(folder):
+        frame.unlink()
 
 
 def see_frames(people: People, frames: Path, crop: Crop) -> Extent | None:

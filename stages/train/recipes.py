@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from gsac.avatar.threads import side_by_side
 from gsac.stages.train.fast import lod, prealign, size_search
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.cpu import Cpu
@@ -28,8 +27,8 @@ def fit_fast(backend: Backend, task: Task) -> Fit:
     require_finite("after the last step", named_values(fit.gaussians))
     levels = [fit.gaussians, *lod.fit_levels(task, backend, fit)]
     levels = bone_drift.remove_drift(levels, task.poses, task.trained)
-    levels = side_by_side(lambda level, _: hold_at_joints(level, task.poses, task.trained), levels)
-    fit.gaussians, *fit.coarser = [shrink_strays(level, task.poses, task.trained) for level in levels]
+    levels = hold_at_joints(levels, task.poses, task.trained)
+    fit.gaussians, *fit.coarser = shrink_strays(levels, task.poses, task.trained)
     return fit
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 
 from gsac.avatar.artifacts import frame_paths, read_alpha, read_frame
 from gsac.avatar.camera import Camera
-from gsac.avatar.threads import available_cores
+from gsac.avatar.threads import available_cores, side_by_side
 from gsac.stages.contract import StageError
 from gsac.stages.train.edge_colour import unmix
 
@@ -74,6 +74,11 @@ class View:
 
 Views = Mapping[int, View] | list[View]
 """Views by frame."""
+
+
+def of_each(change: Callable[[View], View], views: Mapping[int, View]) -> dict[int, View]:
+    """Frame -> its view, changed: all views side by side."""
+    return dict(zip(views, side_by_side(lambda view, _: change(view), views.values()), strict=True))
 
 
 def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None, mixed: bool = False,

@@ -7,6 +7,7 @@ import numpy as np
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.gaussians.merge import merge_to_size
 from gsac.stages.train.judge.heldout import judge
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses
@@ -34,6 +35,7 @@ def warm_up() -> None:
     frames, poses = np.arange(FRAMES), Poses(body, params)
     config = TrainConfig(gaussians=GAUSSIANS, steps=STEPS, pose_rounds=1)
     gaussians = RECIPES["fast", "cpu"](Task(views, frames, frames[:1], poses, config, lambda done, total, unit: None)).gaussians
+    merge_to_size(gaussians, np.ones(len(gaussians)), len(gaussians) // 2, body, poses.rest(0)[0])
     converge(gaussians, poses, frames[:1], views, 1)
     BACKENDS["cpu"].align_poses(gaussians, poses, frames[:1], views, 1)
     judge(gaussians, poses, frames[:1], views)

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from support.toy import Toy
 
+from .batches import kill_in_batches
 from .kills import kill_at_calls, kill_at_random
-from .subjects import SmallRun
+from .subjects import FitBatch, FitRun, SmallRun, ToyBatch
 from .tally import Tally, write_table
 
 
@@ -24,6 +25,9 @@ def _kill(how: Callable[..., Tally], subject: Callable, attack: str, trials: int
 ATTACKS: dict[str, tuple[int, Callable[[int, int, float], Tally]]] = {
     "kill-toy": (1000, partial(_kill, kill_at_random, Toy, "SIGKILL of toy runs at random moments")),
     "kill-small": (200, partial(_kill, kill_at_random, SmallRun, "SIGKILL of whole runs, eight stages, at random moments")),
+    "kill-fit": (1000, partial(_kill, kill_at_random, FitRun, "SIGKILL of runs of six stages, to the body fit, at random moments")),
+    "batch-toy": (400, partial(_kill, kill_in_batches, ToyBatch, "SIGKILL in batches of three toy clips")),
+    "batch-fit": (200, partial(_kill, kill_in_batches, FitBatch, "SIGKILL in batches of three clips, to the body fit")),
     "calls-toy": (200, partial(_kill, kill_at_calls, Toy, "SIGKILL of toy runs at single system calls")),
     "calls-small": (100, partial(_kill, kill_at_calls, SmallRun, "SIGKILL of whole runs at single system calls")),
 }

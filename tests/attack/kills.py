@@ -13,9 +13,10 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from gsac.cache.digest import tree_digest
+from gsac.cache.folder_lock import try_lock
 from gsac.cache.half_made import sweep
 from gsac.cache.objects import NO_MEMO
 from gsac.cache.store import Store
@@ -27,8 +28,6 @@ from .tally import Fault, Tally
 
 OUTLIVES_S = 2.0
 """A process whose parent was killed ends within this time."""
-SETTLES_S = 0.05
-"""A dying process loses its environment, by which it is found here, a moment before its locks."""
 RERUN_S = 600.0
 CALLS = ("rename", "link", "symlink", "unlink", "rmdir", "mkdir", "fsync", "fchmodat", "chmod", "flock", "ftruncate", "write")
 """System calls at which a run is killed."""
@@ -48,6 +47,15 @@ class Subject(Protocol):
     def env(self) -> dict[str, str]: ...
 
     def command(self, *arguments: object) -> list[str]: ...
+
+
+class Kill(NamedTuple):
+    """What became of one start."""
+
+    happened: bool
+    """Whether something was killed."""
+    at_end: bool
+    """Whether the command came to its end all the same."""
 
 
 class Chain:
@@ -74,18 +82,26 @@ class Chain:
             shutil.rmtree(self.subject.cache / name, ignore_errors=True)
         shutil.rmtree(self.subject.out, ignore_errors=True)
 
+    def words(self) -> list[object]:
+        """What is asked of gsac."""
+        return ["run", self.subject.clip, "--out", self.subject.out]
+
+    def folders(self) -> list[Path]:
+        """Folders of runs that are there."""
+        return [self.subject.out] if self.subject.out.exists() else []
+
     def start(self, *before: str) -> subprocess.Popen:
-        """A run of the clip. before: words of the command line before the run's own."""
-        command = [*before, *self.subject.command("run", self.subject.clip, "--out", self.subject.out)]
+        """The command. before: words of the command line before its own."""
+        command = [*before, *self.subject.command(*self.words())]
         with self.heard.open("wb") as heard:
             return subprocess.Popen(command, cwd=self.subject.root, env=self.subject.env | {"TMPDIR": str(self.temporary)},
                                     stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=heard, start_new_session=True)
 
-    def trial(self, kill: Callable[[], bool]) -> None:
-        """One kill, by a function that tells whether the run was killed, and what is there after the next start."""
+    def trial(self, kill: Callable[[], Kill]) -> None:
+        """One start that may be killed, and what is there after the next one."""
         before = self._done()
-        killed = kill()
-        self.tally.trials += killed
+        kill_of = kill()
+        self.tally.trials += kill_of.happened
         self._outlived()
         store = Store(self.subject.cache)
         if not verify(store).sound:
@@ -93,7 +109,7 @@ class Chain:
         if lost := before - self._done():
             self.tally.fault(Fault.LOST, ", ".join(sorted(lost)))
         self._next_start(store)
-        if not killed:
+        if kill_of.at_end:
             self._judge_end()
 
     def finish(self) -> None:
@@ -114,8 +130,9 @@ class Chain:
 
         sweep_store(store)
         sweep(self.temporary)
-        if self.subject.out.exists():
-            with RunFolder(self.subject.out).hold():
+        sweep(self.subject.out)
+        for folder in self.folders():
+            with RunFolder(folder).hold():
                 pass
         left = find_leftovers(self.subject.cache, self.subject.out, self.temporary)
         left = [path for path in left if "/partial/" not in path and path not in self.known]  # the next run takes up the partial
@@ -135,15 +152,15 @@ class Chain:
     def _outlived(self) -> None:
         """Waits for the end of what the run has started, and tells of what outlives it for long."""
         began, alive, self.at_work = time.monotonic(), self.at_work, set()
-        while alive := {*processes_with(self.temporary), *filter(is_alive, alive)}:
+        while (alive := {*processes_with(self.temporary), *filter(is_alive, alive)}) or is_held(self.temporary):
             time.sleep(0.005)
             if time.monotonic() - began > 30:
                 break
         lasted = time.monotonic() - began
         self.tally.longest_s = max(self.tally.longest_s, lasted)
-        time.sleep(SETTLES_S)
         if lasted > OUTLIVES_S:
-            self.tally.fault(Fault.STUCK, f"{len(alive)} processes outlived the run by {lasted:.1f} s, in {self._stage()}")
+            self.tally.fault(Fault.STUCK, f"{len(alive)} processes, or their locks, outlived the run by {lasted:.1f} s, "
+                                         f"in {self._stage()}")
 
     def _stage(self) -> str:
         """The stage at work when the run was killed."""
@@ -156,7 +173,8 @@ class Chain:
 
     def _bytes(self) -> dict[str, str]:
         """Digests of what the folder holds, without what tells of times."""
-        found = [path for path in sorted(self.subject.out.glob("*/*")) if path.parent.name != "logs" and path.name not in TIMES]
+        found = [path for folder in self.folders() for path in sorted(folder.glob("*/*"))
+                 if path.parent.name != "logs" and path.name not in TIMES]
         return {str(path.relative_to(self.subject.out)): tree_digest(path.resolve(), NO_MEMO)[0] for path in found}
 
 
@@ -177,27 +195,44 @@ def is_alive(process: int) -> bool:
     return False
 
 
+def is_held(temporary: Path) -> bool:
+    """Whether a process that is being taken apart still has the lock of its temporary files."""
+    for folder in temporary.iterdir():
+        with contextlib.suppress(FileNotFoundError):
+            descriptor = os.open(folder, os.O_RDONLY)
+            free = try_lock(descriptor)
+            os.close(descriptor)
+            if free is False:
+                return True
+    return False
+
+
 def kill_at_random(subject: Subject, trials: int, seed: int, attack: str, end: float = float("inf")) -> Tally:
     """Kills runs at random moments until there are so many trials, or until the clock (time.monotonic) shows `end`."""
     tally, pick = Tally(attack), random.Random(seed)
     chain = Chain(subject, tally)
 
-    def kill() -> bool:
+    def kill() -> Kill:
         process = chain.start()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(pick.uniform(0.05, 0.8) * chain.whole_s)
-        killed = process.poll() is None
+        killed = wait_at_random(process, chain, pick)
         if killed:
             chain.at_work = {*processes_with(chain.temporary)}
             process.kill()
             process.wait()
             tally.where[chain._stage()] += 1
-        return killed
+        return Kill(killed, not killed)
 
     while tally.trials < trials and time.monotonic() < end:
         chain.trial(kill)
     chain.finish()
     return tally
+
+
+def wait_at_random(process: subprocess.Popen, chain: Chain, pick: random.Random) -> bool:
+    """Lets a command run for a random while. Returns whether it is still at work."""
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(pick.uniform(0.05, 0.8) * chain.whole_s)
+    return process.poll() is None
 
 
 def moments(pick: random.Random) -> Iterator[tuple[str, int]]:
@@ -212,7 +247,7 @@ def kill_at_calls(subject: Subject, trials: int, seed: int, attack: str, end: fl
     tally, pick = Tally(attack), random.Random(seed)
     chain, choices = Chain(subject, tally), moments(pick)
 
-    def kill() -> bool:
+    def kill() -> Kill:
         call, when = next(choices)
         traced = ["strace", "-o", "/dev/null", "-e", f"trace={call}", "-e", f"inject={call}:signal=KILL:when={when}"]
         process = chain.start(*traced)
@@ -221,11 +256,11 @@ def kill_at_calls(subject: Subject, trials: int, seed: int, attack: str, end: fl
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             tally.fault(Fault.STUCK, f"a run killed at {call} {when} did not end")
-            return True
+            return Kill(True, False)
         killed = code in (-signal.SIGKILL, 128 + signal.SIGKILL)
         if killed:
             tally.where[call] += 1
-        return killed
+        return Kill(killed, not killed)
 
     while tally.trials < trials and time.monotonic() < end:
         chain.trial(kill)

@@ -1,7 +1,6 @@
 """The faults of the stability benchmark, what counts as said, and what a trial's end is."""
 
 import csv
-import sys
 import time
 from dataclasses import replace
 
@@ -19,7 +18,7 @@ from gsac.benchmarks.stability.take import Take
 from gsac.benchmarks.stability.trial import CLEAN, DEFAULT, PAPER, End, Task, Trial
 from gsac.cache.code import code_parts
 from gsac.pipeline.clip_check import ClipCheck
-from gsac.pipeline.reporter import PlainReporter
+from gsac.pipeline.journal import plain_journal
 from gsac.stages.contract import BadInput, StageError
 from gsac.turntable.options import TurntableOptions
 
@@ -313,13 +312,15 @@ def test_trials_of_other_settings_are_not_mixed(tmp_path):
     bench.keep_settings(options("--seeds", "1"))
     with pytest.raises(BadInput, match="give another --out"):
         bench.keep_settings(options("--frames", "60"))
+    with pytest.raises(BadInput, match="give another --out"):
+        bench.keep_settings(options("--kept", "10"))
 
 
 def test_trials_of_other_code_do_not_count_and_run_again(tmp_path, capsys):
     lines = tmp_path / "trials.jsonl"
     options = bench.parser().parse_args(["--clip", str(tmp_path), "--fault", "blur", "--seeds", "0", "--severities", "3",
                                          "--methods", DEFAULT, "--out", str(tmp_path)])
-    say = PlainReporter(sys.stderr)
+    say = plain_journal()
     clean, blurred = bench.list_open(options, lines, say)
     table.add_line(Trial.of(clean), lines)
     table.add_line(replace(Trial.of(blurred), code="0" * 12), lines)

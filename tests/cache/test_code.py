@@ -178,6 +178,15 @@ def test_an_unchanged_module_is_not_parsed_again_and_an_edit_is_noticed(tree, mo
     assert len(parsed) == 11
 
 
+def test_what_is_remembered_of_a_stage_s_code_is_written_at_once(tree, monkeypatch):
+    monkeypatch.setattr(memo, "SETTLED_NS", -(10**18))
+    written = []
+    flush = memo.Memo.flush
+    monkeypatch.setattr(memo.Memo, "flush", lambda self: written.append(len(self._pending)) or flush(self))
+    parts(tree)
+    assert len(written) == 1 and written[0] >= 10, "each writing waits for the disk"
+
+
 def test_the_digests_are_the_same_in_every_process(tmp_path):
     command = "from gsac.cache.code import code_parts; print(code_parts('gsac.cache.store'))"
     printed = set()

@@ -1,3 +1,4 @@
+import errno
 import os
 import shutil
 import stat as modes
@@ -135,3 +136,20 @@ def test_every_folder_of_a_store_is_for_those_that_its_root_is_for_and_none_for_
     assert modes.S_IMODE((root / "lock").stat().st_mode) == shared & 0o666
     for file in root.glob("actions/*/*.json"):
         assert modes.S_IMODE(file.stat().st_mode) == 0o444
+
+
+def test_every_file_and_folder_of_a_tree_reaches_the_disk_and_a_failure_is_raised(tmp_path, monkeypatch):
+    (tmp_path / "tree" / "deep").mkdir(parents=True)
+    for number in range(20):
+        (tmp_path / "tree" / "deep" / f"{number}.txt").write_text("words")
+    synced = set()
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.add(os.readlink(f"/proc/self/fd/{descriptor}")))
+    objects.sync(tmp_path / "tree")
+    assert synced == {str(tmp_path / "tree"), *map(str, (tmp_path / "tree").rglob("*"))}
+
+    def fail(descriptor: int) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(OSError, match="Input/output error"):
+        objects.sync(tmp_path / "tree")

@@ -11,7 +11,7 @@ import pytest
 FIRST, SECOND, TEAM = 61001, 61002, 61000
 
 AS_USER = """
-import shutil, sqlite3, gsac.cache.gc, gsac.cache.verify
+import concurrent.futures.thread, shutil, sqlite3, gsac.cache.gc, gsac.cache.verify
 root, user, umask, group = sys.argv[2:]
 os.umask(int(umask, 8))
 os.setgroups([])

@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import subprocess
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ import pytest
 
 from gsac.pipeline import errors
 from gsac.pipeline.cli import execute
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.pace import Pace
 from gsac.pipeline.reporter import PlainReporter
@@ -145,13 +147,12 @@ def test_a_stage_that_fails_on_a_full_disk_says_so_whatever_its_library_said(toy
 
 def test_the_rate_counts_from_the_first_sign_of_progress(monkeypatch):
     now = iter([0.0, 60.0, 70.0])
-    monkeypatch.setattr("gsac.pipeline.reporter.time.monotonic", lambda: next(now))
-
+    monkeypatch.setattr("gsac.pipeline.journal.time", SimpleNamespace(monotonic=lambda: next(now), time=count(0, 60).__next__))
     lines = io.StringIO()
-    reporter = PlainReporter(lines)
-    reporter.starts("train", "first run")
-    reporter.progress("train", 1, 101, "steps")
-    reporter.progress("train", 51, 101, "steps")
+    journal = Journal(PlainReporter(lines).take)
+    journal.starts("train", "first run")
+    journal.progress("train", 1, 101, "steps")
+    journal.progress("train", 51, 101, "steps")
     assert "5 steps/s, 10 s left" in lines.getvalue()
     pace = Pace()
     pace.hear(1, "steps", 60.0)

@@ -6,6 +6,7 @@ from rich.text import Text
 
 from gsac.pipeline.batch import find_clips, make_jobs
 from gsac.pipeline.batch_reporter import open_batch_reporter
+from gsac.pipeline.events import ClipEnded, StageProgress, StageStarted
 from gsac.pipeline.reporter import TerminalReporter
 
 pytestmark = pytest.mark.slow
@@ -27,7 +28,7 @@ def test_a_batch_goes_on_past_a_clip_that_fails_and_says_which_and_why(toy, clip
     rows = {row["clip"].rsplit("/", 1)[1]: row for row in done.json["clips"]}
     assert {name: row["status"] for name, row in rows.items()} == {"one.mp4": "done", "two.mp4": "done", "bad.mp4": "failed"}
     assert "stage left failed" in rows["bad.mp4"]["error"]
-    assert "2 of 3 clips are done" in done.err and "failed: " + str(clips / "bad.mp4") in done.err
+    assert "2 of 3 clips done" in done.err and "failed: " + str(clips / "bad.mp4") in done.err
     assert (toy.root / "avatars" / "two-avatar" / "join" / "out.txt").read_text() == "GAMMA GAMMA"
 
 
@@ -36,7 +37,7 @@ def test_a_batch_leaves_one_page_that_shows_every_clip_and_names_it_on_stdout(to
     page = toy.root / "avatars" / "batch.html"
     assert done.out.splitlines() == [str(page)]
     html = page.read_text()
-    assert "2 of 3 clips are done, 1 failed." in html and "Stage left failed:" in html
+    assert "2 of 3 clips done, 1 failed." in html and "Stage left failed:" in html
     for clip in ("one", "two", "bad"):
         assert f"<h3>{clip}.mp4</h3>" in html and f'href="{clip}-avatar/report.html"' in html
     assert 'href="bad-avatar/logs/left.log"' in html
@@ -56,7 +57,7 @@ def test_a_list_names_clips_relative_to_itself_and_a_missing_one_fails_alone(toy
     todo = toy.root / "todo.txt"
     todo.write_text("# today\nclips/one.mp4\n\nclips/nothing.mp4\nclips/one.mp4\n")
     done = toy.gsac("batch", todo, "--out", toy.root / "avatars", "--set", "left.word=last")
-    assert done.code == 1 and "1 of 2 clips are done" in done.err and "nothing.mp4: no such file" in done.err
+    assert done.code == 1 and "1 of 2 clips done" in done.err and "nothing.mp4: no such file" in done.err
     assert (toy.root / "avatars" / "one-avatar" / "join" / "out.txt").read_text() == "BETA ALPHA"
 
 
@@ -115,16 +116,16 @@ def test_a_batch_says_what_its_clips_are_at_while_they_run(toy, clips):
 
 def test_a_batch_names_each_error_once(toy, clips):
     done = toy.gsac("batch", clips, "--out", toy.root / "avatars", "-j", "1")
-    assert done.err.count("stage left failed") == 1 and "(3 of 3 clips)" in done.err
+    assert done.err.count("stage left failed") == 1 and "(3 of 3 clips" in done.err
 
 
 def test_the_table_of_a_batch_has_a_row_for_each_clip_at_work():
     with open_batch_reporter(TerminalReporter(io.StringIO()), {"one.mp4": 8.0, "two.mp4": 4.0}) as table:
-        table.hear("one.mp4", "1/8 split: starts (first run)")
-        table.hear("two.mp4", "1/8 split: starts (first run)")
-        table.hear("one.mp4", "2/8 keypoints: 30/60 frames")
+        table.take(StageStarted(clip="one.mp4", stage="split", place="1/8", reason="first run"))
+        table.take(StageStarted(clip="two.mp4", stage="split", place="1/8", reason="first run"))
+        table.take(StageProgress(clip="one.mp4", stage="keypoints", place="2/8", done=30, total=60, unit="frames"))
         assert list(table.draw().columns[0]._cells) == [Text("one.mp4"), Text("two.mp4"), Text("batch", style="bold")]
         assert table.draw().columns[1]._cells[0] == Text("2/8 keypoints: 30/60 frames")
-        table.end("one.mp4", "one.mp4: done")
+        table.take(ClipEnded(clip="one.mp4", status="done"))
         assert list(table.draw().columns[0]._cells) == [Text("two.mp4"), Text("batch", style="bold")]
         assert table.draw().columns[1]._cells[1] == Text("1 of 2 clips")

@@ -11,14 +11,21 @@ import pytest
 from gsac.avatar.artifacts import write_frame
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.pipeline.executors.executor import ClipJob, ClipResult
-from gsac.pipeline.report.batch import BatchPage
+from gsac.pipeline.report.batch import IN_PICTURE, BatchPage
 from gsac.pipeline.report.page import write_report
 from gsac.stages.contract import BadInput
+from gsac.stages.findings import Code
 
 FACES = {"ada": 0.97, "bob": 0.92}
 """Clip -> likeness of the avatar's face: good, fair."""
 LIKE = {"psnr": 31.0, "structure": 0.95, "worst": 0.92, "px": 420}
-FOUND = [{"code": "camera_moves", "severity": "wrong"}, {"code": "face_at_rest", "severity": "poorer"}]
+FOUND = {"The camera moves by up to 9 px, in frame 3. Stand the phone on something firm.":
+         {"code": "camera_moves", "severity": "wrong"},
+         "The face was never seen from the front; the avatar's face stays at rest.": {"code": "face_at_rest", "severity": "poorer"},
+         "The edge of the picture cuts off the head in all 9 frames; what lies outside is guessed. Stand in the middle.":
+         {"code": "cut_off", "severity": "poorer"},
+         "A second person was seen in 2 of 9 frames (0-1); only the first one is followed. Keep others out of the picture.":
+         {"code": "second_person", "severity": "poorer"}}
 AXE = "axe-core@4.10.3"
 
 
@@ -31,7 +38,8 @@ def write_avatar(folder, clip, face):
     """The folder of a run with a report; the views of the avatar are grey, the front one red."""
     for name in ("train/heldout", "export"):
         (folder / name).mkdir(parents=True)
-    write_run(folder, clip, {"name": "train", "status": "ran", "findings": FOUND}, {"name": "export", "status": "ran"})
+    found = {"warnings": [*FOUND], "findings": [*FOUND.values()]}
+    write_run(folder, clip, {"name": "train", "status": "ran"} | found, {"name": "export", "status": "ran"})
     (folder / "train/metrics.json").write_text(json.dumps({
         "likeness": {"body": LIKE, "face": LIKE | {"worst": face}, "hands": LIKE}, "seen_area": 0.97, "stray_alpha": 0.0,
         "torn_alpha": 0.0}))
@@ -85,10 +93,17 @@ def test_each_clip_has_a_card_with_the_verdict_of_its_report_failures_first(out)
     assert "✓ Good Body good, face good, hands good, seen from all sides good" in cards["ada.mp4"][0]
     assert "~ Fair Body good, face fair" in cards["bob.mp4"][0]
     assert "Found: camera moves Report" in cards["ada.mp4"][0] and "face at rest" not in cards["ada.mp4"][0]
+    said = "cuts off the head in all 9 frames; what lies outside is guessed. A second person was seen in 2 of 9 frames"
+    assert said in cards["ada.mp4"][0]
+    assert "Stand in the middle" not in cards["ada.mp4"][0], "what to do is the report's"
     assert "✕ Failed Stage keypoints failed: no person in any frame; record again" in cards["eva.mp4"][0]
     assert "✕ Failed stage split failed: gone.mp4: no video in it" in cards["gone.mp4"][0]
     assert "Not done yet" in cards["late.mp4"][0]
-    assert "2 of 5 clips are done, 2 failed." in (out / "batch.html").read_text()
+    assert "2 of 5 clips done, 2 failed." in (out / "batch.html").read_text()
+
+
+def test_what_a_card_tells_in_words_are_findings_that_stages_make():
+    assert set(IN_PICTURE) <= {code.word for code in Code}
 
 
 def test_every_link_leads_to_a_file_beside_the_page_and_nothing_tells_where_the_clips_lie(out):
@@ -116,7 +131,7 @@ def test_clips_that_a_resumed_batch_leaves_keep_their_verdict_or_their_failure(o
     page.write()
     cards = read_cards(tmp_path / "batch.html")
     assert "✓ Good" in cards["ada.mp4"][0] and "✕ Failed stage split failed: cut.mp4: not a video" in cards["cut.mp4"][0]
-    assert "1 of 2 clips are done, 1 failed." in (tmp_path / "batch.html").read_text()
+    assert "1 of 2 clips done, 1 failed." in (tmp_path / "batch.html").read_text()
 
 
 def test_an_unreadable_report_costs_its_own_verdict_only(tmp_path):

@@ -2,9 +2,12 @@
 
 import io
 import json
+from itertools import count
+from types import SimpleNamespace
 
 import pytest
 
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.pace import Course, Pace
 from gsac.pipeline.reporter import BAR, COUNTED, NARROW_BAR, PlainReporter, TerminalReporter
 from gsac.pipeline.worker import EventStream
@@ -67,21 +70,21 @@ def test_each_line_says_which_stage_of_how_many(toy):
 
 def test_a_piped_run_tells_what_is_left_of_the_whole(monkeypatch):
     now = iter([0.0, 20.0, 40.0])
-    monkeypatch.setattr("gsac.pipeline.reporter.time.monotonic", lambda: next(now))
+    monkeypatch.setattr("gsac.pipeline.journal.time", SimpleNamespace(monotonic=lambda: next(now), time=count(0, 20).__next__))
     lines = io.StringIO()
-    reporter = PlainReporter(lines)
-    reporter.follows(course({"split": 2.0, "smplx": 60.0, "face": 3.0, "train": 80.0}))
-    reporter.starts("smplx", "first run")
+    journal = Journal(PlainReporter(lines).take)
+    journal.follows(course({"split": 2.0, "smplx": 60.0, "face": 3.0, "train": 80.0}))
+    journal.starts("smplx", "first run")
     for done in (100, 200):
-        reporter.progress("smplx", done, 300, "steps")
+        journal.progress("smplx", done, 300, "steps")
     assert lines.getvalue().splitlines()[-1] == "2/4 smplx: 200/300 steps, 5 steps/s, 20 s left; whole run: about 1 min 40 s left"
 
 
 def test_work_that_is_no_stage_of_the_run_is_told_by_its_own_name():
     lines = io.StringIO()
-    reporter = PlainReporter(lines)
-    reporter.follows(course({"split": 2.0, "smplx": 60.0, "face": 3.0, "train": 80.0}))
-    reporter.progress("seed3_novel_12", 1, 12, "frames")
+    journal = Journal(PlainReporter(lines).take)
+    journal.follows(course({"split": 2.0, "smplx": 60.0, "face": 3.0, "train": 80.0}))
+    journal.progress("seed3_novel_12", 1, 12, "frames")
     assert lines.getvalue() == "seed3_novel_12: 1/12 frames\n"
 
 
@@ -97,11 +100,12 @@ def test_the_first_word_of_a_new_phase_is_sent_at_once():
 def test_the_bar_keeps_its_width_and_never_stands_full_while_work_goes_on(monkeypatch, columns, bar):
     monkeypatch.setenv("COLUMNS", str(columns))
     reporter = TerminalReporter(io.StringIO())
-    reporter.starts("train", "first run")
+    journal = Journal(reporter.take)
+    journal.starts("train", "first run")
     shown = reporter._bar
     words = [shown.tasks[0].fields["words"]]
     for done, unit in ((3, "steps"), (1400, "steps"), (0, "parts of judging")):
-        reporter.progress("train", done, 4 if "parts" in unit else 1400, unit)
+        journal.progress("train", done, 4 if "parts" in unit else 1400, unit)
         task = shown.tasks[0]
         words.append(task.fields["words"])
         assert not task.finished and shown.columns[2].bar_width == bar

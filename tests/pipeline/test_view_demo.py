@@ -16,8 +16,8 @@ from gsac.pipeline.cli import execute
 from gsac.pipeline.commands import view
 from gsac.pipeline.commands.demo import make_truth_clip
 from gsac.pipeline.commands.view import find_name, find_page
+from gsac.pipeline.journal import plain_journal
 from gsac.pipeline.page_server import make_certificate, serve
-from gsac.pipeline.reporter import PlainReporter
 from gsac.stages.contract import BadInput
 from gsac.stages.export.fbx import avatar_fbx
 from gsac.stages.export.glb import glb_bytes
@@ -270,8 +270,8 @@ def test_the_demo_clip_is_made_once_and_whole_or_not_at_all(tmp_path, monkeypatc
 
     monkeypatch.setattr(turntable, "make_clip", make_clip)
     with pytest.raises(KeyboardInterrupt):
-        make_truth_clip(tmp_path / "clip", PlainReporter())
+        make_truth_clip(tmp_path / "clip", plain_journal())
     assert not (tmp_path / "clip").exists()
     for _ in range(2):
-        assert make_truth_clip(tmp_path / "clip", PlainReporter()).read_text() == "whole"
+        assert make_truth_clip(tmp_path / "clip", plain_journal()).read_text() == "whole"
     assert len(made) == 2

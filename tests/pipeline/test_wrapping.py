@@ -12,6 +12,7 @@ import termios
 import pytest
 
 from gsac.pipeline.cli import execute
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.reporter import PlainReporter, TerminalReporter
 from gsac.pipeline.wrapping import wrap
@@ -39,8 +40,8 @@ def terminal(monkeypatch):
 
 @pytest.mark.parametrize("kind", [PlainReporter, TerminalReporter])
 @pytest.mark.parametrize("tell", [
-    lambda it: it.warning("smplx", SENTENCE), lambda it: it.remark("smplx", SENTENCE), lambda it: it.note(SENTENCE),
-    lambda it: it.ends("smplx", Outcome.FAILED, 0, SENTENCE)])
+    lambda it: Journal(it.take).warning("smplx", SENTENCE), lambda it: Journal(it.take).remark("smplx", SENTENCE),
+    lambda it: it.note(SENTENCE), lambda it: it.foresees("smplx", Outcome.PLANNED, 0, SENTENCE)])
 def test_a_line_breaks_between_words(terminal, kind, tell):
     stream, lines = terminal
     with kind(stream) as reporter:
@@ -67,7 +68,7 @@ def test_an_error_breaks_between_words_too(terminal, monkeypatch, tmp_path):
 
 def test_a_pipe_gets_each_line_whole():
     stream = io.StringIO()
-    PlainReporter(stream).warning("smplx", SENTENCE)
+    Journal(PlainReporter(stream).take).warning("smplx", SENTENCE)
     assert stream.getvalue() == f"smplx: warning: {SENTENCE}\n"
 
 

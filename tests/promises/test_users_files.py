@@ -8,12 +8,13 @@ from __future__ import annotations
 import os
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from gsac.pipeline.cli import execute
+from gsac.pipeline.journal import Journal
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.reporter import words_of
 from support.toy import Toy
 
 MINE = "mine, and precious"
@@ -187,6 +188,6 @@ def test_a_demo_keeps_a_folder_that_lies_where_its_clip_goes(tmp_path, monkeypat
     said = []
     put(tmp_path / "clip" / "holiday.mp4")
     monkeypatch.setattr(clip, "make_clip", write_clip)
-    reporter = SimpleNamespace(starts=lambda *of: None, ends=lambda *of: None, note=said.append)
-    assert demo.make_truth_clip(tmp_path / "clip", reporter).read_text() == "film"
-    assert (tmp_path / "clip-kept" / "holiday.mp4").read_text() == MINE and "clip-kept" in said[0]
+    journal = Journal(lambda event: said.append(words_of(event)))
+    assert demo.make_truth_clip(tmp_path / "clip", journal).read_text() == "film"
+    assert (tmp_path / "clip-kept" / "holiday.mp4").read_text() == MINE and "clip-kept" in said[1]

@@ -32,6 +32,10 @@ def test_sizes_and_frames_are_told_in_one_line():
     assert look.sentence == ("A person in 34 of 36 frames, 500 px tall, seen from 330 of 360 degrees; face 60 px, hands 70 px.")
 
 
+def test_a_clip_of_one_frame_is_told_as_that():
+    assert FirstLook.of(points([0])).sentence.startswith("A person in the only frame, 500 px tall")
+
+
 def test_a_part_that_was_never_seen_is_named_as_that():
     arrays = points([0, 10])
     arrays["score"][:, FACE] = 0

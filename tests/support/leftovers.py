@@ -1,4 +1,4 @@
-"""What killed commands may leave behind: in a store, in the folder of a run, among the system's temporary files."""
+"""What killed commands may leave behind: in a store, in the folder of a run or a batch, among the system's temporary files."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ def find_leftovers(store: Path, out: Path, temporary: Path) -> list[str]:
     found = [path for name in PRIVATE for path in (store / name).iterdir()]
     found += [path for path in (store / "models").rglob("*") if path.name.startswith((".", "pull-", "add-"))]
     found += [path for path in out.rglob(".*") if path.name != ".placed.json"]
-    found += list(out.rglob("*kept*")) + list(out.glob("logs/*.next"))
+    found += list(out.rglob("*kept*")) + list(out.rglob("logs/*.next"))
     return sorted(map(str, [*found, *temporary.iterdir()]))

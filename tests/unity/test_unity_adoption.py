@@ -48,7 +48,8 @@ def test_a_scene_that_names_nobody_shows_the_people_of_the_project_edited_played
     assert lines[1:3] == ["edited 1 DontSave", "played 5 0 draws 1"], "five people in one draw"
     places = np.array([line.split()[1:] for line in lines[3:8]], float)
     np.testing.assert_allclose(places, [[-1.2, 0, 0], [0, 0, 0], [1.2, 0, 0], [-1.2, 0, -1.2], [0, 0, -1.2]], atol=1e-6)
-    assert lines[8:] == ["named 0", "named 1"], "players know their people, scenes in the project stay as they are"
+    assert lines[8:] == ["named 0", "with a deleted prefab 5", "named 1"], (
+        "players know their people, scenes in the project stay as they are")
 
 
 def test_a_file_is_loaded_without_a_halt_may_be_stopped_and_leaves_nothing_where_it_fails(play, files, tmp_path):

@@ -42,10 +42,20 @@ def test_a_linear_project_shows_the_trained_picture_at_40_db_whatever_lies_behin
         want = rgb + (1 - alpha[..., None]) * background
         unknown.append(colours.decibels(stage.lay(shot, background, known=False), want, alpha >= 0))
         direct.append(colours.decibels(stage.draw_direct(shot, background), want, alpha >= 0))
-        if stage.programs.behind:
-            assert colours.decibels(stage.lay(shot, background, known=True), want, person) > 45
+        assert colours.decibels(stage.lay(shot, background, known=True), want, person) > 45
     print(f"not knowing what lies behind: {min(unknown):.1f} dB; as one draw: {min(direct):.1f} dB")
     assert min(unknown) > 40 and min(unknown) > min(direct) + 3
+
+
+@pytest.mark.parametrize("exposure", [1, .5, .05])
+def test_before_a_bright_sky_the_copy_behind_gives_the_trained_edges_at_any_exposure(stage, shot, avatar, exposure):
+    """What is drawn and what is copied are in the frame's exposure already: nothing is undone."""
+    rgb, alpha = colours.trained_picture(shot, avatar.faces, avatar.gaussians)
+    sky = float(colours.to_display(np.asarray(colours.SKY * exposure)))
+    want = rgb + (1 - alpha[..., None]) * sky
+    known, unknown = (colours.decibels(stage.lay(shot, sky, known), want, alpha > colours.EDGE) for known in (True, False))
+    print(f"sky of display value {sky:.2f}: {known:.1f} dB, without the copy {unknown:.1f}")
+    assert known > 45 and known > unknown + 3
 
 
 def test_what_stands_before_the_person_hides_her_and_what_stands_behind_does_not(stage, shot):
@@ -72,6 +82,12 @@ def test_a_picture_of_the_avatar_alone_is_drawn_for_a_camera_and_two_triangles_l
     for lens in ("wide", "flat", "again"):
         assert told[0][lens] in [(n, 1, 2, 0) for n in (count, *map(len, figure.coarser))]
     assert told[0]["part of a screen"][:2] == (told[0]["again"][0], 1) and told[0]["copy"] == (0,)
+
+
+def test_hdrp_is_believed_to_have_a_copy_of_what_lies_behind_only_where_the_cameras_settings_have_refraction(told):
+    said = {what: numbers[0] for what, numbers in told[0].items() if "refraction" in what}
+    assert said == {"other pipeline with refraction": 0, "other pipeline without refraction": 0,
+                    "HDRP with refraction": 1, "HDRP without refraction": 0}
 
 
 def test_a_headset_and_who_wants_it_so_get_the_splats_themselves(told):

@@ -61,6 +61,16 @@ def test_what_was_made_at_run_time_is_destroyed_with_the_last_person(play, files
     assert play("freed", files / "figure.gsac").splitlines() == run * 2
 
 
+def test_an_avatar_that_is_switched_off_opens_no_file_again_and_casts_no_shadow(play, files):
+    """Otherwise the file would stay in memory for good: nobody closes it a second time."""
+    assert play("closed", files / "figure.gsac").splitlines() == [
+        "on: 1 True", "off: 0 False", "a frame later, the renderer off too: 0 False", "materials: 0"]
+
+
+def test_another_file_on_the_field_brings_all_its_expressions(play, files):
+    assert play("swapped", files / "figure.gsac", files / "person.gsac").splitlines() == ["2 2", "52 52"]
+
+
 def test_a_lens_that_brings_the_person_near_brings_the_fine_gaussians(play, files, figure):
     """In a file without heights too; and a camera that does not see the person decides nothing, one that does only for itself."""
     counts = [len(level) for level in (figure.gaussians, *figure.coarser)]

@@ -48,7 +48,8 @@ def test_in_mixed_reality_the_room_is_shown_hides_what_is_behind_it_and_the_pers
 
 
 def test_what_makers_packages_know_of_room_and_hands_is_asked_of_them(sample):
-    assert sample("Makers") == ["False True False True 2 0.2", "False False True 0 False", "False True 2 False", "False True 0.08"]
+    assert sample("Makers") == ["False True False True 2 0.2", "False False True 0 False", "False True -10 -9 -0.2 False",
+                                "False True 2 False", "False True 0.08"]
 
 
 def test_the_shader_of_the_rooms_depth_compiles_for_one_eye_and_for_two(hlsl, package, tmp_path):

@@ -74,6 +74,7 @@ def test_the_rows_are_probe_and_sun_on_the_mirrored_and_turned_normals(told):
 def test_what_stands_between_the_person_and_the_sun_takes_its_light_away_in_some_frames(told):
     moments = told[0]
     np.testing.assert_array_equal(moments["without shadows"], moments["sun"])
+    np.testing.assert_array_equal(moments["a hand before the eyes"], moments["sun"], "no shadow of her own colliders")
     np.testing.assert_allclose(moments["in the shade"], moments["no sun"], atol=1e-6)
     np.testing.assert_array_equal(moments["begins in the shade"], moments["in the shade"])
     far = abs(moments["sun"] - moments["no sun"]).max()

@@ -24,7 +24,7 @@ ONCE = {
     "GsacRenderer.NewView": "a camera's first frame", "GsacSorted.Resize": "another file",
     "GsacCameras.Grow": "more people than ever", "GsacCameras.NewCrowd": "people meet", "GsacCrowd.Reserve": "more of them",
     "GsacCrowd.Plan": "others of them", "GsacPoseStream.Prepare": "another file", "GsacReach.Prepare": "another file",
-    "GsacBenchmark.Finish": "the end"}
+    "GsacBenchmark.Finish": "the end", "GsacColliders.Fit": "another file"}
 """What a frame may call and most frames do not: why."""
 KEYS = {"wave": 1.23 * 20 % 64, "walk": 1.23 * 20 % 23}
 
@@ -71,7 +71,7 @@ def test_the_compiled_code_of_a_frame_makes_no_object(play):
     assert {name for kind, name in lines if kind == "frame"} == {
         "GsacAvatar.LateUpdate", "GsacRenderer.LateUpdate", "GsacCameras.Draw", "GsacPoseStream.LateUpdate",
         "GsacPoseStream.Listen", "GsacBenchmark.Update", "GsacDemo.LateUpdate", "GsacReach.LateUpdate",
-        "GsacHead.Update"}
+        "GsacHead.Update", "GsacColliders.LateUpdate"}
     assert {name for kind, name in lines if kind == "once"} == ONCE.keys()
     assert [name for kind, name in lines if kind == "makes"] == []
     assert int(lines[-1][1]) > 80, "methods walked"

@@ -78,7 +78,8 @@ def picture(gpu, passes, scene, pipeline, matrix=None, linear=0, low_pass=PIXEL,
     matrix = projection(camera) if matrix is None else matrix
     parameters = {"unity_MatrixV": view.T, "glstate_matrix_projection": matrix.T,
                   "_ScreenParams": screen, "_ScaledScreenParams": screen, "_ScreenSize": screen,
-                  "_WorldSpaceCameraPos": [*eye, 0], "GsacIndexBits": 13, **draw_rule(low_pass, linear),
+                  "_WorldSpaceCameraPos": [*eye, 0], "TestFog": [0, 0, 0, 0], "_InvViewProjMatrix": np.eye(4),
+                  "GsacIndexBits": 13, **draw_rule(low_pass, linear),
                   **{f"GsacModel{r}": scene["model"][r] for r in range(3)}, **more}
     return Painting(gpu, *passes[pipeline], *size, N).draw(parameters)
 
@@ -160,6 +161,20 @@ def test_the_scenes_fog_lies_over_the_person_by_depth_unless_switched_off(gpu, h
     wanted = true_picture(scene | {"avatar": replace(scene["avatar"], gaussians=replace(g, rgb=colours.astype(np.float32)))}, PIXEL)
     assert psnr(picture(gpu, foggy, scene, pipeline, GsacFog=1, **fog), wanted) > 55
     assert psnr(picture(gpu, foggy, scene, pipeline, GsacFog=0, **fog), scene["truth"]) > 55
+
+
+def test_in_hdrp_the_fog_lies_over_the_person_by_the_way_from_the_eye_unless_switched_off(gpu, passes, scene):
+    fog = np.array([.2, .4, .6, .25])
+    view = np.vstack([scene["view"], [0, 0, 0, 1]])
+    view[:3, 3] = 0
+    way = np.linalg.norm(scene["bound"].means @ scene["total"].T + scene["place"], axis=1)
+    share = np.exp2(-(fog[3] * way) ** 2)[:, None]
+    g = scene["avatar"].gaussians
+    colours = share * g.rgb + (1 - share) * fog[:3]
+    wanted = true_picture(scene | {"avatar": replace(scene["avatar"], gaussians=replace(g, rgb=colours.astype(np.float32)))}, PIXEL)
+    told = {"TestFog": fog, "_InvViewProjMatrix": np.linalg.inv(projection(scene["camera"]) @ view).T}
+    assert psnr(picture(gpu, passes, scene, "HDRenderPipeline", GsacFog=1, **told), wanted) > 55
+    assert psnr(picture(gpu, passes, scene, "HDRenderPipeline", GsacFog=0, **told), scene["truth"]) > 55
 
 
 WIDE = Camera((240.0, 240.0), (149.0, 101.5), 320, 192)

@@ -46,6 +46,7 @@ namespace Gsac
         Animator animator;
         Avatar built; // by this component, not a file's
         byte[] loose;
+        GsacPicking picking;
         GsacPose target;
         GsacPose shown;
         GsacPose before;
@@ -197,7 +198,7 @@ namespace Gsac
                 else if (body.sharedMesh == null) GsacMesh.Wear(body, model.Body, model.Extent, joints); // it went with the model
             }
             shapes = new GsacShapes(body, data.Expressions);
-            if (target == null)
+            if (target == null || shown.Rotation.Length != data.JointCount * 4 || DrawnWeights.Length != data.Expressions.Length)
             {
                 target = new GsacPose(data.JointCount);
                 shown = new GsacPose(data.JointCount);
@@ -250,7 +251,14 @@ namespace Gsac
 
         void OnDisable()
         {
+            Dress(false);
             Close();
+        }
+
+        /// <summary>Has the body cast shadows and write depth and motion, or takes that from it; one that is not open has none on.</summary>
+        internal void Dress(bool on)
+        {
+            if (model != null && body != null) GsacMesh.Dress(body, on);
         }
 
         void OnDestroy()
@@ -346,6 +354,17 @@ namespace Gsac
             Source = GsacSource.Script;
             limb.Reach(place);
             GsacSkeleton.Read(target, model.Data, joints);
+        }
+
+        /// <summary>
+        /// Where a ray meets the body as it stands now; false where it does not within `farthest` m. Needs no collider. ray: in the world, its
+        /// direction of unit length. Some milliseconds for the first ray of a pose: for clicks and touches, not for each pixel.
+        /// </summary>
+        public bool Raycast(Ray ray, out GsacHit hit, float farthest = float.MaxValue)
+        {
+            if (picking == null || !ReferenceEquals(picking.Model, Model)) picking = new GsacPicking(Model);
+            CollectWeights();
+            return picking.Raycast(transform, joints, DrawnWeights, ray, farthest, out hit);
         }
 
         int JointIndex(string joint)

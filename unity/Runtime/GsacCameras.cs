@@ -27,6 +27,12 @@ namespace Gsac
         /// <summary>Whether a camera shows an object of its layers; null: all do. The editor's prefab stages and hidden objects are told by it.</summary>
         public static Func<Camera, GameObject, bool> Shows;
 
+        /// <summary>
+        /// Whether HDRP copies, for a camera, what lies behind the transparent things; null: nobody knows. Gsac.HighDefinition tells; the
+        /// other pipelines' shaders see it by themselves.
+        /// </summary>
+        public static Func<Camera, bool> CopiesBehind;
+
         /// <summary>The splats' material, shared by all avatars that have none of their own.</summary>
         public static Material Material
         {
@@ -53,6 +59,12 @@ namespace Gsac
                 Made(ref body[1], "Gsac/GsacBodyDepth");
                 return body;
             }
+        }
+
+        /// <summary>Whether a material is the body's own, without making one.</summary>
+        internal static bool IsOfBody(Material worn)
+        {
+            return ReferenceEquals(worn, body[0]);
         }
 
         static Material Made(ref Material material, string shader)

@@ -36,7 +36,9 @@ namespace Gsac
 
         void OnEnable()
         {
-            GsacAvatar[] prefabs = people.Length == 0 && FindPeople != null ? FindPeople() : people;
+            // a prefab that was deleted leaves a gap
+            GsacAvatar[] named = Array.FindAll(people, one => one != null);
+            GsacAvatar[] prefabs = named.Length == 0 && FindPeople != null ? FindPeople() : named;
             if (prefabs.Length == 0)
             {
                 Debug.LogWarning(name + ": nobody to show; drag an avatar.gsac into the Project window, then open this scene again", this);

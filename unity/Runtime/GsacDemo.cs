@@ -37,11 +37,12 @@ namespace Gsac
             string[] names = avatar.Data.Expressions;
             if (names.Length > 0)
             {
+                expression %= names.Length; // another person may have fewer
                 GUILayout.Label(names[expression]);
                 float chosen = GUILayout.HorizontalSlider(weight, 0, 1);
                 if (GUILayout.Button("next expression"))
                 {
-                    avatar.SetExpression(names[expression], 0);
+                    avatar.SetExpression(names[expression], weight = chosen = 0);
                     expression = (expression + 1) % names.Length;
                 }
                 if (chosen != weight) avatar.SetExpression(names[expression], weight = chosen);

@@ -4,7 +4,6 @@ using System.IO;
 using System.Threading;
 using System.Threading.Tasks;
 using UnityEngine;
-using Object = UnityEngine.Object;
 
 namespace Gsac
 {
@@ -25,7 +24,7 @@ namespace Gsac
             }
             catch
             {
-                Object.Destroy(person);
+                GsacCameras.Free(person);
                 throw;
             }
         }
@@ -39,6 +38,18 @@ namespace Gsac
         {
             byte[] bytes = await Named(path, () => GsacData.Load(path), cancel);
             return await LoadAsync(bytes, Path.GetFileNameWithoutExtension(path), path, cancel);
+        }
+
+        /// <summary>
+        /// From an address, https:// or file://. digest: SHA-256 of the file, which is refused where it has another; null: any. most: bytes that
+        /// are accepted. Throws as the one by path, and IOException that names the address.
+        /// </summary>
+        public static async Task<GsacAvatar> LoadAsync(Uri address, string digest = null, long most = GsacContainer.MaxFile,
+                                                       CancellationToken cancel = default(CancellationToken))
+        {
+            byte[] bytes = await Task.Run(() => GsacAddress.Read(address, digest, Math.Min(most, GsacContainer.MaxFile), cancel), cancel);
+            string file = address.ToString();
+            return await LoadAsync(bytes, Path.GetFileNameWithoutExtension(address.LocalPath), file, cancel);
         }
 
         /// <summary>bytes: of a .gsac file; where it does not lie on disk, such as in an Android player's own assets. name: of the person.</summary>

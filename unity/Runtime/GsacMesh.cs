@@ -114,7 +114,7 @@ namespace Gsac
         {
             Material worn = body.sharedMaterial;
             if (on && worn == null) body.sharedMaterials = GsacCameras.BodyMaterials;
-            else if (!on && worn != null && ReferenceEquals(worn, GsacCameras.BodyMaterials[0])) body.sharedMaterials = Bare;
+            else if (!on && worn != null && GsacCameras.IsOfBody(worn)) body.sharedMaterials = Bare;
         }
 
         /// <summary>Gives a renderer the mesh of a person.</summary>

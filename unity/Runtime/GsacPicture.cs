@@ -18,6 +18,7 @@ namespace Gsac
         static readonly int LensId = Shader.PropertyToID("GsacEyeLens");
         static readonly int ColourId = Shader.PropertyToID("GsacTrained");
         static readonly int DepthId = Shader.PropertyToID("GsacTrainedDepth");
+        static readonly int CopiedId = Shader.PropertyToID("GsacBehindIsCopied");
 
         readonly RenderTargetIdentifier[] targets = new RenderTargetIdentifier[2];
         RenderTexture colour, depth;
@@ -75,6 +76,7 @@ namespace Gsac
             properties.SetVector(LensId, new Vector4(lens.m00, lens.m11, flat ? -lens.m03 : lens.m02, flat ? -lens.m13 : lens.m12));
             properties.SetTexture(ColourId, colour);
             properties.SetTexture(DepthId, depth);
+            properties.SetInteger(CopiedId, GsacCameras.CopiesBehind != null && GsacCameras.CopiesBehind(camera) ? 1 : 0);
 
             commands.Clear();
             commands.SetRenderTarget(targets, targets[0]);

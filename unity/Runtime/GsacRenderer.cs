@@ -54,7 +54,7 @@ namespace Gsac
         [SerializeField, Tooltip("0..1: how much of the person is there; less fades her by pixels.")]
         float opacity = 1;
 
-        [SerializeField, Tooltip("Whether the scene's fog lies over the person; not in HDRP.")]
+        [SerializeField, Tooltip("Whether the scene's fog lies over the person.")]
         bool fog = true;
 
         [SerializeField, Tooltip("Whether the person casts shadows and writes depth and motion, by the mesh under the gaussians.")]
@@ -121,7 +121,7 @@ namespace Gsac
             set { opacity = value; }
         }
 
-        /// <summary>Whether the scene's fog lies over the person; not in HDRP, whose fog knows no such things.</summary>
+        /// <summary>Whether the scene's fog lies over the person.</summary>
         public bool Fog
         {
             get { return fog; }
@@ -162,7 +162,7 @@ namespace Gsac
 
         void OnDisable()
         {
-            Dress(false);
+            if (avatar != null) avatar.Dress(false);
             GsacCameras.Remove(this);
             Drop();
         }
@@ -188,13 +188,9 @@ namespace Gsac
         void LateUpdate()
         {
             Refresh();
-            Dress(bodyPass && opacity > 0);
-        }
-
-        void Dress(bool on)
-        {
             if (avatar == null) avatar = GetComponent<GsacAvatar>();
-            if (avatar != null && avatar.IsOpen && avatar.Body != null) GsacMesh.Dress(avatar.Body, on);
+            // one who is off has undressed, and stays closed
+            if (avatar != null && avatar.isActiveAndEnabled && avatar.IsOpen) avatar.Dress(bodyPass && opacity > 0);
         }
 
         /// <summary>
@@ -248,31 +244,8 @@ namespace Gsac
             float lit = model.Data.Light == null ? 0 : Mathf.Clamp(clipLight, 0, 1);
             for (int c = 0; c < 3; c++) light[c] = Light(c, lit);
             sceneLight.Fill(transform, avatar.Joints[0].position, light, 3);
-            bool same = Keep(boneRows, shownBones) & Keep(avatar.DrawnWeights, shownWeights) & Keep(light, shownLight);
+            bool same = GsacKept.Keep(boneRows, shownBones) & GsacKept.Keep(avatar.DrawnWeights, shownWeights) & GsacKept.Keep(light, shownLight);
             if (!same) shape++;
-        }
-
-        /// <summary>Copies `now` to `kept`; whether they were equal.</summary>
-        static bool Keep(Vector4[] now, Vector4[] kept)
-        {
-            bool same = true;
-            for (int i = 0; i < now.Length; i++)
-            {
-                same &= now[i].x == kept[i].x && now[i].y == kept[i].y && now[i].z == kept[i].z && now[i].w == kept[i].w;
-                kept[i] = now[i];
-            }
-            return same;
-        }
-
-        static bool Keep(float[] now, float[] kept)
-        {
-            bool same = true;
-            for (int i = 0; i < now.Length; i++)
-            {
-                same &= now[i] == kept[i];
-                kept[i] = now[i];
-            }
-            return same;
         }
 
         /// <summary>Buffers of the avatar that is there now. False where this device cannot draw it.</summary>

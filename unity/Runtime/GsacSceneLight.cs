@@ -23,6 +23,7 @@ namespace Gsac
         [Tooltip("What throws shadows on the person: colliders of these layers.")]
         public LayerMask Shadows = Physics.DefaultRaycastLayers;
 
+        static readonly RaycastHit[] Met = new RaycastHit[64]; // more than the person's own
         readonly GsacHarmonics light = new GsacHarmonics();
         readonly float[] turn = new float[9], rows = new float[28];
         float shade = -1; // 1: in the light, 0: in the shadow; -1: not known yet
@@ -50,7 +51,7 @@ namespace Gsac
                                Exposure * probe[c, 4], Exposure * probe[c, 5], Exposure * probe[c, 6], Exposure * probe[c, 7], Exposure * probe[c, 8]);
             }
             Light sun = Sun != null ? Sun : RenderSettings.sun;
-            if (sun != null && sun.isActiveAndEnabled) Shine(sun, pelvis);
+            if (sun != null && sun.isActiveAndEnabled) Shine(sun, root, pelvis);
             // the mirrored faces' normals point inwards
             Matrix4x4 m = root.localToWorldMatrix;
             for (int i = 0; i < 3; i++)
@@ -64,10 +65,21 @@ namespace Gsac
             light.Rows(turn, share, rows);
         }
 
-        void Shine(Light sun, Vector3 pelvis)
+        /// <summary>Whether something stands between a place and the light: the person's own colliders do not count.</summary>
+        bool IsShaded(Transform root, Vector3 place, Vector3 towardsLight)
+        {
+            int count = Physics.RaycastNonAlloc(place, towardsLight, Met, FarthestShadow, Shadows, QueryTriggerInteraction.Ignore);
+            for (int i = 0; i < count; i++)
+            {
+                if (!Met[i].transform.IsChildOf(root)) return true;
+            }
+            return false;
+        }
+
+        void Shine(Light sun, Transform root, Vector3 pelvis)
         {
             Vector3 from = -sun.transform.forward;
-            float lit = sun.shadows != LightShadows.None && Physics.Raycast(pelvis, from, FarthestShadow, Shadows, QueryTriggerInteraction.Ignore) ? 0 : 1;
+            float lit = sun.shadows != LightShadows.None && IsShaded(root, pelvis, from) ? 0 : 1;
             // who steps into the shade grows darker, not black at once
             bool jump = shade < 0 || !Application.isPlaying;
             shade = jump ? lit : lit + (shade - lit) * Mathf.Exp(-Time.deltaTime / ShadowSeconds);

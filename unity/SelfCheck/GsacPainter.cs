@@ -24,7 +24,9 @@ namespace Gsac
         {
             this.data = data;
             level = data.Levels[0];
-            posed = Skin(data, bones, weights);
+            var surface = new GsacSurface(data);
+            surface.Pose(bones, weights);
+            posed = surface.Places;
             depths = new double[level.Count];
             order = new int[level.Count];
             splats = new double[level.Count * 9];
@@ -54,38 +56,6 @@ namespace Gsac
                 if (depths[i] > Near) Lay(order[i] * 9, picture, width, height);
             }
             return picture;
-        }
-
-        static double[] Skin(GsacData data, Vector4[] bones, float[] weights)
-        {
-            var places = Array.ConvertAll(data.Vertices, x => (double)x);
-            for (int e = 0; weights != null && e < weights.Length; e++)
-            {
-                for (int m = data.ExpressionStart[e]; m < data.ExpressionStart[e + 1]; m++)
-                {
-                    for (int i = 0; i < 3; i++) places[data.ExpressionVertex[m] * 3 + i] += weights[e] * data.ExpressionDelta[m * 3 + i];
-                }
-            }
-            for (int v = 0; v < data.VertexCount; v++)
-            {
-                double x = places[v * 3], y = places[v * 3 + 1], z = places[v * 3 + 2];
-                if (bones == null)
-                {
-                    places[v * 3 + 1] = y - data.Ground;
-                    continue;
-                }
-                for (int i = 0; i < 3; i++)
-                {
-                    double sum = 0;
-                    for (int k = v * 4; k < v * 4 + 4; k++)
-                    {
-                        Vector4 row = bones[data.SkinIndex[k] * 3 + i];
-                        sum += data.SkinWeight[k] * (row.x * x + row.y * y + row.z * z + row.w);
-                    }
-                    places[v * 3 + i] = sum;
-                }
-            }
-            return places;
         }
 
         /// <summary>Fills a row of `splats`; the depth, m, or 0 where it is not drawn.</summary>

@@ -20,7 +20,7 @@ from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import correct_midway
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View, Views
+from gsac.stages.train.views import View, Views, of_each
 
 
 class Cpu(Backend):
@@ -32,7 +32,8 @@ class Cpu(Backend):
         """As `Backend.train`; keeps checkpoints, and goes on from task.resumed where there is one."""
         config = task.config
         rng = np.random.default_rng(config.seed)
-        fine, coarse = crop_views(task)
+        fine = crop_views(task)
+        coarse = of_each(View.halved, fine)
         steps = config.steps or FAST_STEPS[self.device]
         coarse_until = coarse_steps(person_pixels(task), steps)
         order: list[int] = []

@@ -31,7 +31,7 @@ from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.poses import bundle_adjust
 from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, TURN, Poses
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
-from gsac.stages.train.views import View, Views, person_crop
+from gsac.stages.train.views import View, Views, of_each, person_crop
 
 POSES_STAY = {"pose_rate": 0.0, "expression_rate": 0.0, "joint_rate": 0.0}
 
@@ -45,7 +45,8 @@ class Cuda(Backend):
 
     def train(self, task: Task, count: int) -> Trained:
         """As `Backend.train`; keeps no checkpoints."""
-        fine, coarse = crop_views(task)
+        fine = crop_views(task)
+        coarse = of_each(View.halved, fine)
         gaussians = init_gaussians(task, coarse, count)
         steps = task.config.steps or FAST_STEPS["cuda"]
         recipe = make_recipe(task.config, count, coarse_share=coarse_steps(schedule.person_pixels(task), steps) / steps,

@@ -9,7 +9,7 @@ import numpy as np
 from gsac.avatar.person_height import person_height
 from gsac.stages.train.judge.heldout import Candidate, judge_person
 from gsac.stages.train.poses.poses import Poses
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, of_each
 
 LOSS = 0.25
 """dB that a level may lose to the one before it."""
@@ -39,7 +39,7 @@ def measure_losses(level: Candidate, finer: Candidate) -> np.ndarray:
     views, candidates = _by_frame(level), []
     for _ in range(OCTAVES + 1):
         candidates += [level._replace(views=views), finer._replace(views=views)]
-        views = {t: view.halved() for t, view in views.items()}
+        views = of_each(View.halved, views)
     errors = [sum(row["mse_fg"] * row["fg_pixels"] for row in rows if row["fg_pixels"]) for rows in judge_person(candidates)]
     of_level, of_finer = np.maximum(errors, 1e-12).reshape(-1, 2).T
     return 10 * np.log10(of_level / of_finer)

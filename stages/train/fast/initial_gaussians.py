@@ -10,16 +10,15 @@ from gsac.stages.train.gaussians.cloth_offsets import fold
 from gsac.stages.train.gaussians.detail import find_detail
 from gsac.stages.train.gaussians.first_colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View, person_crop
+from gsac.stages.train.views import View, of_each, person_crop
 
 COLOUR_FRAMES = 24
 """Most frames that the first colours are read from."""
 
 
-def crop_views(task: Task) -> tuple[dict[int, View], dict[int, View]]:
-    """The trained frames, cropped to the person, at full and at half the size."""
-    fine = {int(t): person_crop(task.views[t]) for t in task.trained}
-    return fine, {t: v.halved() for t, v in fine.items()}
+def crop_views(task: Task) -> dict[int, View]:
+    """The trained frames, cropped to the person."""
+    return of_each(person_crop, {int(t): task.views[t] for t in task.trained})
 
 
 def init_gaussians(task: Task, coarse: dict[int, View], count: int) -> Gaussians:

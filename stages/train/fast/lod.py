@@ -24,7 +24,7 @@ from gsac.stages.train.judge.heldout import Candidate, judge_all
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.task import Fit, Task
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, of_each
 
 
 class Level(NamedTuple):
@@ -48,16 +48,16 @@ FRAMES = 6
 def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
     """Levels below fit.gaussians, the finest of them first; none of `LEVELS` that has as many gaussians as the one before it."""
     rest, body = task.poses.rest(int(task.trained[0]))[0], task.poses.body
-    filmed = crop_views(task)[0]
+    filmed = crop_views(task)
     tall = typical_height(task.poses, filmed)
     poses, looked_at = find_frames(task, filmed)
-    coarse = {t: view.scaled(MOVED / tall) for t, view in looked_at.items()}
+    coarse = scale_views(looked_at, MOVED / tall)
     out, finer, own_poses = [], fit.gaussians, None
     for level in LEVELS:
         if len(finer) <= level.most:
             continue
         scale, size = min(1.0, level.height / tall), min(level.most, round(FEWER * len(finer)))
-        views = {t: view.scaled(scale) for t, view in filmed.items()}
+        views = scale_views(filmed, scale)
         tried = min((one for one in (finer, *fit.smaller) if len(one) >= size), key=len)
         worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
         fewer = merge_to_size(tried, worth, size, body, rest)
@@ -65,7 +65,7 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
         trainer.freeze_unseen(views)
         pace = FIRM if len(tried) >= 2 * size else GENTLE
         gaussians = backend.refit(task, trainer, views, pace).finish(views)[0]
-        shown = {t: view.scaled(scale) for t, view in looked_at.items()}
+        shown = scale_views(looked_at, scale)
         finer_poses = own_poses or move(finer, task, poses, coarse)
         own_poses = move(gaussians, task, poses, coarse)
         found = find_drawn_height(Candidate(gaussians, own_poses, list(shown), shown),
@@ -74,6 +74,11 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
         out.append(gaussians)
         finer = gaussians
     return out
+
+
+def scale_views(views: Mapping[int, View], scale: float) -> dict[int, View]:
+    """Frame -> its view at `scale` of its size, where that is smaller."""
+    return of_each(lambda view: view.scaled(scale), views)
 
 
 def find_frames(task: Task, views: dict[int, View]) -> tuple[Poses, dict[int, View]]:
@@ -111,7 +116,7 @@ def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views
     rows, candidates = [], []
     for level in levels:
         assert level.max_height_px is not None  # as `fit_levels` makes them
-        small = {t: view.scaled(level.max_height_px / tall) for t, view in views.items()}
+        small = scale_views(views, level.max_height_px / tall)
         height = next((view.camera.height for view in small.values()), None)
         rows.append({"n_gaussians": len(level), "max_height_px": level.max_height_px, "image_height": height})
         candidates += [Candidate(gaussians, poses, list(small), small) for gaussians in (level, finest)]

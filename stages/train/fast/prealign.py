@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.stages.train.fast.backend import Backend, Round
-from gsac.stages.train.fast.initial_gaussians import init_gaussians
+from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.poses.bundle_adjust import Corrections, are_apart
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View, person_crop
+from gsac.stages.train.views import View, of_each
 
 COUNT = 3000
 """Gaussians, at most as many as are asked for."""
@@ -56,9 +56,9 @@ def draw_rounds(frames: list[int], rounds: int, rng: np.random.Generator) -> lis
 
 def shrink_views(task: Task) -> dict[int, View]:
     """The trained frames, cropped to the person, at a quarter of the size or as small as `LEAST_HEIGHT` allows."""
-    views = {int(t): person_crop(task.views[t]) for t in task.trained}
+    views = crop_views(task)
     for _ in range(2):
         if max(view.camera.height for view in views.values()) < 2 * LEAST_HEIGHT:
             break
-        views = {t: view.halved() for t, view in views.items()}
+        views = of_each(View.halved, views)
     return views

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
-from scipy.spatial import KDTree
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.gaussians.nearest import find_nearest
 from gsac.stages.train.gaussians.unseen import AROUND, NEIGHBOURS, disc_areas, hold_colours
 
 FACING = 0.3
@@ -43,7 +43,7 @@ def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray,
     frames = face_frames(rest, faces)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     normals = frames.R[gaussians.face, :, 1]
-    near = KDTree(bound.means).query(bound.means, k=min(AROUND, len(gaussians)))[1].reshape(len(gaussians), -1)
+    near = find_nearest(bound.means, bound.means, AROUND)
     alike = np.einsum("nki,ni->nk", normals[near], normals)
     areas = disc_areas(bound)
     evidence = find_evidence(pixels, areas, seen, near, alike)
@@ -54,7 +54,7 @@ def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray,
     sure = np.flatnonzero(seen & (evidence >= SURE) & (shown >= SURE * np.median(shown[seen])))
     poor = np.flatnonzero(evidence < SURE)
     if len(sure) and len(poor):
-        around = KDTree(bound.means[sure]).query(bound.means[poor], k=min(AROUND, len(sure)))[1].reshape(len(poor), -1)
+        around = find_nearest(bound.means[sure], bound.means[poor], AROUND)
         held = hold_colours(out, poor, sure[around], frames.R[:, :, 1])
         share = np.clip((SURE - evidence[poor]) / (SURE - HELD), 0, 1)[:, None]
         out.rgb[poor] = np.where(share < 1, out.rgb[poor] + share * (held - out.rgb[poor]), held)

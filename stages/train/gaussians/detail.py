@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from scipy.spatial import KDTree
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.first_colours import PosedFrame, mean_colours, read_sights
+from gsac.stages.train.gaussians.nearest import find_nearest
 
 PROBES = 12000
 """Places on the surface where the images are read."""
@@ -27,7 +27,7 @@ def find_detail(frames: list[PosedFrame], rest: np.ndarray, faces: np.ndarray, s
         return np.ones(len(faces))
     centres = rest[faces].mean(1)
     places = centres[probes.face]
-    near = KDTree(places[seen]).query(centres, k=min(NEAREST, int(seen.sum())))[1].reshape(len(faces), -1)
+    near = find_nearest(places[seen], centres, NEAREST)
     strength = found[seen][:, 0].astype(np.float64)[near].mean(1)
     return np.clip((strength / max(float(strength[probes.face].mean()), 1e-6)) ** POWER, LEAST, MOST)
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
@@ -16,6 +15,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import FROM_CAMERA, basis, shade
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
+from gsac.stages.train.gaussians.nearest import find_nearest
 
 TOLD = 10.0
 """Independent observations of the light in a frame: its errors are correlated over large parts of the body."""
@@ -127,6 +127,5 @@ def fill_unseen(rgb: np.ndarray, seen: np.ndarray, places: np.ndarray) -> np.nda
     if seen.all() or not seen.any():
         return rgb
     out = rgb.copy()
-    near = cKDTree(places[seen]).query(places[~seen], k=min(4, int(seen.sum())))[1]
-    out[~seen] = rgb[seen][near.reshape(len(near), -1)].mean(1)
+    out[~seen] = rgb[seen][find_nearest(places[seen], places[~seen], 4)].mean(1)
     return out

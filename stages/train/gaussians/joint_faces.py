@@ -7,16 +7,21 @@ person bends no joint, so bent ones are sampled. Where the clip's usual pose has
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
-from scipy.spatial import KDTree
 
 from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames, unbind
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
 from gsac.avatar.light import shade
+from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.rotation import about_y
 from gsac.avatar.skinning import joint_transforms
+from gsac.avatar.threads import Share, Workspace, side_by_side
+from gsac.stages.train.gaussians.nearest import find_nearest
 from gsac.stages.train.poses.poses import Poses
 
 BENDS = (
@@ -50,49 +55,66 @@ TURNS = 8
 """Turns of the person over which the light on a gaussian is averaged."""
 
 
-def hold_at_joints(gaussians: Gaussians, poses: Poses, frames: np.ndarray) -> Gaussians:
-    """The gaussians, some bound to other faces. frames: (n,) trained ones, whose median pose leaves each where it is."""
+class Posed(NamedTuple):
+    """The body in one pose."""
+
+    transforms: np.ndarray
+    """(J, 3, 4) float32 of the joints."""
+    frames: FaceFrames
+
+
+def hold_at_joints(levels: list[Gaussians], poses: Poses, frames: np.ndarray) -> list[Gaussians]:
+    """The gaussians of each level, some bound to other faces.
+
+    frames: (n,) trained ones, whose median pose leaves each gaussian where it is.
+    """
     body, (rest, joints) = poses.body, poses.rest(int(frames[0]))
-
-    def carry(pose: np.ndarray) -> tuple[np.ndarray, FaceFrames]:
-        transforms = joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32)
-        return transforms, face_frames(body.bend(rest, joints, pose), body.faces)
-
     usual = np.median(poses.pose[frames], 0)
     usual[0] = 0
-    transforms, at = carry(usual)
+
+    def carry(pose: np.ndarray, _: Workspace) -> Posed:
+        return Posed(joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32),
+                     face_frames(body.bend(rest, joints, pose), body.faces))
+
+    posed, *bent = side_by_side(carry, [usual, *(turn_joints(usual, turns) for turns in BENDS)])
+    return [choose_faces(gaussians, posed, bent, rest, body) for gaussians in levels]
+
+
+def choose_faces(gaussians: Gaussians, usual: Posed, bent: list[Posed], rest: np.ndarray, body: Body) -> Gaussians:
+    """The gaussians where they are in the usual pose, some bound to the face that carries them best to the bent ones.
+
+    rest: (V, 3) m.
+    """
+    share, at = Workspace().share, usual.frames
     bound = bind(at, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    near, fits = faces_around(gaussians.face, bound.means, at, rest, body)
-    surface = Surface(bound.means, near, fits, at, transforms, body)
-    width = np.sort(bound.scales, 1)[:, 1:].mean(1, keepdims=True)
-    swing, bare = np.zeros(near.shape), np.zeros(near.shape)
-    for turns in BENDS:
-        bent, there = carry(turn_joints(usual, turns))
-        swing += ((carried(bound.means, near, at, there) - surface.moved(bent)[:, None]) ** 2).sum(-1)
-        grown = there.k[near] / np.maximum(at.k[near], 1e-9)
-        bare += (BARE * width * np.maximum(grown[:, :1] - grown, 0)) ** 2
+    skinned = face_weights(body)
+    near, fits = faces_around(share, gaussians.face, bound.means, at, skinned, rest[body.faces])
+    surface = Surface(share, bound.means, near, fits, usual, skinned)
+    width = np.sort(bound.scales, 1)[:, 1:].mean(1)
+    lost = np.zeros((*near.shape, 2))
+    for there in bent:
+        share(_add_losses, bound.means, width, near, *at[:3], *there.frames[:3], surface.moved(there.transforms), lost)
+    swing, bare = lost[..., 0], lost[..., 1]
     best = np.where(fits, swing + bare, np.inf).argmin(1)
-    own, new = (np.sqrt(each / len(BENDS)) for each in (swing[:, 0], swing[np.arange(len(swing)), best]))
+    own, new = (np.sqrt(each / len(bent)) for each in (swing[:, 0], swing[np.arange(len(swing)), best]))
     face = np.where((own > SWING) & (new < GAIN * own), near[np.arange(len(near)), best], gaussians.face).astype(np.int32)
     return bind_anew(gaussians, face, bound, at)
 
 
-def faces_around(face: np.ndarray, places: np.ndarray, at: FaceFrames, rest: np.ndarray,
-                 body: Body) -> tuple[np.ndarray, np.ndarray]:
+def faces_around(share: Share, face: np.ndarray, places: np.ndarray, at: FaceFrames, skinned: np.ndarray,
+                 corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(N, K) faces, each gaussian's own first, and (N, K) bool, which of them may carry it.
 
-    face: (N,) own; places: (N, 3) m, and at: frames of the usual pose; rest: (V, 3) m.
+    share: `Workspace.share`; face: (N,) own; places: (N, 3) m, and at: frames of the usual pose; skinned: (F, J) `face_weights`;
+    corners: (F, 3, 3) m at rest.
     """
-    a, b, c = rest[body.faces].transpose(1, 0, 2)
+    a, b, c = corners.transpose(1, 0, 2)
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a))], 0)
     steady = np.flatnonzero(at.valid & (area > LEAST_AREA) & (area > SLENDER * longest))
-    near = steady[KDTree(at.T[steady]).query(places, k=min(NEAR, len(steady)))[1].reshape(len(places), -1)]
-    near = np.concatenate([face[:, None], near], 1)
-    skinned = face_weights(body)
-    apart = 0.5 * np.abs(skinned[near] - skinned[face][:, None]).sum(-1)
-    alike = np.einsum("nki,ni->nk", at.R[near][..., 1], at.R[face][..., 1])
-    fits = (apart < SAME_PART) & (alike > SAME_SIDE)
+    near = np.concatenate([face[:, None], steady[find_nearest(at.T[steady], places, NEAR)]], 1)
+    fits = np.empty(near.shape, np.bool_)
+    share(_find_fitting, near, at.R, skinned, fits)
     fits[:, 0] = True
     return near, fits
 
@@ -105,13 +127,14 @@ def face_weights(body: Body) -> np.ndarray:
 class Surface:
     """The surface at N places, m, as linear blend skinning moves it: by the skin weights around, whatever a single face does."""
 
-    def __init__(self, places: np.ndarray, near: np.ndarray, fits: np.ndarray, at: FaceFrames, transforms: np.ndarray, body: Body):
-        """places: (N, 3) m; near, fits: of `faces_around`; at, transforms (J, 3, 4): of the pose in which the places are."""
-        away = np.where(fits, ((places[:, None] - at.T[near]) ** 2).sum(-1), np.inf)
-        share = np.exp(-(away - away.min(1, keepdims=True)) / (2 * BLUR**2))
-        weight = np.einsum("nk,nkj->nj", share / share.sum(1, keepdims=True), face_weights(body)[near])
-        self.weight = weight.astype(np.float64)
-        blended = self.blend(transforms)
+    def __init__(self, share: Share, places: np.ndarray, near: np.ndarray, fits: np.ndarray, usual: Posed,
+                 skinned: np.ndarray):
+        """share: `Workspace.share`; places: (N, 3) m in the usual pose; near, fits: of `faces_around`; skinned: (F, J)
+        `face_weights`.
+        """
+        self.weight = np.zeros((len(places), skinned.shape[1]))
+        share(_blend_weights, places, near, fits, usual.frames.T, skinned, self.weight)
+        blended = self.blend(usual.transforms)
         self.rest = np.linalg.solve(blended[:, :, :3], (places - blended[:, :, 3])[..., None])[..., 0]
 
     def blend(self, transforms: np.ndarray) -> np.ndarray:
@@ -124,11 +147,69 @@ class Surface:
         return np.einsum("nab,nb->na", blended[:, :, :3], self.rest) + blended[:, :, 3]
 
 
-def carried(places: np.ndarray, near: np.ndarray, at: FaceFrames, bent: FaceFrames) -> np.ndarray:
-    """(N, K, 3) m, places (N, 3) of one pose as each of the faces near (N, K) carries them to another. at, bent: both frames."""
-    local = np.einsum("nkji,nkj->nki", at.R[near], places[:, None] - at.T[near])
-    grown = bent.k[near] / np.maximum(at.k[near], 1e-9)
-    return np.einsum("nkij,nkj->nki", bent.R[near], local) * grown[..., None] + bent.T[near]
+@own_kernel(nogil=True, error_model="numpy")
+def _find_fitting(worker, workers, near, R, skinned, fits):
+    """fits (N, K), written: which faces near (N, K) are of the part and the side of the first. R: (F, 3, 3); skinned: (F, J)."""
+    count, joints = len(near), skinned.shape[1]
+    for i in range(count * worker // workers, count * (worker + 1) // workers):
+        own = near[i, 0]
+        for k in range(near.shape[1]):
+            face, apart, alike = near[i, k], 0.0, 0.0
+            for j in range(joints):
+                apart += abs(skinned[face, j] - skinned[own, j])
+            for c in range(3):
+                alike += R[face, c, 1] * R[own, c, 1]
+            fits[i, k] = 0.5 * apart < SAME_PART and alike > SAME_SIDE
+
+
+@own_kernel(nogil=True, error_model="numpy")
+def _blend_weights(worker, workers, places, near, fits, T, skinned, weight):
+    """weight (N, J), added to: mean of the skin weights (F, J) of the faces near (N, K) that fit, by their distance."""
+    count, faces = near.shape
+    away = np.empty(faces)
+    for i in range(count * worker // workers, count * (worker + 1) // workers):
+        least, total = np.inf, 0.0
+        for k in range(faces):
+            away[k] = 0.0
+            for c in range(3):
+                away[k] += (places[i, c] - T[near[i, k], c]) ** 2
+            if fits[i, k]:
+                least = min(least, away[k])
+        for k in range(faces):
+            away[k] = math.exp(-(away[k] - least) / (2 * BLUR**2)) if fits[i, k] else 0.0
+            total += away[k]
+        for k in range(faces):
+            if fits[i, k]:
+                for j in range(skinned.shape[1]):
+                    weight[i, j] += away[k] / total * skinned[near[i, k], j]
+
+
+@own_kernel(nogil=True, error_model="numpy")
+def _add_losses(worker, workers, places, width, near, R, T, size, bent_R, bent_T, bent_size, surface, lost):
+    """lost (N, K, 2), added to: squares, m2, of what the faces near (N, K) cost in a bent pose, off the surface and laid bare.
+
+    places (N, 3) m, frames R (F, 3, 3), T (F, 3) m and size (F,): of the usual pose; width: (N,) m; the others: of the bent one;
+    surface: (N, 3) m, the places there.
+    """
+    count = len(near)
+    local = np.empty(3)
+    for i in range(count * worker // workers, count * (worker + 1) // workers):
+        own_grown = 0.0
+        for k in range(near.shape[1]):
+            face = near[i, k]
+            grown = bent_size[face] / max(size[face], 1e-9)
+            if k == 0:
+                own_grown = grown
+            for c in range(3):
+                local[c] = 0.0
+                for d in range(3):
+                    local[c] += R[face, d, c] * (places[i, d] - T[face, d])
+            for c in range(3):
+                carried = bent_T[face, c]
+                for d in range(3):
+                    carried += bent_R[face, c, d] * local[d] * grown
+                lost[i, k, 0] += (carried - surface[i, c]) ** 2
+            lost[i, k, 1] += (BARE * width[i] * max(own_grown - grown, 0.0)) ** 2
 
 
 def bind_anew(gaussians: Gaussians, face: np.ndarray, bound: Bound, at: FaceFrames) -> Gaussians:

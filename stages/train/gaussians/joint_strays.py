@@ -6,11 +6,14 @@ most of the fringe: few enough that the clip's own frames do not miss what they 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 from scipy.spatial import KDTree
 
 from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
 from gsac.avatar.raster import render_backward, render_bound
@@ -33,41 +36,71 @@ ROUNDS, SHRUNK = 4, 0.75
 """Rounds that shrink what strays, and the factor of one on its standard deviations."""
 
 
-def shrink_strays(gaussians: Gaussians, poses: Poses, frames: np.ndarray) -> Gaussians:
-    """The gaussians, some smaller. frames: (n,) trained ones, whose median pose is the usual one."""
+class Side(NamedTuple):
+    """A posed body, seen from one side."""
+
+    vertices: np.ndarray
+    """(V, 3) m, camera frame."""
+    camera: Camera
+    away: np.ndarray
+    """(h, w) m off the silhouette."""
+    area: int
+    """Pixels of the silhouette, at least 1."""
+
+
+class Bent(NamedTuple):
+    """A posed body, and how it looks."""
+
+    vertices: np.ndarray
+    """(V, 3) m."""
+    sides: list[Side]
+
+
+def shrink_strays(levels: list[Gaussians], poses: Poses, frames: np.ndarray) -> list[Gaussians]:
+    """The gaussians of each level, some smaller. frames: (n,) trained ones, whose median pose is the usual one."""
     pose, faces = np.median(poses.pose[frames], 0), poses.body.faces
     pose[0] = 0
     usual = put_in_pose(poses, int(frames[0]), pose)
-    bent = [put_in_pose(poses, int(frames[0]), turn_joints(pose, turns)) for turns in BENDS]
-    out = gaussians[np.arange(len(gaussians))]
+    bent = side_by_side(lambda turns, _: see(put_in_pose(poses, int(frames[0]), turn_joints(pose, turns)), faces), BENDS)
+    out = [level[np.arange(len(level))] for level in levels]
 
-    def find_large(posed: np.ndarray, workspace: Workspace) -> np.ndarray:
-        large = np.flatnonzero(find_stray(out, posed, faces, workspace) > LEAST)
-        return large[find_reach(out[large], posed, faces) > find_reach(out[large], usual, faces) + GROWN]
+    def find_large(item: tuple[Gaussians, Bent], workspace: Workspace) -> np.ndarray:
+        gaussians, posed = item
+        large = np.flatnonzero(find_stray(gaussians, posed.sides, faces, workspace) > LEAST)
+        return large[find_reach(gaussians[large], posed.vertices, faces) > find_reach(gaussians[large], usual, faces) + GROWN]
 
+    left = [(gaussians, posed) for gaussians in out for posed in bent]
     for _ in range(ROUNDS):
-        found = side_by_side(find_large, bent)
-        bent = [posed for posed, large in zip(bent, found, strict=True) if len(large)]
-        if not bent:
-            break
-        out.log_scale[np.unique(np.concatenate(found))] += np.float32(np.log(SHRUNK))
+        found = side_by_side(find_large, left)
+        for gaussians in out:
+            strays = [large for (own, _), large in zip(left, found, strict=True) if own is gaussians]
+            if strays:
+                gaussians.log_scale[np.unique(np.concatenate(strays))] += np.float32(np.log(SHRUNK))
+        left = [item for item, large in zip(left, found, strict=True) if len(large)]
     return out
 
 
-def find_stray(gaussians: Gaussians, posed: np.ndarray, faces: np.ndarray, workspace: Workspace) -> np.ndarray:
-    """(N,) alpha that each gaussian adds off the silhouette of the body posed (V, 3) m, over its area, sum over the sides.
-
-    What it adds is the gradient of a sum of pixels by its colour. faces: (F, 3).
-    """
-    stray, off = np.zeros(len(gaussians)), OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
+def see(posed: np.ndarray, faces: np.ndarray) -> Bent:
+    """The body posed (V, 3) m from all sides. faces: (F, 3)."""
+    sides = []
     for side in range(TURNS):
         vertices, camera, metre = turn_before_camera(posed, 360 * side / TURNS)
         body = rasterise(vertices, faces, camera)[0] >= 0
         away = cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / metre
-        counted = np.clip(away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
-        rendering = render_bound(vertices, faces, gaussians, camera, workspace)
-        added = render_backward(rendering.state, counted, np.zeros_like(rendering.alpha)).rgb[:, 0]
-        stray += added / max(np.count_nonzero(body), 1)
+        sides.append(Side(vertices, camera, away, max(int(np.count_nonzero(body)), 1)))
+    return Bent(posed, sides)
+
+
+def find_stray(gaussians: Gaussians, sides: list[Side], faces: np.ndarray, workspace: Workspace) -> np.ndarray:
+    """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, sum over the sides. faces: (F, 3).
+
+    What it adds is the gradient of a sum of pixels by its colour.
+    """
+    stray, off = np.zeros(len(gaussians)), OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
+    for side in sides:
+        counted = np.clip(side.away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
+        rendering = render_bound(side.vertices, faces, gaussians, side.camera, workspace)
+        stray += render_backward(rendering.state, counted, np.zeros_like(rendering.alpha)).rgb[:, 0] / side.area
     return stray
 
 

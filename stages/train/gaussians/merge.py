@@ -10,14 +10,15 @@ neither frames to weigh colours with nor training afterwards.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.mesh import distinct_pairs
+from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.rotation import to_wxyz
+from gsac.stages.train.gaussians.nearest import find_nearest
 
 NEIGHBOURS = 8
 """Nearest gaussians that each may merge with."""
@@ -56,21 +57,40 @@ def find_cheapest_pairs(gaussians: Gaussians, bound: Bound, shown: np.ndarray, n
     bound: the gaussians at rest; shown: (N,) pixels; normals: (N, 3) of their faces.
     """
     places = bound.means.astype(np.float64)
-    near = cKDTree(places).query(places, k=min(NEIGHBOURS + 1, len(places)))[1][:, 1:]
+    near = find_nearest(places, places, NEIGHBOURS + 1)[:, 1:]
     one, other = np.repeat(np.arange(len(places)), near.shape[1]), near.ravel()
     i, j = distinct_pairs(np.minimum(one, other), np.maximum(one, other), len(places))
-    skin = skin_weights(gaussians.face, body)
-    fit = ((normals[i] * normals[j]).sum(1) > SAME_SIDE) & (0.5 * np.abs(skin[i] - skin[j]).sum(1) < SAME_PART)
+    fit = (normals[i] * normals[j]).sum(1) > SAME_SIDE
+    _leave_same_part(i, j, skin_weights(gaussians.face, body), fit)
     i, j = i[fit], j[fit]
     colour = ((gaussians.rgb[i].astype(np.float64) - gaussians.rgb[j]) ** 2).sum(1)
     apart = ((places[i] - places[j]) ** 2).sum(1) / max(areas(bound).mean(), 1e-12)
     cost = shown[i] * shown[j] / (shown[i] + shown[j]) * (colour + EVEN**2 * apart)
-    free, chosen = np.ones(len(places), bool), []
-    for at in np.argsort(cost, kind="stable").tolist():
-        if free[i[at]] and free[j[at]]:
-            free[i[at]] = free[j[at]] = False
-            chosen.append(at)
-    return np.stack([i[chosen], j[chosen]], 1)
+    order = np.argsort(cost, kind="stable")
+    return _take_free(i[order], j[order], np.ones(len(places), bool))
+
+
+@own_kernel(nogil=True)
+def _leave_same_part(i, j, skin, fit):
+    """fit (P,) bool: becomes False where the skin weights (N, J) of i (P,) and j (P,) are too far apart."""
+    for pair in range(len(i)):
+        if fit[pair]:
+            apart = 0.0
+            for joint in range(skin.shape[1]):
+                apart += abs(skin[i[pair], joint] - skin[j[pair], joint])
+            fit[pair] = 0.5 * apart < SAME_PART
+
+
+@own_kernel(nogil=True)
+def _take_free(i, j, free):
+    """(M, 2) of the pairs i (P,), j (P,) in their order: those of which neither is in one taken before. free: (N,) all True."""
+    taken, count = np.empty((len(i), 2), i.dtype), 0
+    for pair in range(len(i)):
+        if free[i[pair]] and free[j[pair]]:
+            free[i[pair]] = free[j[pair]] = False
+            taken[count] = i[pair], j[pair]
+            count += 1
+    return taken[:count]
 
 
 def areas(bound: Bound) -> np.ndarray:

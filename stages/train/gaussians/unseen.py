@@ -7,7 +7,6 @@ constrain depth: no gaussian may stand off the surface that those around it make
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gsac.avatar.binding import Bound, bind, face_frames
 from gsac.avatar.camera import Camera
@@ -15,6 +14,7 @@ from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace
+from gsac.stages.train.gaussians.nearest import find_nearest
 
 BEHIND, FRONT = -0.2, 0.3
 """Cosine between a face's normal and the direction to the camera: up to the first a frame shows nothing of it, from the second on
@@ -68,8 +68,7 @@ def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, fac
         return gaussians
     frames = face_frames(rest, faces)
     size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
-    count = min(NEIGHBOURS, int(seen.sum()))
-    near = np.flatnonzero(seen)[cKDTree(middle[seen]).query(middle[poor], k=count)[1]].reshape(len(poor), count)
+    near = np.flatnonzero(seen)[find_nearest(middle[seen], middle[poor], NEIGHBOURS)]
     out = gaussians[np.arange(len(gaussians))]
     height = np.median(size[near] * gaussians.mu[near, 1], axis=1) / size[poor]
     out.mu[poor, 1] = np.minimum(gaussians.mu[poor, 1], height)
@@ -105,7 +104,7 @@ def level_heights(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> 
     step = STEP * max(1, SPARSE / max(len(gaussians), 1)) ** 0.5
     frames = face_frames(rest, faces)
     size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
-    near = cKDTree(middle).query(middle, k=min(AROUND, len(gaussians)))[1].reshape(len(gaussians), -1)
+    near = find_nearest(middle, middle, AROUND)
     height = size * gaussians.mu[:, 1]
     usual = np.median(height[near], axis=1)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)

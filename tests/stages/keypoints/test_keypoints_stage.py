@@ -182,9 +182,9 @@ def test_the_same_person_is_followed_when_a_second_one_comes(tmp_path, store):
 def test_a_person_cut_by_the_frame_is_warned_of(tmp_path, store):
     image = few(SQUATS, 0)[0]
     _, warnings = stage_on([np.ascontiguousarray(image[:880])], tmp_path, store)
-    assert any("The edge of the picture cuts off the feet in frame 0;" in w for w in warnings)
+    assert any("The edge of the picture cuts off the feet in the only frame;" in w for w in warnings)
     _, warnings = stage_on([np.ascontiguousarray(image[220:])], tmp_path / "headless", store)
-    assert any("The edge of the picture cuts off the head in frame 0;" in w for w in warnings)
+    assert any("The edge of the picture cuts off the head in the only frame;" in w for w in warnings)
 
 
 @pytest.mark.footage

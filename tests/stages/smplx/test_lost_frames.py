@@ -65,7 +65,7 @@ def test_frames_that_repeat_others_are_lost_without_a_word_for_split_has_named_t
 def test_wide_clothes_in_every_frame_are_told_but_nothing_is_lost(good):
     lost, words = said(replace(good, iou=np.full(10, 0.6)))
     assert not lost.any()
-    assert len(words) == 1 and "wide clothes" in words[0] and "10 of 10 frames (0-9)" in words[0]
+    assert len(words) == 1 and "wide clothes" in words[0] and "all 10 frames" in words[0]
 
 
 def test_pictures_that_mix_several_moments_of_a_fast_turn_are_named(good):

@@ -14,6 +14,7 @@ from gsac.stages.train.poses import bundle_adjust
 from gsac.stages.train.poses.photometric import NormalEquations
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.stage import run
+from gsac.stages.train.views import View, of_each
 
 
 def spoiled(monkeypatch, owner, name, spoil, at=3):
@@ -101,7 +102,7 @@ def test_a_frame_that_cannot_be_judged_or_aligned_stops_instead_of_being_left_ou
     with pytest.raises(AttributeError):  # nothing is trained: all that is wanted is the task
         run(job(frames=2, **quiet()))
     task = made[0]
-    gaussians = init_gaussians(task, crop_views(task)[1], 300)
+    gaussians = init_gaussians(task, of_each(View.halved, crop_views(task)), 300)
     poses = task.poses.copy()
     assert len(heldout.judge(gaussians, poses, [0], task.views)) == 1
     with monkeypatch.context() as patch:

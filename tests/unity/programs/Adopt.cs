@@ -52,6 +52,11 @@ public static class Adopt
         var scene = new Scene { Roots = new List<GameObject> { cast.gameObject } };
         new GsacCastFiller().OnProcessScene(scene, null);
         Console.WriteLine("named " + cast.People.Length);
+        Player.Call(cast, "OnDisable");
+        cast.People = new GsacAvatar[] { null, GsacCastFiller.FindPeople()[0] };
+        Player.Call(cast, "OnEnable");
+        Console.WriteLine("with a deleted prefab " + cast.Standing.Length);
+        cast.People = new GsacAvatar[0];
         new GsacCastFiller().OnProcessScene(scene, new BuildReport());
         Console.WriteLine("named " + cast.People.Length);
     }

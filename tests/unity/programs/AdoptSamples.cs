@@ -265,6 +265,17 @@ public static class AdoptSamples
         bool none = room.TryFloor(Vector3.zero, Vector3.forward, out floor);
         foreach (float height in new[] { 0.7f, 0 }) planes.Met.Add(new ARRaycastHit { pose = new Pose { position = new Vector3(0, height, 2) } });
         Say($"{seen.enabled} {none} {room.TryFloor(Vector3.zero, Vector3.forward, out floor)} {floor.y} {room.TryDepth(depth)}");
+        var occlusion = ar.AddComponent<AROcclusionManager>();
+        var origin = new GameObject("origin");
+        origin.transform.localPosition = new Vector3(10, 0, 0);
+        Player.SetField(room, "measured", occlusion);
+        Player.SetField(room, "origin", origin.transform);
+        bool without = room.TryDepth(depth);
+        Shader.Globals["_EnvironmentDepthProjectionMatrices"] = new[] { Matrix4x4.identity, Matrix4x4.Translate(new Vector3(1, 2, 3)) };
+        Shader.Globals["_NdcLinearConversionParameters"] = new Vector4(-0.2f, -1, 0, 0);
+        bool with = room.TryDepth(depth);
+        room.ShowRoom(false);
+        Say($"{without} {with} {depth.FromWorld[0].m03} {depth.FromWorld[1].m03} {depth.Metres.x} {room.TryDepth(depth)}");
         var hands = new GameObject("hands").AddComponent<GsacXRHands>();
         Vector3 tip;
         none = hands.TryTip(true, out tip);

@@ -3,6 +3,7 @@ using System.Collections.Generic;
 using System.IO;
 using Gsac;
 using UnityEngine;
+using UnityEngine.Rendering.HighDefinition;
 
 /// <summary>Avatars that are drawn into pictures of their own, in a project with linear colours.</summary>
 public static class DrawOwn
@@ -76,6 +77,20 @@ public static class DrawOwn
         Player.SetRect(camera, 0.5f, 1);
         tell("part of a screen");
         Console.WriteLine("copy: " + Player.Value(asked, Shader.PropertyToID("GsacEyeScreen")).w);
+        Player.SetRect(camera, 1, 1);
+        GsacRefraction.Tell();
+        foreach (var pipeline in new UnityEngine.Rendering.RenderPipeline[] { null, new HDRenderPipeline() })
+        {
+            foreach (bool there in new[] { true, false })
+            {
+                HDCamera.GetOrCreate(camera).SetRefraction(there);
+                Player.SetPipeline(pipeline);
+                frame();
+                Console.WriteLine((pipeline == null ? "other pipeline" : "HDRP") + (there ? " with" : " without") + " refraction: "
+                                  + Player.Value(asked, Shader.PropertyToID("GsacBehindIsCopied")).x);
+            }
+        }
+        Player.SetPipeline(null);
         renderer.TrainedColours = false;
         tell("switched off");
         renderer.TrainedColours = true;

@@ -210,4 +210,37 @@ public static class Drawing
             Console.WriteLine("gone: " + Player.Alive<Material>() + " " + Player.Alive<Avatar>());
         }
     }
+    /// <summary>What stays of a person whose avatar is switched off while the renderer is on, and goes after.</summary>
+    public static void Closed(string file)
+    {
+        Camera camera = Player.AddCamera("eye");
+        Turn(camera, 180);
+        GsacAvatar avatar = Person(file);
+        Action frame = Player.Frame(new[] { avatar.gameObject });
+        var models = (System.Collections.IDictionary)typeof(GsacModel).GetField("Shared", System.Reflection.BindingFlags.NonPublic | System.Reflection.BindingFlags.Static).GetValue(null);
+        SkinnedMeshRenderer body = avatar.Body;
+        Action<string> tell = what => Console.WriteLine(what + ": " + models.Count + " " + (body.sharedMaterial != null));
+        frame();
+        tell("on");
+        avatar.enabled = false;
+        Player.Call(avatar, "OnDisable");
+        tell("off");
+        avatar.GetComponent<GsacRenderer>().Refresh();
+        Player.Call(avatar.GetComponent<GsacRenderer>(), "LateUpdate");
+        Player.Call(avatar.GetComponent<GsacRenderer>(), "OnDisable");
+        tell("a frame later, the renderer off too");
+        Console.WriteLine("materials: " + Player.Alive<Material>());
+    }
+    /// <summary>Another file on the field of a person who is switched off and on: how many weights are drawn, of how many the file has.</summary>
+    public static void Swapped(string file, string other)
+    {
+        var avatar = new GameObject("person").AddComponent<GsacAvatar>();
+        foreach (string path in new[] { file, other })
+        {
+            Player.Call(avatar, "OnDisable");
+            Player.SetField(avatar, "bytes", Player.Text(File.ReadAllBytes(path)));
+            Player.Call(avatar, "LateUpdate");
+            Console.WriteLine(avatar.DrawnWeights.Length + " " + avatar.Data.Expressions.Length);
+        }
+    }
 }

@@ -44,10 +44,15 @@ public static class Play
             case "scene": PlayLight.Scene(args[1], args[2]); break;
             case "dressed": DrawOwn.Dressed(args[1]); break;
             case "picture": DrawOwn.Picture(args[1], args[2]); break;
+            case "rays": Touch.Rays(args[1], args[2], args[3], args[4]); break;
+            case "colliders": Touch.Colliders(args[1], args[2]); break;
+            case "addresses": Touch.Addresses(args); break;
             case "finish": Drawing.Finish(args[1]); break;
             case "crowd": Crowd.Print(args); break;
             case "crowds": Crowd.Count(args[1]); break;
             case "repeated": Drawing.Repeated(args[1]); break;
+            case "swapped": Drawing.Swapped(args[1], args[2]); break;
+            case "closed": Drawing.Closed(args[1]); break;
             case "freed": Drawing.Freed(args[1]); break;
             default: return Drive.Run(args);
         }

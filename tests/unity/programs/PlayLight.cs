@@ -53,7 +53,9 @@ public static class PlayLight
         tell("no sun");
         scene.Sun = sun;
         tell("sun");
-        Player.IsShaded = true;
+        Player.BeforeSun.Add(avatar.Joints[15]);
+        tell("a hand before the eyes");
+        Player.BeforeSun.Add(new GameObject("roof").transform);
         sun.shadows = LightShadows.None;
         tell("without shadows");
         sun.shadows = LightShadows.Soft;

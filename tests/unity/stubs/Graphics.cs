@@ -271,9 +271,11 @@ namespace UnityEngine
 namespace UnityEngine.Rendering
 {
     public struct ScriptableRenderContext { }
+    public abstract class RenderPipeline { }
 
     public static class RenderPipelineManager
     {
+        public static RenderPipeline currentPipeline { get; internal set; }
         public static event Action<ScriptableRenderContext, Camera> beginCameraRendering;
         internal static void Begin(Camera camera) { if (beginCameraRendering != null) beginCameraRendering(new ScriptableRenderContext(), camera); }
     }

@@ -34,12 +34,30 @@ namespace UnityEngine
 
     public enum QueryTriggerInteraction { Ignore = 1 }
 
+    public class Collider : Component
+    {
+        public bool isTrigger { get; set; }
+    }
+
+    public sealed class CapsuleCollider : Collider
+    {
+        public float radius { get; set; }
+        public float height { get; set; }
+    }
+
+    public struct RaycastHit
+    {
+        public Transform transform { get; internal set; }
+    }
+
     public static class Physics
     {
         public const int DefaultRaycastLayers = ~4;
-        public static bool Raycast(Vector3 origin, Vector3 direction, float maxDistance, int layerMask, QueryTriggerInteraction queryTriggerInteraction)
+        public static int RaycastNonAlloc(Vector3 origin, Vector3 direction, RaycastHit[] results, float maxDistance, int layerMask, QueryTriggerInteraction queryTriggerInteraction)
         {
-            return Player.IsShaded;
+            int count = 0;
+            foreach (Transform met in Player.BeforeSun) results[count++] = new RaycastHit { transform = met };
+            return count;
         }
     }
 }

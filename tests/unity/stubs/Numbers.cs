@@ -39,8 +39,9 @@ namespace UnityEngine
         public static float Dot(Vector3 lhs, Vector3 rhs) { return lhs.x * rhs.x + lhs.y * rhs.y + lhs.z * rhs.z; }
     }
 
-    public struct Vector4
+    public struct Vector4 : System.IEquatable<Vector4>
     {
+        public bool Equals(Vector4 other) { return x == other.x && y == other.y && z == other.z && w == other.w; }
         public float x, y, z, w;
         public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
         public static Vector4 operator -(Vector4 a, Vector4 b) { return new Vector4(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w); }

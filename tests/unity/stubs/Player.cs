@@ -18,9 +18,9 @@ namespace UnityEngine
         public static Action<MaterialPropertyBlock, int> OnOwnDraw;
         public static bool HasHalfTargets;
 
-        /// <summary>The light around, and whether something stands between the person and the sun.</summary>
+        /// <summary>The light around, and whose colliders stand between the person and the sun.</summary>
         public static Rendering.SphericalHarmonicsL2 Probe;
-        public static bool IsShaded;
+        public static readonly List<Transform> BeforeSun = new List<Transform>();
 
         /// <summary>What the user does: the button pressed, controls by label and where they are put.</summary>
         public static string Pressed;
@@ -133,6 +133,7 @@ namespace UnityEngine
         public static List<string> Errors { get { return Debug.Errors; } }
         public static HumanDescription Description(Avatar avatar) { return avatar.Description; }
         public static void SetDeltaTime(float seconds) { Time.deltaTime = seconds; }
+        public static void SetPipeline(Rendering.RenderPipeline pipeline) { Rendering.RenderPipelineManager.currentPipeline = pipeline; }
         public static void SetDataPath(string folder) { Application.persistentDataPath = folder; }
         public static void SetPlaying(bool playing) { Application.isPlaying = playing; }
         public static void SetComputeShaders(bool there) { SystemInfo.supportsComputeShaders = there; }

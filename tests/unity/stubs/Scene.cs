@@ -122,6 +122,11 @@ namespace UnityEngine
         Quaternion turn = Quaternion.identity;
         public Transform parent { get; private set; }
         public int childCount { get { return Children.Count; } }
+        public bool IsChildOf(Transform parent)
+        {
+            for (Transform t = this; t != null; t = t.parent) if (t == parent) return true;
+            return false;
+        }
         public Transform GetChild(int index) { return Children[index]; }
         public Vector3 localPosition { get { return place; } set { place = value; } }
         public Quaternion localRotation { get { return turn; } set { turn = value; } }
@@ -291,6 +296,8 @@ namespace UnityEngine
         }
     }
 
+    public enum RuntimeInitializeLoadType { SubsystemRegistration = 4 }
+    [AttributeUsage(AttributeTargets.Method)] public sealed class RuntimeInitializeOnLoadMethodAttribute : Attribute { public RuntimeInitializeOnLoadMethodAttribute(RuntimeInitializeLoadType loadType) { } }
     [AttributeUsage(AttributeTargets.Class)] public sealed class AddComponentMenu : Attribute { public AddComponentMenu(string menuName) { } }
     [AttributeUsage(AttributeTargets.Class)] public sealed class DisallowMultipleComponent : Attribute { }
     [AttributeUsage(AttributeTargets.Class)] public sealed class ExecuteAlways : Attribute { }

@@ -45,15 +45,20 @@ def carried_by_the_forearm(poses, gaussians):
     return bind_anew(gaussians, face, bound, at), which
 
 
+def stray_of(gaussians, poses, pose):
+    """(N,) stray alpha of gaussians in a pose."""
+    seen = joint_strays.see(joint_strays.put_in_pose(poses, 0, pose), poses.body.faces)
+    return joint_strays.find_stray(gaussians, seen.sides, poses.body.faces, Workspace())
+
+
 def stray_elbow(poses, gaussians):
     """(N,) stray alpha of gaussians where elbows bend."""
-    posed = joint_strays.put_in_pose(poses, 0, turn_joints(poses.pose[0], BENDS[0]))
-    return joint_strays.find_stray(gaussians, posed, poses.body.faces, Workspace())
+    return stray_of(gaussians, poses, turn_joints(poses.pose[0], BENDS[0]))
 
 
 def test_what_a_bent_elbow_throws_off_the_body_shrinks_and_nothing_else_changes(poses, plain):
     thrown, which = carried_by_the_forearm(poses, plain)
-    held = joint_strays.shrink_strays(thrown, poses, FRAMES)
+    held, = joint_strays.shrink_strays([thrown], poses, FRAMES)
     before, after = stray_elbow(poses, thrown), stray_elbow(poses, held)
     assert before[which].sum() > 2e-3
     assert after[which].sum() < 0.5 * before[which].sum()
@@ -71,13 +76,21 @@ def test_hair_that_stands_off_the_head_in_the_clip_stays(poses, plain):
     hair = np.linalg.norm(bound.means - joint_at(poses, "head") - [0, 0.1, 0], axis=1) < 0.12
     lifted = plain[np.arange(len(plain))]
     lifted.mu[hair, 1] += 0.08 / at.k[plain.face[hair]]
-    usual = joint_strays.find_stray(lifted, joint_strays.put_in_pose(poses, 0, poses.pose[0]), poses.body.faces, Workspace())
+    usual = stray_of(lifted, poses, poses.pose[0])
     assert usual[hair].max() > 2 * joint_strays.LEAST
-    held = joint_strays.shrink_strays(lifted, poses, FRAMES)
+    held, = joint_strays.shrink_strays([lifted], poses, FRAMES)
     assert (held.log_scale[hair] == lifted.log_scale[hair]).all(1).mean() > 0.95
 
 
 def test_fewer_gaussians_which_are_wider_are_left_in_peace(poses):
     few = Gaussians.area(poses.rest(0)[0], poses.body.faces, 700)
-    held = joint_strays.shrink_strays(few, poses, FRAMES)
+    held, = joint_strays.shrink_strays([few], poses, FRAMES)
     assert (held.log_scale != few.log_scale).any(1).mean() < 0.02
+
+
+def test_each_level_loses_what_it_would_alone(poses, plain):
+    thrown, _ = carried_by_the_forearm(poses, plain)
+    few = Gaussians.area(poses.rest(0)[0], poses.body.faces, 700)
+    together = joint_strays.shrink_strays([thrown, few], poses, FRAMES)
+    for level, held in zip((thrown, few), together, strict=True):
+        np.testing.assert_array_equal(held.log_scale, joint_strays.shrink_strays([level], poses, FRAMES)[0].log_scale)

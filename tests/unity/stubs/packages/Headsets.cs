@@ -69,6 +69,7 @@ namespace UnityEngine.XR.ARFoundation
     }
 
     public sealed class ARCameraManager : MonoBehaviour { }
+    public sealed class AROcclusionManager : MonoBehaviour { }
 
     public struct ARRaycastHit { public Pose pose { get; set; } }
 

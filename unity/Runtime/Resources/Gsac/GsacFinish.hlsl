@@ -1,15 +1,15 @@
-// What is done to an avatar's picture beyond its own colours and light: tint, fading, the scene's fog. A pass whose pipeline has fog by
-// distance says GSAC_FOGGED (a colour at a clip-space z).
+// What is done to an avatar's picture beyond its own colours and light: tint, fading, the scene's fog. A pass whose pipeline has fog says
+// GSAC_FOGGED (a colour at a place in clip space).
 #ifndef GSAC_FINISH_INCLUDED
 #define GSAC_FINISH_INCLUDED
 
 float4 GsacTint; // factor of the colours, how much of the person is there
 uint GsacFog;    // 1: the scene's fog lies over the person
 
-float3 GsacThroughFog(float3 colour, float z)
+float3 GsacThroughFog(float3 colour, float4 clip)
 {
 #ifdef GSAC_FOGGED
-    if (GsacFog) return GSAC_FOGGED(colour, z);
+    if (GsacFog) return GSAC_FOGGED(colour, clip);
 #endif
     return colour;
 }

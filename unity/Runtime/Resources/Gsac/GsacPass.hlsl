@@ -1,6 +1,6 @@
 // Vertex and Fragment of every pipeline's pass. The pass has included its pipeline's file, which brings UNITY_MATRIX_V,
 // UNITY_MATRIX_P and the stereo macros, and says GSAC_SCREEN (px), GSAC_ORIGIN (place of the pipeline's origin) and, where the
-// pipeline has fog by distance, GSAC_FOGGED (a colour at a clip-space z).
+// pipeline has fog, GSAC_FOGGED (a colour at a place in clip space).
 #include "GsacDraw.hlsl"
 #include "GsacFinish.hlsl"
 #include "GsacLatest.hlsl"
@@ -27,7 +27,7 @@ GsacVaryings Vertex(GsacInput input)
     GsacCorner corner = GsacSplatCorner(input.vertex, UNITY_MATRIX_V, UNITY_MATRIX_P, GSAC_SCREEN, GSAC_ORIGIN);
     output.clip = GsacIfLatest(corner.clip);
     output.sigmas = corner.sigmas;
-    output.colour = float4(GsacThroughFog(corner.colour.rgb * GsacTint.rgb, corner.clip.z), corner.colour.a);
+    output.colour = float4(GsacThroughFog(corner.colour.rgb * GsacTint.rgb, corner.clip), corner.colour.a);
     return output;
 }
 

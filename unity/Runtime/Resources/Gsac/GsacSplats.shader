@@ -39,6 +39,7 @@ Shader "Gsac/Splats"
             #pragma multi_compile_instancing
             #include "Packages/com.unity.render-pipelines.core/ShaderLibrary/Common.hlsl"
             #include "Packages/com.unity.render-pipelines.high-definition/Runtime/ShaderLibrary/ShaderVariables.hlsl"
+            #include "GsacFogHighDefinition.hlsl"
             #define GSAC_SCREEN _ScreenSize.xy
             // HDRP's world is relative to the camera
             #define GSAC_ORIGIN (-GetCameraRelativePositionWS(float3(0, 0, 0)))
@@ -75,7 +76,7 @@ Shader "Gsac/Splats"
             #pragma multi_compile_instancing
             #pragma multi_compile_fog
             #include "Packages/com.unity.render-pipelines.universal/ShaderLibrary/Core.hlsl"
-            #define GSAC_FOGGED(colour, z) MixFog(colour, ComputeFogFactor(z))
+            #define GSAC_FOGGED(colour, clip) MixFog(colour, ComputeFogFactor((clip).z))
             #define GSAC_SCREEN _ScaledScreenParams.xy
             #define GSAC_ORIGIN float3(0, 0, 0)
             #include "GsacPass.hlsl"

@@ -16,6 +16,7 @@ struct GsacLaidVaryings
 {
     float4 clip : SV_Position;
     float2 place : TEXCOORD0;
+    float2 side : TEXCOORD1; // m to the right and up: a metre ahead, or at any distance where all lines of sight run side by side
 };
 
 struct GsacLaidPixel
@@ -24,16 +25,20 @@ struct GsacLaidPixel
     float depth : SV_Depth;
 };
 
+// Clip space of what lies `depth` m ahead.
+float4 GsacAhead(float2 side, float depth, float4x4 projection)
+{
+    return mul(projection, float4(GsacLensOf(projection).flat ? side : side * depth, -depth, 1));
+}
+
 // vertex: 4, the picture's corners.
 GsacLaidVaryings GsacLaid(uint vertex, float4x4 projection)
 {
     float2 place = float2((vertex & 1) ? 1.0 : 0.0, (vertex & 2) ? 1.0 : 0.0);
     float2 corner = lerp(GsacEyeRect.xy, GsacEyeRect.zw, place);
-    float away = GsacEyeScreen.z;
-    float2 side = (corner + GsacEyeLens.zw) / GsacEyeLens.xy;
     GsacLaidVaryings output;
-    float3 eye = float3(GsacLensOf(projection).flat ? side : side * away, -away);
-    output.clip = GsacIfLatest(mul(projection, float4(eye, 1)));
+    output.side = (corner + GsacEyeLens.zw) / GsacEyeLens.xy;
+    output.clip = GsacIfLatest(GsacAhead(output.side, GsacEyeScreen.z, projection));
     output.place = place;
     return output;
 }
@@ -47,9 +52,9 @@ GsacLaidPixel GsacLay(GsacLaidVaryings input, float4x4 projection, float3 behind
     GsacLaidPixel pixel;
     pixel.colour = GsacOver(trained, behind, size.x > GSAC_STAND_IN && GsacEyeScreen.w > 0.5);
     float depth = GsacTrainedDepth.Sample(GsacLinearClampSampler, input.place) / trained.a;
-    float2 place = mul(projection, float4(0, 0, -depth, 1)).zw;
-    pixel.depth = saturate(place.x / place.y);
+    float4 place = GsacAhead(input.side, depth, projection);
+    pixel.depth = saturate(place.z / place.w);
     float alpha = max(pixel.colour.a, 1e-6);
-    pixel.colour.rgb = alpha * GsacThroughFog(pixel.colour.rgb / alpha, place.x);
+    pixel.colour.rgb = alpha * GsacThroughFog(pixel.colour.rgb / alpha, place);
     return pixel;
 }

@@ -21,7 +21,10 @@ Shader "Gsac/Trained"
             #pragma fragment Fragment
             #include "Packages/com.unity.render-pipelines.core/ShaderLibrary/Common.hlsl"
             #include "Packages/com.unity.render-pipelines.high-definition/Runtime/ShaderLibrary/ShaderVariables.hlsl"
+            #include "GsacFogHighDefinition.hlsl"
             #include "GsacTrained.hlsl"
+
+            uint GsacBehindIsCopied; // 1: for this camera; what lies in the texture is another frame's otherwise
 
             GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
             {
@@ -30,7 +33,9 @@ Shader "Gsac/Trained"
 
             GsacLaidPixel Fragment(GsacLaidVaryings input)
             {
-                return GsacLay(input, UNITY_MATRIX_P, float3(0, 0, 0), float2(0, 0));
+                // after opaque things, sky and fog; in this frame's exposure, as all that is drawn here
+                float3 behind = LoadCameraColor((uint2)input.clip.xy, 0);
+                return GsacLay(input, UNITY_MATRIX_P, behind, GsacBehindIsCopied ? _ScreenSize.xy : float2(0, 0));
             }
             ENDHLSL
         }
@@ -55,7 +60,7 @@ Shader "Gsac/Trained"
             #pragma fragment Fragment
             #pragma multi_compile_fog
             #include "Packages/com.unity.render-pipelines.universal/ShaderLibrary/Core.hlsl"
-            #define GSAC_FOGGED(colour, z) MixFog(colour, ComputeFogFactor(z))
+            #define GSAC_FOGGED(colour, clip) MixFog(colour, ComputeFogFactor((clip).z))
             #include "GsacTrained.hlsl"
 
             GsacLaidVaryings Vertex(uint vertex : SV_VertexID)

@@ -12,4 +12,25 @@ float4x4 _NonJitteredViewProjMatrix;
 float4x4 _PrevViewProjMatrix;
 float4 unity_MotionVectorsParams;
 float3 TransformObjectToWorld(float3 place) { return GetCameraRelativePositionWS(mul(unity_ObjectToWorld, float4(place, 1)).xyz); }
+#else
+#define UNITY_UV_STARTS_AT_TOP 1
+#define UNITY_MATRIX_I_VP _InvViewProjMatrix
+#define ZERO_INITIALIZE(type, name) name = (type)0
+float4x4 _InvViewProjMatrix;
+struct PositionInputs
+{
+    float3 positionWS;
+    float2 positionNDC;
+    float deviceDepth;
+    float linearDepth;
+};
+float3 ComputeWorldSpacePosition(float2 screen, float depth, float4x4 toWorld)
+{
+    float4 place = mul(toWorld, float4(screen.x * 2 - 1, 1 - screen.y * 2, depth, 1));
+    return place.xyz / place.w;
+}
+float LinearEyeDepth(float3 place, float4x4 view) { return abs(mul(view, float4(place, 1)).z); }
+float3 GetWorldSpaceNormalizeViewDir(float3 place) { return -normalize(place); }
+Texture2D<float4> _ColorPyramidTexture;
+float3 LoadCameraColor(uint2 pixel, uint level) { return _ColorPyramidTexture.Load(int3(pixel, level)).rgb; }
 #endif
