@@ -24,6 +24,10 @@ FAR = 0.12
 """m from the surface beyond which a point is judged no more."""
 HARD = (2.0, 12.0, 40.0)
 """Weights of depth in the body, one after the other: first the arm finds its way, then it keeps out."""
+DEEP = 0.02
+"""m beyond which an arm is stuck in the body, and the search begins anew farther off."""
+AWAY = (0.0, 0.1, 0.2, 0.05)
+"""m off the goal from which searches begin, each where the one before got stuck."""
 SAMPLES = 400
 """Points of an arm that are kept out of the body."""
 
@@ -65,14 +69,20 @@ def reach(person: Person, start: np.ndarray, side: str, goal: Goal) -> np.ndarra
     bent = joints[chain[1]] + goal.elbow * flip
     arm = Arm(person, side)
     solid = Solid.around(person, start, side, goal.under)
-    first = aim_bones(joints, chain, start, bent, target - 0.09 * fingers)
+    wrist = target - 0.09 * fingers
     hinge = np.array([0, 1.0, 0])
+
+    def posed(x: np.ndarray) -> np.ndarray:
+        out = start.copy()
+        out[chain] = x.reshape(4, 3)
+        return out
+
+    def depths(x: np.ndarray) -> np.ndarray:
+        return solid.depth(arm.place(joint_transforms(posed(x)[None], joints, parents)[0]))
 
     def residuals(x: np.ndarray, hard: float) -> np.ndarray:
         """Of the rotations x (12,): hand's place and directions, elbow's place, bends no joint can do, `hard` times the depth."""
-        trial = start.copy()
-        trial[chain] = x.reshape(4, 3)
-        a = joint_transforms(trial[None], joints, parents)[0]
+        a = joint_transforms(posed(x)[None], joints, parents)[0]
         at = {j: a[j, :, :3] @ joints[j] + a[j, :, 3] for j in (hand, knuckle, elbow)}
         along, facing = unit(at[knuckle] - at[hand]), -a[hand, :, 1]
         rolled = x[6:9] - hinge * (x[6:9] @ hinge)
@@ -80,12 +90,16 @@ def reach(person: Person, start: np.ndarray, side: str, goal: Goal) -> np.ndarra
             (at[knuckle] - target) * 25, (along - fingers) * 0.8, (facing - palm) * 0.8, (at[elbow] - bent) * 4,
             x[:3] * 1.2, rolled * [0.25, 0, 1.0], x[9:] * [0.3, 0.5, 0.3], hard * solid.depth(arm.place(a))])
 
-    x = np.concatenate([start[chain[0]], first.ravel(), np.zeros(3)])
-    for hard in HARD:
-        x = least_squares(residuals, x, args=(hard,), diff_step=1e-3, max_nfev=40, ftol=1e-5).x
-    out = start.copy()
-    out[chain] = x.reshape(4, 3)
-    return out
+    ends: list[np.ndarray] = []
+    for away in AWAY:
+        aimed = aim_bones(joints, chain, start, bent - away * palm, wrist - away * palm)
+        x = np.concatenate([start[chain[0]], aimed.ravel(), np.zeros(3)])
+        for hard in HARD:
+            x = least_squares(residuals, x, args=(hard,), diff_step=1e-3, max_nfev=40, ftol=1e-5).x
+        ends.append(x)
+        if depths(x).max() <= DEEP:
+            return posed(x)
+    return posed(min(ends, key=lambda x: depths(x).max()))
 
 
 def curl_fingers(pose: np.ndarray, side: str, curl: float) -> np.ndarray:
