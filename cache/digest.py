@@ -41,7 +41,7 @@ def tree_digest(path: Path, memo: Memo | None = None) -> tuple[str, Manifest]:
     Links to files are followed; links to folders and special files raise CacheError. Empty folders do not count.
     """
     memo = memo or memo_in(default_root())
-    manifest = {name: [content_digest(file, memo), file.stat().st_size] for name, file in sorted(tree_files(Path(path)).items())}
+    manifest = {name: list(_digest_and_size(file, memo)) for name, file in sorted(tree_files(Path(path)).items())}
     memo.flush()
     return manifest_digest(manifest), manifest
 
@@ -77,13 +77,17 @@ def tree_files(path: Path) -> dict[str, Path]:
 
 def content_digest(path: Path, memo: Memo) -> str:
     """As `file_digest`, for callers that flush the memo themselves once they have asked for many files."""
-    before = path.stat()
+    return _digest_and_size(path, memo)[0]
+
+
+def _digest_and_size(path: Path, memo: Memo) -> tuple[str, int]:
+    before = os.stat(path)
     known = memo.get("file", before)
     if known is not None:
-        return known
+        return known, before.st_size
     with path.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
         after = os.fstat(stream.fileno())
     if modes.S_ISREG(after.st_mode) and identity(after) == identity(before):
         memo.put("file", before, digest)
-    return digest
+    return digest, after.st_size

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, TypeVar
 
@@ -139,9 +139,15 @@ def _typed(kind: type[Kind], raw: dict[str, Any]) -> Kind:
 
 def _fits(hint: str, value: Any) -> bool:
     if hint.startswith("dict[str, "):
-        return isinstance(value, dict) and all(_fits(hint[len("dict[str, "):-1], entry) for entry in value.values())
+        return isinstance(value, dict) and _fit_all(hint[len("dict[str, "):-1], value.values())
     if hint.startswith("list["):
-        return isinstance(value, list) and all(_fits(hint[len("list["):-1], entry) for entry in value)
+        return isinstance(value, list) and _fit_all(hint[len("list["):-1], value)
     if isinstance(value, bool):  # which Python counts among the integers
         return hint not in PLAIN
     return isinstance(value, PLAIN.get(hint, object))
+
+
+def _fit_all(hint: str, values: Iterable[Any]) -> bool:
+    if hint == "str":  # hundreds a record: files and their digests
+        return all(type(value) is str for value in values)
+    return all(_fits(hint, value) for value in values)

@@ -6,13 +6,15 @@ Outputs are `cache: false` in dvc.yaml, so DVC wants no objects of its own: they
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from gsac.cache.digest import tree_files
+from gsac.cache.digest import tree_files, typed_digest
 from gsac.cache.store import Store
 from gsac.pipeline.graph import Graph, Step, read_yaml
 from gsac.pipeline.params import config_values
@@ -22,19 +24,41 @@ from gsac.stages.contract import BadInput
 MEMO_KIND = "md5"
 
 
-def write_lock(run_folder: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store) -> None:
-    """Writes entries of the steps that have just finished; those of others stay as they are."""
+def write_lock(run_folder: RunFolder, graph: Graph, steps: list[str], configs: dict[str, Any], store: Store,
+               digests: Mapping[str, str]) -> None:
+    """Writes entries of the steps that have just finished; those of others stay as they are.
+
+    digests: port -> tree digest, of all that the steps read and wrote. The first line of the file is a digest of them and of the
+    lines below: where both are as they were, the file is, too.
+    """
     import yaml
 
     if not steps:
         return
-    known = _entries(run_folder.root / LOCK)
+    path = run_folder.root / LOCK
+    told = json.dumps([_request(graph.step(name), configs[name], digests) for name in steps])
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        head, _, body = path.read_text(encoding="utf-8").partition("\n")
+        if head == _mark(told, body):
+            return
+    known = _entries(path)
     fresh = {name: _entry(run_folder, graph.step(name), configs[name], store) for name in steps}
     entries = {name: fresh.get(name) or known[name] for name in graph.steps if name in fresh or name in known}
     store.memo.flush()
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     dumper.ignore_aliases = lambda self, data: True
-    write_text(run_folder.root / LOCK, yaml.dump({"schema": "2.0", "stages": entries}, Dumper=dumper, sort_keys=False))
+    body = yaml.dump({"schema": "2.0", "stages": entries}, Dumper=dumper, sort_keys=False)
+    write_text(path, f"{_mark(told, body)}\n{body}")
+
+
+def _request(step: Step, config: Any, digests: Mapping[str, str]) -> list[Any]:
+    """What the entry of a step depends on."""
+    return [step.name, step.cmd, config_values(config), {port: digests.get(port) for port in (*step.deps, *step.outs)}]
+
+
+def _mark(told: str, body: str) -> str:
+    """The first line of a lock. told: what it was written from; body: the lines below."""
+    return f"# gsac: {typed_digest('lock 1', f'{told}{body}'.encode())}"
 
 
 def _entries(path: Path) -> dict[str, Any]:

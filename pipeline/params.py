@@ -66,10 +66,10 @@ def to_yaml(configs: dict[str, Any], notes: bool = True) -> str:
             continue
         meaning = meanings(type(config)) if notes else {}
         lines = [f"{section}:"]
-        for name, value in values.items():
+        for name, value in zip(values, _scalars(values.values()), strict=True):
             if name in meaning:
                 lines.extend(textwrap.wrap(meaning[name], 116, initial_indent="  # ", subsequent_indent="  # "))
-            lines.append(f"  {name}: {_scalar(value)}")
+            lines.append(f"  {name}: {value}")
         blocks.append("\n".join(lines) + "\n")
     return "\n".join(blocks)
 
@@ -91,10 +91,13 @@ def meanings(config: type) -> dict[str, str]:
     return found
 
 
-def _scalar(value: Any) -> str:
+def _scalars(values: Iterable[Any]) -> list[str]:
+    """YAML of values, a line each."""
     import yaml
 
-    return yaml.safe_dump(value, default_flow_style=True, width=10**6).removesuffix("...\n").strip()
+    text = yaml.dump_all(values, Dumper=getattr(yaml, "CSafeDumper", yaml.SafeDumper), default_flow_style=True, width=10**6,
+                         explicit_start=True)
+    return [line.removeprefix("--- ") for line in text.splitlines() if line != "..."]
 
 
 def _sections(document: Any, source: str) -> Values:

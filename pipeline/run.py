@@ -315,7 +315,8 @@ class ClipRun:
             self.entries = {"quality": quality_entry(options.quality, self.configs)} | self._judged_forecast()
             write_rows(self.folder, self.graph, self.store, [result.to_json() for result in self.results],
                        {"clip": str(clip), "clip_digest": digest} | self.entries)
-            dvc_sync.write_lock(self.folder, self.graph, self.finished, self.configs, self.store)
+            digests = {port: digest for result in self.results for port, digest in (result.inputs | result.outputs).items()}
+            dvc_sync.write_lock(self.folder, self.graph, self.finished, self.configs, self.store, digests)
 
     @property
     def finished(self) -> list[str]:

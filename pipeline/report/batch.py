@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from gsac.pipeline.closing import RESULTS
@@ -27,20 +27,31 @@ from gsac.pipeline.run_folder import LOGS, REPORT, RUN, write_text
 from gsac.stages.contract import BadInput
 from gsac.stages.severity import Severity
 
-if TYPE_CHECKING:
-    from gsac.pipeline.report.pictures import Picture
-
 PAGE, TEMPLATE = "batch.html", "batch.html.jinja"
 MARK = '<meta name="gsac-page" content="batch">'
 """Tells the page from a file of the user's by the same name."""
 STRIP = re.compile(r'<div class="turning" style="--views:(\d+)[^<]*<div class="turn"><img src="data:image/webp;base64,([^"]+)"')
 """The turning avatar in report.html: how many views stand side by side, and the picture."""
+KEPT = re.compile(r'<a class="turn" data-drawn="(\w+)" style="--views:(\d+);[^>]*><img src="([^"]+)" width="(\d+)" height="(\d+)"')
+"""A card's picture in the page: the digest of what its report was drawn from, its views, the picture."""
 GAP_S = 5.0
 """s between two writings of the page while clips end."""
 VIEW_HEIGHT = 264
 """px of a view on a card."""
 IN_PICTURE = ("cut_off", "part_hidden", "second_person")
 """Codes of findings that a card tells in words: what of the person the pictures lack, and who else is in them."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Views of an avatar's turn side by side."""
+
+    uri: str
+    width: int
+    height: int
+    views: int
+    drawn: str
+    """Digest of what the report was drawn from, out of which it was cut."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +65,7 @@ class Card:
     words: str = ""
     """The verdict in one line, or why there is none."""
     grade: Grade | None = None
-    strip: Picture | None = None
-    """Views of the avatar's turn side by side, `views` of them."""
-    views: int = 0
+    strip: Strip | None = None
     links: tuple[tuple[str, str], ...] = ()
     """Name and address, relative to the page, of what there is to open."""
     found: tuple[str, ...] = ()
@@ -96,6 +105,7 @@ class BatchPage:
             raise BadInput(f"{self.path} was not written by `gsac batch`, which would write over it; move it away, or give another "
                            "--out")
         self._written = -GAP_S
+        self._strips = read_strips(self.path)
         self._cards = {job: Card(job.clip.name, job.out.name, Outcome.PLANNED) for job in jobs}
 
     @functools.cached_property
@@ -103,16 +113,17 @@ class BatchPage:
         """Runs that lie in the folder and are not of this batch."""
         ours = {job.out for job in self._cards}
         folders = sorted(path.parent for path in self.path.parent.glob(f"*/{RUN}") if path.parent not in ours)
-        return [make_card(folder) for folder in folders]
+        return [make_card(folder, self._strips) for folder in folders]
 
     def add(self, result: ClipResult, before: Mapping[str, Any] | None = None) -> None:
         """Takes in the end of one clip. before: its metrics in the batch before."""
-        card = end_card(result)
+        card = end_card(result, self._strips)
         self._cards[result.job] = replace(card, changes=tuple(list_changes(card.figures, read_figures(before or {}))))
 
     def keep(self, job: ClipJob, error: str) -> None:
         """Takes in a clip that is left as the batch before has left it. error: why it failed there; empty where it did not."""
-        self._cards[job] = failed_card(job, error) if error and Results(job.out).failed is None else make_card(job.out)
+        self._cards[job] = failed_card(job, error) if error and Results(job.out).failed is None else \
+            make_card(job.out, self._strips)
 
     @property
     def is_due(self) -> bool:
@@ -152,12 +163,25 @@ def read_template() -> Any:
     return make_template(TEMPLATE)
 
 
-def end_card(result: ClipResult) -> Card:
-    """Of a clip whose run has ended. Where its failure is not recorded in the folder, that is another run's, or there is none."""
+def read_strips(page: Path) -> dict[str, Strip]:
+    """By `drawn`, the pictures of a page that was written before; none where there is no page."""
+    try:
+        text = page.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return {}
+    return {drawn: Strip(uri, int(width), int(height), int(views), drawn)
+            for drawn, views, uri, width, height in KEPT.findall(text)}
+
+
+def end_card(result: ClipResult, strips: Mapping[str, Strip]) -> Card:
+    """Of a clip whose run has ended. Where its failure is not recorded in the folder, that is another run's, or there is none.
+
+    strips: as in `make_card`.
+    """
     failed = [row["name"] for row in result.summary.get("stages", []) if row["status"] == Outcome.FAILED.value]
     recorded = Results(result.job.out).failed
     if result.code == ExitCode.OK or (recorded is not None and recorded[0] in failed):
-        return make_card(result.job.out)
+        return make_card(result.job.out, strips)
     return failed_card(result.job, result.error)
 
 
@@ -167,8 +191,8 @@ def failed_card(job: ClipJob, error: str) -> Card:
     return Card(job.clip.name, job.out.name, Outcome.FAILED, why)
 
 
-def make_card(folder: Path) -> Card:
-    """Of what lies in the folder of a run."""
+def make_card(folder: Path, strips: Mapping[str, Strip]) -> Card:
+    """Of what lies in the folder of a run. strips: those that were cut before, by `drawn`."""
     results, page = Results(folder), folder / REPORT
     files = {"Report": REPORT, "Viewer": str(RESULTS["viewer"])}
     if results.failed is not None:
@@ -181,9 +205,9 @@ def make_card(folder: Path) -> Card:
     if origin is None or not (origin.grade or origin.verdict):
         words = "No avatar in this run." if origin else f"No report of this version; `gsac report {folder.name}` writes it."
         return Card(results.clip_name, folder.name, Outcome.RAN, words, links=links)
-    strip, views = cut_strip(page)
+    strip = strips.get(origin.digest) or cut_strip(page, origin.digest)
     grade = Grade.__members__.get(origin.grade)
-    return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, views, links, name_findings(results),
+    return Card(results.clip_name, folder.name, Outcome.RAN, origin.verdict, grade, strip, links, name_findings(results),
                 tell_picture(results), read_figures(results.run.get("metrics") or {}))
 
 
@@ -206,8 +230,8 @@ def list_findings(results: Results) -> list[tuple[str, dict[str, Any]]]:
             if isinstance(finding, dict)]
 
 
-def cut_strip(page: Path) -> tuple[Picture | None, int]:
-    """The turning avatar of a report, made small, and the number of its views; None where it shows none."""
+def cut_strip(page: Path, drawn: str) -> Strip | None:
+    """The turning avatar of a report, made small; None where it shows none. drawn: what the report was drawn from."""
     import cv2
     import numpy as np
 
@@ -216,6 +240,6 @@ def cut_strip(page: Path) -> tuple[Picture | None, int]:
     found = STRIP.search(page.read_text(encoding="utf-8", errors="replace"))
     strip = cv2.imdecode(np.frombuffer(base64.b64decode(found[2]), np.uint8), cv2.IMREAD_COLOR) if found is not None else None
     if found is None or strip is None:
-        return None, 0
-    small = shrink_to_fit(cv2.cvtColor(strip, cv2.COLOR_BGR2RGB), strip.shape[1], VIEW_HEIGHT)
-    return make_picture(small, "", "The avatar from the front"), int(found[1])
+        return None
+    small = make_picture(shrink_to_fit(cv2.cvtColor(strip, cv2.COLOR_BGR2RGB), strip.shape[1], VIEW_HEIGHT), "", "")
+    return Strip(small.uri, small.width, small.height, int(found[1]), drawn)

@@ -29,6 +29,17 @@ def test_after_gsac_run_dvc_status_is_clean_and_dvc_repro_runs_nothing(toy, dvc)
     assert toy.runs == []
 
 
+def test_a_run_with_nothing_to_do_leaves_the_lock_and_mends_one_that_was_changed(toy, dvc):
+    toy.ran()
+    lock = toy.out / "dvc.lock"
+    text, before = lock.read_text(), lock.stat()
+    assert toy.ran() == [] and lock.stat() == before
+    lock.write_text(text.replace("size: ", "size: 1"))
+    assert toy.ran() == [] and lock.read_text() == text and dvc.is_clean
+    lock.write_text("# " + text)
+    assert toy.ran() == [] and lock.read_text() == text
+
+
 def test_after_dvc_repro_gsac_status_is_clean_and_gsac_run_runs_nothing(toy, dvc, everything):
     toy.ran("--set", "left.word=last")
     params = toy.out / "params.yaml"

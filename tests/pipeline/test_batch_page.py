@@ -11,6 +11,7 @@ import pytest
 from gsac.avatar.artifacts import write_frame
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.pipeline.executors.executor import ClipJob, ClipResult
+from gsac.pipeline.report import batch
 from gsac.pipeline.report.batch import IN_PICTURE, BatchPage
 from gsac.pipeline.report.page import write_report
 from gsac.stages.contract import BadInput
@@ -132,6 +133,25 @@ def test_clips_that_a_resumed_batch_leaves_keep_their_verdict_or_their_failure(o
     cards = read_cards(tmp_path / "batch.html")
     assert "✓ Good" in cards["ada.mp4"][0] and "✕ Failed stage split failed: cut.mp4: not a video" in cards["cut.mp4"][0]
     assert "1 of 2 clips done, 1 failed." in (tmp_path / "batch.html").read_text()
+
+
+def test_pictures_of_the_page_before_are_kept_as_long_as_their_report_is_the_same(tmp_path, monkeypatch):
+    def write_again():
+        write_page(tmp_path, ClipResult(ClipJob(Path("/elsewhere/ada.mp4"), tmp_path / "ada-avatar"), 0, 1.0))
+        return (tmp_path / "batch.html").read_text()
+
+    write_avatar(tmp_path / "ada-avatar", "ada.mp4", 0.97)
+    first, cut = write_again(), []
+    monkeypatch.setattr(batch, "cut_strip", lambda page, drawn: cut.append(page))
+    assert write_again() == first and not cut
+    metrics = tmp_path / "ada-avatar/train/metrics.json"
+    metrics.write_text(metrics.read_text().replace("0.97", "0.92"))
+    run = json.loads((tmp_path / "ada-avatar/run.json").read_text())
+    run["stages"][0]["outputs"] = {"train/metrics.json": "another"}
+    (tmp_path / "ada-avatar/run.json").write_text(json.dumps(run))
+    write_report(tmp_path / "ada-avatar")
+    write_again()
+    assert cut == [tmp_path / "ada-avatar/report.html"]
 
 
 def test_an_unreadable_report_costs_its_own_verdict_only(tmp_path):
