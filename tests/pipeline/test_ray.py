@@ -27,6 +27,16 @@ def run(job):
         log.write(f"{os.environ.get('CUDA_VISIBLE_DEVICES')} {began} {time.time()}\\n")
 """
 """A stage that notes which GPUs it sees, and from when to when."""
+AT_WORK = """
+import os, time
+
+def run(job):
+    for word, pause in (("begin", 4), ("end", 0)):
+        with open(os.environ["TOY_RUNS"] + ".join", "a") as log:
+            log.write(word + "\\n")
+        time.sleep(pause)
+"""
+"""A stage that notes when it begins and when it is about to end."""
 CORES = 2
 """Of a node: room for one clip."""
 
@@ -60,11 +70,15 @@ def records(toy):
 
 
 def test_a_batch_ends_complete_when_a_node_is_lost_in_the_middle_of_it(toy, clips, cluster):
+    def joins_at_work():
+        log = toy.runs_file.with_name(f"{toy.runs_file.name}.join")
+        return log.read_text().count("begin") - log.read_text().count("end") if log.exists() else 0
+
+    toy.edit("join/stage.py", "def run(job):\n", AT_WORK)
     nodes = [cluster.add_node(num_cpus=CORES) for _ in range(2)]
-    process = toy.start("batch", clips, "--out", toy.root / "avatars", "--executor", "ray", "--address", cluster.address,
-                        "--set", "join.pause_s=3", "--json")
+    process = toy.start("batch", clips, "--out", toy.root / "avatars", "--executor", "ray", "--address", cluster.address, "--json")
     try:
-        toy.wait_for(lambda: toy.runs.count("join") >= 2, 120)
+        toy.wait_for(lambda: joins_at_work() == len(nodes), 120)  # a node has room for one: each of them is at one
         cluster.remove_node(nodes.pop(), allow_graceful=False)
         out, err = process.communicate(timeout=180)
     finally:
