@@ -15,6 +15,7 @@ from gsac.cache.root import default_root
 
 Manifest = dict[str, list]
 """Relative path with `/` -> [sha256 of the content, size in bytes]; a single file is the one entry ''."""
+_CANONICAL = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
 
 
 def typed_digest(kind: str, payload: bytes) -> str:
@@ -24,7 +25,7 @@ def typed_digest(kind: str, payload: bytes) -> str:
 
 def canonical(value: Any) -> bytes:
     """The canonical JSON of a value: sorted keys, no spaces, ASCII, floats by repr. ValueError for NaN or infinity."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode()
+    return _CANONICAL.encode(value).encode()
 
 
 def file_digest(path: Path, memo: Memo | None = None) -> str:

@@ -22,7 +22,7 @@ import enum
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 from gsac.cache.digest import canonical, typed_digest
@@ -91,13 +91,18 @@ class KeyParts:
     def key(self) -> str:
         """The action digest. CacheError names a parameter that JSON cannot hold."""
         try:
-            named = (f'"{name}":'.encode() + self._text(name) for name in sorted(one.name for one in fields(self)))
-            return typed_digest(f"action {KEY_VERSION}", b"{" + b",".join(named) + b"}")
+            return typed_digest(f"action {KEY_VERSION}", self._whole())
         except (TypeError, ValueError):
             for name, value in self.params.items():
                 if not _plain(value):
                     raise CacheError(f"parameter {self.stage}.{name} = {value!r} is not a plain finite value") from None
             raise
+
+    def _whole(self) -> bytes:
+        """The canonical JSON of all parts, of those that are written out already where some are."""
+        if not self._texts:
+            return canonical({name: getattr(self, name) for name in _names()})
+        return b"{" + b",".join(f'"{name}":'.encode() + self._text(name) for name in _names()) + b"}"
 
     def _text(self, name: str) -> bytes:
         texts = self._texts
@@ -113,7 +118,7 @@ class KeyParts:
     def with_inputs(self, inputs: dict[str, str]) -> KeyParts:
         """The same of other inputs (port -> tree digest); what the two share is written out once."""
         other = replace(self, inputs=inputs)
-        other._texts.update((name, self._text(name)) for name in (one.name for one in fields(self)) if name != "inputs")
+        other._texts.update((name, self._text(name)) for name in _names() if name != "inputs")
         return other
 
     def diff(self, other: KeyParts) -> list[Change]:
@@ -138,6 +143,12 @@ class KeyParts:
         if self.device != other.device:
             changes.append(Change(ChangeKind.DEVICE, "device", self.device, other.device))
         return changes
+
+
+@cache
+def _names() -> list[str]:
+    """The parts' names in the order of canonical JSON."""
+    return sorted(one.name for one in fields(KeyParts))
 
 
 def _named(stage: str, params: Mapping[str, Any]) -> dict[str, Any]:

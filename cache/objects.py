@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import os
 import stat as modes
 from pathlib import Path, PurePosixPath
@@ -24,12 +25,17 @@ SYNCED_AT_ONCE = 8
 
 def object_name(digest: str, output: str) -> str:
     """File or folder name of an object. output: the output's relative path."""
-    return digest + PurePosixPath(output).suffix
+    return digest + _suffix(output)
+
+
+@functools.lru_cache
+def _suffix(output: str) -> str:
+    return PurePosixPath(output).suffix
 
 
 def object_path(root: Path, digest: str, output: str) -> Path:
     """Where an object lies in the store at `root`."""
-    return root / "objects" / digest[:2] / object_name(digest, output)
+    return Path(root, f"objects/{digest[:2]}/{object_name(digest, output)}")
 
 
 def measure(path: Path) -> Footprint | None:

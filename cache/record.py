@@ -5,6 +5,7 @@ The first line of a record's file holds the sha256 of all lines after it; the wh
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import re
@@ -131,10 +132,16 @@ def _checksum(content: str) -> str:
 def _typed(kind: type[Kind], raw: dict[str, Any]) -> Kind:
     """A dataclass of parsed JSON; TypeError where a field is of another type than its hint."""
     made = kind(**raw)
-    for one in fields(made):  # pyright: ignore[reportArgumentType], a dataclass
-        if not _fits(str(one.type), getattr(made, one.name)):
-            raise TypeError(f"{one.name} is not {one.type}")
+    for name, hint in _hints(kind):
+        if not _fits(hint, getattr(made, name)):
+            raise TypeError(f"{name} is not {hint}")
     return made
+
+
+@functools.cache
+def _hints(kind: type) -> list[tuple[str, str]]:
+    """Name and hint of each field of a dataclass."""
+    return [(one.name, str(one.type)) for one in fields(kind)]
 
 
 def _fits(hint: str, value: Any) -> bool:

@@ -218,8 +218,8 @@ class Store:
     def _places(self, key: str) -> list[Path]:
         """Files of a key's records, and whatever else lies in their place."""
         with contextlib.suppress(OSError), os.scandir(self.root / "actions") as stages:
-            files = [Path(stage.path, f"{key}.json") for stage in stages]
-            return [file for file in files if os.path.lexists(file)]
+            files = [os.path.join(stage.path, f"{key}.json") for stage in stages]
+            return [Path(file) for file in files if os.path.lexists(file)]
         return []
 
     def _holds(self, record: Record, output: str, deep: bool) -> bool:
