@@ -53,7 +53,7 @@ class Cuda(Backend):
                              least=schedule.shortest_axis(task), **lpips_options(task))
         with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer:
             if task.config.pose_rounds:
-                correct_midway(trainer, task, coarse if recipe.coarse_share > schedule.MIDWAY else fine)
+                correct_midway(trainer, task, coarse)
             train_until(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
             body = trainer.body
             folded = cloth_offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
@@ -125,7 +125,7 @@ class CudaRounds(Rounds):
 
 
 def correct_midway(trainer: CudaTrainer, task: Task, views: dict[int, View]) -> None:
-    """Trains up to where `Cpu.train` corrects all poses together, and corrects them."""
+    """Trains up to where `Cpu.train` corrects all poses together, and corrects them by views of the size that the CPU takes then."""
     if midway := round(schedule.MIDWAY * trainer.recipe.steps):
         train_until(trainer, task, midway)
         poses, trained = task.poses, task.trained
