@@ -67,6 +67,7 @@ SOURCES = (
     "Runtime/GsacCrowd.cs",
     "Runtime/GsacDemo.cs",
     "Runtime/GsacDepths.cs",
+    "Runtime/GsacEyes.cs",
     "Runtime/GsacFinish.cs",
     "Runtime/GsacHead.cs",
     "Runtime/GsacHit.cs",

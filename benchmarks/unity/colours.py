@@ -28,7 +28,7 @@ from gsac.avatar.raster import render, render_bound, render_bound_backward
 from gsac.avatar.rotation import exp
 from gsac.benchmarks.unity.frame import draw_rule, index_bits
 from gsac.benchmarks.unity.gpu import Gpu, Painting, projection
-from gsac.benchmarks.unity.shaders import CORE, compile_pass, shader_passes
+from gsac.benchmarks.unity.shaders import CORE, STEREO, compile_pass, shader_passes
 from gsac.benchmarks.unity.spirv import Program
 
 BACKGROUNDS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -36,6 +36,8 @@ BACKGROUNDS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SKY = 4.0
 """Linear light of a bright sky, 1 being white after exposure."""
 WAYS = ("direct", "refitted", "own", "behind")
+APART = 0.032
+"""m, of each of a headset's eyes from their middle."""
 EDGE = 0.02
 """Least alpha of a pixel of the person."""
 BEHIND = {"": "GsacBehind", "UniversalPipeline": "_CameraOpaqueTexture", "HDRenderPipeline": "_ColorPyramidTexture"}
@@ -69,12 +71,12 @@ class Programs(NamedTuple):
     behind: str
 
 
-def compile_programs(pipeline: str, stand_in: Path) -> Programs:
-    """Compiles what draws the splats in a pipeline. stand_in: folder of stand-ins for the pipeline's files."""
+def compile_programs(pipeline: str, *stand_ins: Path) -> Programs:
+    """Compiles what draws the splats in a pipeline. stand_ins: folders of stand-ins for the pipeline's files."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        own = compile_pass(shader_passes(CORE / "GsacOwn.shader")[""], folder, stand_in, ("OwnVertex", "OwnFragment"))
-        direct, laid = (compile_pass(shader_passes(CORE / f"{shader}.shader")[pipeline], folder, stand_in)
+        own = compile_pass(shader_passes(CORE / "GsacOwn.shader")[""], folder, *stand_ins, entries=("OwnVertex", "OwnFragment"))
+        direct, laid = (compile_pass(shader_passes(CORE / f"{shader}.shader")[pipeline], folder, *stand_ins)
                         for shader in ("GsacSplats", "GsacTrained"))
     return Programs(direct, own, laid, BEHIND[pipeline])
 
@@ -82,11 +84,12 @@ def compile_programs(pipeline: str, stand_in: Path) -> Programs:
 class Stage:
     """A target with linear colours, in which a person is drawn over a grey background by the package's shaders."""
 
-    def __init__(self, gpu: Gpu, programs: Programs, avatar: RiggedAvatar, size: int) -> None:
-        self.gpu, self.programs, self.avatar, self.size = gpu, programs, avatar, size
+    def __init__(self, gpu: Gpu, programs: Programs, avatar: RiggedAvatar, size: int, eyes: int = 1) -> None:
+        """eyes: 2 of a headset, whose programs were compiled with `shaders.STEREO` before the other stand-ins."""
+        self.gpu, self.programs, self.avatar, self.size, self.eyes = gpu, programs, avatar, size, eyes
         count = len(avatar.gaussians)
         self.direct = Painting(gpu, *programs.direct, size, size, count, depth=True)
-        self.own = Painting(gpu, *programs.own, size, size, count, ("rgba16float", "r16float"))
+        self.own = Painting(gpu, *programs.own, eyes * size, size, count, ("rgba16float", "r16float"))
         self.laid = Painting(gpu, *programs.laid, size, size, 1, depth=True)
         gpu.put("GsacLatest", np.zeros(1, np.uint32))
         gpu.textures |= {"GsacTrained": self.own.targets[0], "GsacTrainedDepth": self.own.targets[1]}
@@ -101,37 +104,62 @@ class Stage:
         self.gpu.put("GsacColours", np.concatenate([g.rgb, g.opacity[:, None]], 1).astype(np.float32))
         self.gpu.put("GsacKeys", np.argsort(-bound.means[:, 2], kind="stable").astype(np.uint32))
 
-    def parameters(self, shot: Shot, linear: int) -> dict:
+    def seen_by(self, shot: Shot, eye: int) -> Shot:
+        """The shot in the frame of one of the eyes."""
+        return shot._replace(vertices=shot.vertices - self.places[eye].astype(np.float32))
+
+    @property
+    def places(self) -> np.ndarray:
+        """(2, 3) m, of the eyes; a camera's only one twice."""
+        return np.array([[-APART, 0, 0], [APART, 0, 0]]) if self.eyes == 2 else np.zeros((2, 3))
+
+    def parameters(self, shot: Shot, linear: int, eye: int = 0) -> dict:
         """Of a draw; linear: whether the splats' colours are to be made linear."""
-        view, camera, g = np.diag([1.0, -1, -1, 1]), shot.camera, self.avatar.gaussians
+        camera, g = shot.camera, self.avatar.gaussians
+        flip = np.diag([1.0, -1, -1])
+        views = [np.block([[flip, -flip @ place[:, None]], [np.zeros(3), 1]]) for place in self.places]
         P, screen = projection(camera), [self.size, self.size, 0, 0]
-        return {"unity_MatrixV": view, "glstate_matrix_projection": P.T, "_ScreenParams": screen, "_ScaledScreenParams": screen,
-                "_ScreenSize": screen, "_WorldSpaceCameraPos": [0, 0, 0, 0], "GsacEyeView": view,
+        return {"unity_MatrixV": views[0].T, "glstate_matrix_projection": P.T,
+                "_ScreenParams": screen, "_ScaledScreenParams": screen,
+                "unity_StereoMatrixV": [view.T for view in views], "unity_StereoMatrixP": [P.T, P.T],
+                "_ScreenSize": screen, "_WorldSpaceCameraPos": [0, 0, 0, 0], "GsacEyeView": views[eye].T,
                 "TestFog": [0, 0, 0, 0], "_InvViewProjMatrix": np.eye(4),
                 "GsacEyeProjection": projection(camera, flipped=True).T, "GsacEyeScreen": [self.size, self.size, 2, 1],
-                "GsacEyeRect": [-1, -1, 1, 1], "GsacEyeLens": [P[0, 0], P[1, 1], P[0, 2], P[1, 2]],
+                "GsacParts": self.eyes, "GsacEyePlace": np.column_stack([self.places, [0, 0]]),
+                "GsacEyeRect": [[-1, -1, 1, 1]] * 2, "GsacEyeLens": [[P[0, 0], P[1, 1], P[0, 2], P[1, 2]]] * 2,
                 "GsacIndexBits": index_bits(len(g)), **draw_rule(g.low_pass, linear),
                 **{f"GsacModel{r}": np.eye(4)[r] for r in range(3)}}
 
-    def draw_direct(self, shot: Shot, background: float) -> np.ndarray:
+    def draw_direct(self, shot: Shot, background: float, eye: int = 0) -> np.ndarray:
         """Display values (size, size, 3) of the splats as one draw over a background."""
         grey = float(to_linear(np.asarray(background)))
-        return to_display(self.direct.draw(self.parameters(shot, 1), behind=(grey, grey, grey, 1))[..., :3])
+        return to_display(self.direct.draw(self.parameters(shot, 1), instance=eye, behind=(grey, grey, grey, 1))[..., :3])
 
     def draw_own(self, shot: Shot) -> None:
-        """Draws the person's own picture."""
-        self.own.draw(self.parameters(shot, 0))
+        """Draws the person's own picture, an eye's part after the other's."""
+        for eye in range(self.eyes):
+            self.own.draw(self.parameters(shot, 0, eye), parts=self.eyes, part=eye)
 
-    def lay(self, shot: Shot, background: float, known: bool, far: float = 1) -> np.ndarray:
-        """Display values (size, size, 3) of the own picture laid over a background. far: depth of what stands in the scene."""
+    def lay(self, shot: Shot, background: float, known: bool, far: float = 1, eye: int = 0) -> np.ndarray:
+        """Display values (size, size, 3) of the own picture laid over a background. far: depth of what stands in the scene.
+
+        Of a headset's copy of what lies behind, the other eye's slice is black.
+        """
         grey = float(to_linear(np.asarray(background)))
         side = self.size if known else 4
-        copy = self.gpu.texture(side, side, "rgba16float")
-        self.gpu.device.queue.write_texture({"texture": copy}, np.full((side, side, 4), grey, np.float16), {
-            "bytes_per_row": side * 8, "rows_per_image": side}, (side, side, 1))
+        slices = self.eyes if self.copy_kind == "texture-array" else 1
+        copy, texels = self.gpu.texture(side, side, "rgba16float", slices), np.zeros((slices, side, side, 4), np.float16)
+        texels[min(eye, slices - 1)] = grey
+        self.gpu.device.queue.write_texture({"texture": copy}, texels, {
+            "bytes_per_row": side * 8, "rows_per_image": side}, (side, side, slices))
         self.gpu.textures[self.programs.behind] = copy
         parameters = self.parameters(shot, 0) | {"GsacBehindIsCopied": int(known)}
-        return to_display(self.laid.draw(parameters, behind=(grey, grey, grey, 1), far=far)[..., :3])
+        return to_display(self.laid.draw(parameters, instance=eye, behind=(grey, grey, grey, 1), far=far)[..., :3])
+
+    @property
+    def copy_kind(self) -> str:
+        """Of the binding of what lies behind: `texture`, or a headset's `texture-array`."""
+        return next(kind for kind, name in self.programs.laid[1].bindings.values() if name == self.programs.behind)
 
 
 def bind_shot(shot: Shot, faces: np.ndarray, g: Gaussians) -> tuple[Bound, np.ndarray]:
@@ -199,19 +227,19 @@ def decibels(got: np.ndarray, want: np.ndarray, where: np.ndarray) -> float:
 
 
 def measure(stage: Stage, shots: list[Shot], fitted: Gaussians | None) -> dict[str, np.ndarray]:
-    """Way -> (shots, backgrounds, 2) dB: of the whole picture and of the person's pixels alone."""
+    """Way -> (shots, backgrounds, 2) dB: of the whole picture and of the person's pixels alone; of a headset the last eye's."""
     avatar, rows = stage.avatar, {way: [] for way in WAYS if fitted is not None or way != "refitted"}
-    shown = {"refitted": fitted}
+    shown, eye = {"refitted": fitted}, stage.eyes - 1
     for shot in shots:
-        rgb, alpha = trained_picture(shot, avatar.faces, avatar.gaussians)
+        rgb, alpha = trained_picture(stage.seen_by(shot, eye), avatar.faces, avatar.gaussians)
         for way, row in rows.items():
             stage.put(shot, shown.get(way) or avatar.gaussians)
             if way in ("own", "behind"):
                 stage.draw_own(shot)
             found = []
             for background in BACKGROUNDS:
-                got = (stage.lay(shot, background, way == "behind") if way in ("own", "behind")
-                       else stage.draw_direct(shot, background))
+                got = (stage.lay(shot, background, way == "behind", eye=eye) if way in ("own", "behind")
+                       else stage.draw_direct(shot, background, eye))
                 want = rgb + (1 - alpha[..., None]) * background
                 found.append([decibels(got, want, alpha >= 0), decibels(got, want, alpha > EDGE)])
             row.append(found)
@@ -227,14 +255,17 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=512, help="px, height and width of a picture")
     parser.add_argument("--shots", type=int, default=4)
     parser.add_argument("--no-refit", action="store_true", help="leave out the slow way")
+    parser.add_argument("--headset", action="store_true", help="both eyes at once; judged is the right one")
     options = parser.parse_args()
-    gpu, programs = Gpu(), compile_programs("", options.stand_ins)
+    headset = [STEREO] if options.headset else []
+    gpu, programs = Gpu(), compile_programs("", *headset, options.stand_ins)
     for path in options.avatars:
         avatar = RiggedAvatar.read(path)
         began = time.process_time()
         fitted = None if options.no_refit else refit(avatar)
         took = time.process_time() - began
-        found = measure(Stage(gpu, programs, avatar, options.size), make_shots(avatar, options.size, options.shots, 7), fitted)
+        stage = Stage(gpu, programs, avatar, options.size, 1 + options.headset)
+        found = measure(stage, make_shots(avatar, options.size, options.shots, 7), fitted)
         print(f"{path}: {len(avatar.gaussians)} gaussians; refitting took {took:.1f} CPU s")
         for way, db in found.items():
             print(f"  {way:9s} person {db[..., 1].mean():5.1f} dB (worst {db[..., 1].min():5.1f}), "

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 Parameters = dict[str, Any]
 """Shader parameter -> int (a uint there), floats, or a matrix by columns."""
+OPAQUE: dict[str, dict[str, Any]] = {
+    "texture": {"texture": {}}, "texture-array": {"texture": {"view_dimension": "2d-array"}}, "sampler": {"sampler": {}},
+}
+"""Kind of a binding that is no buffer -> its entry of a layout."""
 Job = tuple[Any, Any, int]
 """A dispatch: pipeline, bind group, workgroups."""
 LAVAPIPE = Path("/usr/share/vulkan/icd.d")
@@ -61,15 +65,15 @@ class Gpu:
         entries = {}
         for visibility, program in programs.items():
             for number, (kind, _) in program.bindings.items():
-                what = {kind: {}} if kind in ("texture", "sampler") else {"buffer": {"type": kind}}
+                what = OPAQUE.get(kind, {"buffer": {"type": kind}})
                 entry = entries.setdefault(number, {"binding": number, "visibility": 0, **what})
                 entry["visibility"] |= visibility
         return self.device.create_bind_group_layout(entries=list(entries.values()))
 
-    def texture(self, width: int, height: int, form: str) -> GPUTexture:
+    def texture(self, width: int, height: int, form: str, slices: int = 1) -> GPUTexture:
         """A texture to draw into, to sample and to read. form: as WebGPU names it."""
         usage = self.wgpu.TextureUsage
-        return self.device.create_texture(size=(width, height, 1), format=form, usage=usage.RENDER_ATTACHMENT | usage.COPY_SRC
+        return self.device.create_texture(size=(width, height, slices), format=form, usage=usage.RENDER_ATTACHMENT | usage.COPY_SRC
                                           | usage.COPY_DST | usage.TEXTURE_BINDING)
 
     def group(self, layout: GPUBindGroupLayout, programs: Sequence[Program], uniform: bytes) -> GPUBindGroup:
@@ -77,14 +81,18 @@ class Gpu:
         usage = self.wgpu.BufferUsage
         entries = []
         for number, (kind, name) in {n: b for program in programs for n, b in program.bindings.items()}.items():
-            if kind in ("texture", "sampler"):
-                entries.append({"binding": number,
-                                "resource": self.textures[str(name)].create_view() if kind == "texture" else self.sampler})
+            if kind in OPAQUE:
+                entries.append({"binding": number, "resource": self._opaque(kind, str(name))})
                 continue
             buffer = self.buffers[name] if kind != "uniform" else self.device.create_buffer_with_data(
                 data=uniform, usage=usage.UNIFORM)
             entries.append({"binding": number, "resource": {"buffer": buffer, "offset": 0, "size": buffer.size}})
         return self.device.create_bind_group(layout=layout, entries=entries)
+
+    def _opaque(self, kind: str, name: str) -> Any:
+        if kind == "sampler":
+            return self.sampler
+        return self.textures[name].create_view(dimension="2d-array" if kind == "texture-array" else "2d")
 
     def job(self, program: Program, parameters: Parameters, groups: int) -> Job:
         """A dispatch of `groups` workgroups over the current buffers, for `dispatch`."""
@@ -141,15 +149,20 @@ class Painting:
         return self.gpu.group(self.layout, [self.vertex, self.fragment], self.vertex.uniform(parameters))
 
     def encode(self, encoder: GPUCommandEncoder, group: GPUBindGroup, timestamps: dict | None = None, instance: int = 0,
-               behind: tuple[float, float, float, float] = (0, 0, 0, 0), far: float = 1) -> None:
-        """Encodes a draw on cleared targets. instance: 0 for the left eye, 1 for the right; behind, far: colour and depth there."""
-        attachments = [{"view": target.create_view(), "clear_value": behind, "load_op": "clear", "store_op": "store"}
+               behind: tuple[float, float, float, float] = (0, 0, 0, 0), far: float = 1, parts: int = 1, part: int = 0) -> None:
+        """Encodes a draw on cleared targets. instance: 0 for the left eye, 1 for the right; behind, far: colour and depth there.
+
+        parts, part: into one of so many parts of the targets, side by side, beside what the parts before it hold.
+        """
+        load = "load" if part else "clear"
+        attachments = [{"view": target.create_view(), "clear_value": behind, "load_op": load, "store_op": "store"}
                        for target in self.targets]
         depth = self.depth and {"view": (self.kept or self.depth).create_view(), "depth_clear_value": far,
                                 "depth_load_op": "load" if self.kept else "clear", "depth_store_op": "store"}
         work = encoder.begin_render_pass(color_attachments=attachments, depth_stencil_attachment=depth, timestamp_writes=timestamps)
         work.set_pipeline(self.pipeline)
         work.set_bind_group(0, group)
+        work.set_viewport(part * self.width // parts, 0, self.width // parts, self.height, 0, 1)
         work.set_index_buffer(self.index, "uint32")
         work.draw_indexed(self.count * 6, 1, 0, 0, instance)
         work.end()
@@ -166,10 +179,10 @@ class Painting:
         return np.frombuffer(raw, np.float16).reshape(self.height, self.width, 4).astype(np.float32)
 
     def draw(self, parameters: Parameters, instance: int = 0, behind: tuple[float, float, float, float] = (0, 0, 0, 0),
-             far: float = 1) -> np.ndarray:
+             far: float = 1, parts: int = 1, part: int = 0) -> np.ndarray:
         """Draws and returns the picture (H, W, 4) float32, premultiplied RGBA. Arguments as `encode`'s."""
         encoder = self.gpu.device.create_command_encoder()
-        self.encode(encoder, self.group(parameters), instance=instance, behind=behind, far=far)
+        self.encode(encoder, self.group(parameters), instance=instance, behind=behind, far=far, parts=parts, part=part)
         self.gpu.device.queue.submit([encoder.finish()])
         return self.read()
 

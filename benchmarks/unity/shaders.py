@@ -47,11 +47,11 @@ def shader_passes(path: Path = CORE / "GsacSplats.shader") -> dict[str, str]:
     return passes
 
 
-def compile_pass(text: str, folder: Path, stand_in: Path, entries: tuple[str, str] = EYES) -> tuple[Program, Program]:
-    """Compiles a pass to its vertex and fragment program. stand_in: folder of stand-ins for the render pipeline's files."""
+def compile_pass(text: str, folder: Path, *stand_ins: Path, entries: tuple[str, str] = EYES) -> tuple[Program, Program]:
+    """Compiles a pass to its vertex and fragment program. stand_ins: folders of stand-ins for the render pipeline's files."""
     source = Path(folder) / "pass.hlsl"
     source.write_text(text)
-    vertex, fragment = (compile_hlsl(source, entry, stage, folder, (CORE, stand_in))
+    vertex, fragment = (compile_hlsl(source, entry, stage, folder, (CORE, *stand_ins))
                         for entry, stage in zip(entries, ("vert", "frag"), strict=True))
     return vertex, fragment
 

@@ -8,10 +8,9 @@ import numpy as np
 
 MAGIC = 0x07230203
 ENTRY_POINT, NAME, MEMBER_NAME, TYPE_POINTER, VARIABLE, DECORATE, MEMBER_DECORATE = 15, 5, 6, 32, 59, 71, 72
-TYPES = {25: "texture", 26: "sampler"}
-"""Instruction that makes a type -> kind of a binding of that type."""
+IMAGE, SAMPLER = 25, 26
 BLOCK, NON_WRITABLE, BINDING, OFFSET = 2, 24, 33, 35
-BLOCK_SIZE = 512
+BLOCK_SIZE = 1024
 """Bytes of a parameter block, more than the package's need."""
 
 
@@ -40,8 +39,10 @@ class Program:
                 members.setdefault(w[0], {})[w[1]] = _text(w[2:])
             elif op == TYPE_POINTER:
                 pointer[w[0]] = w[2]
-            elif op in TYPES:
-                opaque[w[0]] = TYPES[op]
+            elif op == IMAGE:
+                opaque[w[0]] = "texture-array" if w[4] else "texture"
+            elif op == SAMPLER:
+                opaque[w[0]] = "sampler"
             elif op == VARIABLE:
                 kind[w[1]] = pointer[w[0]]
             elif op == DECORATE and w[1] == BINDING:
@@ -55,7 +56,7 @@ class Program:
             at += length
         self.code = code
         self.bindings: dict[int, tuple[str, str | None]] = {}
-        """Binding -> (kind of buffer, `texture` or `sampler`, its name; None for the parameters)."""
+        """Binding -> (kind of buffer, `texture`, `texture-array` or `sampler`, its name; None for the parameters)."""
         self.parameters: dict[str, int] = {}
         """Parameter -> offset in the parameter block, bytes."""
         for variable, number in binding.items():

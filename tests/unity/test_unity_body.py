@@ -32,7 +32,7 @@ def compiled(hlsl, tmp_path_factory):
                 text = "#define MESH\n" + one.split("HLSLPROGRAM")[1].split("ENDHLSL")[0]
                 entries = "Vertex", re.search(r"#pragma fragment (\w+)", one)[1]
                 programs[re.search(r'Name "(\w+)"', one)[1]] = hlsl.compile_pass(
-                    text, tmp_path_factory.mktemp("body"), Path(__file__).parent / "shims", entries)
+                    text, tmp_path_factory.mktemp("body"), Path(__file__).parent / "shims", entries=entries)
     return out
 
 

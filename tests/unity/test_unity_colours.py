@@ -7,6 +7,7 @@ import pytest
 
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.benchmarks.unity import colours
+from gsac.benchmarks.unity.shaders import STEREO
 
 pytestmark = pytest.mark.slow
 
@@ -90,10 +91,14 @@ def test_hdrp_is_believed_to_have_a_copy_of_what_lies_behind_only_where_the_came
                     "HDRP with refraction": 1, "HDRP without refraction": 0}
 
 
-def test_a_headset_and_who_wants_it_so_get_the_splats_themselves(told):
-    drawn = told[0]["again"][0]
-    assert told[0]["switched off"][:2] == told[0]["headset"][:2] == (0, drawn)
-    assert told[0]["switched off"][3] == 1
+def test_a_headset_gets_a_part_of_the_picture_for_each_eye(told):
+    assert told[0]["headset"] == (2 * told[0]["again"][0], 1, 2, 0)
+
+
+@pytest.mark.parametrize("eyes", ["", "headset, "])
+def test_who_wants_it_so_gets_the_splats_themselves(told, eyes):
+    assert told[0][f"{eyes}switched off"][:2] == (0, told[0]["again"][0])
+    assert told[0][f"{eyes}switched off"][3] == 1
 
 
 def test_pictures_are_kept_while_the_person_comes_nearer_and_freed_with_the_renderer(told):
@@ -122,6 +127,51 @@ def test_the_picture_holds_the_avatar_pixel_for_pixel_of_the_screen(told, lens):
     corner = np.array([(left + mx) / sx, (top + my) / sy, -1, 1]) * ([1, 1, away, 1] if lens == "flat" else [away, away, away, 1])
     back = P @ corner
     np.testing.assert_allclose(back[:2] / back[3], [left, top], atol=1e-5)
+
+
+def test_each_eyes_part_holds_what_the_eye_sees_pixel_for_pixel(play, mono, files, tmp_path):
+    play("headset", files / "figure.gsac", tmp_path / "asked")
+    asked = mono.arrays(tmp_path / "asked")
+    assert asked["GsacParts"].tolist() == [2, 2], "two parts, each drawn once"
+    wide, high = asked["size"] / [2, 1]
+    joints = np.c_[asked["joints"].reshape(-1, 3), np.ones(55)]
+    for eye in (0, 1):
+        own = {name.removeprefix(f"{eye}."): array for name, array in asked.items() if name.startswith(f"{eye}.")}
+        view, lens, crop = (own[name].reshape(4, 4).astype(float) for name in ("view", "lens", "GsacEyeProjection"))
+        np.testing.assert_array_equal(own["GsacEyeView"], own["view"])
+        np.testing.assert_array_equal(own["part"], [eye * wide, 0, wide, high])
+        np.testing.assert_allclose(view @ [*own["GsacEyePlace"][:3], 1], [0, 0, 0, 1], atol=1e-5)
+        left, low, right, top = own["GsacEyeRect"]
+        seen, got = joints @ view.T @ lens.T, joints @ view.T @ crop.T
+        wanted = (seen[:, :2] / seen[:, 3:] - [left, low]) / [right - left, top - low] * 2 - 1
+        np.testing.assert_allclose(got[:, :2] / got[:, 3:], wanted * [1, -1], atol=2e-4)
+    assert abs(asked["0.GsacEyePlace"] - asked["1.GsacEyePlace"]).max() > .05
+
+
+@pytest.fixture(scope="module", params=sorted(colours.BEHIND))
+def headset(request, gpu, avatar, shot):
+    programs = colours.compile_programs(request.param, STEREO, Path(__file__).parent / "shims")
+    stage = colours.Stage(gpu, programs, avatar, SIZE, eyes=2)
+    stage.put(shot, avatar.gaussians)
+    stage.draw_own(shot)
+    return stage
+
+
+def test_each_eye_of_a_headset_sees_its_trained_picture_at_40_db_in_a_linear_project(headset, shot, avatar):
+    pictures = []
+    for eye in (0, 1):
+        rgb, alpha = colours.trained_picture(headset.seen_by(shot, eye), avatar.faces, avatar.gaussians)
+        pictures.append(rgb)
+        unknown, direct = [], []
+        for background in colours.BACKGROUNDS:
+            want = rgb + (1 - alpha[..., None]) * background
+            known = colours.decibels(headset.lay(shot, background, known=True, eye=eye), want, alpha > colours.EDGE)
+            assert known > 45, f"eye {eye} before {background}"
+            unknown.append(colours.decibels(headset.lay(shot, background, known=False, eye=eye), want, alpha >= 0))
+            direct.append(colours.decibels(headset.draw_direct(shot, background, eye), want, alpha >= 0))
+        print(f"eye {eye}: not knowing what lies behind {min(unknown):.1f} dB; as one draw {min(direct):.1f} dB")
+        assert min(unknown) > 40 and min(unknown) > min(direct) + 3
+    assert abs(pictures[0] - pictures[1]).max() > .3, "the eyes see different things"
 
 
 def test_a_tinted_and_a_fading_person_look_as_without_a_picture_of_their_own(stage, shot, monkeypatch):

@@ -6,7 +6,7 @@ namespace Gsac
 {
     /// <summary>
     /// The avatar's own picture for one camera, composited in display colours as it was trained, which GsacTrained.shader lays over
-    /// the scene. Only as large as the avatar on the screen.
+    /// the scene. Only as large as the avatar on the screen; of a headset with a part for each eye, side by side.
     /// </summary>
     public sealed class GsacPicture : IDisposable
     {
@@ -16,11 +16,17 @@ namespace Gsac
         static readonly int ScreenId = Shader.PropertyToID("GsacEyeScreen");
         static readonly int RectId = Shader.PropertyToID("GsacEyeRect");
         static readonly int LensId = Shader.PropertyToID("GsacEyeLens");
+        static readonly int PlaceId = Shader.PropertyToID("GsacEyePlace");
+        static readonly int PartsId = Shader.PropertyToID("GsacParts");
         static readonly int ColourId = Shader.PropertyToID("GsacTrained");
         static readonly int DepthId = Shader.PropertyToID("GsacTrainedDepth");
         static readonly int CopiedId = Shader.PropertyToID("GsacBehindIsCopied");
 
+        readonly GsacEyes eyes = new GsacEyes();
+        readonly int[] left = new int[GsacEyes.Most], low = new int[GsacEyes.Most]; // px of the screen, of each eye's part
+        readonly Vector4[] rects = new Vector4[GsacEyes.Most], lenses = new Vector4[GsacEyes.Most], places = new Vector4[GsacEyes.Most];
         readonly RenderTargetIdentifier[] targets = new RenderTargetIdentifier[2];
+        int parts; // eyes that the picture is made for
         RenderTexture colour, depth;
         CommandBuffer commands;
 
@@ -54,33 +60,64 @@ namespace Gsac
         /// </summary>
         public void Draw(Camera camera, Bounds bounds, MaterialPropertyBlock properties, GraphicsBuffer quads, int indexCount)
         {
-            Matrix4x4 view = camera.worldToCameraMatrix, lens = camera.projectionMatrix;
+            eyes.Take(camera);
             float width = camera.pixelWidth, height = camera.pixelHeight;
-            Vector4 rect = Rect(lens * view, bounds);
-            // whole pixels of the screen
-            int left = (int)Math.Floor((rect.x + 1) / 2 * width), low = (int)Math.Floor((rect.y + 1) / 2 * height);
-            int wide = (int)Math.Ceiling((rect.z + 1) / 2 * width) - left, high = (int)Math.Ceiling((rect.w + 1) / 2 * height) - low;
-            if (colour == null || !Fits(colour.width, wide) || !Fits(colour.height, high)) Resize(wide + Spare, high + Spare);
-            wide = colour.width;
+            int wide = 0, high = 0;
+            for (int e = 0; e < eyes.Count; e++)
+            {
+                Vector4 rect = Rect(eyes.Lenses[e] * eyes.Views[e], bounds);
+                // whole pixels of the screen
+                left[e] = (int)Math.Floor((rect.x + 1) / 2 * width);
+                low[e] = (int)Math.Floor((rect.y + 1) / 2 * height);
+                wide = Math.Max(wide, (int)Math.Ceiling((rect.z + 1) / 2 * width) - left[e]);
+                high = Math.Max(high, (int)Math.Ceiling((rect.w + 1) / 2 * height) - low[e]);
+            }
+            if (colour == null || parts != eyes.Count || !Fits(colour.width / parts, wide) || !Fits(colour.height, high))
+                Resize(wide + Spare, high + Spare);
+            wide = colour.width / parts;
             high = colour.height;
-            rect = new Vector4(2 * left / width - 1, 2 * low / height - 1, 2 * (left + wide) / width - 1, 2 * (low + high) / height - 1);
 
-            bool flat = lens.m33 > 0.5f;
             float near = camera.nearClipPlane, far = camera.farClipPlane;
-            float away = Math.Min(Math.Max(-view.MultiplyPoint3x4(bounds.center).z, near + 0.01f * (far - near)), near + 0.99f * (far - near));
+            float away = -eyes.Views[0].MultiplyPoint3x4(bounds.center).z;
+            away = Math.Min(Math.Max(away, near + 0.01f * (far - near)), near + 0.99f * (far - near));
             bool whole = camera.rect.width == 1 && camera.rect.height == 1; // a part of a screen has no copy of its own
-            properties.SetMatrix(ViewId, view);
-            properties.SetMatrix(ProjectionId, GL.GetGPUProjectionMatrix(Crop(rect) * lens, true));
             properties.SetVector(ScreenId, new Vector4(wide, high, away, whole ? 1 : 0));
-            properties.SetVector(RectId, rect);
-            properties.SetVector(LensId, new Vector4(lens.m00, lens.m11, flat ? -lens.m03 : lens.m02, flat ? -lens.m13 : lens.m12));
+            for (int e = 0; e < parts; e++)
+            {
+                rects[e] = new Vector4(2 * left[e] / width - 1, 2 * low[e] / height - 1,
+                                       2 * (left[e] + wide) / width - 1, 2 * (low[e] + high) / height - 1);
+                Look(e);
+                DrawEye(e, wide, properties, quads, indexCount);
+            }
+            if (parts == 1) places[1] = places[0]; // never the nearer one
+            properties.SetVectorArray(PlaceId, places);
+            properties.SetVectorArray(RectId, rects);
+            properties.SetVectorArray(LensId, lenses);
+            properties.SetInteger(PartsId, parts);
             properties.SetTexture(ColourId, colour);
             properties.SetTexture(DepthId, depth);
             properties.SetInteger(CopiedId, GsacCameras.CopiesBehind != null && GsacCameras.CopiesBehind(camera) ? 1 : 0);
+        }
 
+        /// <summary>Fills an eye's `places` and `lenses`.</summary>
+        void Look(int eye)
+        {
+            Vector3 place = eyes.Place(eye);
+            Matrix4x4 lens = eyes.Lenses[eye];
+            bool flat = lens.m33 > 0.5f;
+            places[eye] = new Vector4(place.x, place.y, place.z, 0);
+            lenses[eye] = new Vector4(lens.m00, lens.m11, flat ? -lens.m03 : lens.m02, flat ? -lens.m13 : lens.m12);
+        }
+
+        /// <summary>Draws an eye's part of the picture, at once: the next eye's takes the same properties.</summary>
+        void DrawEye(int eye, int wide, MaterialPropertyBlock properties, GraphicsBuffer quads, int indexCount)
+        {
+            properties.SetMatrix(ViewId, eyes.Views[eye]);
+            properties.SetMatrix(ProjectionId, GL.GetGPUProjectionMatrix(Crop(rects[eye]) * eyes.Lenses[eye], true));
             commands.Clear();
             commands.SetRenderTarget(targets, targets[0]);
-            commands.ClearRenderTarget(false, true, Color.clear);
+            if (eye == 0) commands.ClearRenderTarget(false, true, Color.clear);
+            commands.SetViewport(new Rect(eye * wide, 0, wide, colour.height));
             commands.DrawProcedural(quads, Matrix4x4.identity, GsacCameras.OwnMaterial, 0, MeshTopology.Triangles, indexCount, 1, properties);
             Graphics.ExecuteCommandBuffer(commands);
         }
@@ -125,9 +162,12 @@ namespace Gsac
             return crop;
         }
 
+        /// <summary>width, height: px of an eye's part.</summary>
         void Resize(int width, int height)
         {
             Free();
+            parts = eyes.Count;
+            width *= parts;
             if (commands == null) commands = new CommandBuffer { name = "Gsac" };
             // Linear: what the shader writes is kept as it is
             colour = new RenderTexture(width, height, 0, RenderTextureFormat.ARGBHalf, RenderTextureReadWrite.Linear) { hideFlags = HideFlags.HideAndDontSave };

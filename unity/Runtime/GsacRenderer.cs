@@ -63,7 +63,7 @@ namespace Gsac
         [SerializeField, Tooltip("The scene's light, instead of the clip's.")]
         GsacSceneLight sceneLight = new GsacSceneLight();
 
-        [SerializeField, Tooltip("In projects with linear colours: draws the avatar's edges and layers as it was trained, by a picture of its own for each camera but a headset's.")]
+        [SerializeField, Tooltip("In projects with linear colours: draws the avatar's edges and layers as it was trained, by a picture of its own for each camera, in a headset for each eye.")]
         bool trainedColours = true;
 
         readonly List<GsacView> views = new List<GsacView>();
@@ -145,8 +145,8 @@ namespace Gsac
         }
 
         /// <summary>
-        /// Whether a project with linear colours shows the trained picture, at the cost of a picture of the avatar's size for each camera.
-        /// Off, in a headset and with a material of its own the splats are blended among the scene's linear colours: paler edges, no more to pay.
+        /// Whether a project with linear colours shows the trained picture, at the cost of a picture of the avatar's size for each camera,
+        /// in a headset for each eye. Off and with a material of its own the splats are blended among the scene's linear colours: paler edges, no more to pay.
         /// </summary>
         public bool TrainedColours
         {

@@ -116,7 +116,7 @@ namespace Gsac
             properties.SetBuffer(LatestId, latest);
             for (int r = 0; r < 3; r++) properties.SetVector(ModelIds[r], space.GetRow(r));
             bool linear = QualitySettings.activeColorSpace == ColorSpace.Linear;
-            bool own = linear && finish.Trained && !camera.stereoEnabled && GsacPicture.IsPossible;
+            bool own = linear && finish.Trained && GsacPicture.IsPossible;
             properties.SetVector(BlendId, new Vector4(rule.LowPass, rule.AlphaMax, rule.AlphaMin, linear && !own ? 1 : 0));
             properties.SetInteger(KeepsEnergyId, rule.KeepsEnergy ? 1 : 0);
             properties.SetVector(TintId, finish.Tint);

@@ -12,9 +12,9 @@ namespace Gsac
         public readonly Camera Camera;
         public readonly GsacRenderer Renderer;
         readonly GsacSorted sorted = new GsacSorted();
-        readonly Matrix4x4[] toEye = new Matrix4x4[2], lens = new Matrix4x4[2]; // of each eye: the avatar's space to the eye's, projection
+        readonly GsacEyes eyes = new GsacEyes();
+        readonly Matrix4x4[] toEye = new Matrix4x4[GsacEyes.Most]; // the avatar's space to each eye's
         readonly ComputeShader kernels;
-        int eyes;
         int drawn; // level of before
 
         public GsacModel Model { get; private set; }
@@ -63,24 +63,21 @@ namespace Gsac
         {
             Model = model;
             Matrix4x4 m = Space = root.localToWorldMatrix;
-            eyes = Camera.stereoEnabled ? 2 : 1;
+            eyes.Take(Camera);
             WorldRow = new Vector4(0, 0, 0, 0);
-            for (int e = 0; e < eyes; e++)
+            for (int e = 0; e < eyes.Count; e++)
             {
-                var eye = (Camera.StereoscopicEye)e;
-                Matrix4x4 view = eyes == 2 ? Camera.GetStereoViewMatrix(eye) : Camera.worldToCameraMatrix;
-                WorldRow -= view.GetRow(2) * (1f / eyes); // of two eyes the middle
-                toEye[e] = view * m;
-                lens[e] = eyes == 2 ? Camera.GetStereoProjectionMatrix(eye) : Camera.projectionMatrix;
+                WorldRow -= eyes.Views[e].GetRow(2) * (1f / eyes.Count); // of two eyes the middle
+                toEye[e] = eyes.Views[e] * m;
             }
             Vector4 w = WorldRow;
             depths.Row = new Vector4(w.x * m.m00 + w.y * m.m10 + w.z * m.m20, w.x * m.m01 + w.y * m.m11 + w.z * m.m21,
                                      w.x * m.m02 + w.y * m.m12 + w.z * m.m22, w.x * m.m03 + w.y * m.m13 + w.z * m.m23 + w.w);
             Measure(bones, m);
             if (!(depths.High > depths.Low)) return false;
-            for (int e = 0; e < eyes; e++)
+            for (int e = 0; e < eyes.Count; e++)
             {
-                if (Sees(lens[e] * toEye[e], bones)) return true;
+                if (Sees(eyes.Lenses[e] * toEye[e], bones)) return true;
             }
             return false;
         }
@@ -97,7 +94,7 @@ namespace Gsac
             for (int j = 0; j < Model.Data.JointCount; j++)
             {
                 Vector3 place = GsacSkeleton.Posed(Model.Data, bones, j);
-                for (int e = 0; e < eyes; e++) nearest = Math.Min(nearest, toEye[e].MultiplyPoint3x4(place).magnitude);
+                for (int e = 0; e < eyes.Count; e++) nearest = Math.Min(nearest, toEye[e].MultiplyPoint3x4(place).magnitude);
                 float radius = Model.Extent.Radius[j];
                 if (radius == 0) continue;
                 radius += Model.Extent.Pad;
@@ -111,7 +108,7 @@ namespace Gsac
             Nearest = nearest;
             Bounds = WorldBounds(m, least, most);
             // keys are spent on what lies before the eye
-            if (!IsFlat(lens[0])) depths.Low = Math.Max(depths.Low, 0);
+            if (!IsFlat(eyes.Lenses[0])) depths.Low = Math.Max(depths.Low, 0);
         }
 
         static bool IsFlat(Matrix4x4 projection)
@@ -189,12 +186,12 @@ namespace Gsac
         float Height()
         {
             float largest = 0;
-            for (int e = 0; e < eyes; e++)
+            for (int e = 0; e < eyes.Count; e++)
             {
                 Matrix4x4 m = toEye[e];
                 float size = Mathf.Sqrt(m.m01 * m.m01 + m.m11 * m.m11 + m.m21 * m.m21);
-                float height = Math.Abs(lens[e].m11) * Camera.pixelHeight / 2 * size * Model.Extent.Stature;
-                largest = Math.Max(largest, IsFlat(lens[e]) ? height : height / Nearest);
+                float height = Math.Abs(eyes.Lenses[e].m11) * Camera.pixelHeight / 2 * size * Model.Extent.Stature;
+                largest = Math.Max(largest, IsFlat(eyes.Lenses[e]) ? height : height / Nearest);
             }
             return largest;
         }
@@ -203,10 +200,10 @@ namespace Gsac
         float Distance()
         {
             float least = float.MaxValue;
-            for (int e = 0; e < eyes; e++)
+            for (int e = 0; e < eyes.Count; e++)
             {
-                float away = IsFlat(lens[e]) ? 1 : toEye[e].MultiplyPoint3x4(Vector3.zero).magnitude;
-                least = Math.Min(least, away * UsualLens / Math.Abs(lens[e].m11));
+                float away = IsFlat(eyes.Lenses[e]) ? 1 : toEye[e].MultiplyPoint3x4(Vector3.zero).magnitude;
+                least = Math.Min(least, away * UsualLens / Math.Abs(eyes.Lenses[e].m11));
             }
             return least;
         }

@@ -1,4 +1,5 @@
 // Stands for Unity's file of this name in a headset's single-pass instanced drawing: an eye for every second instance.
+#define UNITY_STEREO_INSTANCING_ENABLED
 #define UNITY_MATRIX_V unity_StereoMatrixV[unity_StereoEyeIndex]
 #define UNITY_MATRIX_P unity_StereoMatrixP[unity_StereoEyeIndex]
 #define UNITY_VERTEX_INPUT_INSTANCE_ID uint instanceID : SV_InstanceID;

@@ -125,7 +125,7 @@ class CudaRounds(Rounds):
 
 
 def correct_midway(trainer: CudaTrainer, task: Task, views: dict[int, View]) -> None:
-    """Trains up to where `Cpu.train` corrects all poses together, and corrects them by views of the size that the CPU takes then."""
+    """Trains up to where `Cpu.train` corrects all poses together, and corrects them by views of half the size, as there."""
     if midway := round(schedule.MIDWAY * trainer.recipe.steps):
         train_until(trainer, task, midway)
         poses, trained = task.poses, task.trained

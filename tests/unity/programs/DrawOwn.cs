@@ -49,9 +49,11 @@ public static class DrawOwn
                 tell(lens);
                 foreach (string name in new[] { "GsacEyeView", "GsacEyeProjection" }) dump.Put(lens + "." + name, Rows(Player.Matrix(asked, Shader.PropertyToID(name))));
                 dump.Put(lens + ".lens", Rows(camera.projectionMatrix));
-                foreach (string name in new[] { "GsacEyeScreen", "GsacEyeRect", "GsacEyeLens" })
+                Vector4 screen = Player.Value(asked, Shader.PropertyToID("GsacEyeScreen"));
+                dump.Put(lens + ".GsacEyeScreen", new[] { screen.x, screen.y, screen.z, screen.w });
+                foreach (string name in new[] { "GsacEyeRect", "GsacEyeLens", "GsacEyePlace" })
                 {
-                    Vector4 v = Player.Value(asked, Shader.PropertyToID(name));
+                    Vector4 v = Player.Values(asked, Shader.PropertyToID(name))[0];
                     dump.Put(lens + "." + name, new[] { v.x, v.y, v.z, v.w });
                 }
                 var picture = (RenderTexture)Player.Texture(asked, Shader.PropertyToID("GsacTrained"));
@@ -91,14 +93,58 @@ public static class DrawOwn
             }
         }
         Player.SetPipeline(null);
-        renderer.TrainedColours = false;
-        tell("switched off");
-        renderer.TrainedColours = true;
         Player.SetEyes(camera, new[] { 1f, 1f });
         tell("headset");
+        renderer.TrainedColours = false;
+        tell("headset, switched off");
         Player.SetEyes(camera, null);
+        tell("switched off");
         Player.Call(renderer, "OnDisable");
         Console.WriteLine("gone: " + Player.Alive<RenderTexture>() + " " + Player.Alive<Material>());
+    }
+
+    /// <summary>Dumps what each eye's part of a headset's picture is drawn with, and what the picture is laid over the scene with.</summary>
+    public static void Headset(string file, string path)
+    {
+        Player.HasHalfTargets = true;
+        GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
+        avatar.TPose();
+        avatar.SkipFade();
+        Camera camera = Player.AddCamera("headset");
+        camera.transform.SetPositionAndRotation(new Vector3(0.4f, 1.3f, 2), Quaternion.Euler(3, 182, 2));
+        Player.SetEyes(camera, new[] { 1.4f, 1.7f });
+        int eye = 0;
+        using (var dump = new Dump(path))
+        {
+            MaterialPropertyBlock asked = null;
+            Player.OnOwnDraw = (properties, count) =>
+            {
+                asked = properties;
+                foreach (string name in new[] { "GsacEyeView", "GsacEyeProjection" })
+                    dump.Put(eye + "." + name, Rows(Player.Matrix(properties, Shader.PropertyToID(name))));
+                Rect part = Player.OwnViewport;
+                dump.Put(eye + ".part", new[] { part.x, part.y, part.width, part.height });
+                dump.Put(eye + ".lens", Rows(camera.GetStereoProjectionMatrix((Camera.StereoscopicEye)eye)));
+                dump.Put(eye + ".view", Rows(camera.GetStereoViewMatrix((Camera.StereoscopicEye)eye)));
+                eye++;
+            };
+            Player.OnDraw = (drawn, indices, count) => { };
+            Player.Frame(new[] { avatar.gameObject })();
+            for (int e = 0; e < 2; e++)
+            {
+                foreach (string name in new[] { "GsacEyeRect", "GsacEyeLens", "GsacEyePlace" })
+                {
+                    Vector4 v = Player.Values(asked, Shader.PropertyToID(name))[e];
+                    dump.Put(e + "." + name, new[] { v.x, v.y, v.z, v.w });
+                }
+            }
+            var picture = (RenderTexture)Player.Texture(asked, Shader.PropertyToID("GsacTrained"));
+            dump.Put("size", new[] { picture.width, picture.height });
+            dump.Put("GsacParts", new[] { Player.Value(asked, Shader.PropertyToID("GsacParts")).x, eye });
+            var places = new List<float>();
+            foreach (Transform joint in avatar.Joints) places.AddRange(new[] { joint.position.x, joint.position.y, joint.position.z });
+            dump.Put("joints", places.ToArray());
+        }
     }
 
     /// <summary>What the body's mesh wears, situation by situation.</summary>

@@ -44,6 +44,7 @@ public static class Play
             case "scene": PlayLight.Scene(args[1], args[2]); break;
             case "dressed": DrawOwn.Dressed(args[1]); break;
             case "picture": DrawOwn.Picture(args[1], args[2]); break;
+            case "headset": DrawOwn.Headset(args[1], args[2]); break;
             case "rays": Touch.Rays(args[1], args[2], args[3], args[4]); break;
             case "colliders": Touch.Colliders(args[1], args[2]); break;
             case "addresses": Touch.Addresses(args); break;

@@ -108,6 +108,8 @@ namespace UnityEngine
         internal readonly GraphicsBuffer[] Buffers = new GraphicsBuffer[96];
         internal readonly Matrix4x4[] Matrices = new Matrix4x4[96];
         internal readonly Texture[] Textures = new Texture[96];
+        internal readonly Vector4[][] Arrays = new Vector4[96][];
+        public void SetVectorArray(int nameID, Vector4[] values) { Arrays[nameID] = (Vector4[])values.Clone(); }
         public void SetVector(int nameID, Vector4 value) { Values[nameID] = value; }
         public void SetMatrix(int nameID, Matrix4x4 value) { Matrices[nameID] = value; }
         public void SetTexture(int nameID, Texture value) { Textures[nameID] = value; }
@@ -136,6 +138,7 @@ namespace UnityEngine
         }
         public static void ExecuteCommandBuffer(CommandBuffer buffer)
         {
+            Player.OwnViewport = buffer.Viewport;
             if (Player.OnOwnDraw != null) Player.OnOwnDraw(buffer.Properties, buffer.Count);
         }
     }
@@ -289,8 +292,10 @@ namespace UnityEngine.Rendering
     {
         internal MaterialPropertyBlock Properties;
         internal int Count;
+        internal Rect Viewport;
         public string name { get; set; }
         public void Clear() { Properties = null; }
+        public void SetViewport(Rect pixelRect) { Viewport = pixelRect; }
         public void Release() { }
         public void SetRenderTarget(RenderTargetIdentifier[] colors, RenderTargetIdentifier depth) { }
         public void ClearRenderTarget(bool clearDepth, bool clearColor, Color backgroundColor) { }

@@ -60,10 +60,14 @@ namespace UnityEngine
 
     public struct Rect
     {
+        public float x { get; set; }
+        public float y { get; set; }
         public float width { get; set; }
         public float height { get; set; }
         public Rect(float x, float y, float width, float height)
         {
+            this.x = x;
+            this.y = y;
             this.width = width;
             this.height = height;
         }

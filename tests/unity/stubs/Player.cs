@@ -18,6 +18,9 @@ namespace UnityEngine
         public static Action<MaterialPropertyBlock, int> OnOwnDraw;
         public static bool HasHalfTargets;
 
+        /// <summary>Of the last such draw.</summary>
+        public static Rect OwnViewport;
+
         /// <summary>The light around, and whose colliders stand between the person and the sun.</summary>
         public static Rendering.SphericalHarmonicsL2 Probe;
         public static readonly List<Transform> BeforeSun = new List<Transform>();
@@ -126,6 +129,7 @@ namespace UnityEngine
         public static GraphicsBuffer Buffer(ComputeShader shader, int kernel, int id) { return shader.Buffers[kernel, id]; }
         public static Vector4 Value(MaterialPropertyBlock block, int id) { return block.Values[id]; }
         public static GraphicsBuffer Buffer(MaterialPropertyBlock block, int id) { return block.Buffers[id]; }
+        public static Vector4[] Values(MaterialPropertyBlock block, int id) { return block.Arrays[id]; }
         public static Matrix4x4 Matrix(MaterialPropertyBlock block, int id) { return block.Matrices[id]; }
         public static Texture Texture(MaterialPropertyBlock block, int id) { return block.Textures[id]; }
         public static int BuffersAlive { get { return GraphicsBuffer.Alive; } }

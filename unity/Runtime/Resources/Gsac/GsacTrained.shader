@@ -19,20 +19,19 @@ Shader "Gsac/Trained"
             #pragma target 4.5
             #pragma vertex Vertex
             #pragma fragment Fragment
+            #pragma multi_compile_instancing
             #include "Packages/com.unity.render-pipelines.core/ShaderLibrary/Common.hlsl"
             #include "Packages/com.unity.render-pipelines.high-definition/Runtime/ShaderLibrary/ShaderVariables.hlsl"
             #include "GsacFogHighDefinition.hlsl"
+            // HDRP's world is relative to the camera
+            #define GSAC_ORIGIN (-GetCameraRelativePositionWS(float3(0, 0, 0)))
             #include "GsacTrained.hlsl"
 
             uint GsacBehindIsCopied; // 1: for this camera; what lies in the texture is another frame's otherwise
 
-            GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
-            {
-                return GsacLaid(vertex, UNITY_MATRIX_P);
-            }
-
             GsacLaidPixel Fragment(GsacLaidVaryings input)
             {
+                UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input);
                 // after opaque things, sky and fog; in this frame's exposure, as all that is drawn here
                 float3 behind = LoadCameraColor((uint2)input.clip.xy, 0);
                 return GsacLay(input, UNITY_MATRIX_P, behind, GsacBehindIsCopied ? _ScreenSize.xy : float2(0, 0));
@@ -58,23 +57,20 @@ Shader "Gsac/Trained"
             #pragma target 4.5
             #pragma vertex Vertex
             #pragma fragment Fragment
+            #pragma multi_compile_instancing
             #pragma multi_compile_fog
             #include "Packages/com.unity.render-pipelines.universal/ShaderLibrary/Core.hlsl"
             #define GSAC_FOGGED(colour, clip) MixFog(colour, ComputeFogFactor((clip).z))
+            #define GSAC_ORIGIN float3(0, 0, 0)
             #include "GsacTrained.hlsl"
 
-            GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
-            {
-                return GsacLaid(vertex, UNITY_MATRIX_P);
-            }
-
-            Texture2D<float4> _CameraOpaqueTexture;
+            GsacCopy _CameraOpaqueTexture;
 
             GsacLaidPixel Fragment(GsacLaidVaryings input)
             {
+                UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input);
                 float2 size;
-                _CameraOpaqueTexture.GetDimensions(size.x, size.y);
-                float3 behind = _CameraOpaqueTexture.Sample(GsacLinearClampSampler, input.clip.xy / _ScaledScreenParams.xy).rgb;
+                float3 behind = GsacCopied(_CameraOpaqueTexture, input.clip.xy / _ScaledScreenParams.xy, size);
                 return GsacLay(input, UNITY_MATRIX_P, behind, size);
             }
             ENDHLSL
@@ -97,23 +93,20 @@ Shader "Gsac/Trained"
             #pragma target 4.5
             #pragma vertex Vertex
             #pragma fragment Fragment
+            #pragma multi_compile_instancing
             #pragma multi_compile_fog
             #include "UnityCG.cginc"
             #include "GsacFogBuiltIn.hlsl"
+            #define GSAC_ORIGIN float3(0, 0, 0)
             #include "GsacTrained.hlsl"
 
-            GsacLaidVaryings Vertex(uint vertex : SV_VertexID)
-            {
-                return GsacLaid(vertex, UNITY_MATRIX_P);
-            }
-
-            Texture2D<float4> GsacBehind;
+            GsacCopy GsacBehind;
 
             GsacLaidPixel Fragment(GsacLaidVaryings input)
             {
+                UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input);
                 float2 size;
-                GsacBehind.GetDimensions(size.x, size.y);
-                float3 behind = GsacBehind.Sample(GsacLinearClampSampler, input.clip.xy / _ScreenParams.xy).rgb;
+                float3 behind = GsacCopied(GsacBehind, input.clip.xy / _ScreenParams.xy, size);
                 return GsacLay(input, UNITY_MATRIX_P, behind, size);
             }
             ENDHLSL
