@@ -35,6 +35,7 @@ from gsac.stages.smplx.lm.hidden_arms import (
     isolate_arm,
     isolate_state,
 )
+from gsac.stages.smplx.lm.mirrored_arms import find_mirrored
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.state import State, to_params
 
@@ -135,9 +136,31 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     missing: (T, 2) bool, hands that were not detected; None: all were.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
+    mirrored, calm = find_mirrored(arms, problem, state, missing)
+    state = unmirror(arms, problem, state, mirrored, calm, missing)
     wrong = find_contradicted(arms, problem, state, missing)
     doubtful = wrong | find_untold(arms, problem, state, missing)
-    return move(arms, problem, state, doubtful, missing), doubtful
+    return move(arms, problem, state, doubtful, missing), doubtful | mirrored
+
+
+def unmirror(arms: HiddenArms, problem: Problem, state: State, mirrored: np.ndarray, calm: np.ndarray,
+             missing: np.ndarray) -> State:
+    """The state with arms of a calmer sequence, where it explains points and mask clearly better, too.
+
+    mirrored: (T, 2) bool, those arms; calm: (T, J, 3, 3) joint rotations of the sequence; missing: (T, 2) bool, hands that were not
+    detected.
+    """
+    settled = replace(state, local=state.local.copy())
+    for stay in list_windows(problem, mirrored):
+        found = []
+        for local in (settled.local, calm):
+            alone, start = isolate_arm(problem, stay), isolate_state(settled, stay, local[stay.around])
+            hold(arms.cut(stay), alone, start, stay.side, ~missing[stay.around, stay.side])
+            bent = bend_arm(alone, start, STEPS)
+            found.append((alone.cost(bent), bent.local))
+        if found[1][0] < found[0][0] - CLEARLY:
+            settled.local[stay.around] = found[1][1]
+    return settled
 
 
 def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray, missing: np.ndarray) -> State:
@@ -145,20 +168,29 @@ def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray,
 
     doubtful: (T, 2) bool, those arms; missing: (T, 2) bool, hands that were not detected.
     """
-    seconds = problem.seen.seconds
-    if seconds is None or not problem.seen.outlines:
-        return state
     settled = replace(state, local=state.local.copy())
+    for stay in list_windows(problem, doubtful):
+        shown = ~missing[stay.around, stay.side]
+        settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, stay.side])
+    return settled
+
+
+def list_windows(problem: Problem, doubtful: np.ndarray) -> list[Stay]:
+    """Frames in which an arm is doubtful, and those around in which it is searched again; none of photos, and without masks.
+
+    doubtful: (T, 2) bool.
+    """
+    seconds, out = problem.seen.seconds, []
+    if seconds is None or not problem.seen.outlines:
+        return out
     for side in np.flatnonzero(doubtful.any(0)).tolist():
         around = np.zeros(len(doubtful), bool)
         for first, last in bridge(doubtful[:, side]):
             around[slice(*find_around(seconds, first, last))] = True
         for start, stop in bridge(around, 0):
             doubted = start + np.flatnonzero(doubtful[start:stop, side])
-            stay = Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop)
-            shown = ~missing[stay.around, side]
-            settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, side])
-    return settled
+            out.append(Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop))
+    return out
 
 
 def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, sure: np.ndarray) -> np.ndarray:
