@@ -35,7 +35,7 @@ from gsac.stages.smplx.lm.hidden_arms import (
     isolate_arm,
     isolate_state,
 )
-from gsac.stages.smplx.lm.mirrored_arms import find_mirrored
+from gsac.stages.smplx.lm.mirrored_arms import find_mirrored, measure_unrest
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.state import State, to_params
 
@@ -145,22 +145,38 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
 
 def unmirror(arms: HiddenArms, problem: Problem, state: State, mirrored: np.ndarray, calm: np.ndarray,
              missing: np.ndarray) -> State:
-    """The state with arms of a calmer sequence, where it explains points and mask clearly better, too.
+    """The state with arms of a calmer sequence, where its cost, with that of the points and the mask, is lower.
 
     mirrored: (T, 2) bool, those arms; calm: (T, J, 3, 3) joint rotations of the sequence; missing: (T, 2) bool, hands that were not
     detected.
     """
     settled = replace(state, local=state.local.copy())
     for stay in list_windows(problem, mirrored):
-        found = []
-        for local in (settled.local, calm):
+        costs, found, picked = [], [], mirrored[stay.around, stay.side]
+        for local, held in ((settled.local, False), (calm, False), (calm, True)):
             alone, start = isolate_arm(problem, stay), isolate_state(settled, stay, local[stay.around])
             hold(arms.cut(stay), alone, start, stay.side, ~missing[stay.around, stay.side])
-            bent = bend_arm(alone, start, STEPS)
-            found.append((alone.cost(bent), bent.local))
-        if found[1][0] < found[0][0] - CLEARLY:
-            settled.local[stay.around] = found[1][1]
+            if held:
+                hold_depth(alone, start, stay.side, picked)
+            bent = replace(settled, local=settled.local.copy())
+            bent.local[stay.around] = bend_arm(alone, start, STEPS).local
+            judge, own = isolate_arm(problem, stay), isolate_state(settled, stay, settled.local[stay.around])
+            hold(arms.cut(stay), judge, own, stay.side, ~missing[stay.around, stay.side])
+            costs.append(judge.cost(isolate_state(bent, stay, bent.local[stay.around]))
+                         + measure_unrest(arms, problem, bent, missing, stay.side))
+            found.append(bent)
+        if np.argmin(costs) > 0:
+            settled = found[int(np.argmin(costs))]
     return settled
+
+
+def hold_depth(alone: Problem, state: State, side: int, frames: np.ndarray) -> None:
+    """Tells the arm's problem that elbow and wrist lie as deep as in the state in some frames, (F,) bool."""
+    chain, rows = alone.skeleton.pose(state.local, state.shape), [ELBOW[side], WRIST[side]]
+    x, at = alone.locate_points(chain, state)[..., 2], np.ix_(frames, rows)
+    alone.seen.depth[at] = (x - x[:, list(alone.hips)].mean(1, keepdims=True))[at]
+    alone.seen.depth_spread = np.broadcast_to(alone.seen.depth_spread, x.shape).copy()
+    alone.seen.depth_spread[at] = BEHIND_SPREAD
 
 
 def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray, missing: np.ndarray) -> State:

@@ -14,22 +14,23 @@ import numpy as np
 
 from gsac.avatar.joints import INDEX
 from gsac.stages.smplx.jacobians import Chain
-from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, ROUGH_DEPTH, WRIST, HiddenArms
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, ROUGH_DEPTH, WRIST, HiddenArms, bridge
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.lm.solver import robust
 from gsac.stages.smplx.state import State
 
 STEP_S = 0.3
 """Seconds between the frames that a sequence goes through, at least: gestures cost the same at any frame rate."""
-CALMER = 20.0
-"""By how much the cost of a sequence must be lower than the fit's."""
+CALMER, APART = 2.0, 0.1
+"""Of frames on end in which the cheapest sequence has another arm than the fit: by how much it must be cheaper than one that has
+the fit's arm there (on six clean arms 0.0), and m by which elbow or wrist must lie elsewhere in one of them."""
 SPEED, QUICK = 0.3, 4.0
 """rad/s, spread of the speed of upper arm and forearm against the trunk, and its robust limit, in spreads: an arm rests or goes."""
 DEEP = 2.0
 """Robust limit of the detector's depths, in spreads."""
-BEHIND, BLIND, MISSED = 0.03, 12.0, 4.0
+BEHIND, UNLIKELY = 0.03, 4.0
 """m behind the trunk's near surface from which on a hand is hidden; cost of a hand that is seen there, and of one that is not seen
-though it lies before the trunk."""
+elsewhere."""
 STRAIGHT = np.sin(np.radians(10))
 """Sine of a bend below which a forearm does not tell which way the elbow points."""
 
@@ -43,22 +44,31 @@ def find_mirrored(arms: HiddenArms, problem: Problem, state: State, missing: np.
     doubtful, local = np.zeros(missing.shape, bool), state.local.copy()
     if problem.seen.seconds is None or len(missing) < 3:
         return doubtful, local
-    chain, seconds = problem.skeleton.pose(state.local, state.shape), problem.seen.seconds
-    some = np.arange(0, len(seconds), max(1, round(STEP_S / float(np.median(np.diff(seconds))))))
+    chain, some = problem.skeleton.pose(state.local, state.shape), pick_frames(problem.seen.seconds)
     for side in (0, 1):
-        places = list_arms(chain, state, side)
-        cost = weigh(arms, problem, state, chain, missing[:, side], places, side, some)
-        hidden = arms.mark(len(missing))[:, side]
+        hidden, places = arms.mark(len(missing))[:, side], list_arms(chain, state, side)
+        cost = weigh(arms, problem, state, chain, missing[:, side], places[some], side, some)
         cost[hidden[some], 1:] = np.inf
-        bones = np.diff(places, axis=2)
-        bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
-        own = np.einsum("tba,tksb->tksa", chain.world[some, INDEX["spine3"]], bones[some])
-        found, saved = find_calmest(own, cost, seconds[some])
-        picked = fill_between(found, some, len(seconds))
-        doubtful[:, side] = (picked > 0) & (saved > CALMER) & ~hidden
+        away = np.linalg.norm(places[some, :, 1:] - places[some, :1, 1:], axis=-1).max(-1)
+        path = find_calmest(cost, measure_motion(chain, places[some], problem.seen.seconds, some), away)
+        picked = fill_between(path, some, len(missing))
+        doubtful[:, side] = (picked > 0) & ~hidden
         for t in np.flatnonzero(doubtful[:, side]).tolist():
-            local[t, ARM_JOINTS[side, 1:3]] = turn_arm(chain, t, side, bones[t, picked[t]])
+            local[t, ARM_JOINTS[side, 1:3]] = turn_arm(chain, t, side, *np.diff(places[t, picked[t]], axis=0))
     return doubtful, local
+
+
+def measure_unrest(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray, side: int) -> float:
+    """Cost of an arm's sequence as the state has it. missing: (T, 2) bool, hands that were not detected."""
+    chain, some = problem.skeleton.pose(state.local, state.shape), pick_frames(problem.seen.seconds)
+    places = list_arms(chain, state, side)[some, :1]
+    cost = weigh(arms, problem, state, chain, missing[:, side], places, side, some)
+    return float(cost.sum() + measure_motion(chain, places, problem.seen.seconds, some).sum())
+
+
+def pick_frames(seconds: np.ndarray) -> np.ndarray:
+    """(N,) those of the frames that sequences go through. seconds: (T,)."""
+    return np.arange(0, len(seconds), max(1, round(STEP_S / float(np.median(np.diff(seconds))))))
 
 
 def list_arms(chain: Chain, state: State, side: int) -> np.ndarray:
@@ -84,20 +94,30 @@ def meet(centre: np.ndarray, radius: np.ndarray, point: np.ndarray) -> tuple[np.
 
 def weigh(arms: HiddenArms, problem: Problem, state: State, chain: Chain, missing: np.ndarray, places: np.ndarray, side: int,
           some: np.ndarray) -> np.ndarray:
-    """(N, K) cost of places (T, K, 3, 3) m by the detector's depths, and by whether the hand is seen, in some frames (N,).
+    """(N, K) cost of places (N, K, 3, 3) m by the detector's depths, and by whether the hand is seen, in some frames (N,).
 
     missing: (T,) bool.
     """
-    seen = problem.seen
-    hips = problem.locate_points(chain, state)[:, list(problem.hips), 2].mean(1)
-    depth = places[:, :, 1:, 2] - hips[:, None, None] - seen.depth[:, None, [ELBOW[side], WRIST[side]]]
-    out = robust(np.nan_to_num(depth / ROUGH_DEPTH), DEEP)[0].sum(-1)[some]
+    seen, rows = problem.seen, [ELBOW[side], WRIST[side]]
+    hips = problem.locate_points(chain, state)[some][:, list(problem.hips), 2].mean(1)
+    depth = places[:, :, 1:, 2] - hips[:, None, None] - seen.depth[some][:, None, rows]
+    out = robust(np.nan_to_num(depth / ROUGH_DEPTH), DEEP)[0].sum(-1)
     for i, t in enumerate(some.tolist()):
-        for k, wrist in enumerate(places[t, :, 2]):
+        for k, wrist in enumerate(places[i, :, 2]):
             near, _ = arms.measure_trunk(state, chain.frame(t), t, wrist)
-            hidden = np.isfinite(near) and wrist[2] > near + BEHIND
-            out[i, k] += BLIND * (hidden and not missing[t]) + MISSED * (missing[t] and not hidden)
+            out[i, k] += UNLIKELY * ((np.isfinite(near) and wrist[2] > near + BEHIND) != missing[t])
     return out
+
+
+def measure_motion(chain: Chain, places: np.ndarray, seconds: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """(N - 1, K, K) cost of the way from each arm to each of the next frame, against the trunk.
+
+    places: (N, K, 3, 3) m, in some frames (N,); seconds: (T,).
+    """
+    bones = np.einsum("tba,tksb->tksa", chain.world[some, INDEX["spine3"]], np.diff(places, axis=2))
+    bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
+    angle = np.arccos(np.clip(np.einsum("tisa,tjsa->tijs", bones[:-1], bones[1:]), -1, 1))
+    return robust(angle / np.diff(seconds[some])[:, None, None, None] / SPEED, QUICK)[0].sum(-1)
 
 
 def fill_between(picked: np.ndarray, some: np.ndarray, frames: int) -> np.ndarray:
@@ -108,28 +128,37 @@ def fill_between(picked: np.ndarray, some: np.ndarray, frames: int) -> np.ndarra
     return np.where(before == after, before, 0)
 
 
-def find_calmest(bones: np.ndarray, cost: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, float]:
-    """(T,) which arm of each frame the cheapest sequence takes (Viterbi 1967), and how much less it costs than the first ones.
+def find_calmest(cost: np.ndarray, motion: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """(N,) which arm of each frame the cheapest sequence takes (Viterbi 1967), the first where another is no clear gain.
 
-    bones: (T, K, 2, 3) unit vectors along upper arm and forearm, trunk frame; cost: (T, K) of each arm; seconds: (T,).
+    cost: (N, K) of each arm; motion: (N - 1, K, K) of the ways between them; away: (N, K) m of each arm from the first.
     """
-    total, asis, back = cost[0], cost[0, 0], []
-    for t in range(1, len(cost)):
-        angle = np.arccos(np.clip(np.einsum("isa,jsa->ijs", bones[t - 1], bones[t]), -1, 1))
-        motion = robust(angle / (seconds[t] - seconds[t - 1]) / SPEED, QUICK)[0].sum(-1)
-        asis, whole = asis + motion[0, 0] + cost[t, 0], total[:, None] + motion
+    total, back = cost[0], []
+    for own, ways in zip(cost[1:], motion, strict=True):
+        whole = total[:, None] + ways
         back.append(whole.argmin(0))
-        total = whole.min(0) + cost[t]
+        total = whole.min(0) + own
     picked = [int(total.argmin())]
     for step in reversed(back):
         picked.append(int(step[picked[-1]]))
-    return np.array(picked[::-1]), float(asis - total.min())
+    path, at = np.array(picked[::-1]), np.arange(len(cost))
+
+    def cost_of(path: np.ndarray) -> float:
+        return float(cost[at, path].sum() + motion[at[:-1], path[:-1], path[1:]].sum())
+
+    for first, last in bridge(path > 0, 0):
+        asis, run = path.copy(), at[first:last]
+        asis[run] = 0
+        if cost_of(asis) - cost_of(path) < CALMER or away[run, path[run]].max() < APART:
+            path = asis
+    return path
 
 
-def turn_arm(chain: Chain, t: int, side: int, bones: np.ndarray) -> np.ndarray:
-    """(2, 3, 3) rotations of shoulder and elbow that point along bones (2, 3), camera frame, the elbow bent as a hinge."""
+def turn_arm(chain: Chain, t: int, side: int, upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
+    """(2, 3, 3) rotations of shoulder and elbow whose bones point along upper (3,) and lower (3,), camera frame; the elbow bends as
+    a hinge."""
     arm, sign = ARM_JOINTS[side], 1 - 2 * side
-    upper, lower = bones
+    upper, lower = upper / np.linalg.norm(upper), lower / np.linalg.norm(lower)
     off = lower - (lower @ upper) * upper
     if np.linalg.norm(off) < STRAIGHT:
         off = chain.world[t, arm[1]][:, 2] - (chain.world[t, arm[1]][:, 2] @ upper) * upper

@@ -44,10 +44,9 @@ def on_hip(request, body, tmp_path_factory):
 def mirror(problem, state, side):
     """The state whose arm is mirrored in some frames."""
     chain, out = problem.skeleton.pose(state.local, state.shape), replace(state, local=state.local.copy())
-    bones = np.diff(list_arms(chain, state, side)[:, 3], axis=1)
-    bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
+    places = list_arms(chain, state, side)[:, 3]
     for t in np.flatnonzero(MIRRORED):
-        out.local[t, ARM_JOINTS[side, 1:3]] = turn_arm(chain, t, side, bones[t])
+        out.local[t, ARM_JOINTS[side, 1:3]] = turn_arm(chain, t, side, *np.diff(places[t], axis=0))
     return out
 
 
@@ -68,10 +67,8 @@ def test_the_four_arms_of_a_picture_share_pixels_and_lengths(on_hip):
 def test_rotations_of_an_arm_point_where_they_should(on_hip):
     side, _, problem, truth = on_hip
     chain = problem.skeleton.pose(truth.local, truth.shape)
-    bones = np.diff(list_arms(chain, truth, side)[:, 0], axis=1)
-    bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
-    local = truth.local.copy()
-    local[:, ARM_JOINTS[side, 1:3]] = [turn_arm(chain, t, side, own) for t, own in enumerate(bones)]
+    places, local = list_arms(chain, truth, side)[:, 0], truth.local.copy()
+    local[:, ARM_JOINTS[side, 1:3]] = [turn_arm(chain, t, side, *np.diff(own, axis=0)) for t, own in enumerate(places)]
     off = place_wrist(problem, replace(truth, local=local), side) - place_wrist(problem, truth, side)
     assert np.linalg.norm(off, axis=-1).max() < 0.06  # rest bones lie only roughly along the axis
 
