@@ -150,30 +150,29 @@ def unmirror(arms: HiddenArms, problem: Problem, state: State, mirrored: np.ndar
     mirrored: (T, 2) bool, those arms; calm: (T, J, 3, 3) joint rotations of the sequence; missing: (T, 2) bool, hands that were not
     detected.
     """
-    settled = replace(state, local=state.local.copy())
+    settled = state
     for stay in list_windows(problem, mirrored):
-        costs, found, picked = [], [], mirrored[stay.around, stay.side]
-        for local, held in ((settled.local, False), (calm, False), (calm, True)):
-            alone, start = isolate_arm(problem, stay), isolate_state(settled, stay, local[stay.around])
-            hold(arms.cut(stay), alone, start, stay.side, ~missing[stay.around, stay.side])
-            if held:
-                hold_depth(alone, start, stay.side, picked)
-            bent = replace(settled, local=settled.local.copy())
-            bent.local[stay.around] = bend_arm(alone, start, STEPS).local
-            judge, own = isolate_arm(problem, stay), isolate_state(settled, stay, settled.local[stay.around])
-            hold(arms.cut(stay), judge, own, stay.side, ~missing[stay.around, stay.side])
-            costs.append(judge.cost(isolate_state(bent, stay, bent.local[stay.around]))
-                         + measure_unrest(arms, problem, bent, missing, stay.side))
-            found.append(bent)
-        if np.argmin(costs) > 0:
-            settled = found[int(np.argmin(costs))]
+        shown = ~missing[stay.around, stay.side]
+        asis, other = (isolate_state(settled, stay, local[stay.around]) for local in (settled.local, calm))
+        judge, free, held = isolate_arm(problem, stay), isolate_arm(problem, stay), isolate_arm(problem, stay)
+        for alone, start in ((judge, asis), (free, other), (held, other)):
+            hold(arms.cut(stay), alone, start, stay.side, shown)
+        hold_depth(held, other, stay.side, mirrored[stay.around, stay.side])
+        costs, found = [], []
+        for alone, start in ((judge, asis), (free, other), (held, other)):
+            bent, local = bend_arm(alone, start, STEPS), settled.local.copy()
+            local[stay.around] = bent.local
+            found.append(replace(settled, local=local))
+            costs.append(judge.cost(bent) + measure_unrest(arms, problem, found[-1], missing, stay.side))
+        best = int(np.argmin(costs))
+        settled = found[best] if best else settled
     return settled
 
 
 def hold_depth(alone: Problem, state: State, side: int, frames: np.ndarray) -> None:
     """Tells the arm's problem that elbow and wrist lie as deep as in the state in some frames, (F,) bool."""
-    chain, rows = alone.skeleton.pose(state.local, state.shape), [ELBOW[side], WRIST[side]]
-    x, at = alone.locate_points(chain, state)[..., 2], np.ix_(frames, rows)
+    x = alone.locate_points(alone.skeleton.pose(state.local, state.shape), state)[..., 2]
+    at = np.ix_(frames, np.array([ELBOW[side], WRIST[side]]))
     alone.seen.depth[at] = (x - x[:, list(alone.hips)].mean(1, keepdims=True))[at]
     alone.seen.depth_spread = np.broadcast_to(alone.seen.depth_spread, x.shape).copy()
     alone.seen.depth_spread[at] = BEHIND_SPREAD

@@ -14,7 +14,7 @@ import numpy as np
 
 from gsac.avatar.joints import INDEX
 from gsac.stages.smplx.jacobians import Chain
-from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, ROUGH_DEPTH, WRIST, HiddenArms, bridge
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, ROUGH_DEPTH, TRUSTED, WRIST, HiddenArms, bridge
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.lm.solver import robust
 from gsac.stages.smplx.state import State
@@ -30,7 +30,7 @@ DEEP = 2.0
 """Robust limit of the detector's depths, in spreads."""
 BEHIND, UNLIKELY = 0.03, 4.0
 """m behind the trunk's near surface from which on a hand is hidden; cost of a hand that is seen there, and of one that is not seen
-elsewhere."""
+elsewhere, unless the detector hardly finds that hand at all."""
 STRAIGHT = np.sin(np.radians(10))
 """Sine of a bend below which a forearm does not tell which way the elbow points."""
 
@@ -41,16 +41,16 @@ def find_mirrored(arms: HiddenArms, problem: Problem, state: State, missing: np.
 
     missing: (T, 2) bool, hands that were not detected.
     """
-    doubtful, local = np.zeros(missing.shape, bool), state.local.copy()
-    if problem.seen.seconds is None or len(missing) < 3:
+    doubtful, local, seconds = np.zeros(missing.shape, bool), state.local.copy(), problem.seen.seconds
+    if seconds is None or len(missing) < 3:
         return doubtful, local
-    chain, some = problem.skeleton.pose(state.local, state.shape), pick_frames(problem.seen.seconds)
+    chain, some = problem.skeleton.pose(state.local, state.shape), pick_frames(seconds)
     for side in (0, 1):
         hidden, places = arms.mark(len(missing))[:, side], list_arms(chain, state, side)
         cost = weigh(arms, problem, state, chain, missing[:, side], places[some], side, some)
         cost[hidden[some], 1:] = np.inf
         away = np.linalg.norm(places[some, :, 1:] - places[some, :1, 1:], axis=-1).max(-1)
-        path = find_calmest(cost, measure_motion(chain, places[some], problem.seen.seconds, some), away)
+        path = find_calmest(cost, measure_motion(chain, places[some], seconds, some), away)
         picked = fill_between(path, some, len(missing))
         doubtful[:, side] = (picked > 0) & ~hidden
         for t in np.flatnonzero(doubtful[:, side]).tolist():
@@ -60,10 +60,12 @@ def find_mirrored(arms: HiddenArms, problem: Problem, state: State, missing: np.
 
 def measure_unrest(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray, side: int) -> float:
     """Cost of an arm's sequence as the state has it. missing: (T, 2) bool, hands that were not detected."""
-    chain, some = problem.skeleton.pose(state.local, state.shape), pick_frames(problem.seen.seconds)
+    seconds = problem.seen.seconds
+    assert seconds is not None  # without times no arm is said to be mirrored
+    chain, some = problem.skeleton.pose(state.local, state.shape), pick_frames(seconds)
     places = list_arms(chain, state, side)[some, :1]
     cost = weigh(arms, problem, state, chain, missing[:, side], places, side, some)
-    return float(cost.sum() + measure_motion(chain, places, problem.seen.seconds, some).sum())
+    return float(cost.sum() + measure_motion(chain, places, seconds, some).sum())
 
 
 def pick_frames(seconds: np.ndarray) -> np.ndarray:
@@ -103,6 +105,8 @@ def weigh(arms: HiddenArms, problem: Problem, state: State, chain: Chain, missin
     depth = places[:, :, 1:, 2] - hips[:, None, None] - seen.depth[some][:, None, rows]
     out = robust(np.nan_to_num(depth / ROUGH_DEPTH), DEEP)[0].sum(-1)
     for i, t in enumerate(some.tolist()):
+        if missing[t] and missing.mean() > 1 - TRUSTED:
+            continue
         for k, wrist in enumerate(places[i, :, 2]):
             near, _ = arms.measure_trunk(state, chain.frame(t), t, wrist)
             out[i, k] += UNLIKELY * ((np.isfinite(near) and wrist[2] > near + BEHIND) != missing[t])
