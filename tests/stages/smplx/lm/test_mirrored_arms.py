@@ -16,7 +16,7 @@ from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm.doubtful_arms import settle_doubtful
 from gsac.stages.smplx.lm.fit import set_up
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, HiddenArms
-from gsac.stages.smplx.lm.mirrored_arms import find_mirrored, list_arms, turn_arm
+from gsac.stages.smplx.lm.mirrored_arms import find_mirrored, list_arms, turn_arm, weigh
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
 
 FRAMES, MIRRORED = 16, np.isin(np.arange(16), range(9, 13))
@@ -94,3 +94,13 @@ def test_a_quick_gesture_is_no_doubt(on_hip):
     state = replace(truth, local=truth.local.copy())
     state.local[8:, INDEX[("left_elbow", "right_elbow")[side]]] = Rotation.from_euler("y", -0.2 if side == 0 else 0.2).as_matrix()
     assert not find_mirrored(arms, problem, state, NONE)[0].any()
+
+
+def test_a_hand_that_the_detector_hardly_ever_finds_does_not_make_its_arm_hide(on_hip):
+    side, arms, problem, truth = on_hip
+    chain, frames = problem.skeleton.pose(truth.local, truth.shape), np.arange(FRAMES)
+    missing = np.ones(FRAMES, bool)
+    missing[::3] = False
+    places = list_arms(chain, truth, side)
+    never, once = (weigh(arms, problem, truth, chain, own, places, side, frames) for own in (missing, frames == 1))
+    assert not never[missing].any() and once[1].any()
