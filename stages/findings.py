@@ -120,6 +120,8 @@ class Code(Enum):
     SIDES_EXCHANGED = Wording("Left was taken for right in {frames}; the sides are exchanged there.", severity=Severity.NEWS)
     TURN_JUMPS = Wording("The turn jumps in {frames}, by pictures out of order or a fast turn; each is fitted alone there.",
                          "Give one recording without cuts, and turn evenly and slowly.", Severity.NEWS)
+    TURNED_OVER = Wording("The body may face the wrong way in {frames}: a front between backs.",
+                          "Tie long hair back, give one recording without cuts, and turn evenly and slowly.")
     OTHER = Wording("{what}")
     """Of a stage that is not of this package."""
 

@@ -35,6 +35,7 @@ from gsac.stages.smplx.lm.hidden_arms import (
     isolate_arm,
     isolate_state,
 )
+from gsac.stages.smplx.lm.mirrored_arms import find_mirrored, measure_unrest
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.state import State, to_params
 
@@ -135,9 +136,46 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     missing: (T, 2) bool, hands that were not detected; None: all were.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
+    mirrored, calm = find_mirrored(arms, problem, state, missing)
+    state = unmirror(arms, problem, state, mirrored, calm, missing)
     wrong = find_contradicted(arms, problem, state, missing)
     doubtful = wrong | find_untold(arms, problem, state, missing)
-    return move(arms, problem, state, doubtful, missing), doubtful
+    return move(arms, problem, state, doubtful, missing), doubtful | mirrored
+
+
+def unmirror(arms: HiddenArms, problem: Problem, state: State, mirrored: np.ndarray, calm: np.ndarray,
+             missing: np.ndarray) -> State:
+    """The state with arms of a calmer sequence, where its cost, with that of the points and the mask, is lower.
+
+    mirrored: (T, 2) bool, those arms; calm: (T, J, 3, 3) joint rotations of the sequence; missing: (T, 2) bool, hands that were not
+    detected.
+    """
+    settled = state
+    for stay in list_windows(problem, mirrored):
+        shown = ~missing[stay.around, stay.side]
+        asis, other = (isolate_state(settled, stay, local[stay.around]) for local in (settled.local, calm))
+        judge, free, held = isolate_arm(problem, stay), isolate_arm(problem, stay), isolate_arm(problem, stay)
+        for alone, start in ((judge, asis), (free, other), (held, other)):
+            hold(arms.cut(stay), alone, start, stay.side, shown)
+        hold_depth(held, other, stay.side, mirrored[stay.around, stay.side])
+        costs, found = [], []
+        for alone, start in ((judge, asis), (free, other), (held, other)):
+            bent, local = bend_arm(alone, start, STEPS), settled.local.copy()
+            local[stay.around] = bent.local
+            found.append(replace(settled, local=local))
+            costs.append(judge.cost(bent) + measure_unrest(arms, problem, found[-1], missing, stay.side))
+        best = int(np.argmin(costs))
+        settled = found[best] if best else settled
+    return settled
+
+
+def hold_depth(alone: Problem, state: State, side: int, frames: np.ndarray) -> None:
+    """Tells the arm's problem that elbow and wrist lie as deep as in the state in some frames, (F,) bool."""
+    x = alone.locate_points(alone.skeleton.pose(state.local, state.shape), state)[..., 2]
+    at = np.ix_(frames, np.array([ELBOW[side], WRIST[side]]))
+    alone.seen.depth[at] = (x - x[:, list(alone.hips)].mean(1, keepdims=True))[at]
+    alone.seen.depth_spread = np.broadcast_to(alone.seen.depth_spread, x.shape).copy()
+    alone.seen.depth_spread[at] = BEHIND_SPREAD
 
 
 def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray, missing: np.ndarray) -> State:
@@ -145,20 +183,29 @@ def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray,
 
     doubtful: (T, 2) bool, those arms; missing: (T, 2) bool, hands that were not detected.
     """
-    seconds = problem.seen.seconds
-    if seconds is None or not problem.seen.outlines:
-        return state
     settled = replace(state, local=state.local.copy())
+    for stay in list_windows(problem, doubtful):
+        shown = ~missing[stay.around, stay.side]
+        settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, stay.side])
+    return settled
+
+
+def list_windows(problem: Problem, doubtful: np.ndarray) -> list[Stay]:
+    """Frames in which an arm is doubtful, and those around in which it is searched again; none of photos, and without masks.
+
+    doubtful: (T, 2) bool.
+    """
+    seconds, out = problem.seen.seconds, []
+    if seconds is None or not problem.seen.outlines:
+        return out
     for side in np.flatnonzero(doubtful.any(0)).tolist():
         around = np.zeros(len(doubtful), bool)
         for first, last in bridge(doubtful[:, side]):
             around[slice(*find_around(seconds, first, last))] = True
         for start, stop in bridge(around, 0):
             doubted = start + np.flatnonzero(doubtful[start:stop, side])
-            stay = Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop)
-            shown = ~missing[stay.around, side]
-            settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, side])
-    return settled
+            out.append(Stay(side, int(doubted[0]), int(doubted[-1]) + 1, start, stop))
+    return out
 
 
 def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, sure: np.ndarray) -> np.ndarray:

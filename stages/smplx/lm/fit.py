@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,8 +28,8 @@ from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.lm.shake import transl_acceleration
-from gsac.stages.smplx.lm.swapped_sides import MARGIN, propose_swapped
-from gsac.stages.smplx.lm.turn_jumps import find_jumps
+from gsac.stages.smplx.lm.swapped_sides import DEARER, MARGIN, believe_by_faces, propose_by_faces, propose_swapped
+from gsac.stages.smplx.lm.turn_jumps import find_jumps, find_turned_over
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -87,24 +87,53 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
 
 def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,
                     config: SmplxConfig) -> tuple[Sightings, Problem, State, int, list[Finding]]:
-    """Fits the key points, with left and right exchanged in the frames that the turn accuses if that costs much less.
+    """Fits the key points, with left and right exchanged in the frames that the turn accuses if that costs much less, or in those
+    that the faces accuse, too, if it hardly costs more.
 
     Returns the sightings that were fitted, problem, state, number of steps and what the user should know.
     """
-    fits: list[tuple[float, Sightings, Problem, State, int]] = []
-    begun: list[tuple[Finding, ...]] = []
-    swapped = propose_swapped(sightings)
-    for seen in (sightings, sightings.exchange_sides(swapped)) if swapped.any() else (sightings,):
-        problem, state, news = set_up(body, seen, outlines, detector, config)
-        begun.append(news)
-        state, steps = fit_points(problem, state, seen, detector, 3 * config.iterations)
-        fits.append((problem.cost(state), seen, problem, state, steps))
-    best = int(len(fits) == 2 and fits[1][0] < fits[0][0] - MARGIN * swapped.sum())
-    said = [*begun[best], *([Finding.of(Code.SIDES_EXCHANGED, swapped)] if best else [])]
-    jumps = fits[best][2].jumps
-    if jumps.any():
-        said.append(Finding.of(Code.TURN_JUMPS, np.pad(jumps, 1)))
-    return *fits[best][1:], said
+    asis = best = Try.of(body, sightings, outlines, detector, config)
+    if (exchanged := propose_swapped(sightings)).any():
+        other = Try.of(body, sightings.exchange_sides(exchanged), outlines, detector, config)
+        best = other if other.cost() < asis.cost() - MARGIN * exchanged.sum() else asis
+    if best is asis and (exchanged := propose_by_faces(sightings)).any():
+        other = Try.of(body, sightings.exchange_sides(exchanged), outlines, detector, config, exchanged)
+        best = other if other.cost() < asis.cost(exchanged) + DEARER * exchanged.sum() else asis
+    said = [*best.said, *([] if best is asis else [Finding.of(Code.SIDES_EXCHANGED, exchanged)])]
+    if best.problem.jumps.any():
+        said.append(Finding.of(Code.TURN_JUMPS, np.pad(best.problem.jumps, 1)))
+    over = find_turned_over(best.state.local[:, 0], sightings.seconds) & ~believe_by_faces(best.sightings)
+    if over.any():
+        said.append(Finding.of(Code.TURNED_OVER, over, figure=over.sum()))
+    return best.sightings, best.problem, best.state, best.steps, said
+
+
+@dataclass(frozen=True)
+class Try:
+    """The key points fitted, with the sides as they are or exchanged."""
+
+    sightings: Sightings
+    problem: Problem
+    state: State
+    steps: int
+    said: tuple[Finding, ...]
+
+    @classmethod
+    def of(cls, body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector, config: SmplxConfig,
+           flat: np.ndarray | None = None) -> Try:
+        """flat: (T,) bool, frames whose depths do not count; None: none."""
+        problem, state, said = set_up(body, sightings, outlines, detector, config)
+        if flat is not None:
+            problem.seen.depth[flat] = np.nan
+        return cls(sightings, problem, *fit_points(problem, state, sightings, detector, 3 * config.iterations), said)
+
+    def cost(self, flat: np.ndarray | None = None) -> float:
+        """flat: (T,) bool, frames whose depths do not count; None: none."""
+        seen, depth = self.problem.seen, self.problem.seen.depth
+        if flat is not None:
+            seen.depth = np.where(flat[:, None], np.nan, depth)
+        cost, seen.depth = self.problem.cost(self.state), depth
+        return cost
 
 
 def set_up(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,

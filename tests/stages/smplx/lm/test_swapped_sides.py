@@ -8,19 +8,65 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from gsac.avatar import rotation
+from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.yaw import yaw
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.lm.fit import fit_clip
-from gsac.stages.smplx.lm.swapped_sides import propose_swapped
-from gsac.stages.smplx.state import to_params
+from gsac.stages.smplx.lm.swapped_sides import propose_by_faces, propose_swapped
+from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.state import Fit, to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, sightings_of, turning_person
 
 FRAMES, BACK = 16, np.isin(np.arange(16), range(6, 10))
+MADE_UP = np.isin(np.arange(16), (7, 8))
+"""Backs that the detector sees as fronts, with a front's depths."""
 
 
 @pytest.fixture(scope="module")
 def truth(body):
     return turning_person(body, FRAMES)
+
+
+def made_up_fronts(body: Body, truth: BodyParams, face: bool = True) -> Sightings:
+    """Sightings of a turn whose face is found where it shows, and two backs that are seen as fronts. face: whether it is at all."""
+    valid = (np.abs(yaw(rotation.exp(truth.global_orient.astype(float)))) < np.radians(45)) & face
+    seen = replace(sightings_of(body, truth), face={"valid": valid}).exchange_sides(MADE_UP)
+    seen.world[MADE_UP, :, 2] *= -1
+    return seen
+
+
+def fit(body: Body, truth: BodyParams, seen: Sightings) -> Fit:
+    with threadpool_limits(1, "blas"):
+        return fit_clip(body, seen, [], SmplxConfig(height_m=height_of(body, truth), silhouette=0), lambda *a: None)
+
+
+def test_fronts_that_the_detector_made_up_of_backs_are_exchanged_where_no_face_is_found(body, truth):
+    found = fit(body, truth, made_up_fronts(body, truth))
+    error = joint_error_mm(body, to_params(body, found.state, np.array([WIDTH / 2, HEIGHT / 2])), truth)
+    assert [note.frames for note in found.notes if note.code is Code.SIDES_EXCHANGED] == [[[7, 8]]]
+    assert error[MADE_UP].mean() < 60  # their depths are the front's, and do not count
+
+
+def test_fronts_between_backs_are_named_where_faces_do_not_tell(body, truth):
+    found = fit(body, truth, made_up_fronts(body, truth, face=False))
+    assert [note.frames for note in found.notes if note.code is Code.TURNED_OVER] == [[[7, 8]]]
+
+
+def test_a_front_between_backs_that_has_a_face_is_believed(body, truth):
+    order = np.arange(FRAMES)
+    order[[0, 8]] = 8, 0  # pictures out of order
+    other = replace(truth, global_orient=truth.global_orient[order], body_pose=truth.body_pose[order])
+    seen = replace(sightings_of(body, other), face={"valid": np.isin(order, (14, 15, 0, 1))})
+    assert not propose_by_faces(seen).any()
+    assert Code.TURNED_OVER not in [note.code for note in fit(body, truth, seen).notes]
+
+
+def test_a_face_that_is_missed_or_made_up_in_a_clean_turn_accuses_nobody(body, truth):
+    for t, valid in ((1, np.isin(np.arange(FRAMES), (0, 14, 15))), (8, np.isin(np.arange(FRAMES), (0, 1, 8, 14, 15)))):
+        seen = replace(sightings_of(body, truth), face={"valid": valid})
+        assert not propose_by_faces(seen).any(), t
 
 
 def test_exchanging_sides_twice_changes_nothing(body, truth):
