@@ -83,8 +83,8 @@ def list_arms(chain: Chain, state: State, side: int) -> np.ndarray:
 
 
 def meet(centre: np.ndarray, radius: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The two places (T, 3) m at a distance (T,) from centre (T, 3) on the line of sight through point (T, 3), the nearer one to it
-    first; where the line passes farther off, the place towards it."""
+    """The two places (T, 3) m at the distance radius (T,) from centre (T, 3) on the line of sight through point (T, 3), the nearer
+    one to it first; where the line passes farther off, the place towards it."""
     sight = point / np.linalg.norm(point, axis=-1, keepdims=True)
     along = (sight * centre).sum(-1)
     half = np.sqrt(np.maximum(radius**2 - (centre**2).sum(-1) + along**2, 0))

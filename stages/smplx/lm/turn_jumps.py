@@ -50,5 +50,5 @@ def find_turned_over(turns: np.ndarray, seconds: np.ndarray | None) -> np.ndarra
 
 
 def wrap(angle: np.ndarray) -> np.ndarray:
-    """Angles (...) rad between -pi and pi."""
+    """angle (...) rad, between -pi and pi."""
     return np.angle(np.exp(1j * angle))
