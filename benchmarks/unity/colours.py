@@ -118,10 +118,12 @@ class Stage:
         camera, g = shot.camera, self.avatar.gaussians
         flip = np.diag([1.0, -1, -1])
         views = [np.block([[flip, -flip @ place[:, None]], [np.zeros(3), 1]]) for place in self.places]
+        relative = self.programs.behind == BEHIND["HDRenderPipeline"]
         P, screen = projection(camera), [self.size, self.size, 0, 0]
         return {"unity_MatrixV": views[0].T, "glstate_matrix_projection": P.T,
                 "_ScreenParams": screen, "_ScaledScreenParams": screen,
-                "unity_StereoMatrixV": [view.T for view in views], "unity_StereoMatrixP": [P.T, P.T],
+                "unity_StereoMatrixV": [np.diag([1.0, -1, -1, 1]) if relative else view.T for view in views],
+                "unity_StereoMatrixP": [P.T, P.T], "_XRWorldSpaceCameraPos": np.column_stack([self.places, [0, 0]]),
                 "_ScreenSize": screen, "_WorldSpaceCameraPos": [0, 0, 0, 0], "GsacEyeView": views[eye].T,
                 "TestFog": [0, 0, 0, 0], "_InvViewProjMatrix": np.eye(4),
                 "GsacEyeProjection": projection(camera, flipped=True).T, "GsacEyeScreen": [self.size, self.size, 2, 1],
@@ -140,16 +142,16 @@ class Stage:
         for eye in range(self.eyes):
             self.own.draw(self.parameters(shot, 0, eye), parts=self.eyes, part=eye)
 
-    def lay(self, shot: Shot, background: float, known: bool, far: float = 1, eye: int = 0) -> np.ndarray:
+    def lay(self, shot: Shot, background: float, known: bool, far: float = 1, eye: int = 0, room: bool = False) -> np.ndarray:
         """Display values (size, size, 3) of the own picture laid over a background. far: depth of what stands in the scene.
 
-        Of a headset's copy of what lies behind, the other eye's slice is black.
+        Of a headset's copy of what lies behind, the other eye's slice is black; room: all of it is, where the real room is seen.
         """
         grey = float(to_linear(np.asarray(background)))
         side = self.size if known else 4
         slices = self.eyes if self.copy_kind == "texture-array" else 1
         copy, texels = self.gpu.texture(side, side, "rgba16float", slices), np.zeros((slices, side, side, 4), np.float16)
-        texels[min(eye, slices - 1)] = grey
+        texels[min(eye, slices - 1)] = (0, 0, 0, 0) if room else (grey, grey, grey, 1)
         self.gpu.device.queue.write_texture({"texture": copy}, texels, {
             "bytes_per_row": side * 8, "rows_per_image": side}, (side, side, slices))
         self.gpu.textures[self.programs.behind] = copy

@@ -174,6 +174,13 @@ def test_each_eye_of_a_headset_sees_its_trained_picture_at_40_db_in_a_linear_pro
     assert abs(pictures[0] - pictures[1]).max() > .3, "the eyes see different things"
 
 
+@pytest.mark.parametrize("headset", ["", "UniversalPipeline"], indirect=True)  # HDRP's copy has no alpha
+def test_before_the_real_room_a_headset_draws_edges_as_for_what_nobody_knows(headset, shot):
+    unknown, room = (headset.lay(shot, .75, known, eye=1, room=known) for known in (False, True))
+    np.testing.assert_array_equal(room, unknown)
+    assert abs(headset.lay(shot, .75, known=True, eye=1) - unknown).max() > .02
+
+
 def test_a_tinted_and_a_fading_person_look_as_without_a_picture_of_their_own(stage, shot, monkeypatch):
     usual = stage.parameters
     monkeypatch.setattr(stage, "parameters", lambda *of: usual(*of) | {"GsacTint": [.3, 1, .6, .5]})

@@ -1,4 +1,5 @@
 using UnityEngine;
+using UnityEngine.XR;
 
 namespace Gsac
 {
@@ -12,9 +13,15 @@ namespace Gsac
 
         public int Count { get; private set; }
 
+        /// <summary>px of what an eye is shown.</summary>
+        public int Width { get; private set; }
+        public int Height { get; private set; }
+
         public void Take(Camera camera)
         {
             Count = camera.stereoEnabled ? Most : 1;
+            Width = Count == Most ? XRSettings.eyeTextureWidth : camera.pixelWidth;
+            Height = Count == Most ? XRSettings.eyeTextureHeight : camera.pixelHeight;
             for (int e = 0; e < Count; e++)
             {
                 var eye = (Camera.StereoscopicEye)e;

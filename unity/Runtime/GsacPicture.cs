@@ -61,7 +61,7 @@ namespace Gsac
         public void Draw(Camera camera, Bounds bounds, MaterialPropertyBlock properties, GraphicsBuffer quads, int indexCount)
         {
             eyes.Take(camera);
-            float width = camera.pixelWidth, height = camera.pixelHeight;
+            float width = eyes.Width, height = eyes.Height;
             int wide = 0, high = 0;
             for (int e = 0; e < eyes.Count; e++)
             {

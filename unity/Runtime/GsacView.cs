@@ -190,7 +190,7 @@ namespace Gsac
             {
                 Matrix4x4 m = toEye[e];
                 float size = Mathf.Sqrt(m.m01 * m.m01 + m.m11 * m.m11 + m.m21 * m.m21);
-                float height = Math.Abs(eyes.Lenses[e].m11) * Camera.pixelHeight / 2 * size * Model.Extent.Stature;
+                float height = Math.Abs(eyes.Lenses[e].m11) * eyes.Height / 2 * size * Model.Extent.Stature;
                 largest = Math.Max(largest, IsFlat(eyes.Lenses[e]) ? height : height / Nearest);
             }
             return largest;

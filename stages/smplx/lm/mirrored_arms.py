@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.joints import INDEX
+from gsac.avatar.yaw import yaw
 from gsac.stages.smplx.jacobians import Chain
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, ROUGH_DEPTH, TRUSTED, WRIST, HiddenArms, bridge
 from gsac.stages.smplx.lm.problem import Problem
@@ -24,6 +25,8 @@ STEP_S = 0.3
 CALMER, APART = 2.0, 0.1
 """Of frames on end in which the cheapest sequence has another arm than the fit: by how much it must be cheaper than one that has
 the fit's arm there (on six clean arms 0.0), and m by which elbow or wrist must lie elsewhere in one of them."""
+TURNED = np.radians(30)
+"""Turn of the body in such frames and their neighbours, below which nothing tells the arms apart: each of them moves alike."""
 SPEED, QUICK = 0.3, 4.0
 """rad/s, spread of the speed of upper arm and forearm against the trunk, and its robust limit, in spreads: an arm rests or goes."""
 DEEP = 2.0
@@ -50,7 +53,7 @@ def find_mirrored(arms: HiddenArms, problem: Problem, state: State, missing: np.
         cost = weigh(arms, problem, state, chain, missing[:, side], places[some], side, some)
         cost[hidden[some], 1:] = np.inf
         away = np.linalg.norm(places[some, :, 1:] - places[some, :1, 1:], axis=-1).max(-1)
-        path = find_calmest(cost, measure_motion(chain, places[some], seconds, some), away)
+        path = find_calmest(cost, measure_motion(chain, places[some], seconds, some), away, yaw(state.local[some, 0]))
         picked = fill_between(path, some, len(missing))
         doubtful[:, side] = (picked > 0) & ~hidden
         for t in np.flatnonzero(doubtful[:, side]).tolist():
@@ -132,10 +135,11 @@ def fill_between(picked: np.ndarray, some: np.ndarray, frames: int) -> np.ndarra
     return np.where(before == after, before, 0)
 
 
-def find_calmest(cost: np.ndarray, motion: np.ndarray, away: np.ndarray) -> np.ndarray:
+def find_calmest(cost: np.ndarray, motion: np.ndarray, away: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """(N,) which arm of each frame the cheapest sequence takes (Viterbi 1967), the first where another is no clear gain.
 
-    cost: (N, K) of each arm; motion: (N - 1, K, K) of the ways between them; away: (N, K) m of each arm from the first.
+    cost: (N, K) of each arm; motion: (N - 1, K, K) of the ways between them; away: (N, K) m of each arm from the first; angle: (N,)
+    rad, the body's turn.
     """
     total, back = cost[0], []
     for own, ways in zip(cost[1:], motion, strict=True):
@@ -153,7 +157,8 @@ def find_calmest(cost: np.ndarray, motion: np.ndarray, away: np.ndarray) -> np.n
     for first, last in bridge(path > 0, 0):
         asis, run = path.copy(), at[first:last]
         asis[run] = 0
-        if cost_of(asis) - cost_of(path) < CALMER or away[run, path[run]].max() < APART:
+        turned = np.ptp(np.unwrap(angle)[max(first - 1, 0):last + 1])
+        if turned < TURNED or cost_of(asis) - cost_of(path) < CALMER or away[run, path[run]].max() < APART:
             path = asis
     return path
 

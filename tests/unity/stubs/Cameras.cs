@@ -77,6 +77,8 @@ namespace UnityEngine.XR
     public static class XRSettings
     {
         public enum StereoRenderingMode { MultiPass, SinglePass, SinglePassInstanced, SinglePassMultiview }
+        public static int eyeTextureWidth { get { return 1200; } }
+        public static int eyeTextureHeight { get; internal set; } = 1080;
         public static StereoRenderingMode stereoRenderingMode { get { return StereoRenderingMode.SinglePassInstanced; } }
     }
 }

@@ -148,7 +148,7 @@ namespace UnityEngine
             return camera;
         }
         public static void SetRect(Camera camera, float width, float height) { camera.rect = new Rect(0, 0, width, height); }
-        public static void SetPixelHeight(Camera camera, int height) { camera.pixelHeight = height; }
+        public static void SetPixelHeight(Camera camera, int height) { camera.pixelHeight = XR.XRSettings.eyeTextureHeight = height; }
         public static void SetEyes(Camera camera, float[] focal) { camera.EyeFocal = focal; }
         public static void SetField(Component on, string field, object value)
         {

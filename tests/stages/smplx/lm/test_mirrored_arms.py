@@ -89,6 +89,13 @@ def test_an_arm_that_keeps_still_is_no_doubt_however_the_body_turns(on_hip):
     assert not find_mirrored(arms, problem, truth, NONE)[0].any()
 
 
+def test_arms_of_who_does_not_turn_are_no_doubt_however_they_move(on_hip):
+    side, arms, problem, truth = on_hip
+    state = replace(truth, local=truth.local.copy())
+    state.local[:, 0] = truth.local[0, 0]
+    assert not find_mirrored(arms, problem, mirror(problem, state, side), NONE)[0].any()
+
+
 def test_a_quick_gesture_is_no_doubt(on_hip):
     side, arms, problem, truth = on_hip
     state = replace(truth, local=truth.local.copy())

@@ -66,29 +66,31 @@ GsacLaidVaryings Vertex(GsacInput input)
 // A copy of the scene has a slice for each eye where both are drawn at once.
 #if defined(UNITY_STEREO_INSTANCING_ENABLED) || defined(UNITY_STEREO_MULTIVIEW_ENABLED)
 #define GsacCopy Texture2DArray<float4>
-float3 GsacCopied(GsacCopy copy, float2 place, out float2 size)
+float4 GsacCopied(GsacCopy copy, float2 place, out float2 size)
 {
     float slices;
     copy.GetDimensions(size.x, size.y, slices);
-    return copy.Sample(GsacLinearClampSampler, float3(place, unity_StereoEyeIndex)).rgb;
+    return copy.Sample(GsacLinearClampSampler, float3(place, unity_StereoEyeIndex));
 }
 #else
 #define GsacCopy Texture2D<float4>
-float3 GsacCopied(GsacCopy copy, float2 place, out float2 size)
+float4 GsacCopied(GsacCopy copy, float2 place, out float2 size)
 {
     copy.GetDimensions(size.x, size.y);
-    return copy.Sample(GsacLinearClampSampler, place).rgb;
+    return copy.Sample(GsacLinearClampSampler, place);
 }
 #endif
 
-// behind: linear light of what lies there; size: px of the picture that it is from, a few where there is none.
-GsacLaidPixel GsacLay(GsacLaidVaryings input, float4x4 projection, float3 behind, float2 size)
+// behind: linear light of what lies there, and alpha; size: px of the picture that it is from, a few where there is none.
+GsacLaidPixel GsacLay(GsacLaidVaryings input, float4x4 projection, float4 behind, float2 size)
 {
     GsacFade(input.clip.xy);
     float4 trained = GsacTrained.Sample(GsacLinearClampSampler, input.place);
     clip(trained.a - GsacBlend.z);
     GsacLaidPixel pixel;
-    pixel.colour = GsacOver(trained, behind, size.x > GSAC_STAND_IN && GsacEyeScreen.w > 0.5);
+    // a headset shows the room where nothing was drawn, and nobody knows that
+    bool known = size.x > GSAC_STAND_IN && GsacEyeScreen.w > 0.5 && (behind.a > 0 || GsacParts == 1);
+    pixel.colour = GsacOver(trained, behind.rgb, known);
     float depth = GsacTrainedDepth.Sample(GsacLinearClampSampler, input.place) / trained.a;
     float4 place = GsacAhead(input.side, depth, projection);
     pixel.depth = saturate(place.z / place.w);

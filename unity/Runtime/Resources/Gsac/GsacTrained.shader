@@ -33,7 +33,7 @@ Shader "Gsac/Trained"
             {
                 UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input);
                 // after opaque things, sky and fog; in this frame's exposure, as all that is drawn here
-                float3 behind = LoadCameraColor((uint2)input.clip.xy, 0);
+                float4 behind = float4(LoadCameraColor((uint2)input.clip.xy, 0), 1);
                 return GsacLay(input, UNITY_MATRIX_P, behind, GsacBehindIsCopied ? _ScreenSize.xy : float2(0, 0));
             }
             ENDHLSL
@@ -70,7 +70,7 @@ Shader "Gsac/Trained"
             {
                 UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input);
                 float2 size;
-                float3 behind = GsacCopied(_CameraOpaqueTexture, input.clip.xy / _ScaledScreenParams.xy, size);
+                float4 behind = GsacCopied(_CameraOpaqueTexture, input.clip.xy / _ScaledScreenParams.xy, size);
                 return GsacLay(input, UNITY_MATRIX_P, behind, size);
             }
             ENDHLSL
@@ -106,7 +106,7 @@ Shader "Gsac/Trained"
             {
                 UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(input);
                 float2 size;
-                float3 behind = GsacCopied(GsacBehind, input.clip.xy / _ScreenParams.xy, size);
+                float4 behind = GsacCopied(GsacBehind, input.clip.xy / _ScreenParams.xy, size);
                 return GsacLay(input, UNITY_MATRIX_P, behind, size);
             }
             ENDHLSL

@@ -1,7 +1,12 @@
 // Stands for HDRP's file of this name in the tests: the view matrix lacks the camera's place, as there.
 #include "UnityCG.cginc"
 float4 _ScreenSize;
+#ifdef UNITY_STEREO_INSTANCING_ENABLED
+#define _WorldSpaceCameraPos _XRWorldSpaceCameraPos[unity_StereoEyeIndex]
+float4 _XRWorldSpaceCameraPos[2];
+#else
 float4 _WorldSpaceCameraPos;
+#endif
 float3 GetCameraRelativePositionWS(float3 place) { return place - _WorldSpaceCameraPos.xyz; }
 #ifdef MESH
 #define UNITY_MATRIX_UNJITTERED_VP _NonJitteredViewProjMatrix
