@@ -9,6 +9,7 @@ F frames, K poses, S places, N points of the surface; sides are 0 left, 1 right.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cache
 
@@ -46,6 +47,8 @@ LEFT, LEFT_SHARE, SAMPLES = 0.02, 0.008, 60
 square; places at most."""
 RADIUS = (0.048, 0.04, 0.05)
 """m, of upper arm, forearm and hand."""
+THIN, BARE = (0.0,) * 4, (0.035, 0.025, 0.035, 0.03)
+"""m about elbow, wrist, the forearm's middle and the knuckles that lie inside the mask: of middle lines alone, and of the skin."""
 OFF, SINKS, SUNK = 0.02, 0.02, 60.0
 """m off the surface at which middle lines of forearm and hand lie when they touch it; spread, and the most that a pose inside
 the body costs."""
@@ -92,10 +95,12 @@ class Around:
 class ArmPaths:
     """Paths of one arm through the frames of its own problem; all else keeps still."""
 
-    def __init__(self, alone: Problem, state: State, side: int, shown: np.ndarray, sure: np.ndarray, height: float):
+    def __init__(self, alone: Problem, state: State, side: int, shown: np.ndarray, sure: np.ndarray, height: float,
+                 bare: tuple[float, ...] = THIN):
         """alone: the arm's problem; shown: (F,) bool, of the hand; sure: (F,) bool, frames in which the arm is not doubtful;
-        height: px, of the person."""
+        height: px, of the person; bare: THIN or BARE."""
         self.alone, self.state, self.side, self.shown, self.sure, self.height = alone, state, side, shown, sure, height
+        self.bare = bare
         self.chain = alone.skeleton.pose(state.local, state.shape)
         self.hips = alone.locate_points(self.chain, state)[:, list(alone.hips), 2].mean(1)
         self.around = look_around(alone, state, side, height)
@@ -132,10 +137,11 @@ class ArmPaths:
         return np.stack([own[k] for own, k in zip(poses, reversed(picked), strict=True)])
 
     def cost(self, local: np.ndarray) -> float:
-        """Of the path of local, (F, J, 3, 3) joint rotations."""
-        poses = local[:, ARM_JOINTS[self.side, 1:]]
+        """Of the path of local, (F, J, 3, 3) joint rotations, whose collar bones may have moved too."""
+        poses, moved = local[:, ARM_JOINTS[self.side, 1:]], copy(self)
+        moved.chain = self.alone.skeleton.pose(local, self.state.shape)
         motion = sum(float(self.measure_motion(t, poses[t - 1], poses[t])) for t in range(1, len(poses)))
-        return motion + sum(float(self.weigh(t, pose[None])[0]) for t, pose in enumerate(poses))
+        return motion + sum(float(moved.weigh(t, pose[None])[0]) for t, pose in enumerate(poses))
 
     def measure_motion(self, t: int, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Cost (...) of the motion from frame t - 1 to t. before, after: (..., 3, 3, 3) rotations."""
@@ -169,9 +175,12 @@ class ArmPaths:
             out += robust(turns / SURE, RESTS)[0].sum(1)
         if seen.outlines and seen.outlines[t].area > 0:
             lower = x[:, 1:3]
-            at = [seen.outlines[t].at(alone.project(self.state, one))
-                  for one in (*lower.swapaxes(0, 1), lower.mean(1), x[:, 3])]
-            outside = np.stack([np.where(inside, distance, 0) for distance, _, inside in at], 1) / self.height
+            size = np.exp(self.state.log_focal) / x[:, 1, 2]
+            outside = []
+            for place, bare in zip((*lower.swapaxes(0, 1), lower.mean(1), x[:, 3]), self.bare, strict=True):
+                distance, _, judged = seen.outlines[t].at(alone.project(self.state, place))
+                outside.append(np.where(judged, distance + size * bare, 0))
+            outside = np.stack(outside, 1) / self.height
             out += INSIDE_SIGHTINGS * robust(np.maximum(outside - SLACK, 0) / SPREAD, BESIDE)[0].mean(1)
         return out
 

@@ -18,7 +18,7 @@ from gsac.avatar.joints import INDEX
 from gsac.avatar.yaw import yaw
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.smplx.jacobians import Chain
-from gsac.stages.smplx.lm.arm_paths import ArmPaths
+from gsac.stages.smplx.lm.arm_paths import BARE, THIN, ArmPaths
 from gsac.stages.smplx.lm.hidden_arms import (
     ARM_JOINTS,
     BEHIND_SPREAD,
@@ -53,6 +53,8 @@ MOVED, LOST = 0.11, 0.03
 that nothing tells. Hanging arms move by 83 mm in turns of 20 frames, hands that went to the hips or the back by 138 on."""
 DEEP = 0.03
 """m inside the trunk from which on a hand would not be seen."""
+BETWEEN = 4
+"""Frames between a mirrored arm and a hidden one that are no surer than these."""
 STEPS = 8
 """Steps from the cheapest path on."""
 CLEARLY = 20.0
@@ -140,7 +142,23 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     state = unmirror(arms, problem, state, mirrored, calm, missing)
     wrong = find_contradicted(arms, problem, state, missing)
     doubtful = wrong | find_untold(arms, problem, state, missing)
-    return move(arms, problem, state, doubtful, missing), doubtful | mirrored
+    state = move(arms, problem, state, doubtful, missing)
+    return move(arms, problem, state, with_stays(arms, mirrored), missing, BARE), doubtful | mirrored
+
+
+def with_stays(arms: HiddenArms, mirrored: np.ndarray) -> np.ndarray:
+    """(T, 2) bool, stays that were searched from mirrored arms, with those and the frames between: where the hand hides is told by
+    the frames that were mirrored. mirrored: (T, 2) bool.
+    """
+    out = np.zeros_like(mirrored)
+    for stay in arms.stays:
+        if mirrored[stay.around, stay.side].any():
+            out[stay.around, stay.side] |= mirrored[stay.around, stay.side]
+            out[stay.first:stay.last, stay.side] = True
+    for side in (0, 1):
+        for first, last in bridge(out[:, side], BETWEEN):
+            out[first:last, side] = True
+    return out
 
 
 def unmirror(arms: HiddenArms, problem: Problem, state: State, mirrored: np.ndarray, calm: np.ndarray,
@@ -178,15 +196,16 @@ def hold_depth(alone: Problem, state: State, side: int, frames: np.ndarray) -> N
     alone.seen.depth_spread[at] = BEHIND_SPREAD
 
 
-def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray, missing: np.ndarray) -> State:
+def move(arms: HiddenArms, problem: Problem, state: State, doubtful: np.ndarray, missing: np.ndarray,
+         bare: tuple[float, ...] = THIN) -> State:
     """The state with arms in poses that explain points and mask clearly better, where there are any.
 
-    doubtful: (T, 2) bool, those arms; missing: (T, 2) bool, hands that were not detected.
+    doubtful: (T, 2) bool, those arms; missing: (T, 2) bool, hands that were not detected; bare: of `ArmPaths`.
     """
     settled = replace(state, local=state.local.copy())
     for stay in list_windows(problem, doubtful):
         shown = ~missing[stay.around, stay.side]
-        settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, stay.side])
+        settled.local[stay.around] = search(arms, problem, settled, stay, shown, shown & ~doubtful[stay.around, stay.side], bare)
     return settled
 
 
@@ -208,14 +227,15 @@ def list_windows(problem: Problem, doubtful: np.ndarray) -> list[Stay]:
     return out
 
 
-def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, sure: np.ndarray) -> np.ndarray:
+def search(arms: HiddenArms, problem: Problem, state: State, stay: Stay, shown: np.ndarray, sure: np.ndarray,
+           bare: tuple[float, ...]) -> np.ndarray:
     """Joint rotations (F, J, 3, 3) of the stay's frames: as they are unless others are clearly better.
 
-    shown: (F,) bool, of the hand; sure: (F,) bool, frames in which the arm is not doubtful.
+    shown: (F,) bool, of the hand; sure: (F,) bool, frames in which the arm is not doubtful; bare: of `ArmPaths`.
     """
     alone, asis = isolate_arm(problem, stay), isolate_state(state, stay, state.local[stay.around])
     hold(arms.cut(stay), alone, asis, stay.side, shown)
-    paths = ArmPaths(alone, asis, stay.side, shown, sure, arms.height)
+    paths = ArmPaths(alone, asis, stay.side, shown, sure, arms.height, bare)
     path = isolate_state(state, stay, paths.find([asis.local]))
     bent = bend_arm(alone, path, STEPS)
     best = bent if paths.cost(bent.local) < paths.cost(path.local) + CLEARLY else path

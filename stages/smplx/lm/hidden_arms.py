@@ -52,8 +52,9 @@ BRIDGED = 2
 """Frames between two stays that belong to them."""
 AROUND_S = 1.2
 """Seconds before and after in which the arm is searched again too: it comes and goes."""
-QUICK, FREE = 4.0, 2.0
-"""Factors there on the spreads of the arm's speed and acceleration, and of its pose."""
+QUICK, STILL, FREE = 4.0, 0.15, 2.0
+"""Factors on the spreads of the arm's speed and acceleration there, and while the hand is out of sight, where it rests; and on that
+of its pose."""
 ROUGH_DEPTH = 0.2
 """m, spread of the detector's depths of the arm there: it mistakes a hand behind the back for one before the belly."""
 GUESSED = 0.03
@@ -80,6 +81,11 @@ class Stay:
     def around(self) -> slice:
         """The frames that are searched again."""
         return slice(self.start, self.stop)
+
+    @property
+    def resting(self) -> slice:
+        """The frames out of sight but the first and the last, to and from which the arm goes."""
+        return slice(self.first + 1, self.last - 1)
 
 
 @dataclass
@@ -159,6 +165,8 @@ class HiddenArms:
             found = [self.fit_arm(problem, state, stay, start) for start in self.list_starts(state, stay)]
             cost, local = min(found, key=lambda entry: entry[0])
             state.local[stay.around] = local
+        for stay in self.stays:
+            problem.loose[stay.resting, np.isin(problem.active, ARM_JOINTS[stay.side])] = STILL
         return state
 
     def list_starts(self, state: State, stay: Stay) -> list[np.ndarray]:
@@ -183,6 +191,7 @@ class HiddenArms:
         start: (F, J, 3, 3) joint rotations.
         """
         alone = isolate_arm(problem, stay)
+        alone.loose[slice(stay.resting.start - stay.start, stay.resting.stop - stay.start)] = STILL
         hidden, trial = replace(self, stays=[stay]).cut(stay), isolate_state(state, stay, start)
         for _ in range(2):
             hidden.hold(alone, trial)
