@@ -61,6 +61,9 @@ GUESSED = 0.03
 """Spread, as a share of the person's height, that is added to elbow and wrist of a hidden hand: networks make them up."""
 FAR_OFF = 5.0
 """Factor on the robust limit in the search."""
+RESTLESS = 1.25
+"""Factor on the cost of a search from which on resting costs too much: 1.18 at most with a hand on the back, 1.32 with one that
+talks."""
 STEPS = 12
 """Steps of each search, at most."""
 SIGMA = {"elbow": 0.05, "wrist": 0.1}
@@ -76,6 +79,8 @@ class Stay:
     last: int
     start: int
     stop: int
+    rests: bool = True
+    """Whether the arm rests while the hand is out of sight."""
 
     @property
     def around(self) -> slice:
@@ -162,11 +167,14 @@ class HiddenArms:
                 problem.seen.spread[frames, point] = np.hypot(problem.seen.spread[frames, point], guessed * self.height)
             problem.loose[stay.around, np.isin(problem.active, arm)] = QUICK
             problem.spread[stay.around, np.isin(problem.active, arm)] *= FREE
-            found = [self.fit_arm(problem, state, stay, start) for start in self.list_starts(state, stay)]
-            cost, local = min(found, key=lambda entry: entry[0])
-            state.local[stay.around] = local
+            starts = self.list_starts(state, stay)
+            resting, moving = (min((self.fit_arm(problem, state, stay, start, speed) for start in starts), key=lambda fit: fit[0])
+                               for speed in (STILL, QUICK))
+            stay.rests = resting[0] < RESTLESS * moving[0]
+            state.local[stay.around] = (resting if stay.rests else moving)[1]
         for stay in self.stays:
-            problem.loose[stay.resting, np.isin(problem.active, ARM_JOINTS[stay.side])] = STILL
+            if stay.rests:
+                problem.loose[stay.resting, np.isin(problem.active, ARM_JOINTS[stay.side])] = STILL
         return state
 
     def list_starts(self, state: State, stay: Stay) -> list[np.ndarray]:
@@ -185,13 +193,13 @@ class HiddenArms:
                 out.append(start)
         return out
 
-    def fit_arm(self, problem: Problem, state: State, stay: Stay, start: np.ndarray) -> tuple[float, np.ndarray]:
+    def fit_arm(self, problem: Problem, state: State, stay: Stay, start: np.ndarray, speed: float) -> tuple[float, np.ndarray]:
         """Cost and joint rotations (F, J, 3, 3) of the stay's frames after a search in which only this arm moves.
 
-        start: (F, J, 3, 3) joint rotations.
+        start: (F, J, 3, 3) joint rotations; speed: factor on the spreads of its motion while the hand is out of sight.
         """
         alone = isolate_arm(problem, stay)
-        alone.loose[slice(stay.resting.start - stay.start, stay.resting.stop - stay.start)] = STILL
+        alone.loose[slice(stay.resting.start - stay.start, stay.resting.stop - stay.start)] = speed
         hidden, trial = replace(self, stays=[stay]).cut(stay), isolate_state(state, stay, start)
         for _ in range(2):
             hidden.hold(alone, trial)

@@ -12,7 +12,7 @@ from gsac.avatar import rotation
 from gsac.avatar.joints import INDEX
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.lm.arm_paths import ArmPaths, list_poses
+from gsac.stages.smplx.lm.arm_paths import BARE, THIN, ArmPaths, list_poses
 from gsac.stages.smplx.lm.fit import move_contradicted, set_up
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, HAND, HIDES, WRIST, HiddenArms, Stay, hiding_pose, isolate_arm
 from gsac.stages.smplx.lm.problem import Problem
@@ -105,6 +105,16 @@ def test_an_elbow_whose_points_are_missing_lies_where_the_mask_shows_a_limb(arm_
     true, before, after = (problem.project(truth, x)[BENT] for x in place)
     assert np.linalg.norm(before - true, axis=1).min() > 0.08 * arms.height
     assert np.linalg.norm(after - true, axis=1).max() < 0.03 * arms.height
+
+
+def test_skin_outside_the_mask_costs_where_middle_lines_inside_do_not(arm_aside):
+    arms, problem, truth = arm_aside
+    stay, t = Stay(0, BENT[0], BENT[-1] + 1, 0, FRAMES), BENT[2]
+    lines, skin = (ArmPaths(isolate_arm(blind(problem), stay), truth, 0, ALL, ~ALL, arms.height, bare) for bare in (THIN, BARE))
+    poses = np.repeat(truth.local[t, ARM_JOINTS[0, 1:]][None], 2, 0)
+    poses[1, 0] = rotation.exp(np.radians([0, 0, 9.0])) @ poses[1, 0]  # raised by half of its width
+    of_lines, of_skin = (np.diff(paths.weigh_alone(t, poses)) for paths in (lines, skin))
+    assert of_lines < 1 and of_skin > of_lines + 2
 
 
 def test_a_hand_that_is_not_seen_is_hidden_by_the_body_and_touches_it(hand_on_belly):

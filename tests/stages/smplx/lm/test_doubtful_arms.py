@@ -15,7 +15,7 @@ from gsac.avatar.wholebody import INDEX as POINT
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, find_untold, settle_doubtful
+from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, find_untold, settle_doubtful, with_stays
 from gsac.stages.smplx.lm.fit import fit_points, set_up
 from gsac.stages.smplx.lm.hidden_arms import HIDES, HiddenArms, Stay, describe_arms, hiding_pose, widen_arm
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
@@ -64,6 +64,15 @@ def test_a_hand_that_is_said_to_be_hidden_is_not_said_to_be_doubtful_too(fitted)
     missing[3:12, 1] = True
     told = HiddenArms(arms.trunk, arms.forearm, arms.height, [Stay(1, 3, 12, 0, FRAMES)])
     assert not find_untold(told, problem, state, missing).any()
+
+
+def test_a_stay_that_was_searched_from_a_mirrored_arm_is_searched_again_with_it(fitted):
+    arms = HiddenArms(fitted[0].trunk, fitted[0].forearm, fitted[0].height, [Stay(1, 8, 11, 4, 13), Stay(0, 8, 11, 4, 13)])
+    mirrored = np.zeros((FRAMES, 2), bool)
+    mirrored[[0, 5, 6], 1] = mirrored[[1, 2], 0] = True
+    again = with_stays(arms, mirrored)
+    assert np.flatnonzero(again[:, 1]).tolist() == [5, 6, 7, 8, 9, 10]  # with the frame between
+    assert not again[:, 0].any()
 
 
 def test_a_wrist_seen_elsewhere_for_some_frames_makes_its_arm_doubtful(fitted):

@@ -15,8 +15,9 @@ from gsac.avatar.wholebody import LEFT_HAND
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
+from gsac.stages.smplx.lm import hidden_arms
 from gsac.stages.smplx.lm.fit import fit_clip, fit_points, set_up
-from gsac.stages.smplx.lm.hidden_arms import HiddenArms, bridge
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, QUICK, STILL, HiddenArms, bridge
 from gsac.stages.smplx.silhouette import read_outline
 from gsac.stages.smplx.state import to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
@@ -105,6 +106,24 @@ def test_a_frame_without_a_mask_does_not_break_the_search(body, tmp_path):
     arms = HiddenArms.of(body, seen.person_height)
     arms.find(problem, state, missing)
     assert arms.stays and np.isfinite(arms.search(problem, state).local).all()
+
+
+@pytest.mark.parametrize("restless, factor", [(np.inf, STILL), (0.0, QUICK)])
+def test_an_arm_whose_hand_is_out_of_sight_rests_unless_that_costs_too_much(body, tmp_path, monkeypatch, restless, factor):
+    monkeypatch.setattr(hidden_arms, "RESTLESS", restless)
+    truth = hide_left_hand(turning_person(body, FRAMES))
+    seen = misread_left_arm(sightings_of(body, truth))
+    problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
+    missing = np.zeros((FRAMES, 2), bool)
+    missing[HIDDEN, 0] = True
+    arms = HiddenArms.of(body, seen.person_height)
+    arms.find(problem, state, missing)
+    arms.search(problem, state)
+    (stay,) = arms.stays
+    left, right = (np.isin(problem.active, joints) for joints in ARM_JOINTS)
+    assert stay.rests == (factor == STILL) and (stay.resting.start, stay.resting.stop) == (stay.first + 1, stay.last - 1)
+    assert (problem.loose[stay.resting, left] == factor).all() and (problem.loose[:, right] == 1).all()
+    assert (problem.loose[[stay.first, stay.last - 1, stay.last]][:, left] == QUICK).all()
 
 
 def misread_left_arm(seen):
