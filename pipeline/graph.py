@@ -142,7 +142,15 @@ def parse_yaml(text: str, source: str) -> Any:
     except BadInput:
         raise
     except Exception as e:  # beside its own errors yaml raises what Python does of an odd number or date
+        if isinstance(e, yaml.MarkedYAMLError) and "nesting depth" in str(e):  # its own bound, which it meets by looking ahead
+            mark = e.problem_mark or e.context_mark
+            raise too_deep(f"{source}: line {mark.line + 1}" if mark else source) from e
         raise BadInput(f"{source}: not valid YAML ({' '.join(str(e).split()) or type(e).__name__})") from e
+
+
+def too_deep(where: str) -> BadInput:
+    """The error of a text with more levels than are read. where: file and line."""
+    return BadInput(f"{where}: it is more than {MOST_DEPTH} levels deep, which is the most that is read")
 
 
 def _check_bounds(text: str, loader: Any, source: str) -> None:
@@ -169,7 +177,7 @@ def _check_bounds(text: str, loader: Any, source: str) -> None:
             says += 1
         where = f"{source}: line {event.start_mark.line + 1}"
         if len(opened) > MOST_DEPTH:
-            raise BadInput(f"{where}: it is more than {MOST_DEPTH} levels deep, which is the most that is read")
+            raise too_deep(where)
         if says > MOST_CHARACTERS:
             raise BadInput(f"{where}: with its aliases written out it has more than {MOST_CHARACTERS} characters, which is the "
                            "most that is read")
