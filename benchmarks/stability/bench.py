@@ -54,6 +54,7 @@ def main(argv: list[str] | None = None) -> int:
     options = parser().parse_args(argv)
     from gsac.benchmarks.stability import chart, table
     from gsac.benchmarks.stability.outcome import draw_curves, find_outcomes
+    from gsac.benchmarks.stability.pairs import describe_pairs, find_pairs
     from gsac.benchmarks.stability.trial import hash_results
     from gsac.pipeline.journal import plain_journal
 
@@ -66,16 +67,17 @@ def main(argv: list[str] | None = None) -> int:
     if options.dry_run:
         return 0
     measure(options, tasks, lines, say)
-    outcomes = find_outcomes(t for t in table.read_lines(lines) if t.code == hash_results(options.until))
-    curves = draw_curves(outcomes)
+    trials = [t for t in table.read_lines(lines) if t.code == hash_results(options.until)]
+    outcomes = find_outcomes(trials)
+    curves, compared = draw_curves(outcomes), describe_pairs(find_pairs(trials))
     if not curves:
         say.note("no trial with a fault was finished")
         return 0
     table.write_csv(outcomes, options.out / "stability.csv")
-    words = table.text(curves)
+    words = table.text(curves, compared)
     print(words)
     (options.out / "stability.txt").write_text(words + "\n")
-    (options.out / "stability.md").write_text(table.markdown(curves))
+    (options.out / "stability.md").write_text(table.markdown(curves, compared))
     chart.draw(curves, options.out)
     return 0
 

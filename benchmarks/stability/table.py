@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -19,37 +20,30 @@ SHEET = ("clip", "fault", "severity", "seed", "method", "end", "retained", "fail
 """Columns of the CSV."""
 
 
-def text(curves: list[Curve]) -> str:
-    """A row for each fault and method, the worst first, then each method's sum."""
+def text(curves: list[Curve], compared: Iterable[str] = ()) -> str:
+    """A row for each fault and method, the worst first, then each method's sum and the sentences that compare them."""
     table = [HEAD, *(_row(c) for c in sorted(curves, key=lambda c: (c.area, c.fault, c.method)))]
     widths = [max(len(row[c]) for row in table) for c in range(len(HEAD))]
     lines = ["  ".join(cell.ljust(w) if c < 2 else cell.rjust(w) for c, (cell, w) in enumerate(zip(row, widths, strict=True)))
              for row in table]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], "", *sum_up(curves)])
+    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:], "", *sum_up(curves), *compared])
 
 
 def sum_up(curves: list[Curve]) -> list[str]:
-    """A sentence for each method, and one that compares them on the faults that both have."""
-    out, areas = [], {}
+    """A sentence for each method."""
+    out = []
     for method in dict.fromkeys(c.method for c in curves):
         some = [c for c in curves if c.method == method]
         worst = min(some, key=lambda c: c.area)
-        areas[method] = {c.fault: c.area for c in some}
         trials, silent, crashed, refused, checked, foretold = np.sum(
             [(c.trials, c.silent, c.crashed, c.refused, c.checked, c.foretold) for c in some], axis=0)
         out.append(f"{method}: area under the curve, median fault {np.median([c.area for c in some]):.2f}, worst {worst.area:.2f} "
                    f"({worst.fault}); of {trials} trials {silent} failed silently, {crashed} crashed or hung, {refused} ended with "
                    f"a sentence; gsac check agrees on {foretold} of {checked} clips")
-    if len(areas) == 2:
-        (first, ours), (second, theirs) = areas.items()
-        more = [ours[fault] - theirs[fault] for fault in ours if fault in theirs]
-        if more:
-            out.append(f"{first} less {second}, {len(more)} faults that both have: median {np.median(more):+.2f}, least "
-                       f"{min(more):+.2f}")
     return out
 
 
-def markdown(curves: list[Curve]) -> str:
+def markdown(curves: list[Curve], compared: Iterable[str] = ()) -> str:
     """The table of docs/lab/stability.md: a row for each fault, the worst first, three columns for each method; then the sums."""
     methods = list(dict.fromkeys(c.method for c in curves))
     by_fault: dict[str, dict[str, Curve]] = {}
@@ -58,7 +52,7 @@ def markdown(curves: list[Curve]) -> str:
     lines = [f"| fault | {' | '.join(f'{m}: area | breaks at | silent' for m in methods)} |",
              "| --- " * (1 + 3 * len(methods)) + "|"]
     lines += [f"| {fault} | {' | '.join(_brief(own.get(m)) for m in methods)} |" for fault, own in by_fault.items()]
-    return "\n".join([*lines, "", *(f"- {sentence}" for sentence in sum_up(curves))]) + "\n"
+    return "\n".join([*lines, "", *(f"- {sentence}" for sentence in (*sum_up(curves), *compared))]) + "\n"
 
 
 def write_csv(outcomes: list[Outcome], path: Path) -> None:

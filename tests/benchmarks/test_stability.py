@@ -9,7 +9,7 @@ import pytest
 
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_frame
 from gsac.benchmarks.fit.truth import Truth
-from gsac.benchmarks.stability import bench, chart, outcome, stages, table, trial, workers
+from gsac.benchmarks.stability import bench, chart, outcome, pairs, stages, table, trial, workers
 from gsac.benchmarks.stability.code import hash_code
 from gsac.benchmarks.stability.fault import Origin
 from gsac.benchmarks.stability.faults import FAULTS, QUICK
@@ -251,11 +251,21 @@ def test_the_area_runs_straight_between_severities_and_the_breakdown_is_the_firs
     assert curves["blur", PAPER].retained[1] == pytest.approx(0.9) and curves["blur", PAPER].breakdown == 5, "over twice the error"
 
 
+def test_both_methods_are_compared_on_the_same_input_by_their_own_clean_clips_and_by_the_better_one():
+    trials = [one(mm=15.0), one(method=PAPER, mm=65.0), one("pole", 3, mm=65.0), one("pole", 3, PAPER, mm=65.0),
+              one("blur", 3, mm=15.0)]
+    pair, = pairs.find_pairs(trials)
+    assert (pair.fault, pair.by_own, pair.by_one) == ("pole", pytest.approx(-0.25), pytest.approx(0.0))
+    own, shared = pairs.describe_pairs([pair])
+    assert "behind by over 0.02 in 1" in own and "behind by over 0.02 in 0" in shared
+    assert pairs.find_pairs(trials[1:]) == [] and pairs.describe_pairs([]) == []
+
+
 def test_table_csv_and_chart_hold_every_fault(tmp_path):
     outcomes = outcome.find_outcomes(TRIALS)
     curves = outcome.draw_curves(outcomes)
-    words = table.text(curves)
-    assert words.splitlines()[2].startswith("pole   paper") and "default less paper, 2 faults that both have" in words
+    words = table.text(curves, ["default less paper"])
+    assert words.splitlines()[2].startswith("pole   paper") and words.splitlines()[-1] == "default less paper"
     assert "| pole | 0.55 | 3 | 1 of 2 | 0.30 | 3 | 1 of 1 |" in table.markdown(curves).splitlines()
     table.write_csv(outcomes, tmp_path / "stability.csv")
     rows = list(csv.DictReader((tmp_path / "stability.csv").read_text().splitlines()))
