@@ -4,8 +4,10 @@ One gaussian a face, random colours, opacity fixed, four frames a step, densific
 with jaw and expression, and betas learned; losses, neighbours, Adam and growth as in the published code, of which the text of the
 paper differs (`train.paper_text`). Only the box of a square frame that can show the person is computed. Known departures:
 
-- gaussians are drawn by our rule (avatar/draw_rule.py): alpha up to 0.999, in the published rasteriser 0.99; gradients are exact,
-  that one's gradient through alpha, which Dice alone has a part in, is not;
+- gaussians are drawn by our rule (avatar/draw_rule.py): alpha up to 0.999, in the published rasteriser 0.99, and as far as it
+  reaches, there three deviations;
+- gradients are exact; where the background shows through, those of the published rasteriser are not: it takes the background's red
+  for green and blue, and has a slope of its own by alpha, which Dice alone has a part in (benchmarks/gpu/published/splats.py);
 - the body has our number of betas, expressions and joints' correctives, and poses come from our own fit;
 - masks are soft; images have the size of `train.height`, the published ones are 1080 px wide;
 - the colours that are handed out are clipped to 0..1.

@@ -14,11 +14,11 @@ from gsac.avatar import binding, light, skinning
 from gsac.avatar.camera import Camera
 from gsac.avatar.draw_rule import ADDED, BRIGHTEST, DARKEST, PIXEL, cuda_constants
 from gsac.avatar.raster import render, render_backward
+from gsac.benchmarks.gpu.published import formulas as haha
 from gsac.stages.train.gaussians import kernels
 from gsac.stages.train.paper.densify import LARGEST
 from gsac.stages.train.paper.knn import K, posed_quats, through_quats
 from gsac.stages.train.paper.losses import window_begin
-from support import haha
 
 HERE = Path(__file__).parent
 SOURCES = Path(binding.__file__).parent / "cuda"

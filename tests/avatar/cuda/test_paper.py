@@ -117,7 +117,7 @@ def test_loss_and_gradient_of_the_images_are_the_published_ones(trainers, text):
     """Of the images as this GPU drew them."""
     import torch
 
-    from support import haha
+    from gsac.benchmarks.gpu.published import formulas as haha
 
     cuda, cpu, _, views = trainers(4, 4, paper_text=text)
     cuda.poison()
@@ -187,7 +187,7 @@ def test_lpips_of_a_window_of_every_frame_is_in_loss_and_gradient(trainers):
 def test_value_and_gradient_of_the_neighbour_term_are_the_published_ones(trainers):
     import torch
 
-    from support import haha
+    from gsac.benchmarks.gpu.published import formulas as haha
 
     cuda, cpu, _, _ = trainers(2, 4)
     start = {name: value.copy() for name, value in cuda.values().items()}

@@ -1,4 +1,4 @@
-"""Recipe `paper` against plain torch transcriptions of the published formulas (tests/support/haha.py), and its loop."""
+"""Recipe `paper` against plain torch transcriptions of the published formulas (benchmarks/gpu/published), and its loop."""
 
 import json
 from types import SimpleNamespace
@@ -15,6 +15,7 @@ from gsac.avatar.draw_rule import MAX_ALPHA
 from gsac.avatar.lpips import NETS, shapes
 from gsac.avatar.raster import render, render_backward, screen_gradients
 from gsac.avatar.threads import Workspace
+from gsac.benchmarks.gpu.published import formulas as haha
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.gaussians import kernels
 from gsac.stages.train.paper import batches, densify, knn, losses, square, trainer
@@ -25,7 +26,6 @@ from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.stage import run
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
-from support import haha
 from support.vgg_hed import write_hed
 
 SIDE = 60
@@ -206,7 +206,11 @@ def test_an_event_takes_the_gaussians_that_the_published_rule_takes():
     for step, images, seen in zip(steps, gradients, radii, strict=True):
         for gradient, radius in zip(images, seen, strict=True):
             densifier.note(step, gradient, radius > 0)
-    expected = haha.selected(torch.tensor(gradients), torch.tensor(radii), steps).numpy()
+    total, times = torch.zeros(2, 300, dtype=torch.float64)
+    for step, images, seen in zip(steps, torch.tensor(gradients), torch.tensor(radii), strict=True):
+        if haha.counts(step):
+            haha.note(total, times, images, seen)
+    expected = haha.selected(total, times).numpy()
     assert 20 < expected.sum() < 280
     np.testing.assert_array_equal(densifier.choose(), np.flatnonzero(expected))
 
@@ -221,13 +225,12 @@ def test_clones_and_halves_have_the_published_places_and_sizes():
     assert 3 < splits.sum() < 22
     samples = np.random.default_rng(7).normal(size=(2, splits.sum(), 3))
     parents, new = make_children(values, chosen, np.random.default_rng(7))
-    mu, logits = haha.grown(torch.tensor(before["mu"]), torch.tensor(before["scale_logit"]),
-                            torch.tensor(np.isin(np.arange(40), chosen)), torch.tensor(samples))
-    np.testing.assert_allclose(np.concatenate([values["mu"], new["mu"]]), mu, atol=1e-7)
-    np.testing.assert_allclose(np.concatenate([values["scale_logit"], new["scale_logit"]]), logits, atol=1e-6)
-    for name in ("quat", "rgb"):
-        np.testing.assert_array_equal(values[name], before[name])
-        np.testing.assert_array_equal(new[name], before[name][parents])
+    theirs = {name: torch.tensor(value) for name, value in before.items()}
+    clone, split, rows = haha.grow(theirs, torch.tensor(np.isin(np.arange(40), chosen)), torch.tensor(samples))
+    np.testing.assert_array_equal(parents, torch.cat([clone, split]))
+    for name in values:
+        np.testing.assert_allclose(values[name], theirs[name], atol=1e-6)
+        np.testing.assert_allclose(new[name], rows[name], atol=1e-6)
 
 
 class Grown:
