@@ -12,7 +12,7 @@ import numpy as np
 
 from gsac.stages.split.probe import Video
 
-NEAR = 0.25
+NEAR = 0.15
 """How far a frame may lie from its place in time for a shorter chain, as a share of the time between kept frames."""
 
 

@@ -87,18 +87,10 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
             return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"),
                         lambda pictures: looks.extend(map(look_at, _read_pictures(pictures, *small))), needed)
 
-        if chains is not None:
-            with contextlib.suppress(StageError):  # programs older than 7.1 leave nothing out
-                written = decode(chains.needed(picks))
-                if len(written[0]) == len(picks) and not written[2]:
-                    return written
-            remove_frames(frames)
-        return decode(None)
+        return decode(None) if chains is None else decode_needed(decode, chains, picks, frames)
 
     def write_scene(scene: Scene) -> WrittenScene:
-        picks = scene.first + pick_by_time(times[scene.first:scene.last + 1], config.fps, config.count)
-        if chains is not None:
-            picks = chains.move_picks(picks, times)
+        picks = pick_frames(times, scene, config, chains)
         own_keys = video.key_ticks[np.isin(video.key_ticks, video.ticks[scene.first:scene.last + 1])]
         return picks, *write_about_person(path, replace(video, key_ticks=own_keys), frames, config, people, partial(write, picks))
 
@@ -203,6 +195,25 @@ def write_about_person(path: Path, video: Video, frames: Path, config: SplitConf
     return None, write(None)
 
 
+def pick_frames(times: np.ndarray, scene: Scene, config: SplitConfig, chains: Chains | None) -> np.ndarray:
+    """The frames of a scene that are kept, (K,). times: (N,) s, of the video's frames; chains: theirs, where it has to be quick."""
+    picks = scene.first + pick_by_time(times[scene.first:scene.last + 1], config.fps, config.count)
+    return picks if chains is None else chains.move_picks(picks, times)
+
+
+def decode_needed(decode: Callable[[np.ndarray | None], Written], chains: Chains, picks: np.ndarray, frames: Path) -> Written:
+    """Writes the frames `picks` (K,) by what they need alone; by all of the video where that fails or something seems damaged.
+
+    decode: writes them, by what is needed, (N,) bool, or None for all.
+    """
+    with contextlib.suppress(StageError):  # programs older than 7.1 cannot
+        written = decode(chains.needed(picks))
+        if len(written[0]) == len(picks) and not written[2]:
+            return written
+    remove_frames(frames)
+    return decode(None)
+
+
 def remove_frames(folder: Path) -> None:
     """Makes room for other ones."""
     for frame in frame_paths(folder):
@@ -261,8 +272,10 @@ def _picture_filters(video: Video, crop: Crop | None, width: int, height: int) -
 
 def _run(path: Path, video: Video, output: list[str], folder: Path | None, on_frame: Callable[[int], None] = lambda done: None,
          read: Callable[[IO[bytes]], None] = lambda pictures: None, needed: np.ndarray | None = None) -> Written:
-    """Runs ffmpeg. read: reads what it writes to its output, to the end; needed: (N,) bool, frames to decode, None: all. Returns the
-    ticks of the frames that passed `showinfo`, their time base, and its error lines."""
+    """Runs ffmpeg. read: reads what it writes to its output, to the end; needed: (N,) bool, frames to decode, None: all.
+
+    Returns the ticks of the frames that passed `showinfo`, their time base, and its error lines.
+    """
     decoder = ["-c:v", video.decoder] if video.decoder else []
     limits = [word for name, value in LIMITS.items() for word in (f"-{name}", value)]
     left_out = _leave_out(video.sent, needed) if needed is not None else []

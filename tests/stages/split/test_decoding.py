@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame
@@ -60,7 +60,7 @@ def test_what_is_not_decoded_changes_no_frame(tmp_path, decoded, kind):
     clip = make_clip(tmp_path / "clip.mp4", *ENCODERS[kind])
     times, frames, said = split(clip, tmp_path / "quick", quick=True, count=7)
     _, every, _ = split(clip, tmp_path / "all", count=None)
-    assert said == [] and 0 < decoded[0] < 0.6 * 120
+    assert said == [] and 0 < decoded[0] < 0.75 * 120
     assert np.array_equal(frames, every[np.round(times * 30).astype(int)])
 
 
@@ -95,6 +95,7 @@ def phone(frames: int, every: int) -> Chains:
     return Chains.of(SimpleNamespace(ticks=ticks, sent=ticks, key_ticks=ticks[::every]))
 
 
+@settings(deadline=None)
 @given(st.integers(1, 700), st.integers(1, 90), st.integers(1, 40))
 def test_moved_frames_stay_near_their_places_and_cost_no_more(frames, every, count):
     chains, times = phone(frames, every), np.arange(frames) / 30
@@ -106,11 +107,11 @@ def test_moved_frames_stay_near_their_places_and_cost_no_more(frames, every, cou
     assert chains.needed(moved).sum() <= chains.needed(picks).sum()
 
 
-def test_twenty_seconds_of_a_phone_are_seen_by_less_than_half_of_their_frames():
+def test_twenty_seconds_of_a_phone_are_seen_evenly_by_three_fifths_of_their_frames():
     chains, times = phone(600, 30), np.arange(600) / 30
     picks = chains.move_picks(pick_by_time(times, None, 32), times)
-    assert len(picks) == 32 and chains.needed(picks).mean() < 0.5
-    assert np.diff(times[picks]).max() < 1.5 * 20 / 31
+    assert len(picks) == 32 and chains.needed(picks).mean() < 0.6
+    assert np.diff(times[picks]).max() < 1.25 * 20 / 31
 
 
 def test_without_times_of_decoding_all_is_decoded():
