@@ -19,7 +19,7 @@ FRAMES = 32
 """Looked at; a video's are spread evenly."""
 LAST = "smplx"
 """The stage up to which they are looked at: only a body shows an arm that no pose explains."""
-PARAMS: dict[str, dict[str, Any]] = {"split": {"count": FRAMES}, "segment": {"use_plate": False, "iterations": 0}}
+PARAMS: dict[str, dict[str, Any]] = {"split": {"count": FRAMES, "quick": True}, "segment": {"use_plate": False, "iterations": 0}}
 """Stage -> parameters. To learn the empty scene and to refine outlines take two thirds of segment's time, and the network's own
 outline serves: on 32 made-up clips, a real one and photos the same is found with either."""
 

@@ -24,7 +24,7 @@ from gsac.benchmarks.stability.faults import FAULTS
 from gsac.benchmarks.stability.footage import Film
 from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run_stage, write_artifact
 from gsac.benchmarks.stability.take import Take, read_take
-from gsac.pipeline.clip_check import FRAMES, LAST, PARAMS, check_clip
+from gsac.pipeline.clip_check import LAST, PARAMS, check_clip
 from gsac.pipeline.journal import plain_journal
 from gsac.stages.contract import BadInput, StageError
 from gsac.stages.severity import Severity
@@ -210,12 +210,12 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
     if fault and fault.origin is Origin.FILM:
         film, touched = fault.inject(film, task.severity, task.seed)
         trial.touched = take.number[touched].tolist()
-    ports, said, take = _split(film, folder, task.kept)
+    ports, said, take = _split(film, folder, {"count": task.kept or len(film.take.frames)})
     trial.findings += [f | {"frames": _numbers(f["frames"], take.number)} for f in said]
     if trial.checked is not None and task.kept is None:
         trial.checked = _check(dict(ports), said, folder / "check", folder)
     elif trial.checked is not None:
-        own, heard, _ = _split(film, folder / "check", FRAMES)
+        own, heard, _ = _split(film, folder / "check", PARAMS["split"])
         trial.checked = _check(own, heard, folder / "check")
     for name in stages_until(task.until):
         values = METHODS[task.method].get(name, {}) | (TRAIN if name == "train" else {})
@@ -230,14 +230,14 @@ def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dic
     return ports, take
 
 
-def _split(film: Film, folder: Path, count: int | None) -> tuple[dict[str, Path], list[Finding], Take]:
-    """Runs `split` on the film and gives its pictures their own times. count: most frames kept; None: all.
+def _split(film: Film, folder: Path, values: dict[str, Any]) -> tuple[dict[str, Path], list[Finding], Take]:
+    """Runs `split` on the film and gives its pictures their own times. values: its parameters that differ from the defaults.
 
     Returns its ports, what it said, and the take that it kept.
     """
     ports = {"clip": folder / f"clip-{os.getpid()}.mp4"}
     film.write(ports["clip"])
-    said = run_stage("split", {"count": count or len(film.take.frames)}, ports, folder / "split")
+    said = run_stage("split", values, ports, folder / "split")
     ports["clip"].unlink()
     clip = Clip.read(ports["split/clip.json"])
     take = film.take.at(film.number(np.array(clip.timestamps_s)))

@@ -31,32 +31,41 @@ def soften(image: np.ndarray, outline: np.ndarray, plate: Plate | None = None, b
     top, left = max(0, rows.min() - pad), max(0, columns.min() - pad)
     window = np.s_[top: rows.max() + pad + 1, left: columns.max() + pad + 1]
     at = rows - top, columns - left
-    colour = image[window].astype(np.float32) / 255
-    inside, beyond = inside[window].astype(np.float32), beyond[window].astype(np.float32)
-    front, front_seen = _mean(colour, inside, at)
-    back, back_seen = _mean(colour, beyond, at)
+    pixels, inside, beyond = image[window], inside[window], beyond[window].astype(np.uint8)
+    colour = _unit(pixels[at])
+    in_front, behind = _sum(inside, at), _sum(beyond, at)
+    front_seen, back_seen = in_front > 0, behind > 0
+    front, back = _mean(pixels, inside, at, in_front), _mean(pixels, beyond, at, behind)
     if plate is not None:
         # The plate has the scene's own texture; the ratio of the means gives it the shadow of this place.
-        scene, known = plate.image[window].astype(np.float32) / 255, plate.known[window][at]
-        mean, _ = _mean(scene, beyond, at)
+        scene, known = plate.image[window], plate.known[window][at]
+        mean = _mean(scene, beyond, at, behind)
         shade = np.where(back_seen[:, None], np.clip((back + 0.02) / (mean + 0.02), 0.5, 2), 1)
-        back = np.where(known[:, None], scene[at] * shade, back)
+        back = np.where(known[:, None], _unit(scene[at]) * shade, back)
         back_seen |= known
     step = front - back
     size = (step * step).sum(axis=1)
-    share = np.clip(((colour[at] - back) * step).sum(axis=1) / np.maximum(size, 1e-6), 0, 1)
+    share = np.clip(((colour - back) * step).sum(axis=1) / np.maximum(size, 1e-6), 0, 1)
     trust = np.where(front_seen & back_seen, size / (size + CONTRAST**2), 0)
     smooth = cv2.GaussianBlur(outline[window].astype(np.float32), (0, 0), 1)[at]
     alpha[rows, columns] = trust * share + (1 - trust) * smooth
     return alpha
 
 
-def _mean(colour: np.ndarray, weight: np.ndarray, at: tuple) -> tuple[np.ndarray, np.ndarray]:
-    """colour: (h, w, 3); weight: (h, w) 0 or 1; at: rows and columns of n pixels.
+def _mean(image: np.ndarray, weight: np.ndarray, at: tuple, count: np.ndarray) -> np.ndarray:
+    """image: (h, w, 3) uint8; weight: (h, w) uint8, 0 or 1; at: rows and columns of n pixels; count: (n,) sums of the weight.
 
-    Returns (n, 3) the mean colour of the weighted pixels in each one's window, and (n,) bool whether there are any.
+    Returns (n, 3) the mean colour, 0..1, of the weighted pixels in each one's window; 0 where there is none.
     """
+    return _unit(_sum(cv2.bitwise_and(image, image, mask=weight), at)) / np.maximum(count, 1)[:, None]
+
+
+def _sum(image: np.ndarray, at: tuple) -> np.ndarray:
+    """image: (h, w, ...) uint8. Returns (n, ...) float32, its sums over the windows of n pixels."""
     size = (2 * REACH + 1, 2 * REACH + 1)
-    share = cv2.boxFilter(weight, -1, size, borderType=cv2.BORDER_REFLECT)[at]
-    total = cv2.boxFilter(cv2.merge([c * weight for c in cv2.split(colour)]), -1, size, borderType=cv2.BORDER_REFLECT)[at]
-    return total / np.maximum(share, 1e-6)[:, None], share > 1e-3
+    return cv2.boxFilter(image, cv2.CV_32F, size, normalize=False, borderType=cv2.BORDER_REFLECT)[at]
+
+
+def _unit(colour: np.ndarray) -> np.ndarray:
+    """colour: (..., 3), 0..255. Returns it as float32, 0..1."""
+    return colour.astype(np.float32) / 255

@@ -6,6 +6,7 @@ A cast shadow changes a pixel too, but it darkens it and hardly changes its hue.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -47,6 +48,11 @@ class Plate:
         x0, y0, x1, y1 = box
         return Plate(self.image[y0:y1, x0:x1], self.known[y0:y1, x0:x1], self.most_changed)
 
+    @cached_property
+    def half(self) -> Plate:
+        """At half size."""
+        return Plate(halve(self.image), halve(self.known.astype(np.float32)) > 0.99, self.most_changed)
+
 
 @dataclass
 class Difference:
@@ -73,22 +79,20 @@ def halve(image: np.ndarray) -> np.ndarray:
 
 
 def compare(image: np.ndarray, plate: Plate, person: np.ndarray) -> Difference | None:
-    """image: (H, W, 3) uint8, like the plate; person: (H, W) network probability.
+    """image: (H, W, 3) uint8; plate: of this place, at half size; person: (H, W) network probability.
 
     None where the plate does not show this frame's scene: too much of the background differs.
     """
-    known = halve(plate.known.astype(np.float32)) > 0.99
-    most_changed = plate.most_changed
-    image, plate, person = halve(image), halve(plate.image), halve(person)
-    outside = known & (cv2.dilate((person > 0.05).astype(np.uint8), np.ones((15, 15), np.uint8)) == 0)
+    image, person = halve(image), halve(person)
+    outside = plate.known & (cv2.dilate((person > 0.05).astype(np.uint8), np.ones((15, 15), np.uint8)) == 0)
     if outside.mean() < 0.05:
         return None
-    gain = measure_gain(plate, image, outside)
-    light, hue = _difference(image, expose(plate, gain))
+    gain = measure_gain(plate.image, image, outside)
+    light, hue = _difference(image, expose(plate.image, gain))
     light_noise = max(LEAST_NOISE, 1.4826 * float(np.median(np.abs(light[outside]))))
     hue_noise = max(LEAST_NOISE, 1.4826 * float(np.median(hue[outside])))
     away = np.hypot(hue / hue_noise, light / light_noise)
-    if max(light_noise, hue_noise) > MOST_NOISE or (away[outside] > CHANGED).mean() > most_changed:
+    if max(light_noise, hue_noise) > MOST_NOISE or (away[outside] > CHANGED).mean() > plate.most_changed:
         return None
     # Darker than the plate may be shadow, brighter may not.
     varies = cv2.GaussianBlur(np.abs(light - cv2.GaussianBlur(light, (0, 0), WINDOW)), (0, 0), WINDOW)
@@ -98,7 +102,7 @@ def compare(image: np.ndarray, plate: Plate, person: np.ndarray) -> Difference |
     doubted = person < SURE
     empty = bare_scene((away < np.where(doubted, ALIKE, BARE)) | shade, person)
     changed = (np.where(shadow, hue / hue_noise, away) > CHANGED) & (person > 0.1)
-    return Difference(gain, empty & known, changed & known)
+    return Difference(gain, empty & plate.known, changed & plate.known)
 
 
 def bare_scene(alike: np.ndarray, person: np.ndarray) -> np.ndarray:

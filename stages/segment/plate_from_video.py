@@ -12,7 +12,6 @@ import numpy as np
 
 from gsac.avatar.artifacts import read_frame
 from gsac.avatar.threads import available_cores, prefetch
-from gsac.stages.segment.network import PersonMask, person_region
 from gsac.stages.segment.plate import Plate
 
 SAMPLES = 24
@@ -30,21 +29,16 @@ Person = Callable[[int, np.ndarray], np.ndarray]
 """(index, image (H, W, 3) uint8) of a frame -> (H, W) bool, the person in it."""
 
 
-def learn_plate(paths: list[Path], xy: np.ndarray, score: np.ndarray, network: PersonMask) -> Plate | None:
-    """From where the network sees the person. paths: T frames; xy: (T, 133, 2) px; score: (T, 133).
+def learn_plate(paths: list[Path], shown: np.ndarray, person: Person) -> Plate | None:
+    """From where the network sees the person. paths: T frames; shown: (T,) bool, frames with a person.
 
     None where too few frames show the person.
     """
-    found = {t: person_region(np.nan_to_num(xy[t]), score[t]) for t in sample(len(paths))}
-    regions = {t: region for t, region in found.items() if region is not None}
-    return median_without(paths, list(regions), lambda t, image: network(image, regions[t]) > 0.05, CLEAR)
+    return median_without(paths, [t for t in sample(len(paths)) if shown[t]], person, CLEAR)
 
 
 def relearn_plate(paths: list[Path], shown: np.ndarray, outline: Person) -> Plate | None:
-    """From the person's outlines, which lie closer. paths: T frames; shown: (T,) bool, frames with a person.
-
-    None where too few frames show the person.
-    """
+    """As `learn_plate`, from the person's outlines, which lie closer."""
     return median_without(paths, [t for t in sample(len(paths)) if shown[t]], outline, NEAR)
 
 

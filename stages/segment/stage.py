@@ -36,6 +36,8 @@ LABELS = "labels"
 WIDE = 0.25
 """Margin around the person in which the scene is compared with the plate, as a share of the person's height."""
 
+LEAST = 0.05
+"""Probability from which on a pixel may be the person."""
 MOSTLY = 0.5
 """Least share of the frames that the plate of a video must fit for it to be learned again from their outlines."""
 
@@ -106,24 +108,35 @@ def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], cl
     frames = job.inputs["split/frames"]
     network = METHODS[job.config.method](job.models)
     sapiens = network if isinstance(network, Sapiens) else None
+    regions = [person_region(np.nan_to_num(xy), score) for xy, score in zip(keypoints["xy"], keypoints["score"], strict=True)]
+    found: dict[int, np.ndarray] = {}
+
+    def look(t: int, image: np.ndarray) -> np.ndarray:
+        """Frame t's probability, (H, W); kept for `masks`, which asks for it again."""
+        found[t] = network(image, regions[t])
+        return found[t]
+
     plate, given = None, (frames / "plate.png").exists()
     learns = job.config.use_plate and clip.timestamps_s is not None and not given
     if job.config.use_plate and given:
         image = read_frame(frames / "plate.png")
         plate = Plate(image, np.ones(image.shape[:2], bool))
     elif learns and sapiens is None:
-        plate = learn_plate(paths, keypoints["xy"], keypoints["score"], network)
+        shown = np.array([region is not None for region in regions])
+        plate = learn_plate(paths, shown, lambda t, image: look(t, image) > LEAST)
     absent, unfound, fits = np.zeros((3, len(paths)), bool)
     cutouts: dict[int, Cutout] = {}
 
     def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]]:
         """Index, image, probability and labels of each frame; the network has threads of its own, so one thread feeds it."""
         for t, image in enumerate(prefetch(pool, read_frame, paths, 2)):
-            region = person_region(np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t])
-            if sapiens is not None and region is not None:
+            if regions[t] is None:
+                yield t, image, None, None
+            elif sapiens is not None:
                 yield t, image, *sapiens.read(image)
             else:
-                yield t, image, None if region is None else network(image, region), None
+                probability = found.pop(t, None)
+                yield t, image, look(t, image) if probability is None else probability, None
 
     def cut(masked: tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]) -> View:
         t, image, probability, labels = masked
@@ -213,7 +226,7 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
     here = None
     if plate is not None:
         x0, y0, x1, y1 = around(probability, margin=WIDE)
-        here = compare(image[y0:y1, x0:x1], plate.part((x0, y0, x1, y1)), probability[y0:y1, x0:x1])
+        here = compare(image[y0:y1, x0:x1], half_of(plate, (x0, y0, x1, y1)), probability[y0:y1, x0:x1])
     if here is not None:
         here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
     outline = cut_out(image[part], probability[part], xy - corner, score, iterations, here)
@@ -234,7 +247,7 @@ def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: 
     fits = True
     if plate is not None:
         x0, y0, x1, y1 = wide = around(kept, margin=WIDE) or box
-        fits = compare(image[y0:y1, x0:x1], plate.part(wide), kept[y0:y1, x0:x1]) is not None
+        fits = compare(image[y0:y1, x0:x1], half_of(plate, wide), kept[y0:y1, x0:x1]) is not None
     return Cutout(box, kept[part] > 0.5, image[part].copy(), kept[part].astype(np.float16)), fits
 
 
@@ -268,7 +281,13 @@ def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.nd
     return alpha
 
 
-def around(probability: np.ndarray, least: float = 0.05, margin: float = 0.04) -> tuple[int, int, int, int] | None:
+def half_of(plate: Plate, box: tuple[int, int, int, int]) -> Plate:
+    """The part of a plate at half size. box: x0, y0, x1, y1 px at full size, of `around`."""
+    x0, y0, x1, y1 = box
+    return plate.half.part((x0 // HALF, y0 // HALF, x1 // HALF, y1 // HALF))
+
+
+def around(probability: np.ndarray, least: float = LEAST, margin: float = 0.04) -> tuple[int, int, int, int] | None:
     """probability: (H, W). Returns x0, y0, x1, y1 px of what may be the person, with a margin of its height; None if nothing may.
 
     The numbers are even except at the frame's end.

@@ -23,6 +23,9 @@ class SplitConfig:
     crop: bool = True
     """Whether footage taller than max_height is cut to the person before it is scaled, where that makes the person larger by a
     fifth or more; the frames are whole where it is not sure where the person is."""
+    quick: bool = False
+    """For a look, as by `gsac check`: frames of a video move by up to a seventh of the time between them to where less has to be
+    decoded, to key frames and soon after them, and their files are not compressed."""
 
     def wishes(self) -> tuple[str, ...]:
         """Names of the network files that find the person."""

@@ -34,6 +34,8 @@ class Video:
     """(N,) int64 presentation times, rising, in time_base; empty where the container has none."""
     key_ticks: np.ndarray
     """(K,) int64, those of them whose frame needs no other one."""
+    sent: np.ndarray
+    """(N,) int64, when each frame is decoded, in time_base, none twice; empty where the container does not tell."""
     time_base: Fraction
     declared_frames: int
     """Number of frames by the header; 0 where it has none."""
@@ -93,7 +95,7 @@ def _probe(container: InputContainer, path: Path) -> Video:
     _check_size(path, stream.width, stream.height)
     stream.codec_context.options = {"max_pixels": LIMITS["max_pixels"]}
     picture = _first_picture(container, stream, path)
-    ticks, key_ticks = _packet_times(path, stream.index)
+    ticks, key_ticks, sent = _packet_times(path, stream.index)
 
     width, height = picture.width, picture.height
     aspect = stream.sample_aspect_ratio or Fraction(1)
@@ -112,7 +114,7 @@ def _probe(container: InputContainer, path: Path) -> Video:
     hidden_alpha = codec in ("vp8", "vp9") and tags.get("alpha_mode") == "1"
     rate = stream.average_rate or stream.guessed_rate
     return Video(
-        stream=stream.index, ticks=ticks, key_ticks=key_ticks, time_base=stream.time_base or Fraction(1, 1_000_000),
+        stream=stream.index, ticks=ticks, key_ticks=key_ticks, sent=sent, time_base=stream.time_base or Fraction(1, 1_000_000),
         declared_frames=stream.frames, width=width, height=height,
         transfer=int(picture.color_trc), primaries=int(picture.color_primaries), matrix=int(picture.colorspace),
         has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
@@ -138,21 +140,25 @@ def _first_picture(container: InputContainer, stream: av.VideoStream, path: Path
                    "copy it from the phone again.")
 
 
-def _packet_times(path: Path, index: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) rising ticks of the intact packets of one stream, and (K,) of its key frames; empty if any has no time."""
-    ticks, keys = [], []
+def _packet_times(path: Path, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(N,) rising ticks of the intact packets of one stream, (K,) of its key frames, and (N,) when each is decoded; the first two
+    are empty if any has no time, the last if it is not told."""
+    ticks, keys, sent = [], [], []
     with open_video(path) as container:
         try:
             for packet in container.demux(container.streams[index]):
                 if packet.size == 0 or packet.is_discard or packet.is_corrupt:
                     continue
                 if packet.pts is None:
-                    return np.zeros(0, np.int64), np.zeros(0, np.int64)
+                    return (np.zeros(0, np.int64),) * 3
                 ticks.append(packet.pts)
+                sent.append(packet.dts)
                 keys += [packet.pts] * packet.is_keyframe
         except av.FFmpegError:
             pass  # a truncated file: what was read so far is what there is
-    return np.unique(np.array(ticks, np.int64)), np.unique(np.array(keys, np.int64))
+    rising, first = np.unique(np.array(ticks, np.int64), return_index=True)
+    told = None not in sent and len(set(sent)) == len(rising) == len(ticks)
+    return rising, np.unique(np.array(keys, np.int64)), np.array(sent if told else [], np.int64)[first if told else []]
 
 
 def _reason(error: Exception) -> str:

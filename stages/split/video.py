@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 import subprocess
@@ -19,10 +20,11 @@ from gsac.avatar.artifacts import Crop, frame_paths, read_frame
 from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.avatar.files import told_no_room
 from gsac.stages.contract import BadInput, StageError
-from gsac.stages.findings import Code, Finding
+from gsac.stages.findings import Code, Finding, runs_of_frames
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_point, sides_near
+from gsac.stages.split.decoding import Chains
 from gsac.stages.split.keyframes import read_key_frames
 from gsac.stages.split.masks import match_frames, write_masks
 from gsac.stages.split.mirrored import find_mirrored, turn_back
@@ -38,6 +40,8 @@ SHOWN = re.compile(r"\bn:\s*\d+ pts:\s*(-?\d+)")
 TIME_BASE = re.compile(r"config in time_base: (\d+)/(\d+)")
 LONGEST_S = 24 * 3600
 SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
+COMPRESSION = {False: ("-compression_level", "4", "-pred", "up"), True: ("-compression_level", "0", "-pred", "none")}
+"""Of the frames' files, by whether it has to be quick: it takes 80 ms a frame of noise to write, and 15 each time to read."""
 LOOKS, CHECKS, TRIES = 12, 30, 3
 """Most key frames by which a crop is planned, most frames in which it is checked, and crops tried before the frames stay whole; as
 often a scene is cut down to one that may show further cuts, now that its frames lie closer."""
@@ -66,6 +70,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         raise BadInput(f"{path.name}: its frames lie {times[-1]:g} s apart from first to last; at most {LONGEST_S} s are read. "
                        "Copy the file from the phone again, or cut the clip.")
     looks: list[Look] = []
+    chains = Chains.of(video) if config.quick else None
 
     def write(picks: np.ndarray, crop: Crop | None) -> Written:
         width, height = frame_size(video, config, crop)
@@ -73,15 +78,19 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, crop, width, height))
         output = ["-filter_complex", f"[0:{video.stream}]{graph},format=rgb24,split[whole][fine];"
                                      f"[fine]scale={small[0]}:{small[1]}:flags=area+bitexact,format=rgb24[small]",
-                  "-map", "[whole]", "-pix_fmt", "rgb24", "-compression_level", "4", "-pred", "up", "-flags", "+bitexact",
+                  "-map", "[whole]", "-pix_fmt", "rgb24", *COMPRESSION[config.quick], "-flags", "+bitexact",
                   "-start_number", "0", "-fps_mode", "passthrough", "-f", "image2", "%06d.png",
                   "-map", "[small]", "-fps_mode", "passthrough", "-f", "rawvideo", "pipe:1"]
-        looks.clear()
-        return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"),
-                    lambda pictures: looks.extend(map(look_at, _read_pictures(pictures, *small))))
+
+        def decode(needed: np.ndarray | None) -> Written:
+            looks.clear()
+            return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"),
+                        lambda pictures: looks.extend(map(look_at, _read_pictures(pictures, *small))), needed)
+
+        return decode(None) if chains is None else decode_needed(decode, chains, picks, frames)
 
     def write_scene(scene: Scene) -> WrittenScene:
-        picks = scene.first + pick_by_time(times[scene.first:scene.last + 1], config.fps, config.count)
+        picks = pick_frames(times, scene, config, chains)
         own_keys = video.key_ticks[np.isin(video.key_ticks, video.ticks[scene.first:scene.last + 1])]
         return picks, *write_about_person(path, replace(video, key_ticks=own_keys), frames, config, people, partial(write, picks))
 
@@ -186,6 +195,25 @@ def write_about_person(path: Path, video: Video, frames: Path, config: SplitConf
     return None, write(None)
 
 
+def pick_frames(times: np.ndarray, scene: Scene, config: SplitConfig, chains: Chains | None) -> np.ndarray:
+    """The frames of a scene that are kept, (K,). times: (N,) s, of the video's frames; chains: theirs, where it has to be quick."""
+    picks = scene.first + pick_by_time(times[scene.first:scene.last + 1], config.fps, config.count)
+    return picks if chains is None else chains.move_picks(picks, times)
+
+
+def decode_needed(decode: Callable[[np.ndarray | None], Written], chains: Chains, picks: np.ndarray, frames: Path) -> Written:
+    """Writes the frames `picks` (K,) by what they need alone; by all of the video where that fails or something seems damaged.
+
+    decode: writes them, by what is needed, (N,) bool, or None for all.
+    """
+    with contextlib.suppress(StageError):  # programs older than 7.1 cannot
+        written = decode(chains.needed(picks))
+        if len(written[0]) == len(picks) and not written[2]:
+            return written
+    remove_frames(frames)
+    return decode(None)
+
+
 def remove_frames(folder: Path) -> None:
     """Makes room for other ones."""
     for frame in frame_paths(folder):
@@ -204,16 +232,20 @@ def see_frames(people: People, frames: Path, crop: Crop) -> Extent | None:
 
 def _select(ticks: np.ndarray, picks: np.ndarray) -> list[str]:
     """The filter that keeps the picked presentation times; no filter where all are kept."""
-    if len(picks) == len(ticks):
-        return []
+    return [] if len(picks) == len(ticks) else [f"select='{_any_of([f'eq(pts,{tick})' for tick in ticks[picks]])}'"]
 
-    def any_of(values: list[int]) -> str:  # a balanced tree: the evaluator recurses
-        if len(values) == 1:
-            return f"eq(pts,{values[0]})"
-        half = len(values) // 2
-        return f"({any_of(values[:half])}+{any_of(values[half:])})"
 
-    return [f"select='{any_of([int(t) for t in ticks[picks]])}'"]
+def _leave_out(sent: np.ndarray, needed: np.ndarray) -> list[str]:
+    """Options by which only needed frames are decoded. sent: (N,) ticks, when each is decoded; needed: (N,) bool."""
+    order = np.argsort(sent)
+    spans = [f"between(dts,{sent[order[first]]},{sent[order[last]]})" for first, last in runs_of_frames(needed[order])]
+    return ["-bsf:v", f"noise=drop='not({_any_of(spans)})'"]
+
+
+def _any_of(terms: list[str]) -> str:
+    """A balanced tree: the evaluator recurses."""
+    half = len(terms) // 2
+    return f"({_any_of(terms[:half])}+{_any_of(terms[half:])})" if half else terms[0]
 
 
 def _picture_filters(video: Video, crop: Crop | None, width: int, height: int) -> list[str]:
@@ -239,13 +271,16 @@ def _picture_filters(video: Video, crop: Crop | None, width: int, height: int) -
 
 
 def _run(path: Path, video: Video, output: list[str], folder: Path | None, on_frame: Callable[[int], None] = lambda done: None,
-         read: Callable[[IO[bytes]], None] = lambda pictures: None) -> Written:
-    """Runs ffmpeg. read: reads what it writes to its output, to the end. Returns the ticks of the frames that passed `showinfo`,
-    their time base, and its error lines."""
+         read: Callable[[IO[bytes]], None] = lambda pictures: None, needed: np.ndarray | None = None) -> Written:
+    """Runs ffmpeg. read: reads what it writes to its output, to the end; needed: (N,) bool, frames to decode, None: all.
+
+    Returns the ticks of the frames that passed `showinfo`, their time base, and its error lines.
+    """
     decoder = ["-c:v", video.decoder] if video.decoder else []
     limits = [word for name, value in LIMITS.items() for word in (f"-{name}", value)]
+    left_out = _leave_out(video.sent, needed) if needed is not None else []
     command = [ffmpeg_program(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
-               "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, "-i", file_url(path), *output]
+               "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, *left_out, "-i", file_url(path), *output]
     ticks: list[int] = []
     base, errors = video.time_base, []
     # The output pattern is relative to `folder`: a % in the folder's own name is no pattern.

@@ -164,7 +164,7 @@ def test_a_soft_shadow_on_the_scene_is_not_person(points):
 def test_another_exposure_of_the_plate_is_brought_into_line():
     truth, background = figure(), scene()
     plate = empty_scene(background * [1.2, 1.1, 0.9])
-    difference = compare(painted(truth, background), plate, rough(truth))
+    difference = compare(painted(truth, background), plate.half, rough(truth))
     assert difference.gain == pytest.approx([1 / 1.2, 1 / 1.1, 1 / 0.9], abs=0.02)
     assert difference.empty[10:60, 10:40].mean() > 0.9 and difference.changed[120:160, 70:90].all()
 
@@ -193,7 +193,7 @@ def test_where_the_plate_was_never_seen_it_says_nothing(points):
     plate = empty_scene(background)
     plate.known[:, 100:260] = False
     plate.image[:, 100:260] = 0
-    difference = compare(painted(truth, background), plate, rough(truth))
+    difference = compare(painted(truth, background), plate.half, rough(truth))
     assert not difference.empty[:, 50:130].any() and not difference.changed[:, 50:130].any()
     alpha, fits = segment_frame(painted(truth, background), rough(truth), *points, plate, 1)
     assert fits and iou(alpha > 0.5, truth > 0.5) > 0.97
