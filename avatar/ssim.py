@@ -79,12 +79,19 @@ def _padded_row(flat, start, count, first, row, at):
 
 
 @kernel
-def similarity(worker, workers, image, target, pitch, start, height, count, shares, factor, scratch, gradient, sums):
+def _differ(spans, row, low, high):
+    """Whether numbers low .. high of a row, which may lie outside the image, can differ. spans: (height, 2)."""
+    return 0 <= row < len(spans) and spans[row, 0] < high and spans[row, 1] > low
+
+
+@kernel
+def similarity(worker, workers, image, target, pitch, start, height, count, shares, spans, factor, scratch, gradient, sums):
     """Adds factor times the mean's gradient with respect to the image to `gradient`; sums (height, strips) add up to the mean.
 
     image, target, gradient: flat; pitch: numbers of a full row; start: index of the crop's first number; count: numbers of a crop
-    row; shares (1 or height, padded row): share of each number in the mean, zero in the margins; scratch: (workers, SCRATCH).
-    Between images and gradient only a few rows of a strip are kept, which never leave the cache.
+    row; shares (1 or height, padded row): share of each number in the mean, zero in the margins; spans: (height, 2) first and end
+    number of a row that may differ, and that a gradient is wanted of; scratch: (workers, SCRATCH). Between images and gradient only
+    a few rows of a strip are kept, which never leave the cache. A window that sees no difference has the similarity 1.
     """
     real = image.dtype.type
     two, zero, c1, c2 = real(2), spread(real(0)), spread(real(C1)), spread(real(C2))
@@ -98,9 +105,19 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
     for first in range(0, count, STRIP):
         narrow = min(STRIP, -(-(count - first) // WIDTH) * WIDTH)
         wide = narrow + 2 * MARGIN
+        low, high = first - 2 * MARGIN, first + narrow + 2 * MARGIN
+        never = begin - 8 * REACH
+        seen, near = never, never  # last row that differs up to this one, and up to 2 REACH further on
+        for row in range(begin - 4 * REACH, begin):
+            near = row if _differ(spans, row, low, high) else near
+            seen = near if row < begin - 2 * REACH else seen
         for row in range(begin - 2 * REACH, end + 2 * REACH):
+            near = row + 2 * REACH if _differ(spans, row + 2 * REACH, low, high) else near
+            seen = row if _differ(spans, row, low, high) else seen
             ring = means + (row + 2 * ROWS) % ROWS * WIDE
-            if 0 <= row < height:
+            if near < row - 2 * REACH:
+                pass
+            elif 0 <= row < height:
                 _padded_row(image, start + row * pitch, count, first, state, x_row)
                 _padded_row(target, start + row * pitch, count, first, state, y_row)
                 for i in range(0, LONG, WIDTH):
@@ -120,8 +137,14 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
             if middle < begin - REACH:
                 continue
             ring = slopes + (middle + 2 * ROWS) % ROWS * STRIP
-            if 0 <= middle < height:
-                share_row = shares[min(middle, len(shares) - 1)]
+            share_row = shares[min(max(middle, 0), len(shares) - 1)]
+            if seen < row - 2 * REACH:
+                if begin <= middle < end:
+                    value = zero
+                    for i in range(0, narrow, WIDTH):
+                        value = value + load(share_row, MARGIN + first + i)
+                    sums[middle, first // STRIP] = total(value)
+            elif 0 <= middle < height:
                 value = zero
                 window = means + (middle - REACH + 2 * ROWS) % ROWS * WIDE
                 for i in range(0, wide, WIDTH):
@@ -149,7 +172,7 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
                     for j in range(3):
                         _keep(state, ring + j * slope_plane + i, STRIP, zero)
             out = middle - REACH
-            if out < begin:
+            if out < begin or not _differ(spans, out, low, high):
                 continue
             window = slopes + (out - REACH + 2 * ROWS) % ROWS * STRIP
             for i in range(0, narrow, WIDTH):

@@ -143,10 +143,10 @@ def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: in
     view, workspace = person_crop(view), Workspace()
     background, gain, grad_gain = np.full(3, 1, np.float32), np.ones(3, np.float32), np.empty(3)
     image, target, grad_rgb = (np.empty((*view.pixels.shape[:2], 3), np.float32) for _ in range(3))
-    grad_alpha = np.empty(view.pixels.shape[:2], np.float32)
+    grad_alpha, spans = np.empty(view.pixels.shape[:2], np.float32), np.empty((len(image), 2), np.int64)
     for step in range(steps):
         rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
-        on_background(workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
+        on_background(workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target, spans)
         image -= target
         image *= np.float32(2 / image.size)
         through_background(workspace.share, image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK,
