@@ -79,6 +79,45 @@ def _padded_row(flat, start, count, first, row, at):
 
 
 @kernel
+def _keep_zeros(rows, at, planes, plane, step, count):
+    """`_keep` of `count` zeros in each of the planes, which are `plane` numbers apart."""
+    for i in range(0, count, WIDTH):
+        for j in range(planes):
+            _keep(rows, at + j * plane + i, step, spread(rows.dtype.type(0)))
+
+
+@kernel
+def _sum(row, at, count):
+    """Sum of `count` numbers of a row from `at` on."""
+    value = spread(row.dtype.type(0))
+    for i in range(0, count, WIDTH):
+        value = value + load(row, at + i)
+    return total(value)
+
+
+@kernel
+def _add_gradient(image, target, rows, window, plane, at, left, count, factor, gradient):
+    """Adds factor times the gradient of `count` numbers at `at` on, of which `left` lie in the row, from the slopes around them.
+
+    window: index of the first of eleven rows of slopes by mx in `rows`; those by q and p lie a plane and two further on.
+    """
+    two = rows.dtype.type(2)
+    for i in range(0, count, WIDTH):
+        mx, q = _down(rows, window + i, STRIP), _down(rows, window + plane + i, STRIP)
+        p = _down(rows, window + 2 * plane + i, STRIP)
+        if i + WIDTH <= left:
+            own = mx + q * load(image, at + i) * two + p * load(target, at + i)
+            store(gradient, at + i, load(gradient, at + i) + own * factor)
+        else:
+            store(rows, 0, mx)
+            store(rows, WIDTH, q)
+            store(rows, 2 * WIDTH, p)
+            for j in range(left - i):
+                own = rows[j] + two * rows[WIDTH + j] * image[at + i + j] + rows[2 * WIDTH + j] * target[at + i + j]
+                gradient[at + i + j] += own * factor
+
+
+@kernel
 def _differ(spans, row, low, high):
     """Whether numbers low .. high of a row, which may lie outside the image, can differ. spans: (height, 2)."""
     return 0 <= row < len(spans) and spans[row, 0] < high and spans[row, 1] > low
@@ -130,9 +169,7 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
                     _keep(state, ring + 2 * plane + i, WIDE, _across(state, q_row + MARGIN + i))
                     _keep(state, ring + 3 * plane + i, WIDE, _across(state, p_row + MARGIN + i))
             else:
-                for i in range(0, wide, WIDTH):
-                    for j in range(4):
-                        _keep(state, ring + j * plane + i, WIDE, zero)
+                _keep_zeros(state, ring, 4, plane, WIDE, wide)
             middle = row - REACH
             if middle < begin - REACH:
                 continue
@@ -140,10 +177,7 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
             share_row = shares[min(max(middle, 0), len(shares) - 1)]
             if seen < row - 2 * REACH:
                 if begin <= middle < end:
-                    value = zero
-                    for i in range(0, narrow, WIDTH):
-                        value = value + load(share_row, MARGIN + first + i)
-                    sums[middle, first // STRIP] = total(value)
+                    sums[middle, first // STRIP] = _sum(share_row, MARGIN + first, narrow)
             elif 0 <= middle < height:
                 value = zero
                 window = means + (middle - REACH + 2 * ROWS) % ROWS * WIDE
@@ -168,24 +202,10 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
                     _keep(state, ring + slope_plane + i, STRIP, _across(state, of_q + MARGIN + i))
                     _keep(state, ring + 2 * slope_plane + i, STRIP, _across(state, of_p + MARGIN + i))
             else:
-                for i in range(0, narrow, WIDTH):
-                    for j in range(3):
-                        _keep(state, ring + j * slope_plane + i, STRIP, zero)
+                _keep_zeros(state, ring, 3, slope_plane, STRIP, narrow)
             out = middle - REACH
             if out < begin or not _differ(spans, out, low, high):
                 continue
             window = slopes + (out - REACH + 2 * ROWS) % ROWS * STRIP
-            for i in range(0, narrow, WIDTH):
-                mx, q = _down(state, window + i, STRIP), _down(state, window + slope_plane + i, STRIP)
-                p = _down(state, window + 2 * slope_plane + i, STRIP)
-                at = start + out * pitch + first + i
-                if first + i + WIDTH <= count:
-                    own = mx + q * load(image, at) * two + p * load(target, at)
-                    store(gradient, at, load(gradient, at) + own * factor)
-                else:
-                    store(state, x_row, mx)
-                    store(state, x_row + WIDTH, q)
-                    store(state, x_row + 2 * WIDTH, p)
-                    for j in range(count - first - i):
-                        own = state[j] + two * state[WIDTH + j] * image[at + j] + state[2 * WIDTH + j] * target[at + j]
-                        gradient[at + j] += own * factor
+            _add_gradient(image, target, state, window, slope_plane, start + out * pitch + first, count - first, narrow, factor,
+                          gradient)

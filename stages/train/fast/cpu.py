@@ -60,6 +60,7 @@ class Cpu(Backend):
             task.progress(step + 1, steps, "steps")
         if trainer.offsets:
             trainer.fold_offsets()
+            trainer.lay_unseen(coarse)
         return Trained(trainer, fine, coarse)
 
     def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,

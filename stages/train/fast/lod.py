@@ -55,7 +55,8 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
     coarse = scale_views(looked_at, MOVED / tall)
     out: list[Gaussians] = []
     heights: list[Future[float]] = []
-    finer, placed = fit.gaussians, None
+    finer, finer_seen, placed = fit.gaussians, fit.seen, None
+    smaller = [(tried.gaussians, tried.seen) for tried in fit.smaller]
     with ThreadPoolExecutor(1) as aside:  # a level is looked at while the next one is fitted
         for level in LEVELS:
             if len(finer) <= level.most:
@@ -63,17 +64,17 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
             placed = placed or aside.submit(move, finer, task, poses, coarse)
             scale, size = min(1.0, level.height / tall), min(level.most, round(FEWER * len(finer)))
             views = scale_views(filmed, scale)
-            tried = min((one for one in (finer, *fit.smaller) if len(one) >= size), key=len)
+            tried, seen = min((one for one in ((finer, finer_seen), *smaller) if len(one[0]) >= size), key=lambda one: len(one[0]))
             worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
-            fewer = merge_to_size(tried, worth, size, body, rest)
+            fewer, seen = merge_to_size(tried, seen, worth, size, body, rest)
             trainer = Trainer(level_heights(fewer, rest, body.faces), task, frozen_body=True, scale=scale)
-            trainer.freeze_unseen(views)
+            trainer.seen = seen
             pace = FIRM if len(tried) >= 2 * size else GENTLE
-            gaussians = backend.refit(task, trainer, views, pace).finish(views)[0]
+            gaussians, seen = backend.refit(task, trainer, views, pace).finish(views)
             finer_placed, placed = placed, aside.submit(move, gaussians, task, poses, coarse)
             heights.append(aside.submit(look, gaussians, placed, finer, finer_placed, scale_views(looked_at, scale)))
             out.append(gaussians)
-            finer = gaussians
+            finer, finer_seen = gaussians, seen
     least = np.minimum.accumulate([height.result() for height in heights])
     for gaussians, height in zip(out, least, strict=True):
         gaussians.max_height_px = float(height)

@@ -67,7 +67,7 @@ def search(task: Task, backend: Backend) -> Fit:
                             "choice, since it was made by them; other heldout_frames do not",
                "size_frames": task.choosing.tolist(), "size_optimism": optimism(scores)}
     taken = scores.index(best)
-    return replace(fits[taken], figures=figures, smaller=[fit.gaussians for fit in fits[taken + 1:]])
+    return replace(fits[taken], figures=figures, smaller=fits[taken + 1:])
 
 
 def refit_fewer(trained: Trained, size: int, task: Task, backend: Backend) -> Trained:
@@ -75,9 +75,9 @@ def refit_fewer(trained: Trained, size: int, task: Task, backend: Backend) -> Tr
     trainer, fine, coarse = trained
     gaussians = trainer.gaussians()
     worth = count_pixels(gaussians, task, coarse) * viewing_weight(gaussians, task.poses.body)
-    fewer = merge_to_size(gaussians, worth, size, task.poses.body, trainer.rest)
+    fewer, seen = merge_to_size(gaussians, trainer.seen, worth, size, task.poses.body, trainer.rest)
     merged = Trainer(level_heights(fewer, trainer.rest, trainer.faces), task, frozen_body=True)
-    merged.freeze_unseen(coarse)
+    merged.seen = seen
     return trained._replace(trainer=backend.refit(task, merged, fine, OF_SIZE, coarse))
 
 
