@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -320,6 +320,8 @@ class Run:
             looking = aside.submit(judge_levels, gaussians, self.result.coarser, poses,
                                    {t: view.reduced(trained.height) for t, view in self.filmed.items()})
             bending = aside.submit(judge_novel, gaussians, poses)
+            if self.job.device == "cpu":
+                wait([judging, comparing, looking, bending])  # twice as many frames at once would take twice the memory
             if config.pose_test_steps:
                 ttpo, small_ttpo = self.judge_aligned(gaussians, aligned, small)
             self.job.progress(1, *JUDGING)

@@ -73,6 +73,7 @@ def search(task: Task, backend: Backend) -> Fit:
 def refit_fewer(trained: Trained, size: int, task: Task, backend: Backend) -> Trained:
     """What was trained, merged to `size` gaussians and refitted to the same views."""
     trainer, fine, coarse = trained
+    assert trainer.seen is not None  # as `Backend.train` and `refit` leave it
     gaussians = trainer.gaussians()
     worth = count_pixels(gaussians, task, coarse) * viewing_weight(gaussians, task.poses.body)
     fewer, seen = merge_to_size(gaussians, trainer.seen, worth, size, task.poses.body, trainer.rest)
@@ -92,7 +93,8 @@ def judge_size(trained: Trained, task: Task, poses: Poses) -> tuple[Fit, SizeSco
     trainer = trained.trainer
     fit = Fit(*trainer.finish(trained.coarse), dict(trainer.gains))
     rows, = judge_person([Candidate(fit.gaussians, poses, task.choosing, task.filmed)])
-    return fit, SizeScore(len(fit.gaussians), [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows])
+    decibels = [psnr(row["mse_fg"]) or 0.0 for row in rows]  # 0 where neither shows the person, whatever the size
+    return fit, SizeScore(len(fit.gaussians), decibels, [row["detail"] for row in rows])
 
 
 def list_sizes(largest: int) -> list[int]:
