@@ -1,8 +1,9 @@
 """Image losses on the CPU, value and gradient with respect to the image at once.
 
 Images are (H, W, 3) in 0..1. `box` = (top, bottom, left, right), px: the loss is that of the crop alone. `weights` (H, W) >= 0
-make every mean a weighted mean over pixels. The gradient of `factor` times the value is added to `gradient` (H, W, 3) where one is
-given (losses of one image add up in one array), else to a new array of zeros.
+make every mean a weighted mean over pixels. `spans` (H, 2), px: first and end column of each row outside of which image and target
+are the same and no gradient is wanted, so that it costs little time. The gradient of `factor` times the value is added to
+`gradient` (H, W, 3) where one is given (losses of one image add up in one array), else to a new array of zeros.
 """
 
 from __future__ import annotations
@@ -32,29 +33,30 @@ class Loss(NamedTuple):
 
 
 def l2(image: np.ndarray, target: np.ndarray, box: Box | None = None, weights: np.ndarray | None = None, factor: float = 1.0,
-       gradient: np.ndarray | None = None, workspace: Workspace | None = None) -> Loss:
+       gradient: np.ndarray | None = None, workspace: Workspace | None = None, spans: np.ndarray | None = None) -> Loss:
     """Mean squared difference over pixels and channels.
 
-    image, target, gradient: (H, W, 3); weights: (H, W).
+    image, target, gradient: (H, W, 3); weights: (H, W); spans: (H, 2) int.
     """
-    job = _Crop(image, target, box, weights, gradient, workspace)
+    job = _Crop(image, target, box, weights, gradient, workspace, spans)
     sums = np.empty(job.height, job.real)
     tail = job.take("l2_tail", (job.workspace.workers, WIDTH))
-    job.workspace.share(_squares, *job.place, job.count, job.shares, job.real.type(factor), tail, job.flat_gradient, sums)
+    job.workspace.share(_squares, *job.place, job.count, job.shares, job.spans, job.real.type(factor), tail,
+                        job.flat_gradient, sums)
     return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
 
 
 def ssim(image: np.ndarray, target: np.ndarray, box: Box | None = None, weights: np.ndarray | None = None, factor: float = 1.0,
-         gradient: np.ndarray | None = None, workspace: Workspace | None = None) -> Loss:
+         gradient: np.ndarray | None = None, workspace: Workspace | None = None, spans: np.ndarray | None = None) -> Loss:
     """Mean structural similarity (1 for equal images): 11x11 gaussian window, sigma 1.5, zero padding, data range 1.
 
-    image, target, gradient: (H, W, 3); weights: (H, W).
+    image, target, gradient: (H, W, 3); weights: (H, W); spans: (H, 2) int.
     """
-    job = _Crop(image, target, box, weights, gradient, workspace)
+    job = _Crop(image, target, box, weights, gradient, workspace, spans)
     scratch = job.take("ssim_scratch", (job.workspace.workers, _ssim.SCRATCH))
     sums = np.empty((job.height, -(-job.count // _ssim.STRIP)), job.real)
-    job.workspace.share(_ssim.similarity, *job.place, job.height, job.count, job.shares, job.real.type(factor), scratch,
-                        job.flat_gradient, sums)
+    job.workspace.share(_ssim.similarity, *job.place, job.height, job.count, job.shares, job.spans, job.real.type(factor),
+                        scratch, job.flat_gradient, sums)
     return Loss(float(sums.sum(dtype=np.float64)), job.gradient)
 
 
@@ -80,7 +82,7 @@ class _Crop:
     """Images, weights and box as the kernels take them: flat arrays, start of the crop, numbers (3 a pixel) of a row."""
 
     def __init__(self, image: np.ndarray, target: np.ndarray, box: Box | None, weights: np.ndarray | None,
-                 gradient: np.ndarray | None, workspace: Workspace | None):
+                 gradient: np.ndarray | None, workspace: Workspace | None, spans: np.ndarray | None = None):
         self.real = np.dtype(np.float64 if image.dtype == np.float64 else np.float32)
         self.workspace = workspace or Workspace()
         rows, columns, channels = image.shape
@@ -98,6 +100,8 @@ class _Crop:
         flat = [np.require(a, self.real, ["C", "W"]).reshape(-1) for a in (image, target)]
         self.place = (*flat, self.pitch, self.start)
         self.flat_gradient = self.gradient.reshape(-1)
+        self.spans = np.empty((self.height, 2), np.int64)
+        self.spans[:] = (0, self.count) if spans is None else np.clip(3 * (spans[top:bottom] - left), 0, self.count)
         self.shares = self._shares(None if weights is None else weights[top:bottom, left:right])
 
     def _shares(self, weights: np.ndarray | None) -> np.ndarray:
@@ -117,7 +121,8 @@ class _Crop:
 
 
 @kernel
-def _squares(worker, workers, image, target, pitch, start, count, shares, factor, tails, gradient, sums):
+def _squares(worker, workers, image, target, pitch, start, count, shares, spans, factor, tails, gradient, sums):
+    """spans: (height, 2) first and end number of a row that may differ."""
     real = image.dtype.type
     twice = real(2) * factor
     tail = tails[worker]
@@ -125,7 +130,7 @@ def _squares(worker, workers, image, target, pitch, start, count, shares, factor
         share_row = shares[min(row, len(shares) - 1)]
         value = spread(real(0))
         rest = real(0)
-        for i in range(0, count, WIDTH):
+        for i in range(spans[row, 0] // WIDTH * WIDTH, spans[row, 1], WIDTH):
             at = start + row * pitch + i
             part = load(share_row, MARGIN + i)
             if i + WIDTH <= count:

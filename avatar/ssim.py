@@ -79,12 +79,58 @@ def _padded_row(flat, start, count, first, row, at):
 
 
 @kernel
-def similarity(worker, workers, image, target, pitch, start, height, count, shares, factor, scratch, gradient, sums):
+def _keep_zeros(rows, at, planes, plane, step, count):
+    """`_keep` of `count` zeros in each of the planes, which are `plane` numbers apart."""
+    for i in range(0, count, WIDTH):
+        for j in range(planes):
+            _keep(rows, at + j * plane + i, step, spread(rows.dtype.type(0)))
+
+
+@kernel
+def _sum(row, at, count):
+    """Sum of `count` numbers of a row from `at` on."""
+    value = spread(row.dtype.type(0))
+    for i in range(0, count, WIDTH):
+        value = value + load(row, at + i)
+    return total(value)
+
+
+@kernel
+def _add_gradient(image, target, rows, window, plane, at, left, count, factor, gradient):
+    """Adds factor times the gradient of `count` numbers at `at` on, of which `left` lie in the row, from the slopes around them.
+
+    window: index of the first of eleven rows of slopes by mx in `rows`; those by q and p lie a plane and two further on.
+    """
+    two = rows.dtype.type(2)
+    for i in range(0, count, WIDTH):
+        mx, q = _down(rows, window + i, STRIP), _down(rows, window + plane + i, STRIP)
+        p = _down(rows, window + 2 * plane + i, STRIP)
+        if i + WIDTH <= left:
+            own = mx + q * load(image, at + i) * two + p * load(target, at + i)
+            store(gradient, at + i, load(gradient, at + i) + own * factor)
+        else:
+            store(rows, 0, mx)
+            store(rows, WIDTH, q)
+            store(rows, 2 * WIDTH, p)
+            for j in range(left - i):
+                own = rows[j] + two * rows[WIDTH + j] * image[at + i + j] + rows[2 * WIDTH + j] * target[at + i + j]
+                gradient[at + i + j] += own * factor
+
+
+@kernel
+def _differ(spans, row, low, high):
+    """Whether numbers low .. high of a row, which may lie outside the image, can differ. spans: (height, 2)."""
+    return 0 <= row < len(spans) and spans[row, 0] < high and spans[row, 1] > low
+
+
+@kernel
+def similarity(worker, workers, image, target, pitch, start, height, count, shares, spans, factor, scratch, gradient, sums):
     """Adds factor times the mean's gradient with respect to the image to `gradient`; sums (height, strips) add up to the mean.
 
     image, target, gradient: flat; pitch: numbers of a full row; start: index of the crop's first number; count: numbers of a crop
-    row; shares (1 or height, padded row): share of each number in the mean, zero in the margins; scratch: (workers, SCRATCH).
-    Between images and gradient only a few rows of a strip are kept, which never leave the cache.
+    row; shares (1 or height, padded row): share of each number in the mean, zero in the margins; spans: (height, 2) first and end
+    number of a row that may differ, and that a gradient is wanted of; scratch: (workers, SCRATCH). Between images and gradient only
+    a few rows of a strip are kept, which never leave the cache. A window that sees no difference has the similarity 1.
     """
     real = image.dtype.type
     two, zero, c1, c2 = real(2), spread(real(0)), spread(real(C1)), spread(real(C2))
@@ -98,9 +144,19 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
     for first in range(0, count, STRIP):
         narrow = min(STRIP, -(-(count - first) // WIDTH) * WIDTH)
         wide = narrow + 2 * MARGIN
+        low, high = first - 2 * MARGIN, first + narrow + 2 * MARGIN
+        never = begin - 8 * REACH
+        seen, near = never, never  # last row that differs up to this one, and up to 2 REACH further on
+        for row in range(begin - 4 * REACH, begin):
+            near = row if _differ(spans, row, low, high) else near
+            seen = near if row < begin - 2 * REACH else seen
         for row in range(begin - 2 * REACH, end + 2 * REACH):
+            near = row + 2 * REACH if _differ(spans, row + 2 * REACH, low, high) else near
+            seen = row if _differ(spans, row, low, high) else seen
             ring = means + (row + 2 * ROWS) % ROWS * WIDE
-            if 0 <= row < height:
+            if near < row - 2 * REACH:
+                pass
+            elif 0 <= row < height:
                 _padded_row(image, start + row * pitch, count, first, state, x_row)
                 _padded_row(target, start + row * pitch, count, first, state, y_row)
                 for i in range(0, LONG, WIDTH):
@@ -113,15 +169,16 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
                     _keep(state, ring + 2 * plane + i, WIDE, _across(state, q_row + MARGIN + i))
                     _keep(state, ring + 3 * plane + i, WIDE, _across(state, p_row + MARGIN + i))
             else:
-                for i in range(0, wide, WIDTH):
-                    for j in range(4):
-                        _keep(state, ring + j * plane + i, WIDE, zero)
+                _keep_zeros(state, ring, 4, plane, WIDE, wide)
             middle = row - REACH
             if middle < begin - REACH:
                 continue
             ring = slopes + (middle + 2 * ROWS) % ROWS * STRIP
-            if 0 <= middle < height:
-                share_row = shares[min(middle, len(shares) - 1)]
+            share_row = shares[min(max(middle, 0), len(shares) - 1)]
+            if seen < row - 2 * REACH:
+                if begin <= middle < end:
+                    sums[middle, first // STRIP] = _sum(share_row, MARGIN + first, narrow)
+            elif 0 <= middle < height:
                 value = zero
                 window = means + (middle - REACH + 2 * ROWS) % ROWS * WIDE
                 for i in range(0, wide, WIDTH):
@@ -145,24 +202,10 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
                     _keep(state, ring + slope_plane + i, STRIP, _across(state, of_q + MARGIN + i))
                     _keep(state, ring + 2 * slope_plane + i, STRIP, _across(state, of_p + MARGIN + i))
             else:
-                for i in range(0, narrow, WIDTH):
-                    for j in range(3):
-                        _keep(state, ring + j * slope_plane + i, STRIP, zero)
+                _keep_zeros(state, ring, 3, slope_plane, STRIP, narrow)
             out = middle - REACH
-            if out < begin:
+            if out < begin or not _differ(spans, out, low, high):
                 continue
             window = slopes + (out - REACH + 2 * ROWS) % ROWS * STRIP
-            for i in range(0, narrow, WIDTH):
-                mx, q = _down(state, window + i, STRIP), _down(state, window + slope_plane + i, STRIP)
-                p = _down(state, window + 2 * slope_plane + i, STRIP)
-                at = start + out * pitch + first + i
-                if first + i + WIDTH <= count:
-                    own = mx + q * load(image, at) * two + p * load(target, at)
-                    store(gradient, at, load(gradient, at) + own * factor)
-                else:
-                    store(state, x_row, mx)
-                    store(state, x_row + WIDTH, q)
-                    store(state, x_row + 2 * WIDTH, p)
-                    for j in range(count - first - i):
-                        own = state[j] + two * state[WIDTH + j] * image[at + j] + state[2 * WIDTH + j] * target[at + j]
-                        gradient[at + j] += own * factor
+            _add_gradient(image, target, state, window, slope_plane, start + out * pitch + first, count - first, narrow, factor,
+                          gradient)

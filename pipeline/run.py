@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 AHEAD = 2
 """Stages whose code is loaded while one is at work; one is not enough, since some stages end before the next has loaded."""
 
+LAST = 2
+"""Stages, the last ones, that others may use the time of: `train` takes most of a run, and leaves cores idle now and then."""
+
 RECALLED = 110
 """Characters of a cached stage's warning at most."""
 
@@ -171,9 +174,9 @@ class ClipRun:
             due = [plan.stage for plan in self.plan(clip, options) if plan.cached is None]
             self.keys.pull_models(due, self.journal.note)
 
-    def run(self, clip: Path, options: Options, at_last: Callable[[str], None] = lambda stage: None) -> None:
-        """Runs the stages that are not up to date; fills `results`, `metrics` and the folder. at_last: called with the
-        last stage's name once it is at work.
+    def run(self, clip: Path, options: Options, near_end: Callable[[list[str]], None] = lambda coming: None) -> None:
+        """Runs the stages that are not up to date; fills `results`, `metrics` and the folder. near_end: called once one of the
+        `LAST` stages is at work, with its name and those of the stages after it.
 
         Where an input of a stage that has to run is found damaged, the run goes back to the stage that made it.
         Raises StageFailedError, NotUpToDateError, CacheError; run.json and finished stages are kept in any case.
@@ -188,8 +191,8 @@ class ClipRun:
         with in_use(self.store) as lease, self._writing_results(clip, source.digest, options), runner:
             at, plans = 0, {}
             while at < len(steps):
-                name, following = steps[at], steps[at + 1:at + 1 + AHEAD]
-                runner.on_start = partial(runner.prepare, *following) if following else partial(at_last, name)
+                name = steps[at]
+                runner.on_start = partial(_use_time, runner, steps[at:], near_end)
                 inputs = self.graph.step(name).deps
                 parts = self.keys.parts(name, {port: digests[port] for port in inputs})
                 lease.add(parts.key)
@@ -332,6 +335,13 @@ class ClipRun:
             "metrics": self.metrics,
             **self.entries,
         }
+
+
+def _use_time(runner: StageRunner, coming: list[str], near_end: Callable[[list[str]], None]) -> None:
+    """What is done while a stage, the first of the coming ones, is at work."""
+    runner.prepare(*coming[1:1 + AHEAD])
+    if len(coming) <= LAST:
+        near_end(coming)
 
 
 def refuse_hopeless(record: Record) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import zip_longest
@@ -50,14 +50,14 @@ class Section:
     """Whose result it shows."""
 
 
-def draw_sections(out_dir: Path, running: str) -> dict[str, Section]:
-    """By name, the sections that can be drawn while a stage runs: those of the stages before it. Reads the template as well.
+def draw_sections(out_dir: Path, coming: Collection[str], drawn: dict[str, Section] | None = None) -> dict[str, Section]:
+    """By name, the sections that can be drawn while stages are still to come: those of the others. Reads the template as well.
 
-    Not the curves over seconds: those are in run.json, which is written at the run's end.
+    Not the curves over seconds: those are in run.json, which is written at the run's end. drawn: those that are made already.
     """
     read_template()
-    drawn = make_sections(Results(out_dir), without=running)
-    return {section.ident: section for section in drawn if not section.absent and section.ident != TRAINING}
+    made = make_sections(Results(out_dir), drawn, coming)
+    return {section.ident: section for section in made if not section.absent and section.ident != TRAINING}
 
 
 def write_report(out_dir: Path, drawn: dict[str, Section] | None = None) -> Path:
@@ -111,10 +111,10 @@ def _as_utf8(value: Any) -> Any:
     return type(value)(value.encode(errors="replace").decode())
 
 
-def make_sections(results: Results, drawn: dict[str, Section] | None = None, without: str = "") -> list[Section]:
+def make_sections(results: Results, drawn: dict[str, Section] | None = None, without: Collection[str] = ()) -> list[Section]:
     """All sections, made in parallel, since most of the time goes into reading and writing pictures.
 
-    drawn: by name, those that are made already; without: a stage whose results are left out.
+    drawn: by name, those that are made already; without: stages whose results are left out.
     """
     draw, one_at_a_time = functools.cache(lambda: Painter(results)), Lock()
 
@@ -127,7 +127,7 @@ def make_sections(results: Results, drawn: dict[str, Section] | None = None, wit
         return known or make_section(results, drawing, ident, title, lead, port, *how)
 
     with ThreadPoolExecutor() as pool:
-        return list(pool.map(lambda parts: section(*parts), [parts for parts in SECTIONS if parts[3].split("/")[0] != without]))
+        return list(pool.map(lambda parts: section(*parts), [parts for parts in SECTIONS if parts[3].split("/")[0] not in without]))
 
 
 class Painter:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from gsac.pipeline.report.origin import drawn_from, read_origin
@@ -12,25 +12,28 @@ from gsac.pipeline.run_folder import REPORT, RunFolder
 
 
 class EarlySections:
-    """Sections of the report that are drawn while the last stage is at work."""
+    """Sections of the report that are drawn while the last stages are at work."""
 
     def __init__(self, folder: RunFolder):
-        self.folder, self._pool, self._drawn = folder, ThreadPoolExecutor(1), None
+        self.folder, self._pool = folder, ThreadPoolExecutor(1)
+        self._drawn: dict[str, Any] = {}
+        self._last: Future[None] | None = None
 
-    def start(self, running: str) -> None:
-        """running: the stage at work, whose results are not there yet."""
-        self._drawn = self._pool.submit(self._draw, running)
+    def start(self, coming: list[str]) -> None:
+        """Draws what is not drawn yet. coming: the stages whose results are not there yet."""
+        self._last = self._pool.submit(self._draw, coming)
 
-    def _draw(self, running: str) -> dict[str, Any]:
+    def _draw(self, coming: list[str]) -> None:
         from gsac.pipeline.report.page import draw_sections
 
-        return draw_sections(self.folder.root, running)
+        self._drawn = draw_sections(self.folder.root, coming, self._drawn)
 
     def sections(self) -> dict[str, Any]:
         """Sections by name; those that are missing are still to be drawn."""
         with contextlib.suppress(Exception):
-            return self._drawn.result() if self._drawn else {}
-        return {}
+            if self._last is not None:
+                self._last.result()
+        return self._drawn
 
 
 def refresh_report(folder: RunFolder, early: EarlySections | None = None) -> str | None:

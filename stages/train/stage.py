@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -262,6 +263,15 @@ class Run:
         """dB on the person, mean over some frames; None of no frame."""
         return mean_psnr(judge_person([Candidate(gaussians, poses, list(views), views)])[0], "mse_fg")
 
+    def judge_fit_and_trained(self, gaussians: Gaussians, poses: Poses) -> list[float | None]:
+        """`psnr_fg` of the held-out frames in the body fit's poses, and of some trained frames."""
+        fitted = poses.copy()
+        fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
+        trained = self.read(self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)])
+        judged = judge_person([Candidate(gaussians, fitted, list(self.filmed), self.filmed),
+                               Candidate(gaussians, poses, list(trained), trained)])
+        return [mean_psnr(rows, "mse_fg") for rows in judged]
+
     def judge_both(self, gaussians: Gaussians, poses: Poses, small: dict[int, View],
                    folder: Path | None = None) -> tuple[list[dict], list[dict]]:
         """Scores of the held-out frames as filmed and in their small views. folder: for the images as filmed."""
@@ -302,18 +312,24 @@ class Run:
         """The content of metrics.json. folder: where the images of the held-out frames go."""
         config, held = self.job.config, self.held
         small = {t: view.reduced(SMALL) for t, view in self.filmed.items()}
-        rows, small_rows = self.judge_both(gaussians, poses, small, folder)
-        self.job.progress(1, *JUDGING)
-        aligned, ttpo, small_ttpo = poses.copy(), [], []
-        if config.pose_test_steps:
-            ttpo, small_ttpo = self.judge_aligned(gaussians, aligned, small)
-        self.job.progress(2, *JUDGING)
-        fitted = poses.copy()
-        fitted.pose, fitted.transl = poses.fit_pose, poses.fit_transl
-        of_fit = self.psnr_fg(gaussians, fitted, self.filmed)
-        of_trained = self.psnr_fg(gaussians, poses, self.read(self.trained[:: -(-len(self.trained) // TRAIN_SAMPLE)]))
-        self.job.progress(3, *JUDGING)
         trained = self.views[0].frame
+        aligned, ttpo, small_ttpo = poses.copy(), [], []
+        with ThreadPoolExecutor(1) as aside:  # a GPU is this thread's alone
+            judging = aside.submit(self.judge_both, gaussians, poses, small, folder)
+            comparing = aside.submit(self.judge_fit_and_trained, gaussians, poses)
+            looking = aside.submit(judge_levels, gaussians, self.result.coarser, poses,
+                                   {t: view.reduced(trained.height) for t, view in self.filmed.items()})
+            bending = aside.submit(judge_novel, gaussians, poses)
+            if self.job.device == "cpu":
+                wait([judging, comparing, looking, bending])  # twice as many frames at once would take twice the memory
+            if config.pose_test_steps:
+                ttpo, small_ttpo = self.judge_aligned(gaussians, aligned, small)
+            self.job.progress(1, *JUDGING)
+            likeness = judge_likeness(gaussians, aligned, held, small, self.camera.height)
+            rows, small_rows = judging.result()
+            self.job.progress(2, *JUDGING)
+            of_fit, of_trained = comparing.result()
+            self.job.progress(3, *JUDGING)
         return summary(rows) | at_test(summary(ttpo)) | {
             f"at_{SMALL}": pick_small(small_rows) | at_test(pick_small(small_ttpo)),
             "psnr_fg_fit": of_fit,
@@ -336,11 +352,10 @@ class Run:
                         for t, row, other in zip(map(int, held), rows, ttpo or [dict.fromkeys(row, np.nan) for row in rows],
                                                  strict=True)],
             "lpips_in_loss": self.in_loss == NETWORKS[0], **({"vgg_hed_in_loss": True} if self.in_loss == VGG_HED else {}),
-            "levels": judge_levels(gaussians, self.result.coarser, poses,
-                                   {t: view.reduced(trained.height) for t, view in self.filmed.items()}),
-            "likeness": judge_likeness(gaussians, aligned, held, small, self.camera.height),
+            "levels": looking.result(),
+            "likeness": likeness,
             "seen_area": self.seen_area,
             "unseen_gaussians": int((~self.result.seen).sum()),
-            **judge_novel(gaussians, poses),
+            **bending.result(),
             "curve": [{key: value for key, value in row.items() if key not in TIMES} for row in self.curve],
         } | self.result.figures

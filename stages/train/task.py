@@ -58,7 +58,7 @@ class Fit:
     """Frame -> (3,) learned gain per channel, where exposure is learned."""
     figures: dict[str, Any] = field(default_factory=dict)
     """The recipe's own entries of metrics.json."""
-    smaller: list[Gaussians] = field(default_factory=list)
+    smaller: list[Fit] = field(default_factory=list)
     """Smaller sizes that were tried and not taken, the largest of them first."""
     coarser: list[Gaussians] = field(default_factory=list)
     """Coarser levels of detail, the finest of them first."""

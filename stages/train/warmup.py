@@ -35,7 +35,8 @@ def warm_up() -> None:
     frames, poses = np.arange(FRAMES), Poses(body, params)
     config = TrainConfig(gaussians=GAUSSIANS, steps=STEPS, pose_rounds=1)
     gaussians = RECIPES["fast", "cpu"](Task(views, frames, frames[:1], poses, config, lambda done, total, unit: None)).gaussians
-    merge_to_size(gaussians, np.ones(len(gaussians)), len(gaussians) // 2, body, poses.rest(0)[0])
+    shown = np.ones(len(gaussians))
+    merge_to_size(gaussians, shown > 0, shown, len(gaussians) // 2, body, poses.rest(0)[0])
     converge(gaussians, poses, frames[:1], views, 1)
     BACKENDS["cpu"].align_poses(gaussians, poses, frames[:1], views, 1)
     judge(gaussians, poses, frames[:1], views)

@@ -81,6 +81,22 @@ def test_ssim_of_a_wide_image_agrees_with_torch():
     assert np.abs(got.gradient - x.grad.numpy()).max() < 1e-12 * x.grad.abs().max().item()
 
 
+@pytest.mark.parametrize("weighted", [False, True])
+def test_columns_that_are_said_to_be_the_same_change_neither_loss_nor_gradient_of_the_others(weighted):
+    image, target, weights = images(90, 150)
+    rng, spans = np.random.default_rng(5), np.zeros((90, 2), np.int64)
+    spans[30:50, 0] = rng.integers(60, 80, 20)
+    spans[30:50, 1] = spans[30:50, 0] + rng.integers(0, 40, 20)
+    columns = np.arange(150)
+    same = (columns < spans[:, :1]) | (columns >= spans[:, 1:])
+    target[same] = image[same]
+    for loss in (losses.l2, losses.ssim):
+        every = loss(image, target, weights=weights if weighted else None)
+        some = loss(image, target, weights=weights if weighted else None, spans=spans)
+        assert abs(some.value - every.value) < 1e-12
+        assert np.abs(some.gradient - every.gradient)[~same].max() < 1e-12 * np.abs(every.gradient).max()
+
+
 def test_gradients_of_several_losses_add_up_in_one_array():
     image, target, _ = (a.astype(np.float32) for a in images(20, 30))
     apart = losses.l2(image, target).gradient + losses.ssim(image, target, factor=-0.1).gradient

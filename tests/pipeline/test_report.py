@@ -167,15 +167,22 @@ def test_a_whole_run_shows_every_section(whole):
 
 
 def test_sections_drawn_while_the_last_stage_runs_are_those_of_the_stages_before_and_give_the_same_page(copied, whole):
-    early = draw_sections(copied, "train")
+    early = draw_sections(copied, ["train", "export"])
     assert sorted(early) == ["alpha", "body", "clip", "keypoints"]
     shutil.rmtree(copied / "segment" / "alpha")
     page = Page(write_report(copied, early))
     assert all(page.images(section) == Page(whole / "report.html").images(section) for section in PICTURES)
 
 
+def test_sections_that_are_drawn_already_are_not_drawn_again(copied):
+    early = draw_sections(copied, ["train", "export"])
+    later = draw_sections(copied, ["export"], early)
+    assert all(later[name] is section for name, section in early.items())
+    assert {"avatar", "heldout"} <= later.keys() - early.keys()
+
+
 def test_a_section_that_was_drawn_early_is_shown_only_if_its_stage_is_of_this_folder(copied):
-    early = draw_sections(copied, "train")
+    early = draw_sections(copied, ["train", "export"])
     write_run(copied, [stage_row("split"), stage_row("keypoints")])
     page = Page(write_report(copied, early))
     assert page.images("clip") and not page.images("body") and not page.images("alpha")

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.threads import side_by_side
 from gsac.stages.train.checkpoint import loop_state
 from gsac.stages.train.config import FAST_STEPS, coarse_share, coarse_steps
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
@@ -59,6 +60,7 @@ class Cpu(Backend):
             task.progress(step + 1, steps, "steps")
         if trainer.offsets:
             trainer.fold_offsets()
+            trainer.lay_unseen(coarse)
         return Trained(trainer, fine, coarse)
 
     def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,
@@ -89,8 +91,7 @@ class Cpu(Backend):
 
     def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""
-        for t in map(int, frames):
-            align_pose(gaussians, poses, t, views[t], steps)
+        side_by_side(lambda t, workspace: align_pose(gaussians, poses, t, views[t], steps, workspace), map(int, frames))
 
 
 class CpuRounds(Rounds):

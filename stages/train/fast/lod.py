@@ -6,6 +6,7 @@ From afar many gaussians share a pixel, and then fewer that were fitted to small
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -52,28 +53,38 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
     tall = typical_height(task.poses, filmed)
     poses, looked_at = find_frames(task, filmed)
     coarse = scale_views(looked_at, MOVED / tall)
-    out, finer, own_poses = [], fit.gaussians, None
-    for level in LEVELS:
-        if len(finer) <= level.most:
-            continue
-        scale, size = min(1.0, level.height / tall), min(level.most, round(FEWER * len(finer)))
-        views = scale_views(filmed, scale)
-        tried = min((one for one in (finer, *fit.smaller) if len(one) >= size), key=len)
-        worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
-        fewer = merge_to_size(tried, worth, size, body, rest)
-        trainer = Trainer(level_heights(fewer, rest, body.faces), task, frozen_body=True, scale=scale)
-        trainer.freeze_unseen(views)
-        pace = FIRM if len(tried) >= 2 * size else GENTLE
-        gaussians = backend.refit(task, trainer, views, pace).finish(views)[0]
-        shown = scale_views(looked_at, scale)
-        finer_poses = own_poses or move(finer, task, poses, coarse)
-        own_poses = move(gaussians, task, poses, coarse)
-        found = find_drawn_height(Candidate(gaussians, own_poses, list(shown), shown),
-                                  Candidate(finer, finer_poses, list(shown), shown))
-        gaussians.max_height_px = min(found, finer.max_height_px or found)
-        out.append(gaussians)
-        finer = gaussians
+    out: list[Gaussians] = []
+    heights: list[Future[float]] = []
+    finer, finer_seen, placed = fit.gaussians, fit.seen, None
+    smaller = [(tried.gaussians, tried.seen) for tried in fit.smaller]
+    with ThreadPoolExecutor(1) as aside:  # a level is looked at while the next one is fitted
+        for level in LEVELS:
+            if len(finer) <= level.most:
+                continue
+            placed = placed or aside.submit(move, finer, task, poses, coarse)
+            scale, size = min(1.0, level.height / tall), min(level.most, round(FEWER * len(finer)))
+            views = scale_views(filmed, scale)
+            tried, seen = min((one for one in ((finer, finer_seen), *smaller) if len(one[0]) >= size), key=lambda one: len(one[0]))
+            worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
+            fewer, seen = merge_to_size(tried, seen, worth, size, body, rest)
+            trainer = Trainer(level_heights(fewer, rest, body.faces), task, frozen_body=True, scale=scale)
+            trainer.seen = seen
+            pace = FIRM if len(tried) >= 2 * size else GENTLE
+            gaussians, seen = backend.refit(task, trainer, views, pace).finish(views)
+            finer_placed, placed = placed, aside.submit(move, gaussians, task, poses, coarse)
+            heights.append(aside.submit(look, gaussians, placed, finer, finer_placed, scale_views(looked_at, scale)))
+            out.append(gaussians)
+            finer, finer_seen = gaussians, seen
+    least = np.minimum.accumulate([height.result() for height in heights])
+    for gaussians, height in zip(out, least, strict=True):
+        gaussians.max_height_px = float(height)
     return out
+
+
+def look(level: Gaussians, poses: Future[Poses], finer: Gaussians, finer_poses: Future[Poses], views: dict[int, View]) -> float:
+    """`find_drawn_height` of a level, each with its own poses in the same views."""
+    return find_drawn_height(Candidate(level, poses.result(), list(views), views),
+                             Candidate(finer, finer_poses.result(), list(views), views))
 
 
 def scale_views(views: Mapping[int, View], scale: float) -> dict[int, View]:

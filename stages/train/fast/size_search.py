@@ -7,6 +7,7 @@ off would reward blur. The search ends at the first size that scores worse than 
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from gsac.avatar.joints import HEAD, JAW, WRISTS, J
 from gsac.avatar.metrics import psnr
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace, side_by_side
-from gsac.stages.train.fast.backend import Backend
+from gsac.stages.train.fast.backend import Backend, Trained
 from gsac.stages.train.fast.initial_gaussians import COLOUR_FRAMES
 from gsac.stages.train.fast.refit import OF_SIZE
 from gsac.stages.train.fast.schedule import budget
@@ -27,7 +28,7 @@ from gsac.stages.train.gaussians.merge import merge_to_size, skin_weights
 from gsac.stages.train.gaussians.unseen import level_heights
 from gsac.stages.train.judge.heldout import Candidate, judge_person
 from gsac.stages.train.poses.photometric import converge
-from gsac.stages.train.poses.poses import carry_to_untrained
+from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import View
 
@@ -44,25 +45,21 @@ def search(task: Task, backend: Backend) -> Fit:
     sizes = list_sizes(budget(task, backend.device))
     if not len(task.choosing):
         return backend.fit(task, sizes[0])
-    trainer, fine, coarse = backend.train(task, sizes[0])
+    largest = backend.train(task, sizes[0])
     poses = carry_to_untrained(task.poses, task.trained)
-    converge(trainer.gaussians(), poses, task.choosing, task.views, POSE_ROUNDS)
-    scores: list[SizeScore] = []
-    fits: list[Fit] = []
-    for size in sizes:
-        task.progress(len(scores), len(sizes), "sizes at most")
-        if scores:
-            gaussians = trainer.gaussians()
-            worth = count_pixels(gaussians, task, coarse) * viewing_weight(gaussians, task.poses.body)
-            fewer = merge_to_size(gaussians, worth, size, task.poses.body, trainer.rest)
-            trainer = Trainer(level_heights(fewer, trainer.rest, trainer.faces), task, frozen_body=True)
-            trainer.freeze_unseen(coarse)
-            trainer = backend.refit(task, trainer, fine, OF_SIZE, coarse)
-        fits.append(Fit(*trainer.finish(coarse), dict(trainer.gains)))
-        rows, = judge_person([Candidate(fits[-1].gaussians, poses, task.choosing, task.filmed)])
-        scores.append(SizeScore(size, [psnr(row["mse_fg"]) for row in rows], [row["detail"] for row in rows]))
+    task.progress(0, len(sizes), "sizes at most")
+    with ThreadPoolExecutor(1) as aside:
+        judging = aside.submit(judge_largest, largest, task, poses)
+        trained = refit_fewer(largest, sizes[1], task, backend)  # that size is tried whatever the first one's score
+        tried = [judging.result(), judge_size(trained, task, poses)]
+    for size in sizes[2:]:
+        task.progress(len(tried), len(sizes), "sizes at most")
+        scores = [score for _, score in tried]
         if choose(scores) is not scores[-1] and not task.config.every_size:
             break
+        trained = refit_fewer(trained, size, task, backend)
+        tried.append(judge_size(trained, task, poses))
+    fits, scores = [fit for fit, _ in tried], [score for _, score in tried]
     best = choose(scores)
     figures = {"size_curve": [asdict(score) | score.means() | {"chosen": score is best} for score in scores],
                "size_rule": f"smallest within one standard error, and {MOST_LOST} dB, of the best psnr_fg of size_frames, their "
@@ -70,7 +67,34 @@ def search(task: Task, backend: Backend) -> Fit:
                             "choice, since it was made by them; other heldout_frames do not",
                "size_frames": task.choosing.tolist(), "size_optimism": optimism(scores)}
     taken = scores.index(best)
-    return replace(fits[taken], figures=figures, smaller=[fit.gaussians for fit in fits[taken + 1:]])
+    return replace(fits[taken], figures=figures, smaller=fits[taken + 1:])
+
+
+def refit_fewer(trained: Trained, size: int, task: Task, backend: Backend) -> Trained:
+    """What was trained, merged to `size` gaussians and refitted to the same views."""
+    trainer, fine, coarse = trained
+    assert trainer.seen is not None  # as `Backend.train` and `refit` leave it
+    gaussians = trainer.gaussians()
+    worth = count_pixels(gaussians, task, coarse) * viewing_weight(gaussians, task.poses.body)
+    fewer, seen = merge_to_size(gaussians, trainer.seen, worth, size, task.poses.body, trainer.rest)
+    merged = Trainer(level_heights(fewer, trainer.rest, trainer.faces), task, frozen_body=True)
+    merged.seen = seen
+    return trained._replace(trainer=backend.refit(task, merged, fine, OF_SIZE, coarse))
+
+
+def judge_largest(trained: Trained, task: Task, poses: Poses) -> tuple[Fit, SizeScore]:
+    """`judge_size`, after the choosing frames of `poses` were moved to their images with these gaussians."""
+    converge(trained.trainer.gaussians(), poses, task.choosing, task.views, POSE_ROUNDS)
+    return judge_size(trained, task, poses)
+
+
+def judge_size(trained: Trained, task: Task, poses: Poses) -> tuple[Fit, SizeScore]:
+    """The finished gaussians, and how well they show the choosing frames in these poses."""
+    trainer = trained.trainer
+    fit = Fit(*trainer.finish(trained.coarse), dict(trainer.gains))
+    rows, = judge_person([Candidate(fit.gaussians, poses, task.choosing, task.filmed)])
+    decibels = [psnr(row["mse_fg"]) or 0.0 for row in rows]  # 0 where neither shows the person, whatever the size
+    return fit, SizeScore(len(fit.gaussians), decibels, [row["detail"] for row in rows])
 
 
 def list_sizes(largest: int) -> list[int]:

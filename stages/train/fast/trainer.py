@@ -168,9 +168,9 @@ class Trainer:
         gain = self.gains.get(t, np.ones(3)).astype(np.float32)
         take, real = self.losses.take, rendering.rgb.dtype
         image, target, grad_rgb = (take(name, rendering.rgb.shape, real) for name in ("image", "target", "grad_rgb"))
-        grad_alpha = take("grad_alpha", rendering.alpha.shape, real)
-        on_background(self.workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
-        loss, grad_image = self._image_loss(image, target)
+        grad_alpha, spans = take("grad_alpha", rendering.alpha.shape, real), take("spans", (len(image), 2), np.int64)
+        on_background(self.workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target, spans)
+        loss, grad_image = self._image_loss(image, target, spans)
         grad_gain = np.empty(3)
         loss += through_background(self.workspace.share, grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain,
                                    config.mask, grad_rgb, grad_alpha, grad_gain)
@@ -228,13 +228,15 @@ class Trainer:
 
         return sum(side_by_side(added, views.items()), np.zeros(len(self.face))) / len(views)
 
-    def _image_loss(self, image: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray]:
+    def _image_loss(self, image: np.ndarray, target: np.ndarray, spans: np.ndarray) -> tuple[float, np.ndarray]:
+        """Value and gradient (h, w, 3). image, target: (h, w, 3); spans: (h, 2) of `on_background`."""
         config = self.config
         gradient = self.losses.take("gradient", image.shape, image.dtype)
         gradient[:] = 0
-        loss, _ = losses.l2(image, target, gradient=gradient, workspace=self.losses)
+        loss, _ = losses.l2(image, target, gradient=gradient, workspace=self.losses, spans=spans)
         if config.ssim:
-            similarity = losses.ssim(image, target, factor=-config.ssim, gradient=gradient, workspace=self.losses).value
+            similarity = losses.ssim(image, target, factor=-config.ssim, gradient=gradient, workspace=self.losses,
+                                     spans=spans).value
             loss += config.ssim * (1 - similarity)
         if config.sobel:
             loss += config.sobel * losses.sobel(image, target, factor=config.sobel, gradient=gradient,
@@ -264,9 +266,10 @@ class Trainer:
         rates = {"mu": config.mu_rate * MU_END**done, "quat": config.quat_rate * END**done,
                  "log_scale": config.scale_rate * END**done, "rgb": config.rgb_rate * END**done,
                  "opacity_logit": config.opacity_rate * END**done}
-        count_rows(grads["rgb"][own], self.count[own])
+        bias = np.empty((own.stop - own.start, 2))
+        count_rows(grads["rgb"][own], self.count[own], bias)
         for name, rate in rates.items():
-            adam_rows(v[name][own], grads[name][own], self.first[name][own], self.second[name][own], self.count[own], rate)
+            adam_rows(v[name][own], grads[name][own], self.first[name][own], self.second[name][own], bias, rate)
         limit(v["mu"][own], v["quat"][own], v["log_scale"][own], v["rgb"][own], v["opacity_logit"][own], self.start[own],
               self.face_scale[own], config.needle, self.least, self.largest, self.reach,
               config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))

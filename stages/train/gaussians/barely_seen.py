@@ -8,13 +8,13 @@ around it count. Between seen and unseen there is no step.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import spsolve
+from scipy.sparse import coo_matrix
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.nearest import find_nearest
 from gsac.stages.train.gaussians.unseen import AROUND, NEIGHBOURS, disc_areas, hold_colours
+from gsac.stages.train.poses.bundle_adjust import conjugate_gradients
 
 FACING = 0.3
 """Cosine between the normals of two gaussians above which one tells how well the frames show the other's place."""
@@ -84,5 +84,7 @@ def spread_colours(rgb: np.ndarray, own: np.ndarray, evidence: np.ndarray, near:
     pairs = coo_matrix((weight, (one, other)), shape=(len(rgb), len(rgb))).tocsr()
     pairs = (pairs + pairs.T) / 2
     own = own.astype(np.float64) + FREE
-    system = diags(own + np.asarray(pairs.sum(1)).ravel()) - pairs
-    return np.clip(np.asarray(spsolve(system.tocsc(), own[:, None] * rgb)), 0, 1).astype(np.float32)
+    diagonal = own + np.asarray(pairs.sum(1)).ravel()
+    even = 1 / np.sqrt(diagonal)[:, None]  # unknowns of one scale need few steps
+    solved = conjugate_gradients(lambda z: z - even * (pairs @ (even * z)), even * own[:, None] * rgb)
+    return np.clip(even * solved, 0, 1).astype(np.float32)

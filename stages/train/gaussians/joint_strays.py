@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from scipy.spatial import KDTree
 
-from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.binding import FaceFrames, bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
@@ -48,11 +48,18 @@ class Side(NamedTuple):
     """Pixels of the silhouette, at least 1."""
 
 
+class Placed(NamedTuple):
+    """A posed body's surface in space."""
+
+    frames: FaceFrames
+    tree: KDTree
+    """Of its vertices."""
+
+
 class Bent(NamedTuple):
     """A posed body, and how it looks."""
 
-    vertices: np.ndarray
-    """(V, 3) m."""
+    surface: Placed
     sides: list[Side]
 
 
@@ -60,18 +67,21 @@ def shrink_strays(levels: list[Gaussians], poses: Poses, frames: np.ndarray) -> 
     """The gaussians of each level, some smaller. frames: (n,) trained ones, whose median pose is the usual one."""
     pose, faces = np.median(poses.pose[frames], 0), poses.body.faces
     pose[0] = 0
-    usual = put_in_pose(poses, int(frames[0]), pose)
+    usual = place(put_in_pose(poses, int(frames[0]), pose), faces)
     bent = side_by_side(lambda turns, _: see(put_in_pose(poses, int(frames[0]), turn_joints(pose, turns)), faces), BENDS)
     out = [level[np.arange(len(level))] for level in levels]
 
-    def find_large(item: tuple[Gaussians, Bent], workspace: Workspace) -> np.ndarray:
-        gaussians, posed = item
-        large = np.flatnonzero(find_stray(gaussians, posed.sides, faces, workspace) > LEAST)
-        return large[find_reach(gaussians[large], posed.vertices, faces) > find_reach(gaussians[large], usual, faces) + GROWN]
+    def find_large(item: tuple[Gaussians, Bent, np.ndarray], _: Workspace) -> np.ndarray:
+        gaussians, posed, stray = item
+        large = np.flatnonzero(stray > LEAST)
+        return large[find_reach(gaussians[large], posed.surface) > find_reach(gaussians[large], usual) + GROWN]
 
     left = [(gaussians, posed) for gaussians in out for posed in bent]
     for _ in range(ROUNDS):
-        found = side_by_side(find_large, left)
+        shown = side_by_side(lambda seen, workspace: find_stray(*seen, faces, workspace),
+                             [(gaussians, side) for gaussians, posed in left for side in posed.sides])
+        sums = [sum(shown[TURNS * k:TURNS * (k + 1)], np.zeros(len(gaussians))) for k, (gaussians, _) in enumerate(left)]
+        found = side_by_side(find_large, [(*item, stray) for item, stray in zip(left, sums, strict=True)])
         for gaussians in out:
             strays = [large for (own, _), large in zip(left, found, strict=True) if own is gaussians]
             if strays:
@@ -88,29 +98,29 @@ def see(posed: np.ndarray, faces: np.ndarray) -> Bent:
         body = rasterise(vertices, faces, camera)[0] >= 0
         away = cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / metre
         sides.append(Side(vertices, camera, away, max(int(np.count_nonzero(body)), 1)))
-    return Bent(posed, sides)
+    return Bent(place(posed, faces), sides)
 
 
-def find_stray(gaussians: Gaussians, sides: list[Side], faces: np.ndarray, workspace: Workspace) -> np.ndarray:
-    """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, sum over the sides. faces: (F, 3).
+def place(posed: np.ndarray, faces: np.ndarray) -> Placed:
+    """The surface of the body posed (V, 3) m. faces: (F, 3)."""
+    return Placed(face_frames(posed, faces), KDTree(posed))
+
+
+def find_stray(gaussians: Gaussians, side: Side, faces: np.ndarray, workspace: Workspace) -> np.ndarray:
+    """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, seen from a side. faces: (F, 3).
 
     What it adds is the gradient of a sum of pixels by its colour.
     """
-    stray, off = np.zeros(len(gaussians)), OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
-    for side in sides:
-        counted = np.clip(side.away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
-        rendering = render_bound(side.vertices, faces, gaussians, side.camera, workspace)
-        stray += render_backward(rendering.state, counted, np.zeros_like(rendering.alpha)).rgb[:, 0] / side.area
-    return stray
+    off = OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
+    counted = np.clip(side.away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
+    rendering = render_bound(side.vertices, faces, gaussians, side.camera, workspace)
+    return render_backward(rendering.state, counted, np.zeros_like(rendering.alpha)).rgb[:, 0] / side.area
 
 
-def find_reach(gaussians: Gaussians, posed: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(N,) m from the body posed (V, 3) m to the ends of the gaussians: of the centre from its vertices, and the longest axis.
-
-    faces: (F, 3).
-    """
-    bound = bind(face_frames(posed, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    return KDTree(posed).query(bound.means)[0] + bound.scales.max(1)
+def find_reach(gaussians: Gaussians, surface: Placed) -> np.ndarray:
+    """(N,) m from the body to the ends of the gaussians: of the centre from its vertices, and the longest axis."""
+    bound = bind(surface.frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    return surface.tree.query(bound.means)[0] + bound.scales.max(1)
 
 
 def put_in_pose(poses: Poses, t: int, pose: np.ndarray) -> np.ndarray:

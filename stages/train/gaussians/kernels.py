@@ -11,13 +11,13 @@ from gsac.avatar.threads import Share
 
 
 def on_background(share: Share, rgb: np.ndarray, alpha: np.ndarray, pixels: np.ndarray, background: np.ndarray, gain: np.ndarray,
-                  image: np.ndarray, target: np.ndarray) -> None:
+                  image: np.ndarray, target: np.ndarray, spans: np.ndarray) -> None:
     """Composes render and frame over one colour: image = gain * rgb + (1 - alpha) bg, target likewise from the cut-out frame.
 
     share: `Workspace.share`; rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8 premultiplied; background, gain:
-    (3,). image, target: (h, w, 3), written.
+    (3,). Written: image, target (h, w, 3); spans (h, 2) int, first and end column of each row in which either shows the person.
     """
-    share(_on_background, rgb, alpha, pixels, background, gain, image, target)
+    share(_on_background, rgb, alpha, pixels, background, gain, image, target, spans)
 
 
 def through_background(share: Share, grad_image: np.ndarray, rgb: np.ndarray, alpha: np.ndarray, pixels: np.ndarray,
@@ -36,12 +36,18 @@ def through_background(share: Share, grad_image: np.ndarray, rgb: np.ndarray, al
 
 
 @own_kernel(nogil=True, error_model="numpy", fastmath=True)
-def _on_background(worker, workers, rgb, alpha, pixels, background, gain, image, target):
+def _on_background(worker, workers, rgb, alpha, pixels, background, gain, image, target, spans):
     byte = rgb.dtype.type(1 / 255)
     one = rgb.dtype.type(1)
-    height = rgb.shape[0]
+    height, width = alpha.shape
     for y in range(height * worker // workers, height * (worker + 1) // workers):
-        for x in range(rgb.shape[1]):
+        first, end = 0, width
+        while first < end and alpha[y, first] == 0 and pixels[y, first, 3] == 0:
+            first += 1
+        while end > first and alpha[y, end - 1] == 0 and pixels[y, end - 1, 3] == 0:
+            end -= 1
+        spans[y, 0], spans[y, 1] = first, end
+        for x in range(width):  # all of them: a loop that begins elsewhere is not made of vectors
             clear, clear_target = one - alpha[y, x], one - pixels[y, x, 3] * byte
             for c in range(3):
                 image[y, x, c] = gain[c] * rgb[y, x, c] + clear * background[c]
@@ -71,10 +77,10 @@ def _through_background(worker, workers, grad_image, rgb, alpha, pixels, backgro
 
 
 @own_kernel(nogil=True, error_model="numpy")
-def adam_rows(value, grad, first, second, count, rate):
-    """One Adam step (0.9, 0.99) of the rows of value (N, C) whose gradient is not zero; count: (N,) steps of each row.
+def adam_rows(value, grad, first, second, bias, rate):
+    """One Adam step (0.9, 0.99) of the rows of value (N, C) whose gradient is not zero; bias: (N, 2) of `count_rows`.
 
-    A gaussian that a frame does not show keeps its value and its moments. `count_rows` advances count.
+    A gaussian that a frame does not show keeps its value and its moments.
     """
     for i in range(value.shape[0]):
         touched = False
@@ -82,9 +88,7 @@ def adam_rows(value, grad, first, second, count, rate):
             touched |= grad[i, c] != 0
         if not touched:
             continue
-        n = count[i] if count[i] > 0 else 1
-        scale = rate / (1 - 0.9**n)
-        unbias = 1 / (1 - 0.99**n)
+        scale, unbias = rate / bias[i, 0], bias[i, 1]
         for c in range(value.shape[1]):
             g = np.float64(grad[i, c])
             first[i, c] += 0.1 * (g - first[i, c])
@@ -106,13 +110,18 @@ def adam(value, grad, first, second, count, rate):
 
 
 @own_kernel(nogil=True, error_model="numpy")
-def count_rows(grad, count):
-    """Adds one to count (N,) where the row of grad (N, C) is not zero."""
+def count_rows(grad, count, bias):
+    """Adds one to count (N,) where the row of grad (N, C) is not zero.
+
+    bias (N, 2), written: what Adam divides the first moment by and multiplies the second with after so many steps, at least one.
+    """
     for i in range(grad.shape[0]):
         for c in range(grad.shape[1]):
             if grad[i, c] != 0:
                 count[i] += 1
                 break
+        n = count[i] if count[i] > 0 else 1
+        bias[i, 0], bias[i, 1] = 1 - 0.9**n, 1 / (1 - 0.99**n)
 
 
 @own_kernel(nogil=True, error_model="numpy")

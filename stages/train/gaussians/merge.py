@@ -34,10 +34,12 @@ OPAQUE = 0.95
 """Largest opacity of a merged gaussian."""
 
 
-def merge_to_size(gaussians: Gaussians, shown: np.ndarray, size: int, body: Body, rest: np.ndarray) -> Gaussians:
-    """Merges to `size` gaussians, or to as few as neighbours allow.
+def merge_to_size(gaussians: Gaussians, seen: np.ndarray, shown: np.ndarray, size: int, body: Body,
+                  rest: np.ndarray) -> tuple[Gaussians, np.ndarray]:
+    """Merges to `size` gaussians, or to as few as neighbours allow; also tells which are seen: those made of one that is.
 
-    shown: (N,) pixels that each adds to the images, possibly weighted; rest: (V, 3) m, the body that they are merged on.
+    seen: (N,) bool; shown: (N,) pixels that each adds to the images, possibly weighted; rest: (V, 3) m, the body that they are
+    merged on. Returns M gaussians, (M,) bool.
     """
     frames = face_frames(rest, body.faces)
     shown = np.asarray(shown, np.float64) + HIDDEN * np.mean(shown)
@@ -47,8 +49,16 @@ def merge_to_size(gaussians: Gaussians, shown: np.ndarray, size: int, body: Body
         if not len(pairs):
             break
         pairs = pairs[:min(len(gaussians) - size, max(int(ROUND * len(gaussians)), 1))]
-        gaussians, shown = merge_pairs(gaussians, bound, shown, pairs, frames)
-    return gaussians
+        left, gaussians, shown = merge_pairs(gaussians, bound, shown, pairs, frames)
+        seen = _join_pairs(seen, pairs)[left]
+    return gaussians, seen
+
+
+def _join_pairs(seen: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """(N,) bool, of both of a pair whether one of them is seen. seen: (N,) bool; pairs: (P, 2)."""
+    out = seen.copy()
+    out[pairs] |= seen[pairs[:, ::-1]]
+    return out
 
 
 def find_cheapest_pairs(gaussians: Gaussians, bound: Bound, shown: np.ndarray, normals: np.ndarray, body: Body) -> np.ndarray:
@@ -107,10 +117,11 @@ def skin_weights(face: np.ndarray, body: Body) -> np.ndarray:
 
 
 def merge_pairs(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np.ndarray,
-                frames: FaceFrames) -> tuple[Gaussians, np.ndarray]:
+                frames: FaceFrames) -> tuple[np.ndarray, Gaussians, np.ndarray]:
     """Merges each of pairs (P, 2) to one gaussian with the mean and spread of both, on the face of the one that shows more.
 
-    bound, frames: gaussians and faces at rest; shown: (N,) pixels, by which the two are weighted. Returns M gaussians, (M,) pixels.
+    bound, frames: gaussians and faces at rest; shown: (N,) pixels, by which the two are weighted. Returns the indices
+    (M,) of the gaussians that are left, merged or not, M gaussians, (M,) pixels.
     """
     first = shown[pairs[:, 0]] >= shown[pairs[:, 1]]
     keep, drop = np.where(first, *pairs.T), np.where(first, *pairs.T[::-1])
@@ -137,4 +148,4 @@ def merge_pairs(gaussians: Gaussians, bound: Bound, shown: np.ndarray, pairs: np
     shown = shown.copy()
     shown[keep] += shown[drop]
     left = np.setdiff1d(np.arange(len(out)), drop)
-    return out[left], shown[left]
+    return left, out[left], shown[left]

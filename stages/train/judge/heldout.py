@@ -138,15 +138,15 @@ def find_boxes(poses: Poses, t: int, camera: Camera) -> dict[str, tuple[int, int
     return found
 
 
-def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: int) -> None:
+def align_pose(gaussians: Gaussians, poses: Poses, t: int, view: View, steps: int, workspace: Workspace) -> None:
     """Test-time pose optimisation: moves the pose of frame t in `poses` to its own image; the avatar stays."""
-    view, workspace = person_crop(view), Workspace()
+    view = person_crop(view)
     background, gain, grad_gain = np.full(3, 1, np.float32), np.ones(3, np.float32), np.empty(3)
     image, target, grad_rgb = (np.empty((*view.pixels.shape[:2], 3), np.float32) for _ in range(3))
-    grad_alpha = np.empty(view.pixels.shape[:2], np.float32)
+    grad_alpha, spans = np.empty(view.pixels.shape[:2], np.float32), np.empty((len(image), 2), np.int64)
     for step in range(steps):
         rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
-        on_background(workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target)
+        on_background(workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target, spans)
         image -= target
         image *= np.float32(2 / image.size)
         through_background(workspace.share, image, rendering.rgb, rendering.alpha, view.pixels, background, gain, TEST_MASK,

@@ -59,12 +59,13 @@ def picture_loss(picture: Picture, share: float, text: bool, workspace: Workspac
     In HAHA's code as GSAC changed it, L2 and SSIM see both images times alpha times mask; no gradient passes through that factor.
     """
     p, gain, grad_gain = picture, np.ones(3, np.float32), np.empty(3)
-    image, target = np.empty_like(p.rgb), np.empty_like(p.rgb)
-    on_background(workspace.share, p.rgb, p.alpha, p.pixels, p.background, gain, image, target)
+    image, target, spans = np.empty_like(p.rgb), np.empty_like(p.rgb), np.empty((len(p.rgb), 2), np.int64)
+    on_background(workspace.share, p.rgb, p.alpha, p.pixels, p.background, gain, image, target, spans)
     part = share * p.alpha.size / p.side**2  # a mean over the box as its part of the mean over the square
     seen = 1 if text else (p.alpha * p.mask)[..., None]
-    value, gradient = losses.l2(image * seen, target * seen, factor=part, workspace=workspace)
-    similarity = losses.ssim(image * seen, target * seen, factor=-SSIM * part, gradient=gradient, workspace=workspace).value
+    value, gradient = losses.l2(image * seen, target * seen, factor=part, workspace=workspace, spans=spans)
+    similarity = losses.ssim(image * seen, target * seen, factor=-SSIM * part, gradient=gradient, workspace=workspace,
+                             spans=spans).value
     value = part * (value + SSIM * (1 - similarity))
     gradient *= seen
     if text:

@@ -17,7 +17,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
 from gsac.avatar.numba_kernel import own_kernel
-from gsac.avatar.raster import render_backward, render_bound, render_bound_backward
+from gsac.avatar.raster import State, render_backward, render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.finite import require_finite
 from gsac.stages.train.poses.poses import Poses
@@ -55,11 +55,6 @@ class NormalEquations(NamedTuple):
     pixels: int
     """Number of pixels that show the person in render or mask."""
 
-    @property
-    def mean(self) -> float:
-        """Squared error of one channel of one pixel."""
-        return self.error / max(4 * self.pixels, 1)
-
 
 def joint_shares(body: Body, face: np.ndarray) -> np.ndarray:
     """(N, TURNING) float32, the share of each joint's turn that moves the gaussians' faces, face (N,)."""
@@ -73,25 +68,56 @@ def joint_shares(body: Body, face: np.ndarray) -> np.ndarray:
     return (body.weights[body.faces[face]].mean(1) @ below).astype(np.float32)
 
 
-def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: int, view: View,
-                     workspace: Workspace) -> NormalEquations:
-    """Of frame t in its view. share: (N, TURNING) `joint_shares` of the gaussians."""
-    vertices = poses.vertices(t)
-    rendering = render_bound(vertices, poses.body.faces, gaussians, view.camera, workspace)
+class Residuals(NamedTuple):
+    """How a frame's render differs from it."""
+
+    state: State
+    """Of the rendering."""
+    colour: np.ndarray
+    """(h, w, 3) residuals."""
+    mask: np.ndarray
+    """(h, w) residuals times `MASK`."""
+    slope: np.ndarray
+    """(h, w, 3) of `compare`."""
+    error: float
+    """Squared error on the person."""
+    pixels: int
+    """Number of pixels that show the person in render or mask."""
+
+    @property
+    def mean(self) -> float:
+        """Squared error of one channel of one pixel."""
+        return self.error / max(4 * self.pixels, 1)
+
+
+def find_residuals(gaussians: Gaussians, poses: Poses, t: int, view: View, workspace: Workspace) -> Residuals:
+    """Of frame t in its view."""
+    rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
     height, width = rendering.alpha.shape
     colour, mask = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
     slope, squares = np.empty((height, width, 3), np.float32), np.empty((height * width, 4), np.float32)
     pixels = compare(rendering.rgb, rendering.alpha, view.pixels, np.float32(np.sqrt(MASK)), colour, mask, slope, squares)
-    means = rendering.state.means.copy()
-    grads = render_bound_backward(rendering.state, colour, mask)
+    return Residuals(rendering.state, colour, mask, slope, float(squares[:pixels].sum()), pixels)
+
+
+def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: int, view: View,
+                     workspace: Workspace) -> NormalEquations:
+    """Of frame t in its view. share: (N, TURNING) `joint_shares` of the gaussians."""
+    return differentiate(find_residuals(gaussians, poses, t, view, workspace), share, poses, t, view)
+
+
+def differentiate(found: Residuals, share: np.ndarray, poses: Poses, t: int, view: View) -> NormalEquations:
+    """The normal equations of the residuals that frame t has with its pose as it stands, before its workspace is used again."""
+    means = found.state.means.copy()
+    grads = render_bound_backward(found.state, found.colour, found.mask)
     grad_pose, grad_transl, _, _ = poses.gradients(t, grads.vertices)
     turns = np.einsum("jba,jb->ja", rotation.log_derivative(poses.pose[t, BODY]), grad_pose[BODY])
-    tensors = render_backward(rendering.state, slope, np.zeros_like(rendering.alpha)).rgb
+    tensors = render_backward(found.state, found.slope, np.zeros_like(found.mask)).rgb
     used = np.flatnonzero(tensors[:, 0] + tensors[:, 2] > FLAT)
     rows = np.empty((2 * len(used), UNKNOWNS), np.float32)
     _rows(used, means, tensors, share, *_axes(poses, t), np.array(view.camera.focal, np.float32), rows)
     return NormalEquations(np.concatenate([turns.ravel(), grad_transl]), CURVATURE * (rows.T @ rows).astype(np.float64),
-                           float(squares[:pixels].sum()), pixels)
+                           found.error, found.pixels)
 
 
 def converge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: Views, rounds: int) -> None:
@@ -105,18 +131,20 @@ def converge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: V
     def one(t: int, workspace: Workspace) -> None:
         view, damping = person_crop(views[t]), 1.0
         pose, transl = poses.pose[t].copy(), poses.transl[t].copy()
-        normal = normal_equations(gaussians, share, poses, t, view, workspace)
+        found = find_residuals(gaussians, poses, t, view, workspace)
+        least, normal = found.mean, differentiate(found, share, poses, t, view)
         for number in range(rounds):
-            known = 1 / (max(normal.mean, 1e-5) * CORRELATED)
+            known = 1 / (max(least, 1e-5) * CORRELATED)
             move = np.linalg.solve(known * normal.hessian + damping * spread, -known * normal.gradient)
             require_finite(f"in round {number} of its pose", {f"move of frame {t}": move})
             move = np.clip(move, -MOST, MOST)
             turns = rotation.exp(move[:-3].reshape(TURNING, 3))
             poses.pose[t, BODY], poses.transl[t] = rotation.log(rotation.exp(pose[BODY]) @ turns), transl + move[-3:]
-            moved = normal_equations(gaussians, share, poses, t, view, workspace)
-            if moved.mean < normal.mean:
-                pose, transl, normal = poses.pose[t].copy(), poses.transl[t].copy(), moved
-                damping = max(damping / 2, 1.0)
+            found = find_residuals(gaussians, poses, t, view, workspace)
+            if found.mean < least:
+                pose, transl, least, damping = poses.pose[t].copy(), poses.transl[t].copy(), found.mean, max(damping / 2, 1.0)
+                if number + 1 < rounds:
+                    normal = differentiate(found, share, poses, t, view)
             else:
                 damping *= 8
         poses.pose[t], poses.transl[t] = pose, transl

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gsac.avatar.threads import Workspace
 from gsac.stages.contract import StageError
 from gsac.stages.train.fast import trainer as fast
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
@@ -108,7 +109,7 @@ def test_a_frame_that_cannot_be_judged_or_aligned_stops_instead_of_being_left_ou
     with monkeypatch.context() as patch:
         spoiled(patch, heldout, "render_bound_backward", bad_vertices)
         with pytest.raises(StageError, match="gradient of frame 1 is not finite at step 2 of its pose at test time"):
-            heldout.align_pose(gaussians, poses, 1, task.views[1], 5)
+            heldout.align_pose(gaussians, poses, 1, task.views[1], 5, Workspace())
     nan_in(poses.transl[1])
     with pytest.raises(StageError, match="translation of frame 1 is not finite when it is judged"):
         heldout.judge(gaussians, poses, [0, 1], task.views)

@@ -197,8 +197,8 @@ def test_a_number_that_is_not_finite_stops_with_step_and_quantity(job, monkeypat
     made = job(frames=2, steps=5, holdout=0)
     plain = trainer.Trainer._image_loss
 
-    def poisoned(self, image, target):
-        loss, gradient = plain(self, image, target)
+    def poisoned(self, image, target, spans):
+        loss, gradient = plain(self, image, target, spans)
         self.calls = getattr(self, "calls", 0) + 1
         return (float("nan"), gradient) if self.calls == 3 else (loss, gradient)
 

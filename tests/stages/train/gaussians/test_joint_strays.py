@@ -48,7 +48,7 @@ def carried_by_the_forearm(poses, gaussians):
 def stray_of(gaussians, poses, pose):
     """(N,) stray alpha of gaussians in a pose."""
     seen = joint_strays.see(joint_strays.put_in_pose(poses, 0, pose), poses.body.faces)
-    return joint_strays.find_stray(gaussians, seen.sides, poses.body.faces, Workspace())
+    return sum(joint_strays.find_stray(gaussians, side, poses.body.faces, Workspace()) for side in seen.sides)
 
 
 def stray_elbow(poses, gaussians):

@@ -17,13 +17,17 @@ def images(seed=0, h=7, w=5):
     return rgb, alpha, pixels, rng.random(3), rng.random(3) + 0.5
 
 
+def spans(alpha):
+    return np.empty((len(alpha), 2), np.int64)
+
+
 def test_backgrounds_gradient_agrees_with_central_differences():
     rgb, alpha, pixels, background, gain = images()
     weight = np.random.default_rng(1).normal(size=rgb.shape)
 
     def loss(rgb, alpha, gain):
         image, target = np.empty_like(rgb), np.empty_like(rgb)
-        on_background(SHARE, rgb, alpha, pixels, background, gain, image, target)
+        on_background(SHARE, rgb, alpha, pixels, background, gain, image, target, spans(alpha))
         return (image * weight).sum() + 0.3 * ((alpha - pixels[..., 3] / 255) ** 2).mean()
 
     got = [np.empty_like(rgb), np.empty_like(alpha), np.empty(3)]
@@ -44,8 +48,18 @@ def test_frame_and_render_of_the_same_content_agree_on_any_background():
     _, _, pixels, background, _ = images()
     alpha = pixels[..., 3] / 255
     image, target = np.empty((*alpha.shape, 3)), np.empty((*alpha.shape, 3))
-    on_background(SHARE, pixels[..., :3] / 255, alpha, pixels, background, np.ones(3), image, target)
+    on_background(SHARE, pixels[..., :3] / 255, alpha, pixels, background, np.ones(3), image, target, spans(alpha))
     np.testing.assert_allclose(image, target, atol=1e-12)
+
+
+def test_spans_hold_all_that_shows_the_person_and_no_blank_column_beside():
+    rgb, alpha, pixels, background, gain = images(h=4, w=9)
+    alpha[:, :2], pixels[:, :3] = 0, 0
+    alpha[1, 7:], pixels[1, 6:] = 0, 0
+    alpha[2], pixels[2] = 0, 0
+    found = spans(alpha)
+    on_background(SHARE, rgb, alpha, pixels, background, gain, np.empty_like(rgb), np.empty_like(rgb), found)
+    assert found[[0, 1]].tolist() == [[2, 9], [2, 7]] and found[2, 0] == found[2, 1]
 
 
 def test_a_background_gives_the_same_bytes_on_any_number_of_threads():
@@ -54,7 +68,7 @@ def test_a_background_gives_the_same_bytes_on_any_number_of_threads():
     def both(workers: int) -> list[np.ndarray]:
         share, (image, target, grad_rgb), grad_alpha = Workspace(workers).share, np.empty((3, *rgb.shape)), np.empty_like(alpha)
         grad_gain = np.empty(3)
-        on_background(share, rgb, alpha, pixels, background, gain, image, target)
+        on_background(share, rgb, alpha, pixels, background, gain, image, target, spans(alpha))
         term = through_background(share, image - target, rgb, alpha, pixels, background, gain, 0.3, grad_rgb, grad_alpha, grad_gain)
         return [image, target, grad_rgb, grad_alpha, grad_gain, np.array(term)]
 
@@ -65,8 +79,9 @@ def test_a_background_gives_the_same_bytes_on_any_number_of_threads():
 def test_adam_moves_a_row_by_the_rate_at_first_and_leaves_rows_without_gradient():
     value, grad = np.ones((3, 2), np.float32), np.array([[1.0, -50], [0, 0], [1e-6, 1]], np.float32)
     first, second, count = np.zeros((3, 2)), np.zeros((3, 2)), np.zeros(3, np.int64)
-    count_rows(grad, count)
-    adam_rows(value, grad, first, second, count, 0.1)
+    bias = np.empty((3, 2))
+    count_rows(grad, count, bias)
+    adam_rows(value, grad, first, second, bias, 0.1)
     np.testing.assert_allclose(value, [[0.9, 1.1], [1, 1], [0.9, 0.9]], atol=1e-5)
     np.testing.assert_array_equal(count, [1, 0, 1])
 

@@ -41,7 +41,7 @@ def alpha(gaussians, rest, body):
 
 def test_merging_gives_the_number_asked_for_and_leaves_no_holes(person, rest, body):
     gaussians, _ = person
-    fewer = merge.merge_to_size(gaussians, np.ones(COUNT), 700, body, rest)
+    fewer, _ = merge.merge_to_size(gaussians, np.ones(COUNT, bool), np.ones(COUNT), 700, body, rest)
     assert len(fewer) == 700
     before, after = alpha(gaussians, rest, body), alpha(fewer, rest, body)
     assert after[before > 0.9].mean() > 0.9 * before[before > 0.9].mean()
@@ -50,7 +50,7 @@ def test_merging_gives_the_number_asked_for_and_leaves_no_holes(person, rest, bo
 
 def test_plain_cloth_is_merged_before_a_pattern(person, rest, body):
     gaussians, patterned = person
-    fewer = merge.merge_to_size(gaussians, np.ones(COUNT), 1000, body, rest)
+    fewer, _ = merge.merge_to_size(gaussians, np.ones(COUNT, bool), np.ones(COUNT), 1000, body, rest)
     above = rest[body.faces].mean(1)[fewer.face][:, 1] > 0
     assert above.sum() / patterned.sum() > 1.3 * (~above).sum() / (~patterned).sum()
 
@@ -59,9 +59,10 @@ def test_what_frames_show_outlives_what_none_shows(person, rest, body):
     gaussians, _ = person
     gaussians.rgb[:] = 0.5
     left = rest[body.faces].mean(1)[gaussians.face][:, 0] > 0
-    fewer = merge.merge_to_size(gaussians, left.astype(float), 1000, body, rest)
+    fewer, seen = merge.merge_to_size(gaussians, left, left.astype(float), 1000, body, rest)
     still = rest[body.faces].mean(1)[fewer.face][:, 0] > 0
     assert still.sum() > 0.9 * left.sum()
+    np.testing.assert_array_equal(seen, still, "what is made of a seen one is seen")
     before, after = alpha(gaussians, rest, body), alpha(fewer, rest, body)
     assert after[before > 0.9].mean() > 0.9 * before[before > 0.9].mean(), "the part that no frame shows stays covered"
 
@@ -73,7 +74,7 @@ def test_a_merged_gaussian_lies_where_the_one_that_shows_more_lay(person, rest, 
     shown = np.ones(COUNT)
     pair = merge.find_cheapest_pairs(gaussians, bound, shown, frames.R[gaussians.face, :, 1], body)[:1]
     shown[pair[0, 0]] = 9
-    fewer, _ = merge.merge_pairs(gaussians, bound, shown, pair, frames)
+    _, fewer, _ = merge.merge_pairs(gaussians, bound, shown, pair, frames)
     places = bind(frames, fewer.face, fewer.mu, fewer.quat, fewer.log_scale).means
     wanted = 0.9 * bound.means[pair[0, 0]] + 0.1 * bound.means[pair[0, 1]]
     assert np.linalg.norm(places - wanted, axis=1).min() < 1e-5

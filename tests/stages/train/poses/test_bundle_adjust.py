@@ -160,8 +160,7 @@ def test_no_round_makes_a_frame_worse_than_it_was(job, monkeypatch):
     gaussians, poses = init_gaussians(task, views, 600), task.poses
 
     def error():
-        return photometric.normal_equations(gaussians, photometric.joint_shares(poses.body, gaussians.face), poses, 0, views[0],
-                                          Workspace(1)).mean
+        return photometric.find_residuals(gaussians, poses, 0, views[0], Workspace(1)).mean
 
     before, fitted = error(), poses.pose[0].copy()
     photometric.converge(gaussians, poses, [0], task.views, rounds=0)
