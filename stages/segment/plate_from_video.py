@@ -38,7 +38,10 @@ def learn_plate(paths: list[Path], shown: np.ndarray, person: Person) -> Plate |
 
 
 def relearn_plate(paths: list[Path], shown: np.ndarray, outline: Person) -> Plate | None:
-    """As `learn_plate`, from the person's outlines, which lie closer."""
+    """From the person's outlines, which lie closer. paths: T frames; shown: (T,) bool, frames with a person.
+
+    None where too few frames show the person.
+    """
     return median_without(paths, [t for t in sample(len(paths)) if shown[t]], outline, NEAR)
 
 
